@@ -2,6 +2,7 @@
 
 import math
 import time
+from contextlib import closing
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
@@ -11,7 +12,7 @@ from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
     from kappaskin.live import Engine, Status
-    from kappaskin.publish import Latency, TargetStatus
+    from kappaskin.publish import TargetStatus
 
 _EVERY = 1.0  # s between two lines
 _POLL = 0.05  # s
@@ -88,7 +89,7 @@ def _line(status: "Status") -> str:
     publishing = status.publishing
     parts = [f"{status.state:9}", f"{status.rate:6.0f} frames/s", *map(_words, publishing.targets)]
     if math.isfinite(publishing.latency.whole):
-        parts.append(_late(publishing.latency))
+        parts.append(f"99 % within {1e3 * publishing.latency.whole:.1f} ms")
     return "  ".join([*parts, status.message])
 
 
@@ -98,10 +99,6 @@ def _words(target: "TargetStatus") -> str:
         return f"{text}, {len(target.receivers)} connected"
     trouble = target.receivers[0].trouble if target.receivers else "opening"
     return f"{text} ({trouble})" if trouble else text
-
-
-def _late(latency: "Latency") -> str:
-    return f"99 % within {1e3 * latency.whole:.1f} ms"
 
 
 _READ = 0.1  # s
@@ -128,8 +125,8 @@ def listen(*, udp: Whole = 9870, seconds: float = math.inf, json: Switch = False
 
     check_time(seconds, "listen")
     stopped = stops()
-    listener, end = UdpListener(udp), time.monotonic() + seconds
-    try:
+    end = time.monotonic() + seconds
+    with closing(UdpListener(udp)) as listener:
         while not stopped and time.monotonic() < end:
             for message in listener.read(_READ):
                 lines = listener.lines(message)
@@ -137,8 +134,6 @@ def listen(*, udp: Whole = 9870, seconds: float = math.inf, json: Switch = False
                     print_json(message)
                 else:
                     print(*lines, sep="\n", end="\n" if lines else "", flush=bool(lines))
-    finally:
-        listener.close()
     if not json:
         print(listener.summary)
     return 0 if listener.contacts else FAILED

@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kappaskin.cli.common import FAILED, Switch, check_time, print_json, stops
+from kappaskin.cli.common import FAILED, Switch, check_time, print_result, stops
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
@@ -92,10 +92,7 @@ def calibrate(
     except KeyboardInterrupt:
         print(file=sys.stderr)
         raise Refusal("stopped before the last step; nothing was written") from None
-    if json:
-        print_json(report.to_json())
-    else:
-        print(*report.summary(), sep="\n")
+    print_result(report.to_json(), json, lambda: "\n".join(report.summary()))
     return FAILED if report.failed else 0
 
 
@@ -219,20 +216,15 @@ def press(
     except KeyboardInterrupt:
         print(file=sys.stderr)
         raise Refusal("stopped before the last element; the map was not verified") from None
-    if json:
-        print_json(
-            {
-                "confirmed": verdict.confirmed,
-                "words": list(verdict.words),
-                "order": None if verdict.order is None else verdict.order.tolist(),
-                "pressed": [
-                    {"asked": p.asked, "verdict": p.verdict, "answered": p.element}
-                    for p in test.done
-                ],
-            }
-        )
-    else:
-        print(*verdict.words, sep="\n")
+    value = {
+        "confirmed": verdict.confirmed,
+        "words": list(verdict.words),
+        "order": None if verdict.order is None else verdict.order.tolist(),
+        "pressed": [
+            {"asked": p.asked, "verdict": p.verdict, "answered": p.element} for p in test.done
+        ],
+    }
+    print_result(value, json, lambda: "\n".join(verdict.words))
     return 0 if verdict.confirmed else FAILED
 
 
@@ -261,15 +253,13 @@ def monitor(port: str, *, seconds: float = math.inf, reset: Switch = False) -> i
 
     check_time(seconds, "listen")
     stopped = stops()
-    listening, end = WireMonitor(port), time.monotonic() + seconds
-    try:
+    end = time.monotonic() + seconds
+    with closing(WireMonitor(port)) as listening:
         if reset:
             listening.reset()
         while not (stopped or listening.lost) and time.monotonic() < end:
             for line in listening.read(_WAIT):
                 print(line, flush=True)
-    finally:
-        listening.close()
     print(listening.summary())
     return FAILED if listening.lost or not listening.accounting().accepted else 0
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from kappaskin.bases import SineBasis, basis_for
 from kappaskin.errors import Refusal
-from kappaskin.estimation import METHODS, Estimator, Fit, estimator_for
+from kappaskin.estimation import METHODS, Estimator, Fit, LeastSquares, estimator_for
 from kappaskin.frames import Array
 from kappaskin.mechanics import Plate, PointLoad
 from kappaskin.scenes import Scene, Stimulus, load_scene, scaled_to
@@ -23,6 +23,8 @@ RADIUS = 12.9e-3
 """Base radius R0 of the paper's fingertip in m; its arc is half a circle."""
 APPLIED = (0.63, 1.27, 1.90)
 """Table 2's displacements under the load in mm."""
+FINGERTIP_NOISE = 4.5
+"""RMS of a reading's noise in 1/m (Table 2)."""
 
 _COLUMNS = ("w_max_mm", "e_max_mm", "rms_mm")
 PAPER_1 = {
@@ -141,17 +143,51 @@ def fingertip_scene(applied: float, radius: float = RADIUS) -> Scene:
     Eq. 10 as it must read, u = a0 (3 sin 3 theta - sin theta); at another the strip is as long.
     """
     patch = Patch(math.pi * RADIUS, 0.02, radius, strip=True)
-    plate, middle = Plate(patch), PointLoad(patch.a / 2, patch.b / 2)
-    reference = (3, 1)
-    load = scaled_to(plate, middle, applied / 1e3, basis_for(patch, "hinged", *reference))
+    middle, name = PointLoad(patch.a / 2, patch.b / 2), f"{applied:.2f}"
+    return pressed_scene(name, patch, middle, applied / 1e3, (10, 1), (3, 1), FINGERTIP_NOISE)
+
+
+def pressed_scene(
+    name: str,
+    patch: Patch,
+    load: PointLoad,
+    applied: float,
+    elements: tuple[int, int],
+    reference: tuple[int, int],
+    noise: float,
+) -> Scene:
+    """A skin that a `load` moves by `applied` m, and m x n elements with `noise` in 1/m RMS.
+
+    Its true shape has Ni x Nj functions, as `reference` says.
+    """
+    plate = Plate(patch)
+    scaled = scaled_to(plate, load, applied, basis_for(patch, "hinged", *reference))
     return Scene(
-        f"{applied:.2f}",
+        name,
         plate,
-        SensorLayout.regular(patch, 10, 1),
-        (Stimulus(load),),
-        effects=(UniformNoise(4.5),),
+        SensorLayout.regular(patch, *elements),
+        (Stimulus(scaled),),
+        effects=(UniformNoise(noise),),
         reference=reference,
     )
+
+
+def noisy_fit(
+    scene: Scene,
+    functions: tuple[int, int],
+    rng: np.random.Generator,
+    sigma: float | None = None,
+) -> tuple[Array, Array, Fit]:
+    """One frame: true coefficients (Nr,) in m, readings (3, P) in 1/m, and least squares of them.
+
+    `sigma` in 1/m is the noise of a reading, where it is known.
+    """
+    truth = scene.plate.deflection(scene.loads, scene.basis).ravel()
+    readings = (scene.layout.curvature_operator(scene.basis) @ truth).reshape(3, -1)
+    for effect in scene.reading_effects:
+        readings = effect.start(readings.shape, rng)(readings, 0.0)
+    basis = basis_for(scene.plate.patch, scene.edge, *functions)
+    return truth, readings, LeastSquares(basis, scene.layout, sigma=sigma)(readings)
 
 
 def table_2(

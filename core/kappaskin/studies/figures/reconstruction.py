@@ -4,12 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kappaskin.bases import SineBasis, basis_for
-from kappaskin.estimation import LeastSquares
 from kappaskin.frames import Array
 from kappaskin.scenes import load_scene
 from kappaskin.studies.figures import style
-from kappaskin.studies.paper import APPLIED, RADIUS, fingertip_scene
+from kappaskin.studies.paper import APPLIED, FINGERTIP_NOISE, RADIUS, fingertip_scene, noisy_fit
 
 _SIDE = 101  # points along each edge, as Table 1's RMS takes them
 _MESH = 5  # of which every fifth is drawn as a line, with the load on one
@@ -41,16 +39,11 @@ class _SquareRun:
 def square_run() -> _SquareRun:
     """10 x 10 elements with the scene's noise, 8 x 8 functions fitted to a truth of 15 x 15."""
     scene = load_scene("centre")
-    patch, layout, reference = scene.plate.patch, scene.layout, scene.basis
-    truth = scene.plate.deflection(scene.loads, reference)
-    curvature = (layout.curvature_operator(reference) @ truth.ravel()).reshape(3, -1)
-    rng = np.random.default_rng(scene.seed)
-    for effect in scene.reading_effects:
-        curvature = effect.start(curvature.shape, rng)(curvature, 0.0)
-    basis, grid = SineBasis(patch, 8, 8), patch.grid(_SIDE, _SIDE)
-    c = LeastSquares(basis, layout)(curvature).coefficients
-    w, fitted = reference.on_grid(*grid)(truth), basis.on_grid(*grid)(c)
-    return _SquareRun(*(1e3 * part for part in (*grid, w, fitted, layout.positions)))
+    truth, _, fit = noisy_fit(scene, (8, 8), np.random.default_rng(scene.seed))
+    reference, grid = scene.basis, scene.plate.patch.grid(_SIDE, _SIDE)
+    w = reference.on_grid(*grid)(truth.reshape(reference.shape))
+    fitted = fit.estimator.basis.on_grid(*grid)(fit.coefficients)
+    return _SquareRun(*(1e3 * part for part in (*grid, w, fitted, scene.layout.positions)))
 
 
 def draw_square(figure: style.Figure) -> None:
@@ -97,8 +90,6 @@ def _draw_error(figure: style.Figure, axes: style.Axes, found: _SquareRun) -> No
 
 # The paper's Fig. 9: a fingertip's arc at rest, pressed, and as ten noisy readings give it
 
-NOISE = 4.5
-"""RMS of a reading's noise in 1/m (Table 2)."""
 SEED = 2
 _ELEMENT = {"ls": "", "marker": "o", "color": style.BLUE, "mec": "white", "mew": 0.4}
 
@@ -132,19 +123,15 @@ class _FingertipRun:
 def fingertip_run(applied: float, rng: np.random.Generator) -> _FingertipRun:
     """Table 2's strip with a load that moves it by `applied` mm, 8 functions fitted to it."""
     scene = fingertip_scene(applied)
-    patch, layout, (noise,) = scene.plate.patch, scene.layout, scene.reading_effects
-    truth = scene.plate.deflection(scene.loads, scene.basis).ravel()
-    curvature = (layout.curvature_operator(scene.basis) @ truth).reshape(3, -1)
-    basis = basis_for(patch, scene.edge, 8, 1)
-    readings = noise.start(curvature.shape, rng)(curvature, 0.0)
-    fit = LeastSquares(basis, layout, sigma=NOISE)(readings)
+    patch, layout = scene.plate.patch, scene.layout
+    truth, _, fit = noisy_fit(scene, (8, 1), rng, FINGERTIP_NOISE)
     s = np.column_stack([np.linspace(0, patch.a, 181), np.full(181, patch.b / 2)])
-    at, c = basis.at(s), fit.coefficients.ravel()
+    basis, c = fit.estimator.basis, fit.coefficients.ravel()
     return _FingertipRun(
         s[:, 0] / patch.radius,
         scene.basis.at(s) @ truth,
-        at @ c,
-        np.sqrt(np.einsum("pi,ij,pj->p", at, fit.covariance, at)),
+        basis.at(s) @ c,
+        fit.surface_sd(s).ravel(),
         layout.positions[:, 0] / patch.radius,
         basis.at(layout.positions) @ c,
     )

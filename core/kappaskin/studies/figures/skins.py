@@ -5,15 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kappaskin.bases import SineBasis
-from kappaskin.estimation import LeastSquares
 from kappaskin.frames import Array
-from kappaskin.mechanics import Plate, PointLoad
-from kappaskin.scenes import TABLE_1_NOISE, scaled_to
-from kappaskin.scenes.effects import UniformNoise
-from kappaskin.sensing import SECOND_GENERATION, SensorLayout
+from kappaskin.mechanics import PointLoad
+from kappaskin.scenes import TABLE_1_NOISE
+from kappaskin.sensing import SECOND_GENERATION
 from kappaskin.skin import Patch
 from kappaskin.studies.figures import style
+from kappaskin.studies.paper import noisy_fit, pressed_scene
 
 _STRIP = Patch(0.1, 0.01, strip=True)
 ELEMENTS = 10
@@ -36,24 +34,19 @@ class _StripRun:
 
 def strip_run() -> _StripRun:
     """A strip pressed off its middle, read with Table 1's noise, fitted by 8 functions of x."""
-    plate, reference = Plate(_STRIP), SineBasis(_STRIP, 15, 1)
-    load = scaled_to(plate, PointLoad(_STRIP_LOAD, _STRIP.b / 2), _STRIP_PRESSED, reference)
-    truth = plate.deflection([load], reference).ravel()
-    layout, basis = SensorLayout.regular(_STRIP, ELEMENTS, 1), SineBasis(_STRIP, 8, 1)
-    curvature = (layout.curvature_operator(reference) @ truth).reshape(3, -1)
-    spoil = UniformNoise(TABLE_1_NOISE).start(curvature.shape, np.random.default_rng(_STRIP_SEED))
-    readings = spoil(curvature, 0.0)
-    fit = LeastSquares(basis, layout, sigma=TABLE_1_NOISE)(readings)
+    load, elements = PointLoad(_STRIP_LOAD, _STRIP.b / 2), (ELEMENTS, 1)
+    scene = pressed_scene("strip", _STRIP, load, _STRIP_PRESSED, elements, (15, 1), TABLE_1_NOISE)
+    rng = np.random.default_rng(_STRIP_SEED)
+    truth, readings, fit = noisy_fit(scene, (8, 1), rng, TABLE_1_NOISE)
     p = np.column_stack([np.linspace(0, _STRIP.a, 201), np.full(201, _STRIP.b / 2)])
-    at = basis.at(p)
     return _StripRun(
-        1e3 * layout.positions[:, 0],
+        1e3 * scene.layout.positions[:, 0],
         readings[0],
         1e3 * p[:, 0],
-        reference.at(p, 2, 0) @ truth,
-        1e3 * reference.at(p) @ truth,
-        1e3 * at @ fit.coefficients.ravel(),
-        1e3 * np.sqrt(np.einsum("pi,ij,pj->p", at, fit.covariance, at)),
+        scene.basis.at(p, 2, 0) @ truth,
+        1e3 * scene.basis.at(p) @ truth,
+        1e3 * fit.estimator.basis.at(p) @ fit.coefficients.ravel(),
+        1e3 * fit.surface_sd(p).ravel(),
     )
 
 
@@ -208,14 +201,10 @@ def patch_run(noise: float = _NOISE) -> _PatchRun:
     The truth has the 8 x 6 functions that are fitted: with more, the error of leaving them out
     would be ten times the noise's at an element, and no error bar would show it.
     """
-    plate, basis = Plate(SKIN), SineBasis(SKIN, 8, 6)
-    load = scaled_to(plate, PointLoad(*_LOAD), _PRESSED, basis)
-    truth = plate.deflection([load], basis).ravel()
-    layout = SensorLayout.regular(SKIN, COLUMNS, ROWS)
-    curvature = (layout.curvature_operator(basis) @ truth).reshape(3, -1)
-    spoil = UniformNoise(noise).start(curvature.shape, np.random.default_rng(_SEED))
-    readings = spoil(curvature, 0.0)
-    fit = LeastSquares(basis, layout, sigma=noise)(readings)
+    load, elements = PointLoad(*_LOAD), (COLUMNS, ROWS)
+    scene = pressed_scene("patch", SKIN, load, _PRESSED, elements, (8, 6), noise)
+    _, _, fit = noisy_fit(scene, (8, 6), np.random.default_rng(_SEED), noise)
+    layout, basis = scene.layout, scene.basis
     c, M = fit.coefficients.ravel(), fit.estimator.M.reshape(3, len(layout), -1)
     xx, yy, xy = M @ c + np.array([SKIN.base_curvature, 0, 0])[:, None]
     outlines = layout.positions[:, None] + _outline()
