@@ -1,4 +1,4 @@
-"""The command `kappaskin`: its subcommands in groups, and the modules of these."""
+"""The command `kappaskin`: its subcommands, in groups."""
 
 import os
 import sys

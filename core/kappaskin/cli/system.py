@@ -10,7 +10,7 @@ from dataclasses import asdict
 from importlib import metadata
 from typing import TYPE_CHECKING, Any, Literal
 
-from kappaskin.cli.common import FAILED, ProgressLine, Switch, print_json, print_result
+from kappaskin.cli.common import FAILED, ProgressLine, Switch, print_result
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
@@ -117,64 +117,56 @@ def doctor(port: str = "", *, json: Switch = False) -> int:
     from kappaskin.sources import diagnose
 
     if not port:
-        _tell_machine(json)
+        machine = examine()
+        print_result(machine, json, lambda: _machine_text(machine))
         return 0
     found = diagnose(port)
-    if json:
-        print_json(found.to_json())
-    else:
-        _tell_port(found)
+    print_result(found.to_json(), json, lambda: _port_text(found))
     return FAILED if found.why else 0
 
 
-def _tell_port(found: "Diagnosis") -> None:
-    _line("port", found.plug)
+def _port_text(found: "Diagnosis") -> str:
+    lines = [_line("port", found.plug)]
     if found.device:
-        _line("device", found.device)
+        lines.append(_line("device", found.device))
     if math.isfinite(found.rate):
-        _line("rate", f"{found.rate:.1f} frames/s of the {found.said_rate:g} it says")
+        rate = f"{found.rate:.1f} frames/s of the {found.said_rate:g} it says"
         known = f"known to {1e3 * found.clock_sd:.2g} ms" if found.clock_sd < math.inf else _DEAF
-        _line("clock", known)
+        lines += [_line("rate", rate), _line("clock", known)]
     if math.isfinite(found.temperature):
-        _line("temperature", f"{found.temperature:.1f} degrees Celsius")
-    if found.accounting.bytes_in:
-        _line("losses", f"{found.accounting.words}, in {found.accounting.bytes_in:,} bytes")
-    for event in found.events:
-        if event.kind != "met":
-            _line(event.kind, event.text)
-    _line("verdict", found.why or "well")
+        lines.append(_line("temperature", f"{found.temperature:.1f} degrees Celsius"))
+    if received := found.accounting.bytes_in:
+        lines.append(_line("losses", f"{found.accounting.words}, in {received:,} bytes"))
+    lines += [_line(event.kind, event.text) for event in found.events if event.kind != "met"]
+    return "\n".join([*lines, _line("verdict", found.why or "well")])
 
 
 _DEAF = "not known: the device does not answer pings"
 
 
-def _line(name: str, text: str) -> None:
-    print(f"{name:<20}{text}")
+def _line(name: str, text: str) -> str:
+    return f"{name:<20}{text}"
 
 
-def _tell_machine(json: bool) -> None:
+def _machine_text(found: dict[str, Any]) -> str:
+    """What `examine` found, for people."""
     from kappaskin.sources import Port, permission_line
 
-    found = examine()
-    if json:
-        print_json(found)
-        return
-    for name in ("kappaskin", "python", "system"):
-        _line(name, found[name])
+    lines = [_line(name, found[name]) for name in ("kappaskin", "python", "system")]
     for package, version in found["packages"].items():
-        _line(package, version or "not installed")
-    _line("display", found["display"] or "none (`xvfb-run` gives a virtual one)")
-    for port in found["serial_ports"]:
-        serial_port = Port(**port)
-        may = "" if serial_port.opened else f"  no permission. {permission_line(serial_port.port)}"
-        _line("serial port", f"{serial_port.words}{may}")
+        lines.append(_line(package, version or "not installed"))
+    lines.append(_line("display", found["display"] or "none (`xvfb-run` gives a virtual one)"))
+    for port in (Port(**port) for port in found["serial_ports"]):
+        may = "" if port.opened else f"  no permission. {permission_line(port.port)}"
+        lines.append(_line("serial port", f"{port.words}{may}"))
     if not found["serial_ports"]:
-        _line("serial ports", "none found")
-    _line("missing", " ".join(found["missing"]) or "nothing")
+        lines.append(_line("serial ports", "none found"))
+    lines.append(_line("missing", " ".join(found["missing"]) or "nothing"))
     if None in found["packages"].values():
-        print("Install the desktop app's packages with: pip install 'kappaskin[app]'")
+        lines.append("Install the desktop app's packages with: pip install 'kappaskin[app]'")
     if found["install"]:
-        print(f"Install what is missing with: sudo {found['install']}")
+        lines.append(f"Install what is missing with: sudo {found['install']}")
+    return "\n".join(lines)
 
 
 def drill(source: str = "", *, json: Switch = False, long: Switch = False) -> int:
