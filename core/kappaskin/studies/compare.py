@@ -1,4 +1,4 @@
-"""Comparisons: the same work by Kappaskin and by what one would use instead, side by side."""
+"""Comparisons with other software: error, time and memory on the same problems."""
 
 import importlib
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence

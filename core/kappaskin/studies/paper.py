@@ -1,4 +1,4 @@
-"""The paper's Tables 1 and 2, computed, and its misprints."""
+"""Tables 1 and 2 of the paper, computed, and its misprints."""
 
 import math
 import textwrap

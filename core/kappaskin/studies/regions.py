@@ -1,4 +1,4 @@
-"""Scanning a region of interest while the contact moves, compared with full scans."""
+"""Region scanning: errors on a moving contact, compared with full scans."""
 
 import math
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Simulated scenes: their readings with the truth, and what each effect costs."""
+"""Simulated scenes: readings with the truth, and the time that each effect takes."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Settings worth trying on a scene, what each costs, and which to choose."""
+"""Cost of accuracy: settings, the cost of each, and those that no other beats."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -116,6 +116,10 @@ class Cost:
         """Seconds until the answer is there: conversion, then arithmetic."""
         return self.conversion_time + self.time_per_frame
 
+    def time(self, total: bool) -> float:
+        """Seconds of the arithmetic, or in `total`."""
+        return self.total_time if total else self.time_per_frame
+
 
 @dataclass(frozen=True)
 class Refused:
@@ -173,15 +177,11 @@ def frontier(costs: Iterable[Cost | Refused], total: bool = False) -> tuple[Cost
     """
     known = [cost for cost in costs if isinstance(cost, Cost) and cost.rms < cost.shape_rms]
     kept: list[Cost] = []
-    for cost in sorted(known, key=lambda cost: (_time(cost, total), cost.rms)):
+    for cost in sorted(known, key=lambda cost: (cost.time(total), cost.rms)):
         # Better than those kept, not than all: many small steps make a large one.
         if not kept or cost.rms < (1 - ALIKE) * kept[-1].rms:
             kept.append(cost)
     return tuple(kept)
-
-
-def _time(cost: Cost, total: bool) -> float:
-    return cost.total_time if total else cost.time_per_frame
 
 
 def cheapest(costs: Iterable[Cost | Refused], within: float) -> Cost | None:

@@ -1,4 +1,4 @@
-"""The bench: error, time and memory of settings on a scene, and of the effects in it."""
+"""Cost bench: error, time and memory of settings on a scene, and of the effects in it."""
 
 import statistics
 import time
@@ -452,7 +452,7 @@ class _EffectJudge:
         return float(rms_distance(self._basis, fitted, self._reference, true).mean())
 
 
-# Costs measured in a background process of one thread
+# Costs measured in a background process
 
 EffectCosts = tuple[EffectCost, ...] | Refused
 """What a scene's effects cost with a setting, or why that setting is refused."""

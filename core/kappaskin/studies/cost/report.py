@@ -1,4 +1,4 @@
-"""Reports of costs: JSON rows, tables, a plot, and the answer to an accuracy that is asked for."""
+"""Cost reports: JSON rows, tables, a plot, and the cheapest setting of a requested accuracy."""
 
 import math
 import re
@@ -436,11 +436,6 @@ def draw(figure: style.Figure, scene: Scene, costs: Sequence[Cost | Refused]) ->
                     va="center", size=6.5)  # fmt: skip
 
 
-def _time(cost: Cost, total: bool) -> float:
-    """In ms."""
-    return 1e3 * (cost.total_time if total else cost.time_per_frame)
-
-
 def _draw_panel(axes: style.Axes, costs: Sequence[Cost], total: bool) -> None:
     methods = list(dict.fromkeys(cost.setting.method for cost in costs))
     colours = dict(zip(methods, cycle(_COLOURS), strict=False))
@@ -458,13 +453,13 @@ def _draw_panel(axes: style.Axes, costs: Sequence[Cost], total: bool) -> None:
         }
         if cost in best:
             look |= {"mew": 1.2, "zorder": 4}
-        axes.plot(_time(cost, total), 1e3 * cost.rms, "o", ms=sizes[cost.count], **look)
+        axes.plot(1e3 * cost.time(total), 1e3 * cost.rms, "o", ms=sizes[cost.count], **look)
     _draw_frontier(axes, best, total, colours)
 
 
 def _limit(axes: style.Axes, costs: Sequence[Cost], total: bool) -> None:
     """Show all `costs`, with room for a label left of the fastest and below the most accurate."""
-    x = [_time(cost, total) for cost in costs]
+    x = [1e3 * cost.time(total) for cost in costs]
     y = [1e3 * cost.rms for cost in costs]
     right = 1.4 * max(x)
     left = min(x) * (min(x) / right) ** (_LABEL / (_PANEL[0] - _LABEL))
@@ -476,7 +471,7 @@ def _limit(axes: style.Axes, costs: Sequence[Cost], total: bool) -> None:
 def _draw_frontier(
     axes: style.Axes, best: Sequence[Cost], total: bool, colours: dict[str, str]
 ) -> None:
-    x = [_time(cost, total) for cost in best]
+    x = [1e3 * cost.time(total) for cost in best]
     y = [1e3 * cost.rms for cost in best]
     right, top = axes.get_xlim()[1], axes.get_ylim()[1]
     axes.plot([x[0], *x, right], [top, *y, y[-1]], drawstyle="steps-post", color=style.INK, lw=0.7,

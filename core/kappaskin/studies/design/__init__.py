@@ -1,4 +1,4 @@
-"""Running a study: its tasks handed out to processes or to a Dask cluster."""
+"""Design studies: runs, on processes of this machine or on a Dask cluster."""
 
 import os
 import socket
@@ -13,7 +13,7 @@ from concurrent.futures import (
     ProcessPoolExecutor,
     wait,
 )
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, closing, contextmanager, suppress
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Protocol
@@ -80,12 +80,8 @@ def processes(count: int) -> Generator[Workers]:
     """So many processes of this machine, one thread each."""
     if not 1 <= count <= _MOST:
         raise Refusal(f"expected 1 to {_MOST} workers, got {count}")
-    with process_context() as context:
-        workers = _Processes(count, context)
-        try:
-            yield workers
-        finally:
-            workers.close()
+    with process_context() as context, closing(_Processes(count, context)) as workers:
+        yield workers
 
 
 class _Cluster:
@@ -109,18 +105,14 @@ class _Cluster:
         return self._executor.submit(run_task, task)
 
 
-@contextmanager
-def study_workers(count: int | None = None, scheduler: str = "") -> Generator[Workers]:
+def study_workers(count: int | None = None, scheduler: str = "") -> AbstractContextManager[Workers]:
     """The workers of a Dask `scheduler`, or without one so many processes of this machine.
 
     As many as there are cores when no `count` is given.
     """
     if scheduler:
-        found = cluster(scheduler)
-    else:
-        found = processes(count if count is not None else os.cpu_count() or 1)
-    with found as workers:
-        yield workers
+        return cluster(scheduler)
+    return processes(count if count is not None else os.cpu_count() or 1)
 
 
 @contextmanager

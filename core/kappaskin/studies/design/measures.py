@@ -1,4 +1,4 @@
-"""Accuracy of a design: measured in blocks of simulated frames, and predicted."""
+"""Design accuracy: measured in blocks of simulated frames, and predicted."""
 
 import math
 import statistics

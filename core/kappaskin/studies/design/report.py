@@ -1,4 +1,4 @@
-"""Reports of a study: text table, CSV, figures and an HTML page."""
+"""Design reports: text table, CSV, figures and an HTML page."""
 
 import csv
 import html

@@ -1,4 +1,4 @@
-"""Results of a study: tasks and their keys, means with intervals, and the folder of both."""
+"""Design results: tasks and their keys, means with intervals, and the folder of both."""
 
 import hashlib
 import json

@@ -1,4 +1,4 @@
-"""A study's file: a scene, what of it varies, and when a point is known well enough."""
+"""Design study files: a scene, the values that vary, the measures and when to stop."""
 
 import copy
 import json

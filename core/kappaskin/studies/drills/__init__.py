@@ -1,4 +1,4 @@
-"""Running the drills, and their table."""
+"""Fault drills: the list of them, their run and the table of results."""
 
 import math
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""Drills on this machine: its disk and its processes."""
+"""Fault drills of the machine: its disk and its processes."""
 
 import errno
 import os

@@ -1,4 +1,4 @@
-"""Drills on the line and the device: noise, wrong baud rates, stalls, restarts, unplugging."""
+"""Fault drills of line and device: noise, baud rates, stalls, restarts, unplugging."""
 
 import json
 import math

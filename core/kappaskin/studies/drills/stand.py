@@ -1,4 +1,4 @@
-"""The test stand of a drill: a device, the relay before it and the source that reads through it."""
+"""Test stand of a drill: a device, the relay before it, and the source behind that."""
 
 import json
 import math

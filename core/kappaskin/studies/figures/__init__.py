@@ -1,4 +1,4 @@
-"""The paper's figures: their names, what draws each, and files of them."""
+"""Figures of the paper: their names, the functions that draw them, and their files."""
 
 from collections.abc import Callable, Iterable
 from importlib import import_module

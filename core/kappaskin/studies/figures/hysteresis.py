@@ -1,4 +1,4 @@
-"""Fig. 8 of the paper, and the accuracy that a base curvature costs through hysteresis."""
+"""Figures of hysteresis: the paper's Fig. 8, and errors against the base curvature."""
 
 import math
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Figs. 6 and 9 of the paper: a square skin and a fingertip, reconstructed from noisy readings."""
+"""Figures of reconstruction: the paper's Figs. 6 and 9, a square skin and a fingertip."""
 
 from dataclasses import dataclass
 

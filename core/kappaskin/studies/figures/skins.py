@@ -1,4 +1,4 @@
-"""Figs. 1 and 2 of the paper: how a skin is built, and what its elements measure."""
+"""Figures of skins: the paper's Figs. 1 and 2, the construction and the elements."""
 
 import math
 from dataclasses import dataclass

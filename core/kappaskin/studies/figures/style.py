@@ -1,4 +1,4 @@
-"""How every figure looks: sizes for print, the app's colours, and the same bytes every time."""
+"""Style of the figures: sizes for print, colours, and files that are the same every time."""
 
 import io
 import re

@@ -1,4 +1,4 @@
-"""Verdicts: every hard case through every method that claims it, judged against the truth.
+"""Stability: every hard case by every method that claims it, and the verdict on the answer.
 
 The verdicts, in the order in which they are found:
 

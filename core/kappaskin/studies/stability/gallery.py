@@ -1,4 +1,4 @@
-"""Hard cases: what a case is, and the gallery of them.
+"""Gallery of hard cases.
 
 Where a case does not say otherwise, 40 frames are read of a shape whose every function bends the
 skin alike, by about 0.3 1/m, with Gaussian noise of the paper's 0.231 1/m; all seeded.

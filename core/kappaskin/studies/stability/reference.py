@@ -1,4 +1,4 @@
-"""The reference of a hard case: its condition, and its answer in extended precision.
+"""Reference of a hard case: its condition, and its answer in extended precision.
 
 Coefficients are compared in the scaled unknowns, each times the length of its column of M, in which
 every function bends the skin alike.
