@@ -159,8 +159,8 @@ class Display(QObject):
 
     def tint(self, name: str, estimate: Estimate, values: Array, now: float) -> Tint:
         shade, at_rest = SHADES[name], self.colouring.at_rest(name, estimate)
-        if name in COMPONENTS:  # whatever is shown of them, one range for the skin and the map
-            values = estimate.curvature[COMPONENTS.index(name)]
+        if shade.row >= 0:  # whatever is shown of them, one range for the skin and the map
+            values = self.colouring.of_elements(name, estimate)
         elif name == "displacement":
             values = 1e3 * estimate.surface
         limit = self.ranges.limit(name, values - at_rest, self.settings, now)
@@ -207,6 +207,5 @@ def of_row(name: str, of_channels: NDArray[Any]) -> NDArray[Any]:
 
     Of that component which a quantity is made from, or of any of them.
     """
-    component = name.removeprefix("residual_")
-    row = of_channels[COMPONENTS.index(component)] if component in COMPONENTS else None
-    return of_channels.max(axis=0) if row is None else row
+    row = SHADES[name].row
+    return of_channels.max(axis=0) if row < 0 else of_channels[row]

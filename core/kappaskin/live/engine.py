@@ -253,9 +253,10 @@ class Engine:
         return self._ring.read(status.generation, status.slot, sequence)
 
     def recent(self, status: Status, after: int) -> tuple[Array, Array, int]:
-        """Device times (T,) in s and curvature (T, 3, P) in 1/m of the estimates since `after`.
+        """Device times (T,) in s and what is `traced` (T, 3 k, P) of the estimates since `after`.
 
-        A number that the last call answered with, 0 at first; at most the last 64 are there.
+        Of each of k quantities the components: of `curvature` in 1/m. `after` is a number that the
+        last call answered with, 0 at first; at most the last 64 are there.
         """
         if status.slot is None:
             return np.empty(0), np.empty((0, 3, 0)), 0

@@ -7,7 +7,8 @@ writer makes odd, or changes, while it writes, and a reader that saw it change r
 
 import os
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass
 from multiprocessing import resource_tracker
 from multiprocessing.shared_memory import SharedMemory
 from operator import attrgetter
@@ -17,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal
-from kappaskin.frames import Array, Contact, Estimate, LocalGeometry
-from kappaskin.pipeline import Pipeline
+from kappaskin.frames import Array, Estimate
+from kappaskin.pipeline import ACROSS, ALONG, COLUMN, ELEMENT, REPORTED, ROW, Pipeline, stored
 
 _SIZE = 96 * 2**20  # pages that are never written cost no memory
 _STATUS_SIZE = 8 * 2**20  # the calibration of a large skin is most of it
@@ -26,74 +27,44 @@ _HEADER = 64
 _MOST_SLOTS = 64
 _TRIES = 100
 
-_CONTACT = [
-    ("position", "f8", 2),
-    ("position_sd", "f8", 2),
-    ("force", "f8"),
-    ("force_sd", "f8"),
-    ("displacement", "f8"),
-    ("displacement_sd", "f8"),
-    ("spare", "i8"),
-    ("single", "?"),
-    ("near_rim", "?"),
-]
-_GEOMETRY = [
-    ("position", "f8", 3),
-    ("frame", "f8", (3, 3)),
-    ("metric", "f8", (2, 2)),
-    ("curvature_form", "f8", (2, 2)),
-    ("torsion_form", "f8", 2),
-    ("covariance", "f8", (3, 3)),
-]
-_RECORDS: dict[str, type[Contact | LocalGeometry]] = {"contact": Contact, "geometry": LocalGeometry}
-
 
 def slot_type(pipeline: Pipeline) -> np.dtype[np.void]:
     """The record of one estimate: the fields of `Estimate` between two tickets."""
-    setup, P = pipeline.setup, len(pipeline.sensor.layout)
-    surface = ("f8", (setup.ny, setup.nx))
-    return np.dtype(
-        [
-            ("opened", "u8"),
-            ("generation", "i8"),
-            ("sequence", "i8"),
-            ("device_time", "f8"),
-            ("host_time", "f8"),
-            ("taken", "f8"),
-            ("taken_sd", "f8"),
-            ("ready_time", "f8"),
-            ("nominal", "f8", (3, P)),
-            ("curvature", "f8", (3, P)),
-            ("fresh", "?", (3, P)),
-            ("residual", "f8", (3, P)),
-            ("coefficients", "f8", pipeline.basis.shape),
-            ("surface", *surface),
-            ("noise", "f8"),
-            ("suspect", "u1", P),
-            ("converged", "?"),
-            ("fit_time", "f8"),
-            ("contact", _CONTACT),
-            ("geometry", _GEOMETRY),
-            ("true_surface", *surface),
-            ("true_contact", "f8", 2),
-            ("error_at_load", "f8"),
-            ("error_rms", "f8"),
-            ("closed", "u8"),
-        ]
-    )
+    setup = pipeline.setup
+    (along, across), (ny, nx) = pipeline.basis.shape, (setup.ny, setup.nx)
+    P = len(pipeline.sensor.layout)
+    lengths = {ELEMENT: P, ALONG: along, ACROSS: across, ROW: ny, COLUMN: nx}
+    stored = {path: (of.kind, of.shape(lengths)) for path, of in _STORED.items()}
+    return np.dtype([("opened", "u8"), *_fields(Estimate, "", stored), ("closed", "u8")])
+
+
+_STORED = stored()
+
+
+def _fields(
+    value: Any, path: str, types: Mapping[str, tuple[str, tuple[int, ...]]]
+) -> list[tuple[Any, ...]]:
+    """The fields of a record of a `value`: of each its name and its type, by its path."""
+    return [
+        (field.name, _fields(field.type, f"{path}{field.name}.", types))
+        if is_dataclass(field.type)
+        else (field.name, *types[f"{path}{field.name}"])
+        for field in fields(value)
+    ]
+
+
+_TRACED = [of.value for of in REPORTED if of.traced]
+_RECORDS: list[tuple[int, Any]] = [
+    (n, field.type) for n, field in enumerate(fields(Estimate)) if is_dataclass(field.type)
+]
 
 
 def _estimate(record: Any) -> Estimate:
     """The estimate in a copied record; its arrays are views of the copy."""
-
-    def read(owner: Any, name: str) -> Any:
-        value = owner[name]
-        if name in _RECORDS:
-            return _RECORDS[name](*(read(value, part) for part in value.dtype.names))
-        return value if value.shape else value.item()
-
-    names = (name for name in record.dtype.names if name not in ("opened", "closed"))
-    return Estimate(*(read(record, name) for name in names))
+    values = list(record.item()[1:-1])
+    for n, kind in _RECORDS:
+        values[n] = kind(*values[n])
+    return Estimate(*values)
 
 
 _Column = tuple[Callable[[Estimate], Any], Any]
@@ -106,7 +77,7 @@ def _columns(slots: Any) -> list[_Column]:
     """
     columns: list[_Column] = []
     for name in slots.dtype.names[1:-1]:
-        parts = slots[name].dtype.names if name in _RECORDS else None
+        parts = slots[name].dtype.names
         if parts is None:
             columns.append((attrgetter(name), slots[name]))
         else:
@@ -238,9 +209,10 @@ class Ring:
     def recent(
         self, generation: int, slot: np.dtype[np.void], after: int
     ) -> tuple[Array, Array, int]:
-        """Reader: times (T,) in s and curvature (T, 3, P) of all after the one numbered `after`.
+        """Reader: times (T,) in s and what is `traced` of all after the one numbered `after`.
 
-        As many of `generation` as are still there, and the number of the last, counted from 1.
+        It is (T, 3 k, P), for each of the k quantities its components. As many of `generation` as
+        are still there, and the number of the last, counted from 1.
         """
         if generation != self._generation or slot != self._slots.dtype:
             self._map(slot)
@@ -249,12 +221,13 @@ class Ring:
         tickets = np.arange(max(after, written - len(self._slots)), written) + 1
         here = (tickets - 1) % len(self._slots)
         closed = self._slots["closed"][here]
-        times, curvature = self._slots["device_time"][here], self._slots["curvature"][here]
+        times = self._slots["device_time"][here]
+        values = np.concatenate([self._slots[name][here] for name in _TRACED], axis=1)
         # The tickets in the order opposite to the writer's, as above.
         whole = (closed == tickets) & (self._slots["opened"][here] == tickets)
         if self._header[self._GENERATION] != generation:
             whole[:] = False
-        return times[whole], curvature[whole], written
+        return times[whole], values[whole], written
 
     def _ticket_of(self, sequence: int) -> int:
         """Which estimate was written of that frame last, counted from 1; 0 where none is there."""

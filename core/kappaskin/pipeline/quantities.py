@@ -10,37 +10,11 @@ from kappaskin.bases import Basis, CurvatureMap
 from kappaskin.contact import CurvatureFormMap
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Estimator, Uncertainty
-from kappaskin.frames import COMPONENTS, Array, Estimate
+from kappaskin.frames import Array, Estimate
+from kappaskin.pipeline.reported import Reported, curvature_invariant, skin_colours
 from kappaskin.sensing import SensorLayout
 
-QUANTITIES = {
-    "displacement": "m",
-    **dict.fromkeys(COMPONENTS, "1/m"),
-    **dict.fromkeys(("first", "second", "mean"), "1/m"),
-    "gaussian": "1/m^2",
-    **dict.fromkeys((f"residual_{name}" for name in COMPONENTS), "1/m"),
-    "error_bar": "m",
-    "difference": "m",
-}
-"""Units by name. `xx`, `yy` and `xy` are changes of curvature. `first`, `second` (the principal
-curvatures, the larger one first), `mean` and `gaussian` are the skin's own, its bend at rest
-included. A residual is reading minus fit, `error_bar` the standard deviation of the displacement,
-`difference` the displacement less the true one."""
-
-_OF_FORM = ("first", "second", "mean", "gaussian")
 _AT_ONCE = 2**21  # values of functions that are worked out at once
-
-
-def curvature_invariant(name: str, form: Array) -> Array:
-    """A principal, the mean or the Gaussian curvature (...) of `form` (3, ...): xx, yy, xy."""
-    xx, yy, xy = form
-    if name == "gaussian":
-        return xx * yy - xy**2
-    mean = (xx + yy) / 2
-    if name == "mean":
-        return mean
-    half = np.hypot((xx - yy) / 2, xy)
-    return mean + half if name == "first" else mean - half
 
 
 class ErrorBars:
@@ -76,7 +50,7 @@ class ErrorBars:
 
 
 class Quantities:
-    """Values of `QUANTITIES` for estimates with one `basis` and one size of surface.
+    """Values of `skin_colours` for estimates with one `basis` and one size of surface.
 
     What a quantity needs is computed when it is first asked for. `error_bar` is NaN until
     `error_bars` is set.
@@ -112,54 +86,56 @@ class Quantities:
 
     def at_rest(self, name: str) -> float:
         """The value of a skin at rest, in SI units."""
-        H = self.layout.patch.base_curvature
-        return (
-            float(curvature_invariant(name, np.array([H, 0.0, 0.0]))) if name in _OF_FORM else 0.0
-        )
+        of = skin_colours()[name].at_rest
+        return 0.0 if of is None else of(self.layout.patch.base_curvature)
 
     def on_surface(self, name: str, estimate: Estimate) -> Array:
         """The values (ny, nx) in SI units; NaN off the skin and where they are not known."""
-        if name == "displacement":
-            return estimate.surface
-        if name == "difference":
-            return estimate.surface - estimate.true_surface
-        if name == "error_bar":
-            bars = self.error_bars
-            unknown = np.full(estimate.surface.shape, np.nan)
-            return unknown if bars is None else bars.on_surface(estimate.noise)
-        if name in _OF_FORM:
-            return curvature_invariant(name, self._form(estimate.coefficients))
-        if name not in COMPONENTS:
+        of = skin_colours()[name].on_surface
+        if of is None:
             raise Refusal(f"expected a quantity that a surface has, got {name!r}; ask of_elements")
-        if name not in self._changes:
-            self._changes[name] = CurvatureMap(self.basis, name, *self.grid)
-        return self._changes[name](estimate.coefficients)
+        return of(Reported(estimate, skin=self))
+
+    def of_elements(self, name: str, estimate: Estimate) -> Array:
+        """The values (P,) in SI units: of curvature as each element reads it; NaN where missing."""
+        of = skin_colours()[name].of_elements
+        if of is not None:
+            return of(Reported(estimate, skin=self))
+        corners, weights = self._interpolation
+        values = self.on_surface(name, estimate).ravel()[corners]
+        return np.sum(np.where(weights > 0, values, 0.0) * weights, axis=1)
 
     def directions(self, estimate: Estimate) -> Array:
         """Both principal curvatures in 1/m, and the angle of the first in rad from x, on the grid.
 
         They are (3, ny, nx).
         """
-        xx, yy, xy = form = self._form(estimate.coefficients)
+        xx, yy, xy = form = self.form(estimate)
         angle = np.arctan2(xy, (xx - yy) / 2) / 2
         return np.stack(
             [curvature_invariant("first", form), curvature_invariant("second", form), angle]
         )
 
-    def of_elements(self, name: str, estimate: Estimate) -> Array:
-        """The values (P,) in SI units: of curvature as each element reads it; NaN where missing."""
-        if name in COMPONENTS:
-            return estimate.curvature[COMPONENTS.index(name)]
-        if name.startswith("residual_"):
-            return estimate.residual[COMPONENTS.index(name.removeprefix("residual_"))]
-        if name in _OF_FORM:
-            return curvature_invariant(name, self._form_at_elements(estimate.curvature))
-        corners, weights = self._interpolation
-        values = self.on_surface(name, estimate).ravel()[corners]
-        return np.sum(np.where(weights > 0, values, 0.0) * weights, axis=1)
+    # What quantities of the table are computed of.
 
-    def _form_at_elements(self, curvature: Array) -> Array:
+    def surface_sd(self, estimate: Estimate) -> Array:
+        """Standard deviations (ny, nx) of the displacement in m; NaN where they are not known."""
+        if self.error_bars is None:
+            return np.full(estimate.surface.shape, np.nan)
+        return self.error_bars.on_surface(estimate.noise)
+
+    def change(self, component: str, estimate: Estimate) -> Array:
+        """The change (ny, nx) of a component of curvature in 1/m that the fit has."""
+        if component not in self._changes:
+            self._changes[component] = CurvatureMap(self.basis, component, *self.grid)
+        return self._changes[component](estimate.coefficients)
+
+    def form(self, estimate: Estimate) -> Array:
+        """The curvature form (3, ny, nx) in 1/m of the skin itself."""
+        return self._form(estimate.coefficients)
+
+    def form_at_elements(self, estimate: Estimate) -> Array:
         """The curvature form (3, P) in 1/m as the elements read it, where slopes are small."""
         patch = self.layout.patch
-        form = curvature + np.array([[patch.base_curvature], [0.0], [0.0]])
+        form = estimate.curvature + np.array([[patch.base_curvature], [0.0], [0.0]])
         return np.where([[False], [True], [True]], 0.0, form) if patch.strip else form

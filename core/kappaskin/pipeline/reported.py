@@ -1,4 +1,4 @@
-"""The table of what an estimate reports, from which files, messages and readouts are made.
+"""The table of what an estimate reports, from which files, messages and the screen are made.
 
 It stands here, beside what makes an estimate, since some error bars need the fit that it comes
 from, and since all that shows, sends or writes an estimate lies above. Another quantity is one
@@ -6,21 +6,27 @@ entry of `REPORTED` and the function that computes it.
 """
 
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from itertools import product
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from itertools import groupby, product
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from kappaskin.errors import Refusal
 from kappaskin.estimation import Fit
-from kappaskin.frames import COMPONENTS, Estimate
+from kappaskin.frames import COMPONENTS, Array, Estimate
+
+if TYPE_CHECKING:
+    from kappaskin.pipeline.quantities import Quantities
 
 UNKNOWN = math.pi / math.sqrt(12)
 """In rad, the spread of a line that may point anywhere: an error bar of a direction at most."""
 
-ELEMENT, ALONG, ACROSS = "element", "along", "across"
-"""Axes of a quantity whose length depends on the skin and the functions."""
+ELEMENT, ALONG, ACROSS, ROW, COLUMN = "element", "along", "across", "row", "column"
+"""Axes of a quantity whose length depends on the skin, the functions and the surface's points."""
 
 _SUFFIX = {
     "": "",
@@ -37,13 +43,16 @@ _SD, _INTERVAL = "standard deviation", "Student's t, half width of the 95 % inte
 class Reported:
     """An `estimate` with what several quantities are computed of; each is computed once.
 
-    Error bars in space, those of `spread` and `tilt`, need the `fit` that made it.
+    Error bars in space, those of `spread` and `tilt`, need the `fit` that made it, quantities on
+    the surface the `skin`.
     """
 
-    __slots__ = ("_in_space", "_principal", "contact", "estimate", "fit", "geometry")
+    __slots__ = ("_in_space", "_principal", "contact", "estimate", "fit", "geometry", "skin")
 
-    def __init__(self, estimate: Estimate, fit: Fit | None = None) -> None:
-        self.estimate, self.fit = estimate, fit
+    def __init__(
+        self, estimate: Estimate, fit: Fit | None = None, skin: "Quantities | None" = None
+    ) -> None:
+        self.estimate, self.fit, self.skin = estimate, fit, skin
         self.contact, self.geometry = estimate.contact, estimate.geometry
         self._in_space: tuple[list[float], list[float]] | None = None
         self._principal: tuple[list[float], list[float]] | None = None
@@ -60,11 +69,12 @@ class Reported:
             return self._in_space
         if self.fit is None:
             return [math.nan] * 3, [*self.geometry.normal.tolist(), math.nan]
-        geometry, estimator = self.geometry, self.fit.estimator
-        patch = estimator.basis.patch
+        geometry, patch = self.geometry, self.fit.estimator.basis.patch
         x, y = self.contact.position.tolist()
         x_sd, y_sd = self.contact.position_sd.tolist()
-        f_sd, *slopes_sd = self.fit.sd_of(estimator.basis.jet(x, y)[:3]).tolist()
+        # Cached: the geometry there was computed of it.
+        variances = self.fit.jet(x, y)[1].diagonal()[:3].tolist()
+        f_sd, *slopes_sd = (math.sqrt(v) if v >= 0 else math.nan for v in variances)
         t, e, normal = geometry.frame.tolist()
         (L, m), (_, k) = geometry.metric.tolist()
         (xx, xy), (_, yy) = geometry.curvature_form.tolist()
@@ -117,7 +127,12 @@ def _root(C: list[list[float]], xx: float, yy: float, xy: float) -> float:
 Getter = Callable[[Reported], Any]
 
 
-@dataclass(frozen=True)
+def _got(of: str | Getter) -> Getter:
+    """What gets a quantity: itself, or what has its place among the fields of an estimate."""
+    return attrgetter(f"estimate.{of}") if isinstance(of, str) else of
+
+
+@dataclass(frozen=True, repr=False, eq=False)
 class Number:
     """A published number: its `key`, which ends in its unit, how it is written, its meaning."""
 
@@ -126,34 +141,83 @@ class Number:
     text: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False, eq=False)
+class SkinColour:
+    """What the skin and a heatmap may be coloured by: `name` in settings, `label` in menus.
+
+    The `symbol` is HTML, the `tip` has the equation, and `unknown` says why there may be no value.
+    `on_surface` gets the values (ny, nx) on the surface's points; without it there are values at
+    the elements only. `of_elements` gets these (P,); without it they are those of the surface.
+    `at_rest` gets the value of a skin at rest from its curvature, zero if left out, from which
+    colours of what is `signed` go both ways. They reach as far as `least` at least, on the screen's
+    scale, or for a length as that share of the skin's longer side; those of one `group` may share
+    a range.
+
+    The `unit` and the `row` among the components (-1 for none) are those of its quantity.
+    """
+
+    name: str
+    label: str
+    symbol: str
+    tip: str
+    on_surface: Getter | None = None
+    of_elements: Getter | None = None
+    at_rest: Callable[[float], float] | None = None
+    unknown: str = ""
+    signed: bool = True
+    least: float = 0.5
+    group: str = ""
+    unit: str = ""
+    row: int = -1
+
+    @property
+    def surface(self) -> bool:
+        """Whether there is a value at every point of the skin, or only at the elements."""
+        return self.on_surface is not None
+
+
+class HeaderNumber(NamedTuple):
+    """How a number stands in the window's header: its `key` in lessons, its width in characters."""
+
+    key: str
+    width: int
+    tip: str
+    signed: bool = False
+
+
+@dataclass(frozen=True, repr=False, eq=False)
 class ReportedQuantity:
     """A quantity of an estimate: a number, or an array whose axes have `parts`, the labels there.
 
-    `value` gets it, `sd` its standard deviation and `half_width` that of its 95 % interval; each
-    is a column of tables if its suffix is among `columns`, of the NumPy type `kind`, described by
-    `text` and `sd_text`. A quantity of the `group` contact is NaN without one.
+    `value` gets it, `sd` its standard deviation and `half_width` that of its 95 % interval, each a
+    function, or the path of a field of the estimate, as "contact.force". Each is a column of
+    tables if its suffix is among `columns`, of the NumPy type `kind`, described by `text` and
+    `sd_text`. A quantity of the `group` contact is NaN without one; those of the groups skin and
+    truth are in no table.
 
     Published it is one number for each of `keys`, key and meaning, written in a `form`; its error
     bars follow it, or each its number if they are `interleaved`. Without `keys` these are made of
-    name, parts and unit; with none in it, as for an array of every element, it is not published.
+    name, parts and unit, but for what has more numbers with a larger skin, which is not published.
     `quick` gets all that is published of it as a list, in less time than `value` and `sd`.
 
     On the screen its numbers are called as in `labels_shown`, and each is `shown` in a unit, as so
-    many times the value, with so many digits; without labels it is no readout.
+    many times the value, with so many digits; without labels it is no readout. `header` says how
+    it stands in the window's header too. An element's value is a column `element_head` of its
+    card; `traced` is the title of what is drawn of it over time, which has to be a field of the
+    estimate. `colours` are what the skin may be coloured by of it.
     """
 
     name: str
     unit: str
     text: str
-    value: Getter
+    value: str | Getter
     symbol: str = ""
     parts: tuple[str | tuple[str, ...], ...] = ()
     kind: str = "<f8"
     group: str = "contact"
-    sd: Getter | None = None
+    sd: str | Getter | None = None
     sd_text: str = _SD
-    half_width: Getter | None = None
+    half_width: str | Getter | None = None
     columns: tuple[str, ...] = ("", "_sd", "_95")
     keys: tuple[tuple[str, str], ...] | None = None
     sd_keys: tuple[tuple[str, str], ...] | None = None
@@ -162,24 +226,35 @@ class ReportedQuantity:
     interleaved: bool = False
     labels_shown: tuple[str, ...] = ()
     shown: tuple[str, float, int] = ("", 1.0, 3)
+    header: HeaderNumber | None = None
+    element_head: str = ""
+    traced: str = ""
+    colours: tuple[SkinColour, ...] = ()
 
     @property
     def forms(self) -> tuple[tuple[str, str, Getter], ...]:
         """Suffix, meaning and getter of the value, its standard deviation and its interval."""
-        found = [("", self.text, self.value)]
-        if self.sd is not None:
-            found.append(("_sd", self.sd_text, self.sd))
-        if self.half_width is not None:
-            found.append(("_95", _INTERVAL, self.half_width))
-        return tuple(found)
+        of = (
+            ("", self.text, self.value),
+            ("_sd", self.sd_text, self.sd),
+            ("_95", _INTERVAL, self.half_width),
+        )
+        return tuple((suffix, text, _got(get)) for suffix, text, get in of if get is not None)
 
-    def labels(self, axes: dict[str, tuple[str, ...]]) -> tuple[str, ...]:
-        """What is appended to the name for each number, flattened; `axes` have the labels of some.
+    def labels(self, lengths: dict[str, int]) -> tuple[str, ...]:
+        """What is appended to the name for each number, flattened, by the `lengths` of axes.
 
         Empty for a number.
         """
-        names = [axes[axis] if isinstance(axis, str) else axis for axis in self.parts]
+        names = [
+            tuple(map(str, range(lengths[axis]))) if isinstance(axis, str) else axis
+            for axis in self.parts
+        ]
         return tuple("".join(f"_{each}" for each in parts) for parts in product(*names))
+
+    def shape(self, lengths: dict[str, int]) -> tuple[int, ...]:
+        """Its shape as an array; `lengths` are those of some axes."""
+        return tuple(lengths[axis] if isinstance(axis, str) else len(axis) for axis in self.parts)
 
     @property
     def published(self) -> tuple[Number, ...]:
@@ -194,6 +269,8 @@ class ReportedQuantity:
     def _keys(self) -> tuple[tuple[str, str], ...]:
         if self.keys is not None:
             return self.keys
+        if any(isinstance(axis, str) for axis in self.parts):
+            return ()
         suffix = _SUFFIX[self.unit]
         return tuple((f"{self.name}{label}{suffix}", self.text) for label in self.labels({}))
 
@@ -209,34 +286,53 @@ class ReportedQuantity:
             for key, _ in self._keys
         )
 
-    def steps(self) -> "tuple[tuple[bool, Getter], ...]":
+    def steps(self) -> "Iterator[tuple[bool, str | Getter]]":
         """What gets the `published` numbers in order: whether several, as a list, and how."""
         if self.quick is not None:
-            return ((True, self.quick),)
-        if self.interleaved and self.sd is not None:
-            return ((True, _interleaved(_listed(self.value), _listed(self.sd))),)
-        found = [(self.value, len(self._keys)), (self.sd, len(self._sd_keys))]
-        return tuple(
-            (True, _listed(getter)) if count > 1 else (False, getter)
-            for getter, count in found
-            if getter is not None and count
-        )
+            yield True, self.quick
+        elif self.interleaved and self.sd is not None:
+            value, sd = self._listed(self.value), self._listed(self.sd)
+            yield True, lambda r: [n for pair in zip(value(r), sd(r), strict=True) for n in pair]
+        else:
+            found = (self.value, len(self._keys)), (self.sd, len(self._sd_keys))
+            for of, count in found:
+                if of is not None and count:
+                    yield count > 1, (self._listed(of) if count > 1 else of)
+
+    def _listed(self, of: str | Getter) -> Getter:
+        """What gets an array as a flat list."""
+        get = _got(of)
+        if len(self.parts) == 1 and isinstance(of, str):
+            return lambda reported: get(reported).tolist()
+        return lambda reported: np.ravel(get(reported)).tolist()
+
+    def shaded(self) -> Iterator[SkinColour]:
+        """Its `colours` with what they have from it."""
+        get, elements = _got(self.value), self.parts[-1:] == (ELEMENT,)
+        for row, colour in enumerate(self.colours):
+            yield replace(
+                colour,
+                on_surface=colour.on_surface or (None if elements else get),
+                of_elements=colour.of_elements or (partial(_row, get, row) if elements else None),
+                unit=self.unit,
+                row=row if self.parts[0] == COMPONENTS else -1,
+            )
 
 
-def _listed(getter: Getter) -> Getter:
-    """What gets an array as a flat list."""
-    return lambda reported: np.ravel(getter(reported)).tolist()
-
-
-def _interleaved(value: Getter, sd: Getter) -> Getter:
-    return lambda reported: [
-        each for pair in zip(value(reported), sd(reported), strict=True) for each in pair
-    ]
+def _row(get: Getter, row: int, reported: Reported) -> Array:
+    return np.atleast_2d(get(reported))[row].astype(float, copy=False)
 
 
 def numbers_of(quantities: Iterable[ReportedQuantity]) -> Callable[[Reported], list[float]]:
     """What gets all that is published of some quantities, in order."""
-    steps = tuple(step for quantity in quantities for step in quantity.steps())
+    found = (step for quantity in quantities for step in quantity.steps())
+    steps: list[tuple[bool, Getter]] = []
+    for _, some in groupby(found, lambda step: isinstance(step[1], str)):
+        run = list(some)
+        # Fields one after the other are got at once.
+        if fields := [f"estimate.{of}" for _, of in run if isinstance(of, str)]:
+            steps.append((len(fields) > 1, attrgetter(*fields)))
+        steps += [(several, of) for several, of in run if not isinstance(of, str)]
 
     def numbers(reported: Reported) -> list[float]:
         found: list[float] = []
@@ -258,7 +354,7 @@ _FRAME = (
         "sequence",
         "",
         "number of the frame",
-        lambda r: r.estimate.sequence,
+        "sequence",
         kind="<i8",
         group="frame",
         keys=(),
@@ -267,7 +363,7 @@ _FRAME = (
         "setup",
         "",
         "number of the settings",
-        lambda r: r.estimate.generation,
+        "generation",
         kind="<i8",
         group="frame",
         keys=(),
@@ -276,7 +372,7 @@ _FRAME = (
         "device_time",
         "s",
         "on the device's clock",
-        lambda r: r.estimate.device_time,
+        "device_time",
         symbol="t",
         group="frame",
         keys=(("device_time_s", "when the scan began on the device's clock"),),
@@ -286,7 +382,7 @@ _FRAME = (
         "host_time",
         "s",
         "when it came, monotonic clock",
-        lambda r: r.estimate.host_time,
+        "host_time",
         group="frame",
         keys=(),
     ),
@@ -294,79 +390,274 @@ _FRAME = (
         "taken",
         "s",
         "when it was taken, monotonic clock",
-        lambda r: r.estimate.taken,
+        "taken",
         group="frame",
-        sd=lambda r: r.estimate.taken_sd,
+        sd="taken_sd",
         sd_text="standard deviation of taken",
         keys=(),
         sd_keys=(("taken_sd_s", "standard deviation of timestamp; null where nothing tells"),),
     ),
+    ReportedQuantity(
+        "ready_time",
+        "s",
+        "when the estimate was done, monotonic clock",
+        "ready_time",
+        group="frame",
+        columns=(),
+        keys=(),
+    ),
 )
+_KAPPA, _SIGMA, _DELTA = "\N{GREEK SMALL LETTER KAPPA}", "\u03c3", "\u0394"
+_OWN = "of the skin itself, its bend at rest included"
+_WHITE = "White is a skin at rest."
+_ROOT = "\u221a(((xx \u2212 yy) / 2)\u00b2 + xy\u00b2)"
+
+
+def _changes(*tips: tuple[str, str]) -> tuple[SkinColour, ...]:
+    """Colours of the changes of curvature xx, yy and xy: each its label and its tip."""
+    return tuple(
+        SkinColour(
+            name,
+            label,
+            f"{_KAPPA}<sub>{name}</sub>",
+            tip,
+            on_surface=lambda r, name=name: _skin(r).change(name, r.estimate),
+            group="curvature",
+        )
+        for name, (label, tip) in zip(COMPONENTS, tips, strict=True)
+    )
+
+
+def _skin(reported: Reported) -> "Quantities":
+    if reported.skin is None:
+        raise Refusal("expected a skin, which a quantity on its surface is computed of, got none")
+    return reported.skin
+
+
+def curvature_invariant(name: str, form: Array) -> Array:
+    """A principal, the mean or the Gaussian curvature (...) of `form` (3, ...): xx, yy, xy."""
+    xx, yy, xy = form
+    if name == "gaussian":
+        return xx * yy - xy**2
+    mean = (xx + yy) / 2
+    if name == "mean":
+        return mean
+    half = np.hypot((xx - yy) / 2, xy)
+    return mean + half if name == "first" else mean - half
+
+
+def _invariant(
+    name: str, unit: str, label: str, symbol: str, tip: str, least: float = 0.5, group: str = ""
+) -> ReportedQuantity:
+    """A `curvature_invariant` on the skin."""
+    of = partial(curvature_invariant, name)
+    return ReportedQuantity(
+        f"surface_{name}",
+        unit,
+        f"{label} of the skin, on the surface's points",
+        lambda r: of(_skin(r).form(r.estimate)),
+        symbol=symbol,
+        parts=(ROW, COLUMN),
+        group="skin",
+        colours=(
+            SkinColour(
+                name,
+                label,
+                symbol,
+                tip,
+                of_elements=lambda r: of(_skin(r).form_at_elements(r.estimate)),
+                at_rest=lambda H: float(of(np.array([H, 0.0, 0.0]))),
+                least=least,
+                group=group,
+            ),
+        ),
+    )
+
+
 _FIT = (
+    ReportedQuantity(
+        "surface",
+        "m",
+        "displacement on the surface's points, above zero inward; NaN off the skin",
+        "surface",
+        symbol="w",
+        parts=(ROW, COLUMN),
+        group="skin",
+        colours=(
+            SkinColour(
+                "displacement",
+                "Displacement",
+                "w",
+                "How far the skin moved in along its normal: w (Eq. 1).",
+                signed=False,
+                least=1e-3,
+            ),
+        ),
+    ),
     ReportedQuantity(
         "nominal",
         "1/m",
         f"Eq. 8; {_MISSING}",
-        lambda r: r.estimate.nominal,
+        "nominal",
         parts=(COMPONENTS, ELEMENT),
         group="fit",
-        keys=(),
     ),
     ReportedQuantity(
         "curvature",
         "1/m",
         _MISSING,
-        lambda r: r.estimate.curvature,
-        symbol="\N{GREEK SMALL LETTER KAPPA}",
+        "curvature",
+        symbol=_KAPPA,
         parts=(COMPONENTS, ELEMENT),
         group="fit",
-        keys=(),
+        sd="noise",
+        columns=("",),
+        element_head="reads",
+        traced="Curvature",
+        colours=_changes(
+            ("Curvature xx", "Bending along x as each element reads it: w_xx (Eq. 3)."),
+            ("Curvature yy", "Bending along y as each element reads it: w_yy (Eq. 4)."),
+            ("Twist xy", "Twist as each element reads it: w_xy (Eq. 5)."),
+        ),
+    ),
+    _invariant(
+        "first",
+        "1/m",
+        "Principal curvature 1",
+        f"{_KAPPA}<sub>1</sub>",
+        f"The larger principal curvature {_OWN}: (xx + yy) / 2 + {_ROOT}. {_WHITE}",
+        group="curvature",
+    ),
+    _invariant(
+        "second",
+        "1/m",
+        "Principal curvature 2",
+        f"{_KAPPA}<sub>2</sub>",
+        f"The smaller principal curvature {_OWN}: (xx + yy) / 2 \u2212 {_ROOT}. {_WHITE}",
+        group="curvature",
+    ),
+    _invariant(
+        "mean",
+        "1/m",
+        "Mean curvature",
+        f"{_KAPPA}<sub>m</sub>",
+        f"The mean curvature {_OWN}: (xx + yy) / 2. {_WHITE}",
+        group="curvature",
+    ),
+    _invariant(
+        "gaussian",
+        "1/m^2",
+        "Gaussian curvature",
+        "K",
+        f"The Gaussian curvature {_OWN}: xx yy \u2212 xy\u00b2. Above zero like a ball or a "
+        "bowl, below like a saddle; a sheet that only bends keeps zero.",
+        least=1.0,
     ),
     ReportedQuantity(
         "fresh",
         "",
         "whether the frame brought it",
-        lambda r: r.estimate.fresh,
+        "fresh",
         parts=(COMPONENTS, ELEMENT),
         kind="?",
         group="fit",
-        keys=(),
     ),
     ReportedQuantity(
         "residual",
         "1/m",
         "reading less fit",
-        lambda r: r.estimate.residual,
+        "residual",
         parts=(COMPONENTS, ELEMENT),
         group="fit",
-        keys=(),
+        element_head="fit leaves",
+        colours=tuple(
+            SkinColour(
+                f"residual_{name}",
+                f"Residual {name}",
+                f"r<sub>{name}</sub>",
+                f"What the shape leaves of each reading of {name}: reading less fit. Noise alone "
+                "has no pattern; one that stays tells of too few functions or a wrong edge.",
+                least=0.1,
+                group="residual",
+            )
+            for name in COMPONENTS
+        ),
+    ),
+    ReportedQuantity(
+        "surface_sd",
+        "m",
+        "standard deviation of the displacement on the surface's points",
+        lambda r: _skin(r).surface_sd(r.estimate),
+        symbol=f"{_SIGMA}<sub>w</sub>",
+        parts=(ROW, COLUMN),
+        group="skin",
+        colours=(
+            SkinColour(
+                "error_bar",
+                "Error bar",
+                f"{_SIGMA}<sub>w</sub>",
+                "The standard deviation of the displacement that the noise of the readings leads "
+                "to: \u221a(b' C b), with the functions b there and the covariance C of their "
+                "coefficients. Of Tracking, as one frame by itself would have it.",
+                unknown="Computing how sure the surface is\N{HORIZONTAL ELLIPSIS}",
+                signed=False,
+                least=1e-5,
+            ),
+        ),
+    ),
+    ReportedQuantity(
+        "surface_error",
+        "m",
+        "displacement less the true one; NaN without a simulation",
+        lambda r: r.estimate.surface - r.estimate.true_surface,
+        symbol=f"{_DELTA}w",
+        parts=(ROW, COLUMN),
+        group="skin",
+        colours=(
+            SkinColour(
+                "difference",
+                "Difference to the truth",
+                f"{_DELTA}w",
+                "The displacement found less the true one, which only a simulation knows.",
+                unknown="No simulation: the true surface is not known",
+                least=1e-5,
+            ),
+        ),
     ),
     ReportedQuantity(
         "suspect",
         "",
         "why an element is left out, 0 if it is not",
-        lambda r: r.estimate.suspect,
+        "suspect",
         parts=(ELEMENT,),
         kind="|u1",
         group="fit",
-        keys=(),
+        colours=(
+            SkinColour(
+                "health",
+                "Health",
+                "Health",
+                "What is wrong with each element (F3): any of its three channels that is left out, "
+                "and why.",
+                signed=False,
+            ),
+        ),
     ),
     ReportedQuantity(
         "coefficients",
         "m",
         "of the functions; NaN where the settings have fewer",
-        lambda r: r.estimate.coefficients,
+        "coefficients",
         symbol="c",
         parts=(ALONG, ACROSS),
         group="fit",
-        keys=(),
     ),
     ReportedQuantity(
         "noise",
         "1/m",
         "standard deviation of a reading",
-        lambda r: r.estimate.noise,
-        symbol="\N{GREEK SMALL LETTER SIGMA}",
+        "noise",
+        symbol=_SIGMA,
         group="fit",
         keys=(("noise_per_m", "standard deviation of one reading"),),
         form="%.3g",
@@ -377,10 +668,13 @@ _FIT = (
         "converged",
         "",
         "whether the fit did",
-        lambda r: r.estimate.converged,
+        "converged",
         kind="?",
         group="fit",
         keys=(),
+    ),
+    ReportedQuantity(
+        "fit_time", "s", "what the fit took", "fit_time", group="fit", columns=(), keys=()
     ),
 )
 _CONTACT = (
@@ -388,7 +682,7 @@ _CONTACT = (
         "present",
         "",
         "whether there is a contact",
-        lambda r: r.contact.present,
+        "contact.present",
         kind="?",
         keys=(
             ("present", "whether the readings hold a contact; without one its numbers are null"),
@@ -398,7 +692,7 @@ _CONTACT = (
         "single",
         "",
         "whether one point load explains the readings",
-        lambda r: r.contact.single,
+        "contact.single",
         kind="?",
         keys=(
             ("single", "whether one point load explains the readings as well as the shape does"),
@@ -408,7 +702,7 @@ _CONTACT = (
         "near_rim",
         "",
         "whether it is too near a held edge",
-        lambda r: r.contact.near_rim,
+        "contact.near_rim",
         kind="?",
         keys=(
             (
@@ -418,18 +712,17 @@ _CONTACT = (
         ),
     ),
     ReportedQuantity(
-        "spare", "", "readings more than needed", lambda r: r.contact.spare, kind="<i8", keys=()
+        "spare", "", "readings more than needed", "contact.spare", kind="<i8", keys=()
     ),
     ReportedQuantity(
         "position",
         "m",
         "of the contact",
-        lambda r: r.contact.position,
+        "contact.position",
         symbol="x",
         parts=(("x", "y"),),
-        sd=lambda r: r.contact.position_sd,
-        half_width=lambda r: r.contact.position_95,
-        quick=lambda r: [*r.contact.position.tolist(), *r.contact.position_sd.tolist()],
+        sd="contact.position_sd",
+        half_width="contact.position_95",
         labels_shown=("Contact x", "Contact y"),
         shown=("mm", 1e3, 2),
         keys=(
@@ -442,26 +735,30 @@ _CONTACT = (
         "force",
         "N",
         "of the contact",
-        lambda r: r.contact.force,
+        "contact.force",
         symbol="F",
-        sd=lambda r: r.contact.force_sd,
-        half_width=lambda r: r.contact.force_95,
+        sd="contact.force_sd",
+        half_width="contact.force_95",
         keys=(("force_N", "of the contact, above zero where it presses"),),
         labels_shown=("Force",),
         shown=("mN", 1e3, 1),
+        header=HeaderNumber("force", 14, "How hard that load presses, with its error bar."),
     ),
     ReportedQuantity(
         "displacement",
         "m",
         _OF_SKIN,
-        lambda r: r.contact.displacement,
+        "contact.displacement",
         symbol="w",
-        sd=lambda r: r.contact.displacement_sd,
-        half_width=lambda r: r.contact.displacement_95,
+        sd="contact.displacement_sd",
+        half_width="contact.displacement_95",
         columns=("", "_sd"),
         keys=(("displacement_m", f"{_OF_SKIN}, above zero inward"),),
         labels_shown=("Depth",),
         shown=("mm", 1e3, 3),
+        header=HeaderNumber(
+            "depth", 15, "Displacement at the contact, with its error bar; positive is in."
+        ),
     ),
 )
 _GEOMETRY = (
@@ -469,7 +766,7 @@ _GEOMETRY = (
         "point",
         "m",
         "the contact in space",
-        lambda r: r.geometry.position,
+        "geometry.position",
         symbol="r",
         parts=(("x", "y", "z"),),
         sd=lambda r: r.in_space()[0],
@@ -486,7 +783,7 @@ _GEOMETRY = (
         "normal",
         "",
         "outward unit normal",
-        lambda r: r.geometry.normal,
+        "geometry.normal",
         symbol="n",
         parts=(("x", "y", "z"),),
         sd=lambda r: r.in_space()[1][3],
@@ -504,7 +801,7 @@ _GEOMETRY = (
         "frame",
         "",
         "unit vectors, row by row: along x (t), across it (s), outward normal (n)",
-        lambda r: r.geometry.frame,
+        "geometry.frame",
         parts=(("t", "s", "n"), ("x", "y", "z")),
         keys=(),
     ),
@@ -512,7 +809,7 @@ _GEOMETRY = (
         "metric",
         "",
         "what a step along x, y is along the frame",
-        lambda r: r.geometry.metric,
+        "geometry.metric",
         parts=(("t", "s"), ("x", "y")),
         keys=(),
     ),
@@ -520,7 +817,7 @@ _GEOMETRY = (
         "curvature_form",
         "1/m",
         f"{_OF_SKIN}, along the frame",
-        lambda r: r.geometry.curvature_form,
+        "geometry.curvature_form",
         symbol="K",
         parts=(("t", "s"), ("t", "s")),
         keys=(),
@@ -529,7 +826,7 @@ _GEOMETRY = (
         "torsion_form",
         "1/m",
         _OF_SKIN,
-        lambda r: r.geometry.torsion_form,
+        "geometry.torsion_form",
         symbol="T",
         parts=(("t", "s"),),
         keys=(),
@@ -538,7 +835,7 @@ _GEOMETRY = (
         "covariance",
         "1/m^2",
         "of xx, yy, xy of the curvature form",
-        lambda r: r.geometry.covariance,
+        "geometry.covariance",
         parts=(COMPONENTS, COMPONENTS),
         keys=(),
     ),
@@ -546,27 +843,24 @@ _GEOMETRY = (
         "principal",
         "1/m",
         "principal curvatures",
-        lambda r: r.geometry.principal,
-        symbol="\N{GREEK SMALL LETTER KAPPA}",
+        "geometry.principal",
+        symbol=_KAPPA,
         parts=(("1", "2"),),
-        sd=lambda r: r.geometry.principal_sd,
+        sd="geometry.principal_sd",
         keys=(
             ("curvature_1_per_m", "larger principal curvature of the skin at the contact"),
             ("curvature_2_per_m", "smaller principal curvature"),
         ),
         quick=lambda r: r.principal()[0],
         interleaved=True,
-        labels_shown=(
-            "Larger \N{GREEK SMALL LETTER KAPPA}",
-            "Smaller \N{GREEK SMALL LETTER KAPPA}",
-        ),
+        labels_shown=(f"Larger {_KAPPA}", f"Smaller {_KAPPA}"),
         shown=("1/m", 1.0, 2),
     ),
     ReportedQuantity(
         "direction",
         "",
         "unit vectors along the principal curvatures",
-        lambda r: r.geometry.directions,
+        "geometry.directions",
         parts=(("1", "2"), ("x", "y", "z")),
         sd=lambda r: r.principal()[1][6],
         columns=(),
@@ -591,12 +885,58 @@ _GEOMETRY = (
         "angle",
         "rad",
         "from x to the first principal curvature",
-        lambda r: r.geometry.angle,
+        "geometry.angle",
         keys=(),
     ),
 )
 
-REPORTED = (*_FRAME, *_FIT, *_CONTACT, *_GEOMETRY)
+_TRUTH = (
+    ReportedQuantity(
+        "true_surface",
+        "m",
+        "the true displacement on the surface's points",
+        "true_surface",
+        parts=(ROW, COLUMN),
+        group="truth",
+    ),
+    ReportedQuantity(
+        "true_contact",
+        "m",
+        "the true place of the contact",
+        "true_contact",
+        parts=(("x", "y"),),
+        group="truth",
+    ),
+    ReportedQuantity(
+        "error_at_load",
+        "m",
+        "displacement less the true one at the true contact",
+        "error_at_load",
+        group="truth",
+        labels_shown=("Error at load",),
+        shown=("mm", 1e3, 3),
+        header=HeaderNumber(
+            "error",
+            10,
+            "Reconstructed minus true displacement there (simulated only).",
+            signed=True,
+        ),
+    ),
+    ReportedQuantity(
+        "error_rms",
+        "m",
+        "root mean square of that over the skin",
+        "error_rms",
+        group="truth",
+        labels_shown=("RMS error",),
+        shown=("mm", 1e3, 3),
+        header=HeaderNumber(
+            "rms", 9, "Root mean square error over the whole skin (simulated only)."
+        ),
+    ),
+)
+
+REPORTED = (*_FRAME, *_FIT, *_CONTACT, *_GEOMETRY, *_TRUTH)
 """Every quantity of an estimate, in the order in which tables have them."""
 
 
@@ -607,6 +947,18 @@ def getters() -> dict[str, Getter]:
         for quantity in REPORTED
         for suffix, _, getter in quantity.forms
     }
+
+
+def stored() -> dict[str, ReportedQuantity]:
+    """The quantity that each field of an estimate has its type and its axes from, by its path."""
+    of_sd = {of.sd: replace(of, kind="<f8") for of in REPORTED if isinstance(of.sd, str)}
+    return of_sd | {of.value: of for of in REPORTED if isinstance(of.value, str)}
+
+
+@cache
+def skin_colours() -> dict[str, SkinColour]:
+    """All that the skin may be coloured by, by name."""
+    return {colour.name: colour for quantity in REPORTED for colour in quantity.shaded()}
 
 
 class Readout(NamedTuple):
@@ -623,14 +975,24 @@ class Readout(NamedTuple):
 def readouts(estimate: Estimate) -> list[Readout]:
     """What the screen shows of an estimate: first of the contact, then of the fit."""
     reported = Reported(estimate)
+    found = (each for each in REPORTED if each.group in ("contact", "fit"))
+    return [
+        readout
+        for quantity in sorted(found, key=lambda each: each.group != "contact")
+        for readout in readouts_of(quantity, reported)
+    ]
+
+
+def readouts_of(quantity: ReportedQuantity, reported: Reported) -> list[Readout]:
+    """What the screen shows of a quantity: each of its numbers that has a label."""
+    unit, scale, digits = quantity.shown
+    numbers = [
+        np.ravel(math.nan if of is None else _got(of)(reported))
+        for of in (quantity.value, quantity.sd, quantity.half_width)
+        if quantity.labels_shown
+    ]
     found: list[Readout] = []
-    for quantity in sorted(REPORTED, key=lambda each: each.group != "contact"):
-        unit, scale, digits = quantity.shown
-        numbers = [
-            np.ravel(math.nan if get is None else get(reported))
-            for get in (quantity.value, quantity.sd, quantity.half_width)
-        ]
-        for part, label in enumerate(quantity.labels_shown):
-            value, sd, half_width = (scale * float(each[part % len(each)]) for each in numbers)
-            found.append(Readout(label, value, sd, half_width, unit, digits))
+    for part, label in enumerate(quantity.labels_shown):
+        value, sd, half_width = (scale * float(each[part % len(each)]) for each in numbers)
+        found.append(Readout(label, value, sd, half_width, unit, digits))
     return found

@@ -64,7 +64,7 @@ SWITCHES = {number.key: number.text for number in _of(_FLAGS)} | {
 # Made once of the table, since they are called for every frame.
 _frame_numbers, _fit_numbers, _contact_numbers = map(numbers_of, (_FRAME, _FIT, _AT_CONTACT))
 _NOTHING = [math.nan] * len(_of(_AT_CONTACT))
-_GET_FLAGS = tuple(quantity.value for quantity in _FLAGS)
+_flags = numbers_of(_FLAGS)
 _FLAGS_TEXT = ",".join(f'"{key}":%s' for key in SWITCHES)
 
 
@@ -113,7 +113,7 @@ def _numbers(values: list[float]) -> str:
     )
 
 
-def _yes(value: bool) -> str:
+def _yes(value: float) -> str:
     return "true" if value else "false"
 
 
@@ -172,7 +172,7 @@ class EstimateMessage:
     @cached_property
     def contact(self) -> bytes:
         """The message about the contact, as JSON."""
-        flags = [_yes(get(self._reported)) for get in _GET_FLAGS]
+        flags = [_yes(flag) for flag in _flags(self._reported)]
         text = (
             f'{{"kind":"contact","version":{VERSION},"source":"{self.mark.source}",'
             f"{_FLAGS_TEXT % (*flags, _yes(self.shape_follows))},{_numbers(self.values)}}}"

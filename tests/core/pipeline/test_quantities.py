@@ -25,8 +25,7 @@ from kappaskin import (
     local_geometry,
 )
 from kappaskin.frames import COMPONENTS
-from kappaskin.pipeline import QUANTITIES, ErrorBars, Quantities
-from kappaskin.pipeline.quantities import curvature_invariant
+from kappaskin.pipeline import ErrorBars, Quantities, curvature_invariant, skin_colours
 
 FLAT, BENT = Patch(0.1, 0.06), Patch(0.04, 0.03, 12.9e-3)
 SETUP = Setup(6, 5, 25, 17)
@@ -203,7 +202,7 @@ def test_an_error_bar_is_not_known_until_it_is_given(centre) -> None:
 def test_every_quantity_has_a_unit_and_a_value_at_every_element(centre) -> None:
     pipeline, estimate = centre
     quantities = quantities_of(pipeline)
-    for name in QUANTITIES:
+    for name in skin_colours():
         assert quantities.of_elements(name, estimate).shape == (100,)
     with pytest.raises(Refusal, match="residual_xx"):
         quantities.on_surface("residual_xx", estimate)

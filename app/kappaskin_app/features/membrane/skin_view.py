@@ -24,10 +24,6 @@ from kappaskin_app.widgets.colour_bar import SkinScale
 from kappaskin_app.widgets.tint import Tint
 
 _MARKS = 0.06  # s between two drawings of the marks
-_UNKNOWN = {
-    "difference": "No simulation: the true surface is not known",
-    "error_bar": "Computing how sure the surface is\N{HORIZONTAL ELLIPSIS}",
-}
 
 Array = NDArray[np.float64]
 
@@ -155,7 +151,7 @@ class SkinView(QObject):
         """Say in the picture why there are no colours."""
         known = name == "health" or values.dtype == np.uint8 or bool(np.isfinite(values).any())
         if self._selection.mode is None:
-            self.membrane.show_caption("" if known else _UNKNOWN.get(name, ""))
+            self.membrane.show_caption("" if known else SHADES[name].unknown)
 
     def _times(self) -> float:
         """How many times the displacement is drawn larger: as wanted, or as much as fits."""

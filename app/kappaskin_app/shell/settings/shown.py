@@ -1,7 +1,9 @@
 """Settings of the estimator and of the view."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, make_dataclass
+from typing import Any
 
+from kappaskin.pipeline import skin_colours
 from kappaskin_app.shell.settings.asks import Choice, Range, Several, Switch, asked
 from kappaskin_app.shell.settings.skin import EDGE_NAMES
 
@@ -36,22 +38,7 @@ class Reading:
     )
 
 
-COLOURS = (
-    ("displacement", "Displacement"),
-    ("xx", "Curvature xx"),
-    ("yy", "Curvature yy"),
-    ("xy", "Twist xy"),
-    ("first", "Principal curvature 1"),
-    ("second", "Principal curvature 2"),
-    ("mean", "Mean curvature"),
-    ("gaussian", "Gaussian curvature"),
-    ("residual_xx", "Residual xx"),
-    ("residual_yy", "Residual yy"),
-    ("residual_xy", "Residual xy"),
-    ("error_bar", "Error bar"),
-    ("difference", "Difference to the truth"),
-    ("health", "Health"),
-)
+COLOURS = tuple((name, colour.label) for name, colour in skin_colours().items())
 METHOD_NAMES = (
     ("least-squares", "Least squares"),
     ("as-printed", "As printed (Eq. 6)"),
@@ -116,8 +103,16 @@ def _cut_level(side: str, beyond: str) -> Range:
     return Range(f"{side} height", tip, 0.0, 1.0, 0.05, 100.0, "%", 0)
 
 
+ColourRanges: Any = make_dataclass(
+    "ColourRanges",
+    [(f"range_{name}", float, 0.0) for name in skin_colours() if name != "health"],
+    frozen=True,
+)
+"""How far colours reach, in SI units: on one side, or on both. 0 follows what is shown."""
+
+
 @dataclass(frozen=True)
-class View:
+class View(ColourRanges):
     """How the skin is shown."""
 
     colour_by: str = asked(
@@ -237,17 +232,3 @@ class View:
         ),
     )
     traced: tuple[int, ...] = ()  # elements whose last seconds are drawn
-    # How far colours reach, in SI units: on one side, or on both. 0 follows what is shown.
-    range_displacement: float = 0.0
-    range_xx: float = 0.0
-    range_yy: float = 0.0
-    range_xy: float = 0.0
-    range_first: float = 0.0
-    range_second: float = 0.0
-    range_mean: float = 0.0
-    range_gaussian: float = 0.0
-    range_residual_xx: float = 0.0
-    range_residual_yy: float = 0.0
-    range_residual_xy: float = 0.0
-    range_error_bar: float = 0.0
-    range_difference: float = 0.0

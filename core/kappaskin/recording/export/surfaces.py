@@ -1,12 +1,12 @@
 """Exported meshes of the skin's surface: STL, VTP and PVD."""
 
 import base64
+import html
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
@@ -196,7 +196,7 @@ class VtpSurfaces(SurfaceWriter):
         if self.request.folder is None:
             return
         sets = "".join(
-            f'<DataSet timestep="{at!r}" part="0" file={quoteattr(name)}/>\n'
+            f'<DataSet timestep="{at!r}" part="0" file="{html.escape(name)}"/>\n'
             for name, at in self.times.items()
         )
         (self.scratch / self.request.to.name).write_text(

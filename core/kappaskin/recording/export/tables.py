@@ -51,7 +51,6 @@ def columns(info: RecordingInfo) -> tuple[Column, ...]:
     """All of them, for P elements and Ni x Nj functions: of the frame, then of its estimate."""
     P = len(info.sensor.layout)
     lengths = {ELEMENT: P, ALONG: info.functions[0], ACROSS: info.functions[1]}
-    axes = {axis: tuple(map(str, range(length))) for axis, length in lengths.items()}
 
     def counts(exported: ExportedFrame) -> "NDArray[np.float64]":
         found = np.full(3 * P, np.nan)
@@ -59,11 +58,19 @@ def columns(info: RecordingInfo) -> tuple[Column, ...]:
         return found.reshape(3, P)
 
     nominal = next(quantity for quantity in REPORTED if quantity.name == "nominal")
-    made = {group: _columns(group, axes) for group in ("frame", "fit", "contact")}
+    made = {group: _columns(group, lengths) for group in ("frame", "fit", "contact")}
     return (
         Column("time", "s", "<f8", (), (), "when it came, since the recording began", _time),
         *made["frame"],
-        Column("counts", "", "<f8", (3, P), nominal.labels(axes), "NaN where not scanned", counts),
+        Column(
+            "counts",
+            "",
+            "<f8",
+            (3, P),
+            nominal.labels(lengths),
+            "NaN where not scanned",
+            counts,
+        ),
         *made["fit"],
         *made["contact"],
     )
@@ -73,15 +80,15 @@ def _time(exported: ExportedFrame) -> float:
     return exported.at
 
 
-def _columns(group: str, axes: dict[str, tuple[str, ...]]) -> list[Column]:
+def _columns(group: str, lengths: dict[str, int]) -> list[Column]:
     """The columns of the quantities of one group."""
     return [
         Column(
             f"{quantity.name}{suffix}",
             quantity.unit,
             quantity.kind,
-            tuple(len(axes[axis] if isinstance(axis, str) else axis) for axis in quantity.parts),
-            quantity.labels(axes) if quantity.parts else (),
+            quantity.shape(lengths),
+            quantity.labels(lengths) if quantity.parts else (),
             text,
             _value(getter),
         )
