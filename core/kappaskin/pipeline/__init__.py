@@ -13,6 +13,7 @@ from kappaskin.pipeline.reported import REPORTED as REPORTED
 from kappaskin.pipeline.reported import ROW as ROW
 from kappaskin.pipeline.reported import Getter as Getter
 from kappaskin.pipeline.reported import Number as Number
+from kappaskin.pipeline.reported import Readout as Readout
 from kappaskin.pipeline.reported import Reported as Reported
 from kappaskin.pipeline.reported import ReportedQuantity as ReportedQuantity
 from kappaskin.pipeline.reported import SkinColour as SkinColour

@@ -202,9 +202,11 @@ class ReportedQuantity:
 
     On the screen its numbers are called as in `labels_shown`, and each is `shown` in a unit, as so
     many times the value, with so many digits; without labels it is no readout. `header` says how
-    it stands in the window's header too. An element's value is a column `element_head` of its
-    card; `traced` is the title of what is drawn of it over time, which has to be a field of the
-    estimate. `colours` are what the skin may be coloured by of it.
+    it stands in the window's header too. `colours` are what the skin may be coloured by of it.
+
+    What has `COMPONENTS` at every element may be a column `element_head` of an element's card.
+    `traced` is the title of what is drawn of it over time: then it is a field of the estimate with
+    one of `colours` for each component, by whose names it is in the table of all elements.
     """
 
     name: str
@@ -290,9 +292,6 @@ class ReportedQuantity:
         """What gets the `published` numbers in order: whether several, as a list, and how."""
         if self.quick is not None:
             yield True, self.quick
-        elif self.interleaved and self.sd is not None:
-            value, sd = self._listed(self.value), self._listed(self.sd)
-            yield True, lambda r: [n for pair in zip(value(r), sd(r), strict=True) for n in pair]
         else:
             found = (self.value, len(self._keys)), (self.sd, len(self._sd_keys))
             for of, count in found:
@@ -505,13 +504,14 @@ _FIT = (
     ReportedQuantity(
         "curvature",
         "1/m",
-        _MISSING,
+        f"as calibration and tare make it; {_MISSING}",
         "curvature",
         symbol=_KAPPA,
         parts=(COMPONENTS, ELEMENT),
         group="fit",
         sd="noise",
         columns=("",),
+        shown=("1/m", 1.0, 2),
         element_head="reads",
         traced="Curvature",
         colours=_changes(
@@ -569,6 +569,7 @@ _FIT = (
         "residual",
         parts=(COMPONENTS, ELEMENT),
         group="fit",
+        shown=("1/m", 1.0, 2),
         element_head="fit leaves",
         colours=tuple(
             SkinColour(

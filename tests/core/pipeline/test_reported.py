@@ -1,7 +1,9 @@
 """One table of what an estimate reports: what is in it is in every file and message."""
 
+import dataclasses
 import json
 import math
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -10,12 +12,15 @@ from types import SimpleNamespace
 import pytest
 
 from kappaskin import load_scene
-from kappaskin.frames import COMPONENTS
-from kappaskin.pipeline import REPORTED, getters, readouts
+from kappaskin.frames import COMPONENTS, Estimate
+from kappaskin.pipeline import REPORTED, getters, readouts, stored
 from kappaskin.publish.foxglove_channels import CHANNELS
 from kappaskin.publish.message import CONTACT, SWITCHES
 from kappaskin.recording import messages as m
 from kappaskin.recording.export.tables import columns
+
+TESTS = Path(__file__).parents[2]
+GUIDE = runpy.run_path(str(TESTS / "guide_quantities.py"))
 
 COLUMNS = [
     "time",
@@ -168,67 +173,99 @@ def test_everything_recorded_of_a_contact_can_be_verified() -> None:
     assert recorded <= set(getters())
 
 
-ADDED = """
-import sys, json
+@pytest.mark.parametrize("page", GUIDE["TABLES"], ids=lambda page: page.name)
+def test_the_tables_of_the_guide_are_made_from_the_table(page: Path) -> None:
+    assert page.read_text("utf-8") == GUIDE["renewed"](page), "run python tests/guide_quantities.py"
+
+
+def test_every_field_of_an_estimate_has_its_type_from_the_table() -> None:
+    fields = {field.name: field.type for field in dataclasses.fields(Estimate)}
+    parts = {n: dataclasses.fields(fields[n]) for n in ("contact", "geometry")}
+    paths = {f"{name}.{field.name}" for name in parts for field in parts[name]}
+    assert {*stored()} >= paths | (fields.keys() - parts.keys())
+
+
+FOUND = """
+import json
+import sys
 from pathlib import Path
-from types import SimpleNamespace
 
-import h5py, numpy as np
-import kappaskin.pipeline as pipeline
-from kappaskin.pipeline.reported import ReportedQuantity
-import kappaskin.pipeline.reported as table
-
-pipeline.REPORTED = table.REPORTED = (
-    *table.REPORTED,
-    ReportedQuantity(
-        "twice", "N", "twice the force", lambda r: 2 * r.contact.force,
-        sd=lambda r: 2 * r.contact.force_sd,
-    ),
-)
+import h5py
+import numpy as np
 
 from kappaskin import Setup, Simulator, load_scene
-from kappaskin.pipeline import Pipeline
+from kappaskin.live.ring import Ring, slot_type
+from kappaskin.pipeline import Pipeline, Reported, getters, readouts, skin_colours
 from kappaskin.publish.foxglove_channels import CHANNELS
 from kappaskin.publish.message import EstimateMessage, MessageHeader
 from kappaskin.recording import ExportRequest
 from kappaskin.recording.export.writing import export_steps
 
-recording, folder = map(Path, sys.argv[1:])
+recording, folder, guide = map(Path, sys.argv[1:])
 found = {}
 for suffix in (".csv", ".npz", ".h5"):
     to = folder / f"out{suffix}"
     list(export_steps(ExportRequest(recording, to), folder))
+
+
+def doubled(file, name, half):
+    return np.array_equal(file[name][()], 2 * file[half][()], equal_nan=True)
+
+
 with np.load(folder / "out.npz") as npz, h5py.File(folder / "out.h5") as h5:
-    found["npz"] = np.array_equal(npz["twice"], 2 * npz["force"], equal_nan=True)
-    found["hdf5"] = np.array_equal(h5["twice_sd"][:], 2 * npz["force_sd"], equal_nan=True)
-    found["unit"] = h5["twice"].attrs["unit"]
+    for name, file in (("npz", npz), ("hdf5", h5)):
+        found[name] = doubled(file, "twice_sd", "force_sd")
+        found[name] &= doubled(file, "twice_read", "curvature")
+    found["units"] = (h5["twice"].attrs["unit"], h5["twice_read"].attrs["unit"]) == ("N", "1/m")
 heads = [line for line in (folder / "out.csv").read_text().splitlines() if line[0] != "#"][0]
-found["csv"] = heads.endswith(",twice [N],twice_sd [N]")
+found["csv"] = heads.endswith(",twice [N],twice_sd [N]") and "twice_read_xy_3 [1/m]" in heads
+
 scene = load_scene("off-centre")
-made = Pipeline(scene.sensor(), Setup())
+made = Pipeline(scene.sensor(), Setup(), 1)
 estimate = made(Simulator(scene).frame(0, lambda: 1.0))
 message = EstimateMessage(estimate, made.fitted, made, MessageHeader("sim", 0.0, 0, True))
 said = json.loads(message.contact)
 found["udp"] = abs(said["twice_N"] / said["force_N"] - 2) < 1e-4 and "twice_sd_N" in said
 described = json.loads(CHANNELS[0].schema)["properties"]["twice_N"]
 found["foxglove"] = described["description"] == "twice the force"
-print(json.dumps(found))
+
+ring, slot = Ring.create(), slot_type(made)
+ring.lay_out(1, slot)
+ring.write(estimate)
+got, (_, recent, _) = ring.read(1, slot), ring.recent(1, slot, 0)
+found["ring"] = np.array_equal(got.twice_read, estimate.twice_read)
+found["ring"] &= getters()["twice"](Reported(got)) == 2 * estimate.contact.force
+found["recent"] = np.array_equal(recent[0], [*got.curvature, *got.twice_read])
+ring.destroy()
+found["readouts"] = [r.value for r in readouts(got) if r.label == "Twice"] == [
+    2e3 * got.contact.force
+]
+found["colours"] = skin_colours()["twice_xy"].unit == "1/m"
+sys.path.insert(0, str(guide.parent))
+import guide_quantities
+
+found["guide"] = "| `twice_N` | twice the force |" in guide_quantities.keys()
+found["guide"] &= "| `twice_read` |" in guide_quantities.quantities()
+print(json.dumps({name: bool(whether) for name, whether in found.items()}))
 """
 
 
 @pytest.mark.slow
-def test_a_quantity_added_to_the_table_is_in_every_file_and_message(
+def test_quantities_added_to_the_table_are_in_every_file_message_and_slot(
     recording: Path, tmp_path: Path
 ) -> None:
     pytest.importorskip("h5py")
-    command = [sys.executable, "-c", ADDED, str(recording), str(tmp_path)]
+    code = (TESTS / "added_quantities.py").read_text("utf-8") + FOUND
+    given = [str(recording), str(tmp_path), str(TESTS / "guide_quantities.py")]
 
-    done = subprocess.run(command, capture_output=True, text=True, timeout=180)
+    done = subprocess.run(
+        [sys.executable, "-c", code, *given], capture_output=True, text=True, timeout=180
+    )
 
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
-    assert found.pop("unit") == "N"
-    assert found == dict.fromkeys(("npz", "hdf5", "csv", "udp", "foxglove"), True)
+    assert found == dict.fromkeys(found, True)
+    assert len(found) == 11
 
 
 def test_readouts_are_the_estimate_in_units_of_the_screen(messages_of) -> None:

@@ -20,14 +20,16 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin.estimation import FAULTS
-from kappaskin.frames import COMPONENTS, Estimate
-from kappaskin.pipeline import readouts
+from kappaskin.frames import Estimate
+from kappaskin.pipeline import REPORTED, Reported, readouts
 from kappaskin.sensing import Sensor
 from kappaskin_app.guard import guarded
 from kappaskin_app.widgets.layout import fit_rows
 
 FACTS = ("What", "Value", "95 % within", "Unit")
-ELEMENTS = ("Element", "x [mm]", "y [mm]", *(f"{name} [1/m]" for name in COMPONENTS), "Left out")
+_READ = tuple(quantity for quantity in REPORTED if quantity.traced)
+_HEADS = (f"{of.name.replace('_', ' ')} [{each.unit}]" for each in _READ for of in each.colours)
+ELEMENTS = ("Element", "x [mm]", "y [mm]", *_HEADS, "Left out")
 
 Rows = list[tuple[str, ...]]
 
@@ -46,11 +48,13 @@ def elements_of(estimate: Estimate, sensor: Sensor) -> Rows:
     places = 1e3 * sensor.layout.positions
     if estimate.curvature.shape[1] != len(places):
         return []  # of the skin before
+    reported = Reported(estimate)
+    read = [(each.forms[0][2](reported), each.shown[2]) for each in _READ]
     return [
         (
             str(number),
             *(_told(value, 1) for value in place),
-            *(_told(value, 2) for value in estimate.curvature[:, number]),
+            *(_told(value, digits) for values, digits in read for value in values[:, number]),
             FAULTS[estimate.suspect[number]],
         )
         for number, place in enumerate(places)

@@ -9,6 +9,7 @@ from PySide6.QtGui import QFont, QFontInfo, QResizeEvent
 from PySide6.QtWidgets import QApplication, QGridLayout, QLabel, QWidget
 
 from kappaskin.frames import Contact, Estimate
+from kappaskin.pipeline import REPORTED, Readout, Reported, readouts_of
 from kappaskin_app.theme import Theme
 from kappaskin_app.widgets.line import Line
 
@@ -50,38 +51,34 @@ FIELDS = {
         "Where one point load explains the readings best; spread: they are not of one; near rim: "
         "too near a held edge for place and force to be trusted.",
     ),
-    "force": ("Force", "How hard that load presses, with its error bar."),
-    "depth": (
-        "Depth",
-        "Displacement at the contact, with its error bar; positive is in.",
-    ),
-    "error": (
-        "Error at load",
-        "Reconstructed minus true displacement there (simulated only).",
-    ),
-    "rms": ("RMS error", "Root mean square error over the whole skin (simulated only)."),
 }
+_WIDTHS = {"contact": 22, "rate": 15, "lost": 19, "age": 10}
+"""Characters of each, as many as it mostly has."""
+_NUMBERS = [(each, each.header) for each in REPORTED if each.header is not None]
+for _quantity, _header in _NUMBERS:
+    FIELDS[_header.key] = (_quantity.labels_shown[0], _header.tip)
+    _WIDTHS[_header.key] = _header.width
 
 _DIGITS = 1.14  # as wide as a character on average, the space between two fields with it
 _SMALL = 0.85  # of a number's letters are those of its name
-_WIDTHS = {
-    "contact": 22,
-    "rate": 15,
-    "lost": 19,
-    "force": 14,
-    "depth": 15,
-    "age": 10,
-    "error": 10,
-    "rms": 9,
-}
-"""Characters of each, as many as it mostly has."""
+_LARGE = {"mN": "N"}
+"""The unit of what has a thousand or more of another."""
 
 
-def _with_error(value: float, sd: float, digits: int, unit: str) -> str:
+def _with_error(value: float, sd: float, digits: int, unit: str, sign: str = "") -> str:
     if not math.isfinite(value):
         return NONE
     bar = f" \N{PLUS-MINUS SIGN} {sd:.{digits}f}" if math.isfinite(sd) else ""
-    return f"{_number(value, digits)}{bar} {unit}"
+    return f"{_number(value, digits, sign)}{bar} {unit}"
+
+
+def _told(found: Readout, sign: str) -> str:
+    """A number of the table with its error bar."""
+    _, value, sd, _, unit, digits = found
+    if unit in _LARGE and abs(value) >= 1e3:
+        return _with_error(1e-3 * value, 1e-3 * sd, 3, _LARGE[unit], sign)
+    coarse = unit == "mm" and sd >= _FINE
+    return _with_error(value, sd, digits - coarse, unit, sign)
 
 
 def _number(value: float, digits: int, sign: str = "") -> str:
@@ -115,12 +112,6 @@ def _age(age: float, sd: float) -> str:
     if not math.isfinite(sd):
         return f"\N{GREATER-THAN OR EQUAL TO} {age:.0f} ms"
     return f"{age:.0f} ms" if sd < _TINY else _with_error(age, sd, 0 if sd >= 1 else 1, "ms")
-
-
-def _force(contact: Contact) -> str:
-    if abs(contact.force) >= 1:
-        return _with_error(contact.force, contact.force_sd, 3, "N")
-    return _with_error(contact.force * 1e3, contact.force_sd * 1e3, 1, "mN")
 
 
 class Readouts(QWidget):
@@ -198,18 +189,14 @@ class Readouts(QWidget):
 
     def show_estimate(self, estimate: Estimate | None) -> None:
         if estimate is None:
-            for key in ("contact", "force", "depth", "error", "rms"):
+            for key in ("contact", *(header.key for _, header in _NUMBERS)):
                 self._write(key, NONE)
             return
-        contact = estimate.contact
-        self._write("contact", _contact(contact))
-        self._write("force", _force(contact))
-        depth, sd = contact.displacement * 1e3, contact.displacement_sd * 1e3
-        digits = 3 if sd < _FINE else 2
-        self._write("depth", _with_error(depth, sd, digits, "mm"))
-        error, rms = estimate.error_at_load * 1e3, estimate.error_rms * 1e3
-        self._write("error", f"{_number(error, 3, '+')} mm" if math.isfinite(error) else NONE)
-        self._write("rms", f"{_number(rms, 3)} mm" if math.isfinite(rms) else NONE)
+        self._write("contact", _contact(estimate.contact))
+        reported = Reported(estimate)
+        for quantity, header in _NUMBERS:
+            (found,) = readouts_of(quantity, reported)
+            self._write(header.key, _told(found, "+" if header.signed else ""))
 
     def _write(self, key: str, text: str) -> None:
         self._numbers[key].show_text(text)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from kappaskin.errors import Refusal
+from kappaskin.pipeline import REPORTED
 from kappaskin.scenes import SCENES
 from kappaskin_app.features.lessons.expression import NUMBER, TRUTH, Expression, expression
 from kappaskin_app.features.lessons.figures import KINDS
@@ -30,8 +31,8 @@ READY = tuple(sorted(_FOLDER.glob("[0-9]*.md")))
 """The files of the lessons that come with the program, in their order."""
 
 DOCKS = ("curvature", "cost", "stability", "scene", "health", "compare")
-_NUMBERS = ("rate", "contact", "force", "depth", "error", "rms")
-READOUTS = tuple(f"readout-{name}" for name in _NUMBERS)
+_NUMBERS = (each.header.key for each in REPORTED if each.header is not None)
+READOUTS = tuple(f"readout-{name}" for name in ("rate", "contact", *_NUMBERS))
 _PLACES = {*DOCKS, *READOUTS, *SETTABLE}
 
 _FORMAT = 1

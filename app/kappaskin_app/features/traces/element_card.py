@@ -8,14 +8,16 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from kappaskin.frames import COMPONENTS
+from kappaskin.pipeline import REPORTED
 from kappaskin_app.theme import Theme
 from kappaskin_app.widgets.plots import Curve, CurvePlot
 
 Array = NDArray[np.float64]
 
+TRACED = tuple(quantity for quantity in REPORTED if quantity.traced)
 _NONE = "Click an element, on the skin or in a heatmap."
 _NONE_TRACED = "Click an element and press Trace it, on its card (Ctrl+Alt+E)."
-_TRACE = "The curvature over the last 10 s, in every frame that was computed, up to 500 a second."
+_TRACE = "{} over the last 10 s, in every frame that was computed, up to 500 a second."
 _SPECTRUM = (
     "The amplitude of the sine of each frequency that fits best to the last 10 s, by least squares "
     "(Lomb and Scargle), up to half of the frames in a second: hum stands out as a line."
@@ -38,8 +40,11 @@ class ElementCard(QWidget):
         self.button.setToolTip("Add this element to the traces (Ctrl+Alt+T), or take it out.")
         self.button.clicked.connect(lambda *_: self.traced.emit())
         self.button.setEnabled(False)
-        self.past = CurvePlot("Curvature", "1/m", True, _TRACE)
-        self.spectrum = CurvePlot("Amplitude", "1/m", False, _SPECTRUM)
+        self.pasts = [
+            CurvePlot(of.traced, of.unit, True, _TRACE.format(f"{of.traced} (xx, yy, xy)"))
+            for of in TRACED
+        ]
+        self.spectrum = CurvePlot("Amplitude", TRACED[0].unit, False, _SPECTRUM)
         left = QVBoxLayout()
         for widget in (self.title, self.facts):
             left.addWidget(widget)
@@ -48,8 +53,8 @@ class ElementCard(QWidget):
         around = QHBoxLayout(self)
         around.setContentsMargins(8, 4, 8, 6)
         around.addLayout(left, 4)
-        around.addWidget(self.past, 3)
-        around.addWidget(self.spectrum, 3)
+        for plot in (*self.pasts, self.spectrum):
+            around.addWidget(plot, 3)
 
     def show_facts(self, title: str, facts: str) -> None:
         """Write what is known of the element; nothing of none."""
@@ -62,9 +67,11 @@ class ElementCard(QWidget):
         self.button.setText("Do not &trace it" if traced else "&Trace it")
 
     def show_past(self, times: Array, values: Array, seconds: float) -> None:
-        """Draw `values` (T, 3) in 1/m at `times` (T,) in s up to now."""
-        curves = [Curve(name, n, values[:, n]) for n, name in enumerate(COMPONENTS)]
-        self.past.show_curves(times, curves, (-seconds, 0.0), "s")
+        """Draw `values` (T, 3 k) of k quantities at `times` (T,) in s up to now."""
+        for number, plot in enumerate(self.pasts):
+            of = values[:, 3 * number :]
+            curves = [Curve(name, n, of[:, n]) for n, name in enumerate(COMPONENTS)]
+            plot.show_curves(times, curves, (-seconds, 0.0), "s")
 
     def show_spectrum(self, frequencies: Array, amplitudes: Array) -> None:
         """Draw `amplitudes` (3, F) in 1/m at `frequencies` (F,) in Hz; or say so of none."""
@@ -76,8 +83,8 @@ class ElementCard(QWidget):
         self.spectrum.show_curves(frequencies, curves, span, "Hz")
 
     def show_theme(self, theme: Theme) -> None:
-        self.past.show_theme(theme)
-        self.spectrum.show_theme(theme)
+        for plot in (*self.pasts, self.spectrum):
+            plot.show_theme(theme)
 
 
 class Traces(QWidget):
@@ -87,7 +94,8 @@ class Traces(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.plots = [CurvePlot(f"Curvature {name}", "1/m", True, _TRACE) for name in COMPONENTS]
+        titles = [(f"{of.traced} {name}", of.unit) for of in TRACED for name in COMPONENTS]
+        self.plots = [CurvePlot(title, unit, True, _TRACE.format(title)) for title, unit in titles]
         around = QHBoxLayout(self)
         around.setContentsMargins(8, 4, 8, 6)
         for plot in self.plots:
@@ -97,7 +105,7 @@ class Traces(QWidget):
     def show_past(
         self, elements: Sequence[int], times: Array, values: Array, seconds: float
     ) -> None:
-        """Draw `values` (T, 3, k) in 1/m of k `elements` at `times` (T,) in s up to now."""
+        """Draw `values` (T, plots, k) of k `elements` at `times` (T,) in s up to now."""
         for row, plot in enumerate(self.plots):
             curves = [
                 Curve(str(element), n, values[:, row, n], element)

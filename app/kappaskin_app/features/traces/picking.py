@@ -11,8 +11,9 @@ from kappaskin.calibration import Calibration
 from kappaskin.estimation import amplitude_spectrum
 from kappaskin.frames import COMPONENTS, Estimate
 from kappaskin.live import Status
+from kappaskin.pipeline import REPORTED, Reported, ReportedQuantity
 from kappaskin.sensing import Sensor
-from kappaskin_app.features.traces.element_card import ElementCard, Traces
+from kappaskin_app.features.traces.element_card import TRACED, ElementCard, Traces
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.history import History
@@ -38,14 +39,15 @@ class Past:
 
     def forget(self, elements: int) -> None:
         """Begin anew with so many `elements`."""
-        self._least = max(_LEAST, SECONDS * 12 * elements / _LARGEST)
+        rows = len(COMPONENTS) * len(TRACED)
+        self._least = max(_LEAST, SECONDS * 4 * rows * elements / _LARGEST)
         count = round(SECONDS / self._least) + 1
         self._times = np.full(count, np.nan)
-        self._read: NDArray[np.float32] = np.empty((count, 3, elements), np.float32)
+        self._read: NDArray[np.float32] = np.empty((count, rows, elements), np.float32)
         self._next, self._last = 0, -np.inf
 
     def take(self, times: Array, readings: Array) -> None:
-        """Keep `readings` (T, 3, P) in 1/m at `times` (T,) in s, those not too near to another."""
+        """Keep `readings` (T, rows, P) at `times` (T,) in s, those not too near to another."""
         elements = readings.shape[2]
         for at, read in zip(times.tolist(), readings, strict=True):
             if elements != self._read.shape[2] or at < self._last:
@@ -55,7 +57,7 @@ class Past:
                 self._next, self._last = (self._next + 1) % len(self._times), at
 
     def of(self, elements: list[int]) -> tuple[Array, Array]:
-        """Times (T,) in s before the newest, upwards, and readings (T, 3, k) of k `elements`."""
+        """Times (T,) in s before the newest, upwards, and readings (T, rows, k) of k `elements`."""
         order = np.roll(np.arange(len(self._times)), -self._next)
         order = order[self._times[order] > self._last - SECONDS]
         read = self._read[order[:, None], :, np.asarray(elements, np.intp)]
@@ -63,7 +65,11 @@ class Past:
 
 
 _PM, _DASH = "\N{PLUS-MINUS SIGN}", "\N{EN DASH}"
-_HEADS = ("", "reads [1/m]", "fit leaves [1/m]", "gain", "offset [1/m]", "channel", "health")
+_READ = tuple(quantity for quantity in REPORTED if quantity.element_head)
+_HEADS = (
+    *("", *(f"{quantity.element_head} [{quantity.unit}]" for quantity in _READ)),
+    *("gain", "offset [1/m]", "channel", "health"),
+)
 
 
 def facts(element: int, sensor: Sensor, status: Status, estimate: Estimate) -> str:
@@ -95,15 +101,23 @@ def _row(
     name = COMPONENTS[number]
     found = [f for f in status.health.findings if f.channel == channel]
     health = "; ".join(f"{f.kind}: {f.figure}" for f in found) or "well"
-    read, left = estimate.curvature[number, element], estimate.residual[number, element]
+    reported = Reported(estimate)
     return (
         f"<b>{name}</b>",
-        f"{_number(read, '+z.2f')} {_PM} {_number(estimate.noise, '.2f')}",
-        _number(left, "+z.2f"),
+        *(_read(quantity, reported, number, element) for quantity in _READ),
         *_calibrated(status.setup.calibration, channel),
         str(_converted(sensor, channel)),
         "dead: the device says so" if sensor.layout.lacking[number, element] else health,
     )
+
+
+def _read(quantity: ReportedQuantity, reported: Reported, row: int, element: int) -> str:
+    """A component of a quantity of an element, with its error bar if it has one."""
+    (_, _, value), *others = quantity.forms
+    found, digits = value(reported), quantity.shown[2]
+    bars = [np.broadcast_to(of(reported), found.shape) for _, _, of in others[:1]]
+    told = [_number(bar[row, element], f".{digits}f") for bar in bars]
+    return f" {_PM} ".join([_number(found[row, element], f"+z.{digits}f"), *told])
 
 
 def _calibrated(calibration: Calibration | None, channel: int) -> tuple[str, str]:
@@ -250,7 +264,7 @@ class Picking(QObject):
 
     def _show_spectrum(self) -> None:
         times, values = self._past.of([self.element])
-        read = values[:, :, 0]
+        read = values[:, : len(COMPONENTS), 0]
         # A component that a dead channel lacks is nothing; a frame that lacks any is left out.
         there = np.isfinite(read).any(axis=0)
         whole = np.isfinite(read[:, there]).all(axis=1)

@@ -126,7 +126,7 @@ def test_a_click_on_the_skin_opens_the_card_which_traces_the_element(
     assert not card.isVisible()
     qtbot.mouseClick(window.membrane.plotter, left, pos=pixel_of(window, 17))
     until(lambda: card.isVisible() and "Element 17" in card.title.text())
-    until(lambda: len(card.past.curves) == 3 and len(card.spectrum.curves) == 3)
+    until(lambda: len(card.pasts[0].curves) == 3 and len(card.spectrum.curves) == 3)
     until(lambda: "\N{PLUS-MINUS SIGN}" in card.title.text())  # its error bar
     card.button.click()
     assert window.history.settings.traced == (17,)

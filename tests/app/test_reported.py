@@ -1,0 +1,76 @@
+"""A quantity added to the table of what an estimate reports is found everywhere on the screen."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+TESTS = Path(__file__).parents[1]
+
+FOUND = """
+import json
+
+import numpy as np
+from PySide6.QtWidgets import QApplication
+
+from kappaskin import Pipeline, Setup, Simulator, Status, load_scene
+from kappaskin_app.features.contact.numbers import ELEMENTS, elements_of, facts_of
+from kappaskin_app.features.contact.readouts import Readouts
+from kappaskin_app.features.heatmaps.maps import Maps
+from kappaskin_app.features.lessons.reading import READOUTS
+from kappaskin_app.features.traces.element_card import ElementCard, Traces
+from kappaskin_app.features.traces.picking import facts
+from kappaskin_app.shell.colouring import SHADES, Colouring
+from kappaskin_app.shell.settings import COLOURS, Settings
+
+app = QApplication([])
+scene = load_scene("off-centre")
+sensor, setup = scene.sensor(), Setup(4, 3, 9, 7)
+estimate = Pipeline(sensor, setup)(Simulator(scene).frame(0, lambda: 1.0))
+status = Status(sensor=sensor, setup=setup)
+found, twice = {}, 2 * estimate.curvature
+
+readouts = Readouts()
+readouts.show_estimate(estimate)
+force = 1e3 * estimate.contact.force
+found["header"] = readouts.text("twice").startswith(f"{2 * force:.1f} ")
+found["lessons"] = "readout-twice" in READOUTS
+found["facts"] = ("Twice", f"{2 * force:.1f}") in [row[:2] for row in facts_of(estimate, "")]
+at = ELEMENTS.index("twice xy [1/m]")
+found["elements"] = float(elements_of(estimate, sensor)[7][at]) == round(twice[2, 7], 3)
+found["card"] = "reads twice [1/m]" in facts(7, sensor, status, estimate)
+
+card, traces = ElementCard(), Traces()
+values = np.arange(12.0).reshape(2, 6)
+card.show_past(np.array([-1.0, 0.0]), values, 10.0)
+traces.show_past([3], np.array([-1.0, 0.0]), values[:, :, None], 10.0)
+found["card's past"] = card.pasts[1].curves[2].values.tolist() == [5.0, 11.0]
+found["traces"] = traces.plots[5].curves[0].values.tolist() == [5.0, 11.0]
+
+colouring = Colouring()
+colouring.follow(status)
+found["colours"] = np.array_equal(colouring.of_elements("twice_xy", estimate), twice[2])
+colouring.close()
+found["menu"] = dict(COLOURS)["twice_xy"] == "Twice xy" and not SHADES["twice_xy"].surface
+found["range"] = Settings(range_twice_xy=3.0).range_twice_xy == 3.0
+found["heatmaps"] = "twice_xy" in Maps().heatmaps
+print(json.dumps({name: bool(whether) for name, whether in found.items()}))
+"""
+
+
+@pytest.mark.slow
+def test_quantities_added_to_the_table_are_in_every_view() -> None:
+    code = (TESTS / "added_quantities.py").read_text("utf-8") + FOUND
+    environment = os.environ | {"QT_QPA_PLATFORM": "offscreen"}
+
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=180, env=environment
+    )
+
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found == dict.fromkeys(found, True)
+    assert len(found) == 11
