@@ -316,12 +316,6 @@ def _read(name: str, scene: Scene, N: int, makers: Mapping[str, _MakesSolver]) -
     )
 
 
-def _finer(scene: Scene, elements: int) -> Scene:
-    """The scene with so many elements along each side and a truth of 31 x 31 functions."""
-    layout = SensorLayout.regular(scene.plate.patch, elements, elements)
-    return replace(scene, layout=layout, reference=(31, 31))
-
-
 # A plate under a load
 
 _EXACT = 64  # functions along each side: under that load the series is summed to rounding
@@ -372,7 +366,8 @@ def comparisons() -> Generator[Comparison]:
     for scene in (centre, off_centre):
         name = f"Table 1, {scene.name}: 10 x 10 elements, 8 x 8 functions"
         yield _read(name, scene, 8, _SOLVERS | _BAYES | _SLOPES)
-    finer = _finer(centre, 24)
+    layout = SensorLayout.regular(centre.plate.patch, 24, 24)
+    finer = replace(centre, layout=layout, reference=(31, 31))
     yield _read("24 x 24 elements, 16 x 16 functions", finer, 16, _SOLVERS | _FAST | _SLOPES)
     name = "Table 2, 0.63 mm: 10 elements on half a circle, 8 functions"
     yield _read(name, fingertip_scene(0.63), 8, _SOLVERS)

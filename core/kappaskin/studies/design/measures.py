@@ -2,7 +2,6 @@
 
 import math
 import statistics
-import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -26,7 +25,7 @@ from kappaskin.frames import Array, Contact, Mask, Truth
 from kappaskin.mechanics import Plate
 from kappaskin.scenes import Indenter, Scene, Simulator, kept_effects
 from kappaskin.skin import Patch
-from kappaskin.studies.cost.bench import covered, points_on, rms_distance
+from kappaskin.studies.cost.bench import covered, points_on, rms_distance, seconds
 
 # Blocks of frames: what was true, what was read, what was fitted
 
@@ -197,12 +196,9 @@ def _rate(block: FrameBlock) -> Array:
 
 
 def _time(block: FrameBlock) -> Array:
-    taken, _ = list[float](), block.fit  # what remembers takes the frames in before
-    for K in block.curvature[np.arange(_CALLS) % len(block.curvature)]:
-        begun = time.perf_counter()
-        block.estimator(K)
-        taken.append(time.perf_counter() - begun)
-    return np.array([statistics.median(taken)])
+    _ = block.fit  # an estimator with a memory takes all frames in before
+    frames = block.curvature[np.arange(_CALLS) % len(block.curvature)]
+    return np.array([statistics.median(seconds(block.estimator, K) for K in frames)])
 
 
 MEASURES = {

@@ -4,14 +4,14 @@ import copy
 import json
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib.resources import files
 from itertools import pairwise, product
 from math import prod
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 import numpy as np
 import scipy
@@ -168,10 +168,8 @@ def check_product(axes: tuple[Axis, ...], most: int) -> None:
 # Tables [[draw]]: values that are drawn anew for every block of frames
 
 
-class Distribution(Protocol):
-    """Something that values are drawn from; all of its values lie within bounds."""
-
-    def __call__(self, rng: np.random.Generator) -> Any: ...
+Distribution = Callable[[np.random.Generator], Any]
+"""Something that values are drawn from; all of its values lie within bounds."""
 
 
 def _check_bounds(low: float, high: float) -> None:

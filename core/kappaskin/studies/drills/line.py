@@ -409,13 +409,12 @@ def _unplug(stand: Stand) -> DrillOutcome:
 
 def _suspend(stand: Stand) -> DrillOutcome:
     """Stop the process that plays the device for a while."""
-    stand.settle()
-    stand.device.signal(signal.SIGSTOP)
-    try:
-        stand.run(5.0 if stand.long else 1.0)
-    finally:
-        stand.device.signal(signal.SIGCONT)
-    stand.recover(_WITHIN)
+    with stand.fault(_WITHIN):
+        stand.device.signal(signal.SIGSTOP)
+        try:
+            stand.run(5.0 if stand.long else 1.0)
+        finally:
+            stand.device.signal(signal.SIGCONT)
     return stand.outcome()
 
 
