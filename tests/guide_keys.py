@@ -7,7 +7,8 @@ from pathlib import Path
 from types import UnionType
 from typing import Any, get_args, get_origin
 
-from kappaskin.scenes import PARTS, Key
+from kappaskin._schema import Key
+from kappaskin.scenes import PARTS
 
 PAGE = Path(__file__).parents[1] / "resources" / "kappaskin_resources" / "guide" / "scenes.md"
 HEADING = "## Every key"

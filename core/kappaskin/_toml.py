@@ -1,11 +1,272 @@
-"""TOML tables as text, laid out as a person would write them."""
+"""TOML: strict reading, of which every refusal names its line, and writing as a person would."""
 
+import difflib
 import json
+import re
 import textwrap
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Callable, Container, Generator, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import MISSING, fields
 from datetime import datetime
-from types import MappingProxyType
-from typing import Any, cast
+from pathlib import Path
+from types import MappingProxyType, UnionType
+from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
+
+from kappaskin.errors import Refusal
+
+# Reading
+
+_Made = TypeVar("_Made")
+
+REQUIRED = object()
+"""The default of a key that has none."""
+
+_KINDS: dict[Any, str] = {
+    float: "a number",
+    int: "a whole number",
+    bool: "true or false",
+    str: "a text",
+}
+
+# A name begins and ends with what is no space: else a line of spaces is tried in every way.
+_HEADER = re.compile(r"\s*(\[\[?)\s*([\w.\-\"']+(?: +[\w.\-\"']+)*)\s*\]\]?\s*(#.*)?$")
+_KEY = re.compile(r"""\s*("[^"]*"|'[^']*'|[\w\-"'.]+)\s*=""")
+_DEEP_TABLES = re.compile(r"(?:\.[\w\"'-]+){64}")  # tables in tables, which take long to read
+
+Place = tuple[str | int, ...]
+"""The way to a value: keys, and numbers from 0 where tables come in arrays."""
+
+
+def _names(dotted: str) -> list[str]:
+    if dotted[0] == dotted[-1] and dotted.count(dotted[0]) == 2 and dotted[0] in "\"'":
+        return [dotted[1:-1]]
+    return [name.strip().strip("\"'") for name in dotted.split(".")]
+
+
+def parsed(text: str, file: Path) -> dict[str, Any]:
+    """What the TOML `text`, of `file`, says."""
+    try:
+        if _DEEP_TABLES.search(text):
+            raise RecursionError
+        return tomllib.loads(text)
+    except ValueError as error:  # a whole number of thousands of digits is one of these, too
+        raise Refusal(f"{file}: expected a scene in TOML, got a mistake in it: {error}") from error
+    except RecursionError as error:
+        raise Refusal(f"{file}: expected a scene, got tables or lists nested too deep") from error
+
+
+class _LineNumbers:
+    """Where the keys of a file stand; of what is inside a value, where the value begins."""
+
+    def __init__(self, text: str) -> None:
+        self._lines: dict[Place, int] = {(): 1}
+        within, counts = list[str | int](), dict[str, int]()
+        in_text = False  # of several lines
+        for number, line in enumerate(text.split("\n"), 1):
+            was_in_text, quotes = in_text, line.count('"""') + line.count("'''")
+            in_text ^= quotes % 2 == 1
+            if was_in_text:
+                continue
+            if header := _HEADER.match(line):
+                if header[1] == "[[":
+                    counts[header[2]] = counts.get(header[2], -1) + 1
+                    for inner in [name for name in counts if name.startswith(f"{header[2]}.")]:
+                        del counts[inner]  # a new table has none yet
+                within = self._counted(_names(header[2]), counts)
+                self._lines[tuple(within)] = number
+            elif key := _KEY.match(line):
+                self._lines.setdefault((*within, *_names(key[1])), number)
+
+    @staticmethod
+    def _counted(names: list[str], counts: dict[str, int]) -> list[str | int]:
+        """The names with the number of the last table after those that are arrays of tables."""
+        place, dotted = list[str | int](), list[str]()
+        for name in names:
+            dotted.append(name)
+            place.append(name)
+            if ".".join(dotted) in counts:
+                place.append(counts[".".join(dotted)])
+        return place
+
+    def of(self, place: Place) -> int:
+        """The line of what is at `place`, or of the nearest thing around it."""
+        while place not in self._lines:
+            place = place[:-1]
+        return self._lines[place]
+
+
+class _Placed(Refusal):
+    """A refusal that says already where in the file it stands."""
+
+
+class TomlTable:
+    """What a file says at one `place`; it is refused where it says what nobody asks for."""
+
+    def __init__(
+        self, values: dict[str, Any], text: "str | _LineNumbers", name: str, place: Place = ()
+    ) -> None:
+        """The `values` that the `text` of a file of this `name` has at `place`."""
+        self._lines = _LineNumbers(text) if isinstance(text, str) else text
+        self._values, self._name, self.place = values, name, place
+        self._asked: set[str] = set()
+
+    def refusal(self, why: str, key: str = "") -> Refusal:
+        """The refusal of what stands at `key`, with its line."""
+        place = (*self.place, key) if key else self.place
+        return _Placed(f"{self._name}, line {self._lines.of(place)}: {_dotted(place)}{why}")
+
+    @contextmanager
+    def blamed(self, key: str = "") -> Generator[None]:
+        """Say of what is refused meanwhile where it stands in the file."""
+        try:
+            yield
+        except _Placed:
+            raise
+        except Refusal as refusal:
+            raise self.refusal(str(refusal), key) from refusal
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._values
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def is_table(self, key: str) -> bool:
+        """Whether there is a table at `key`."""
+        return isinstance(self._values[key], dict)
+
+    def listed(self, key: str) -> list[Any]:
+        """The list at `key`, of values of any kind."""
+        self._asked.add(key)
+        if not isinstance(value := self._values[key], list):
+            raise self.refusal(f"expected a list, got {value!r:.60}", key)
+        return cast("list[Any]", value)
+
+    def get(
+        self, key: str, kind: Any, default: Any = REQUIRED, within: Container[object] | None = None
+    ) -> Any:
+        """The value at `key`, of `kind`: float, int, bool, str, or a tuple of them.
+
+        Its numbers must be `within` a range, if one is given.
+        """
+        self._asked.add(key)
+        if key in self._values:
+            value: Any = self._as(self._values[key], kind, key)
+            if within is not None and not _all_within(value, within):
+                raise self.refusal(f"expected {within}, got {self._values[key]!r:.60}", key)
+            return value
+        if default is REQUIRED:
+            raise self.refusal(f"expected {key} = {_expected(kind)}, got none")
+        return default
+
+    def _as(self, value: Any, kind: Any, key: str) -> Any:
+        if isinstance(kind, UnionType):
+            listed = isinstance(value, list)
+            kind = next(k for k in get_args(kind) if listed == (get_origin(k) is tuple))
+        if get_origin(kind) is tuple and isinstance(value, list):
+            kinds, values = get_args(kind), cast("list[Any]", value)
+            each = kinds[:1] * len(values) if kinds[1:] == (...,) else kinds
+            if len(each) == len(values):
+                return tuple(self._as(v, k, key) for v, k in zip(values, each, strict=True))
+        elif kind is float and isinstance(value, int | float) and not isinstance(value, bool):
+            with suppress(OverflowError):  # of a whole number of hundreds of digits
+                return float(value)
+        elif type(value) is kind:
+            return value
+        raise self.refusal(f"expected {_expected(kind)}, got {value!r:.60}", key)
+
+    def table(self, key: str) -> "TomlTable":
+        """The table at `key`; an empty one when there is none."""
+        self._asked.add(key)
+        value = self._values.get(key, {})
+        if not isinstance(value, dict):
+            raise self.refusal(f"expected a table [{key}], got {value!r:.60}", key)
+        return self._inside(value, key)
+
+    def tables(self, key: str) -> "list[TomlTable]":
+        """The tables of the array [[key]]."""
+        self._asked.add(key)
+        value = self._values.get(key, [])
+        many = cast("list[Any]", value) if isinstance(value, list) else [value]
+        if not all(isinstance(one, dict) for one in many):
+            raise self.refusal(f"expected an array of tables [[{key}]], got {value!r:.60}", key)
+        return [self._inside(one, key, n) for n, one in enumerate(many)]
+
+    def _inside(self, values: Any, *place: str | int) -> "TomlTable":
+        """A table in this one, of these `values`."""
+        return TomlTable(values, self._lines, self._name, (*self.place, *place))
+
+    def make(
+        self,
+        kind: Callable[..., _Made],
+        limits: Mapping[str, Container[object]] | None = None,
+        **given: Any,
+    ) -> _Made:
+        """An instance of the dataclass `kind`, its fields as the table says, or as `given`.
+
+        Numbers must be within their `limits`, by key.
+        """
+        hints, values = get_type_hints(kind), dict(given)
+        for field in fields(cast("Any", kind)):
+            if field.init and field.name not in given:
+                required = field.default is MISSING and field.default_factory is MISSING
+                if required or field.name in self:
+                    values[field.name] = self.get(
+                        field.name, hints[field.name], within=(limits or {}).get(field.name)
+                    )
+                self._asked.add(field.name)
+        with self.blamed():
+            return kind(**values)
+
+    def choose(self, key: str, among: dict[str, _Made], default: Any = REQUIRED) -> _Made:
+        """What the name at `key` stands for."""
+        return self.stands_for(self.get(key, str, default), key, among)
+
+    def stands_for(self, name: str, key: str, among: dict[str, _Made]) -> _Made:
+        """What a `name` that stands at `key` stands for."""
+        if name not in among:
+            near = "".join(f"; did you mean {one!r}?" for one in _nearest(name, list(among)))
+            raise self.refusal(f"expected one of {', '.join(among)}, got {name!r}{near}", key)
+        return among[name]
+
+    def done(self, *others: str) -> None:
+        """Refuse a key that nobody asked for; it may be meant as one of those or of `others`."""
+        for key in self._values:
+            if key not in self._asked:
+                near = "".join(
+                    f"; did you mean {one}?" for one in _nearest(key, [*self._asked, *others])
+                )
+                known = near or f"; known are {', '.join(sorted(self._asked))}"
+                raise self.refusal(f"expected no such key{known}", key)
+
+
+def _all_within(value: Any, within: Container[object]) -> bool:
+    each = cast("tuple[Any, ...]", value) if isinstance(value, tuple) else (value,)
+    return all(one in within for one in each)
+
+
+def _nearest(name: str, known: list[str]) -> list[str]:
+    return difflib.get_close_matches(name, known, 1)
+
+
+def _dotted(place: Place) -> str:
+    """The way to a value as a person writes it, tables counted from one."""
+    text = ""
+    for part in place:
+        text += f"[{part + 1}]" if isinstance(part, int) else f".{part}"
+    return f"{text[1:]}: " if text else ""
+
+
+def _expected(kind: Any) -> str:
+    if get_origin(kind) is not tuple:
+        return _KINDS.get(kind, str(kind))
+    kinds = get_args(kind)
+    what = _KINDS.get(kinds[0], "value").removeprefix("a ")
+    return f"a list of {what}s" if kinds[1:] == (...,) else f"a list of {len(kinds)} {what}s"
+
+
+# Writing
 
 _WIDTH = 88
 _INDENT = "    "

@@ -63,7 +63,7 @@ ROOMS = {
         "estimation/placement studies/stability",
     ),
     "scene": (
-        "scenes/*",
+        "scenes/* _schema _toml",
         "scenes/stimulus scenes/scene scenes/read scenes/write scenes/schema scenes/plan "
         "scenes/simulator",
     ),

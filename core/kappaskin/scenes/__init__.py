@@ -12,9 +12,6 @@ from kappaskin.scenes.cylinders import check_strain as check_strain
 from kappaskin.scenes.cylinders import radii_for as radii_for
 from kappaskin.scenes.cylinders import schedule as schedule
 from kappaskin.scenes.cylinders import step_pairs as step_pairs
-from kappaskin.scenes.keys import Key as Key
-from kappaskin.scenes.keys import Unit as Unit
-from kappaskin.scenes.keys import instead_of as instead_of
 from kappaskin.scenes.plan import Plan as Plan
 from kappaskin.scenes.plan import kept_effects as kept_effects
 from kappaskin.scenes.plan import plan as plan
@@ -41,6 +38,4 @@ from kappaskin.scenes.simulator import Simulator as Simulator
 from kappaskin.scenes.stimulus import Indenter as Indenter
 from kappaskin.scenes.stimulus import Orbit as Orbit
 from kappaskin.scenes.stimulus import Stimulus as Stimulus
-from kappaskin.scenes.tables import TomlTable as TomlTable
-from kappaskin.scenes.tables import parsed as parsed
 from kappaskin.scenes.write import write_scene as write_scene

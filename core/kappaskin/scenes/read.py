@@ -10,6 +10,8 @@ from typing import Any, cast, get_type_hints
 
 import numpy as np
 
+from kappaskin._schema import Within
+from kappaskin._toml import TomlTable, parsed
 from kappaskin.bases import basis_for
 from kappaskin.errors import Refusal
 from kappaskin.mechanics import HeightMap, Load, Mesh, Plate, RigidObject
@@ -22,7 +24,6 @@ from kappaskin.scenes.effects import (
     IntermittentElements,
     StrainLimit,
     StuckElements,
-    Within,
 )
 from kappaskin.scenes.plan import effects_of
 from kappaskin.scenes.scene import LINEAR, EffectSelection, Scene, scaled_to
@@ -48,7 +49,6 @@ from kappaskin.scenes.stimulus import (
     RecordedMotion,
     Stimulus,
 )
-from kappaskin.scenes.tables import TomlTable, parsed
 from kappaskin.sensing import FIRST_GENERATION, SECOND_GENERATION, SensorLayout, Transduction
 from kappaskin.skin import Disk, Patch, Polygon
 

@@ -7,6 +7,8 @@ the guide come from it.
 import math
 from typing import Any
 
+from kappaskin._schema import Key, Part, PartKind, Unit, Within, fields_of
+from kappaskin._toml import REQUIRED
 from kappaskin.bases import EDGES
 from kappaskin.mechanics import (
     Block,
@@ -24,8 +26,7 @@ from kappaskin.mechanics import (
     Wedge,
 )
 from kappaskin.scenes.cylinders import RADII
-from kappaskin.scenes.effects import EFFECTS, Effect, Within
-from kappaskin.scenes.keys import Key, Part, PartKind, Unit, fields_of
+from kappaskin.scenes.effects import EFFECTS, Effect
 from kappaskin.scenes.scene import EffectSelection, Scene
 from kappaskin.scenes.stimulus import (
     EASES,
@@ -37,7 +38,6 @@ from kappaskin.scenes.stimulus import (
     TapStep,
     TurnStep,
 )
-from kappaskin.scenes.tables import REQUIRED
 from kappaskin.sensing import Amplifier, Converter, HalfBridge, Multiplexer, SensorLayout
 from kappaskin.skin import Disk, Patch, Polygon
 
@@ -206,6 +206,7 @@ ELEMENTS = Part(
         ),
     },
     (SensorLayout,),
+    either=(("grid", "positions"),),
 )
 
 ELECTRONICS = Part(
@@ -429,6 +430,7 @@ TOUCH = Part(
     },
     kinds=LOADS | OBJECTS,
     chosen_by="what",
+    either=(("force", "displacement"), ("force", "depth"), ("orbit", "path", "recorded")),
 )
 
 ORBIT = Part(

@@ -11,6 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
+from kappaskin._schema import Within
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics import (
@@ -21,7 +22,6 @@ from kappaskin.mechanics import (
     Plate,
     RigidObject,
 )
-from kappaskin.scenes.effects import Within
 from kappaskin.skin import Patch
 
 _SECONDS = Within(1e-6, 1e9, "s")

@@ -8,13 +8,13 @@ from typing import Any, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from kappaskin._schema import PartKind
 from kappaskin._toml import table
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics import Load, RigidObject
 from kappaskin.scenes.cylinders import RADII, Presentation, schedule
 from kappaskin.scenes.effects import EFFECTS, Effect, StrainLimit
-from kappaskin.scenes.keys import PartKind
 from kappaskin.scenes.plan import effects_of
 from kappaskin.scenes.read import CHAINS, LOOPS, read_scene, usual_reference
 from kappaskin.scenes.scene import Scene

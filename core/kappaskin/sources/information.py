@@ -10,11 +10,11 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from kappaskin._schema import Within
 from kappaskin.bases import check_edge
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.mechanics import Plate
 from kappaskin.scenes import PARTS, check_sides
-from kappaskin.scenes.effects import Within
 from kappaskin.sensing import (
     Amplifier,
     Converter,

@@ -10,7 +10,7 @@ import pytest
 
 from kappaskin import Refusal
 from kappaskin._toml import table
-from kappaskin.scenes import PARTS, Indenter, instead_of, load_scene, read_scene
+from kappaskin.scenes import PARTS, Indenter, load_scene, read_scene
 from kappaskin.scenes.effects import EFFECTS
 
 GUIDE = runpy.run_path(str(Path(__file__).parents[2] / "guide_keys.py"))
@@ -71,18 +71,19 @@ def test_the_examples_of_every_kind_are_what_a_reader_takes(part, kind):
 
     for name, example in PARTS[part].optional(kind).items():
         if name not in {"shape", *FILES}:
-            rest = {key: needed[key] for key in needed if key not in instead_of(name)}
+            rest = {key: needed[key] for key in needed if key not in PARTS[part].instead_of(name)}
             if "like" not in rest:  # which tells all of the loops
                 read_scene(with_one(part, kind, rest | {name: example}), Path("a.toml"))
 
 
 def test_what_cannot_stand_beside_a_key_says_the_same_of_it():
-    every = {name for part in PARTS.values() for name in part.keys}
-    for name in every:
-        for other in instead_of(name):
-            assert name in instead_of(other)
-    assert instead_of("force") == {"displacement", "depth"}
-    assert not instead_of("x")
+    for part in PARTS.values():
+        for name in part.keys:
+            for other in part.instead_of(name):
+                assert other in part.keys
+                assert name in part.instead_of(other)
+    assert PARTS["touch"].instead_of("force") == {"displacement", "depth"}
+    assert not PARTS["touch"].instead_of("x")
 
 
 TABLES = {"scene": "", "skin": "[skin]\n", "cylinders": "[cylinders]\n"}

@@ -8,8 +8,6 @@ from kappaskin.scenes.effects.effect import RunningEffect as RunningEffect
 from kappaskin.scenes.effects.effect import Size as Size
 from kappaskin.scenes.effects.effect import SkinEffect as SkinEffect
 from kappaskin.scenes.effects.effect import Survey as Survey
-from kappaskin.scenes.effects.effect import Within as Within
-from kappaskin.scenes.effects.effect import parameters as parameters
 from kappaskin.scenes.effects.electronics import CrossTalk as CrossTalk
 from kappaskin.scenes.effects.electronics import MainsHum as MainsHum
 from kappaskin.scenes.effects.electronics import Quantisation as Quantisation

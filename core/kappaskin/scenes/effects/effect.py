@@ -4,62 +4,20 @@ The size of an effect is judged by a `Survey` of the scene, so that what does no
 be left out.
 """
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
-from functools import cache, cached_property
-from numbers import Integral, Real
-from typing import Any, ClassVar, get_type_hints
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 
+from kappaskin._schema import parameters
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics import Plate
 from kappaskin.sensing import SensorLayout, Transduction
-
-
-@dataclass(frozen=True)
-class Within:
-    """Finite numbers from `least` to `most` in `unit`; only `whole` ones, `or_zero`, if it says so.
-
-    It annotates a field: `rise: Annotated[float, Within(-200, 200, "K")]`.
-    """
-
-    least: float
-    most: float = math.inf
-    unit: str = ""
-    whole: bool = False
-    or_zero: bool = False
-
-    def __contains__(self, value: object) -> bool:
-        if isinstance(value, bool) or not isinstance(value, Integral if self.whole else Real):
-            return False
-        try:
-            number = float(value)
-        except OverflowError:
-            return False
-        inside = self.least <= number <= self.most or (self.or_zero and not number)
-        return math.isfinite(number) and inside
-
-    def __str__(self) -> str:
-        upward = math.isinf(self.most)
-        text = f"at least {self.least:g}" if upward else f"{self.least:g} to {self.most:g}"
-        return f"{text} {self.unit}".rstrip() + (", a whole number" if self.whole else "")
-
-
-@cache
-def parameters(effect: type[Any]) -> dict[str, Within]:
-    """What each number that tells an effect of this class must be within, by its name."""
-    hints = get_type_hints(effect, include_extras=True)
-    return {
-        field.name: note
-        for field in fields(effect)
-        for note in getattr(hints[field.name], "__metadata__", ())
-        if isinstance(note, Within)
-    }
 
 
 def _check_ranges(name: str, effect: object) -> None:

@@ -5,14 +5,8 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from kappaskin.scenes.effects.effect import (
-    Effect,
-    ReadingEffect,
-    RunningEffect,
-    Size,
-    Survey,
-    Within,
-)
+from kappaskin._schema import Within
+from kappaskin.scenes.effects.effect import Effect, ReadingEffect, RunningEffect, Size, Survey
 from kappaskin.sensing import Transduction
 
 

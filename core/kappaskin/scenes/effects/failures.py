@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from kappaskin._schema import Within
 from kappaskin.errors import Refusal
 from kappaskin.scenes.effects.effect import (
     Effect,
@@ -15,7 +16,6 @@ from kappaskin.scenes.effects.effect import (
     RunningEffect,
     Size,
     Survey,
-    Within,
 )
 from kappaskin.sensing import SensorLayout
 

@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
+from kappaskin._schema import Within
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
@@ -17,7 +18,6 @@ from kappaskin.scenes.effects.effect import (
     RunningEffect,
     Size,
     Survey,
-    Within,
 )
 from kappaskin.sensing import (
     PrandtlIshlinskii,

@@ -6,8 +6,9 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
+from kappaskin._schema import Within
 from kappaskin.errors import Refusal
-from kappaskin.scenes.effects.effect import ReadingEffect, RunningEffect, Size, Survey, Within
+from kappaskin.scenes.effects.effect import ReadingEffect, RunningEffect, Size, Survey
 
 LARGEST = 6.0
 """Standard deviations that no reading of many frames is off by: one of 500 million is."""

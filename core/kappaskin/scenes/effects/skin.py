@@ -6,8 +6,9 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
+from kappaskin._schema import Within
 from kappaskin.mechanics import Plate
-from kappaskin.scenes.effects.effect import NOTHING, Size, SkinEffect, Survey, Within
+from kappaskin.scenes.effects.effect import NOTHING, Size, SkinEffect, Survey
 
 
 class _Backing(SkinEffect):

@@ -16,6 +16,7 @@ from typing import Any, cast
 import numpy as np
 import scipy
 
+from kappaskin._toml import TomlTable, parsed
 from kappaskin.errors import Refusal
 from kappaskin.estimation import (
     METHODS,
@@ -23,7 +24,7 @@ from kappaskin.estimation import (
     Estimator,
     check_placement,
 )
-from kappaskin.scenes import Scene, TomlTable, parsed, read_scene_text, scene_of
+from kappaskin.scenes import Scene, read_scene_text, scene_of
 from kappaskin.studies.design.measures import MEASURES, placed_estimator
 
 # Dotted places of values in a file

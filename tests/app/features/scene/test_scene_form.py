@@ -15,7 +15,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin.scenes import SCENES, Key, Unit
+from kappaskin._schema import Key, Unit
+from kappaskin.scenes import SCENES
 from kappaskin_app.features.scene.scene_form.form import SceneForm
 from kappaskin_app.features.scene.scene_form.sections import sections_of
 from kappaskin_app.features.scene.scene_text import changes

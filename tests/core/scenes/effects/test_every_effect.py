@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from kappaskin import Refusal, Transduction
+from kappaskin._schema import Within, parameters
 from kappaskin.scenes.effects import (
     EFFECTS,
     FIRST_GENERATION_LOOPS,
@@ -25,8 +26,6 @@ from kappaskin.scenes.effects import (
     Temperature,
     Tolerance,
     UniformNoise,
-    Within,
-    parameters,
 )
 from kappaskin.scenes.effects.electronics import CrossTalk, MainsHum
 from kappaskin.scenes.effects.noise import FlickerNoise

@@ -14,7 +14,8 @@ import numpy as np
 import kappaskin
 from kappaskin import *
 from kappaskin.scenes.effects import *
-from kappaskin.scenes.effects import EFFECTS, parameters
+from kappaskin._schema import parameters
+from kappaskin.scenes.effects import EFFECTS
 
 patch = Patch(0.1, 0.1)
 plate, layout = Plate(patch, tension=5.0), SensorLayout.regular(patch, 4, 4)

@@ -5,7 +5,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from kappaskin.scenes import PARTS, Key, instead_of
+from kappaskin._schema import Key
+from kappaskin.scenes import PARTS
 from kappaskin_app.features.scene.scene_text import changes
 from kappaskin_app.features.scene.scene_text.changes import Place
 from kappaskin_app.shell.effects import called, explained
@@ -302,7 +303,7 @@ def _offers(part: str, kind: str, values: Values, place: Place) -> tuple[Additio
         if name in values:
             continue
         key = _key(part, kind, name)
-        instead = sorted(instead_of(name) & set(values))
+        instead = sorted(PARTS[part].instead_of(name) & set(values))
         words = key.label + "".join(
             f" instead of {_key(part, kind, other).label.lower()}" for other in instead
         )

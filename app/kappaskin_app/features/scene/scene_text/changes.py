@@ -11,7 +11,7 @@ from typing import Any
 import tomlkit
 from tomlkit.items import AbstractTable, AoT, InlineTable, Table
 
-from kappaskin.scenes import PARTS, instead_of
+from kappaskin.scenes import PARTS
 from kappaskin_app.features.scene.scene_text.parsing import parsed
 from kappaskin_app.features.scene.scene_text.places import placed
 
@@ -44,7 +44,8 @@ def put_in(text: str, place: Place, key: str, value: Any) -> str:
         if isinstance(name, str) and name not in owner:
             owner[name] = _new(owner, is_super=name != place[-1])
         owner = owner[name]
-    values = {name: one for name, one in owner.items() if name not in instead_of(key)}
+    instead = PARTS[str(place[0])].instead_of(key) if place else set[str]()
+    values = {name: one for name, one in owner.items() if name not in instead}
     _set(document, place, values | {key: value})
     return _tidy(text, document)
 

@@ -1,19 +1,60 @@
-"""Keys of a scene file: what is declared of one, of a kind of table, and of a table.
+"""Schemas: what is declared of the keys of a file, of its tables, and of the kinds of these.
 
-What there is to declare is in `schema`. A key that becomes a field of a class has that field's kind
-and default; one of an effect has its range and unit as well.
+A key that becomes a field of a class has that field's kind and default, and its range and unit
+where the field is annotated with them.
 """
 
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, dataclass, field, fields, replace
 from functools import cache
+from numbers import Integral, Real
 from typing import Any, TypeVar, cast, get_args, get_type_hints
 
-from kappaskin.scenes.effects import Within, parameters
-from kappaskin.scenes.tables import REQUIRED, TomlTable
+from kappaskin._toml import REQUIRED, TomlTable
 
 _Made = TypeVar("_Made")
+
+
+@dataclass(frozen=True)
+class Within:
+    """Finite numbers from `least` to `most` in `unit`; only `whole` ones, `or_zero`, if it says so.
+
+    It annotates a field: `rise: Annotated[float, Within(-200, 200, "K")]`.
+    """
+
+    least: float
+    most: float = math.inf
+    unit: str = ""
+    whole: bool = False
+    or_zero: bool = False
+
+    def __contains__(self, value: object) -> bool:
+        if isinstance(value, bool) or not isinstance(value, Integral if self.whole else Real):
+            return False
+        try:
+            number = float(value)
+        except OverflowError:
+            return False
+        inside = self.least <= number <= self.most or (self.or_zero and not number)
+        return math.isfinite(number) and inside
+
+    def __str__(self) -> str:
+        upward = math.isinf(self.most)
+        text = f"at least {self.least:g}" if upward else f"{self.least:g} to {self.most:g}"
+        return f"{text} {self.unit}".rstrip() + (", a whole number" if self.whole else "")
+
+
+@cache
+def parameters(made: type[Any]) -> dict[str, Within]:
+    """What each number that a class is made from must be within, by its name."""
+    hints = get_type_hints(made, include_extras=True)
+    return {
+        field.name: note
+        for field in fields(made)
+        for note in getattr(hints[field.name], "__metadata__", ())
+        if isinstance(note, Within)
+    }
 
 
 @dataclass(frozen=True)
@@ -140,9 +181,10 @@ class PartKind:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One table of a scene file: its keys, the classes that they are fields of, and its kinds.
+    """One table of a file: its keys, the classes that they are fields of, and its kinds.
 
-    The key `chosen_by` says of which kind a table is.
+    The key `chosen_by` says of which kind a table is; of the keys in one of `either` only one may
+    stand there.
     """
 
     label: str
@@ -150,6 +192,7 @@ class Part:
     made: tuple[type[Any], ...] = ()
     kinds: Mapping[str, PartKind] = field(default_factory=dict[str, PartKind])
     chosen_by: str = ""
+    either: tuple[tuple[str, ...], ...] = ()
 
     def key(self, name: str, kind: str = "") -> Key:
         """What is declared of a key in a table of this `kind`; of an unknown key, its name."""
@@ -179,12 +222,16 @@ class Part:
         """All that a table of this kind may say, with examples."""
         return self.needed(kind) | self.optional(kind)
 
+    def instead_of(self, name: str) -> set[str]:
+        """The keys that cannot stand beside the one of this name."""
+        return {other for group in self.either if name in group for other in group} - {name}
+
     def missing(self, kind: str, there: Collection[str]) -> dict[str, Any]:
         """What a table of this kind needs and lacks, nothing else being `there` in its stead."""
         return {
             name: example
             for name, example in self.needed(kind).items()
-            if name not in there and not instead_of(name) & set(there)
+            if name not in there and not self.instead_of(name) & set(there)
         }
 
     @property
@@ -216,17 +263,3 @@ class Part:
     def make(self, table: TomlTable, made: Callable[..., _Made], **given: Any) -> _Made:
         """What `table` says as an instance of a class, of which some fields are `given`."""
         return table.make(made, self.limits, **given)
-
-
-_EITHER = (
-    ("force", "displacement"),
-    ("force", "depth"),
-    ("grid", "positions"),
-    ("orbit", "path", "recorded"),
-)
-
-
-def instead_of(key: str) -> set[str]:
-    """The keys that cannot stand beside `key`."""
-    groups = [group for group in _EITHER if key in group]
-    return {other for group in groups for other in group} - {key}
