@@ -45,8 +45,8 @@ if TYPE_CHECKING:
     from kappaskin.mechanics import RectangleLoad as RectangleLoad
     from kappaskin.pipeline import Pipeline as Pipeline
     from kappaskin.pipeline import Setup as Setup
+    from kappaskin.pipeline import setup_from_text as setup_from_text
     from kappaskin.recording import Recording as Recording
-    from kappaskin.recording import setup_from_text as setup_from_text
     from kappaskin.scenes import Scene as Scene
     from kappaskin.scenes import Simulator as Simulator
     from kappaskin.scenes import Stimulus as Stimulus
@@ -75,8 +75,8 @@ else:
         ("frames", "Contact Estimate Event Frame"),
         ("live", "Engine Status"),
         ("mechanics", "DiscLoad GaussianLoad LineLoad Plate PointLoad RectangleLoad"),
-        ("pipeline", "Pipeline Setup"),
-        ("recording", "Recording setup_from_text"),
+        ("pipeline", "Pipeline Setup setup_from_text"),
+        ("recording", "Recording"),
         ("scenes", "Scene Simulator Stimulus load_scene planned read_scene write_scene"),
         ("sensing", "Sensor SensorLayout Transduction"),
         ("skin", "Disk Patch Polygon"),

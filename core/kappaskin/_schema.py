@@ -5,7 +5,7 @@ where the field is annotated with them.
 """
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import MISSING, dataclass, field, fields, replace
 from functools import cache
 from numbers import Integral, Real
@@ -84,7 +84,8 @@ class Key:
     """One key of a table: `label` and `tip` on the screen, and what its value may be.
 
     `kind` is float, int, bool, str or a tuple of them. The reader refuses what is not within
-    `limits`; `least` and `most` bound an editor where the class that is made refuses the rest.
+    `limits`; `least` and `most` bound an editor further, or alone where the class that is made
+    refuses the rest.
     `choices` are names in the file with their words. An editor begins with the `example`, or the
     default; what is not `offered` it cannot add. Behind a written value stands its unit, unless
     there is a `comment`.
@@ -124,7 +125,8 @@ class Key:
         """The least and the largest number that an editor offers, in the unit of the file."""
         if self.limits is None:
             return self.least, self.most
-        return 0.0 if self.limits.or_zero else self.limits.least, self.limits.most
+        least = 0.0 if self.limits.or_zero else self.limits.least
+        return max(self.least, least), min(self.most, self.limits.most)
 
     @property
     def explained(self) -> str:
@@ -260,6 +262,14 @@ class Part:
         key = self.key(name)
         return table.choose(name, {choice: choice for choice, _ in key.choices}, key.default)
 
-    def make(self, table: TomlTable, made: Callable[..., _Made], **given: Any) -> _Made:
-        """What `table` says as an instance of a class, of which some fields are `given`."""
-        return table.make(made, self.limits, **given)
+    def make(
+        self, table: TomlTable, made: type[_Made], complete: bool = False, **given: Any
+    ) -> _Made:
+        """What `table` says as an instance of a class, of which some fields are `given`.
+
+        A `complete` table leaves out no field.
+        """
+        for name in fields_of(made).keys() & self.keys.keys():
+            if name in table and name not in given and self.key(name).choices:
+                given[name] = self.choose(table, name)
+        return table.make(made, self.limits, complete, **given)

@@ -1,7 +1,8 @@
-"""TOML: strict reading, of which every refusal names its line, and writing as a person would."""
+"""TOML and JSON read strictly, with the line of what is refused; TOML written as people would."""
 
 import difflib
 import json
+import math
 import re
 import textwrap
 import tomllib
@@ -10,7 +11,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import MISSING, fields
 from datetime import datetime
 from pathlib import Path
-from types import MappingProxyType, UnionType
+from types import MappingProxyType, NoneType, UnionType
 from typing import Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 from kappaskin.errors import Refusal
@@ -54,6 +55,24 @@ def parsed(text: str, file: Path) -> dict[str, Any]:
         raise Refusal(f"{file}: expected a scene in TOML, got a mistake in it: {error}") from error
     except RecursionError as error:
         raise Refusal(f"{file}: expected a scene, got tables or lists nested too deep") from error
+
+
+def json_table(text: str) -> "TomlTable":
+    """The object that the JSON `text` is; a `Refusal` for another, and for what is no number."""
+    try:
+        found = json.loads(text, parse_float=_finite, parse_constant=_finite)
+    except (ValueError, RecursionError) as error:
+        raise Refusal(str(error)) from error
+    if not isinstance(found, dict):
+        raise Refusal(f"expected an object with keys, got {found!r:.80}")
+    return TomlTable(cast("dict[str, Any]", found))
+
+
+def _finite(text: str) -> float:
+    """The number in `text`; JSON has no infinity and no NaN."""
+    if not math.isfinite(value := float(text)):
+        raise ValueError(f"expected a number, got {text}")
+    return value
 
 
 class _LineNumbers:
@@ -104,9 +123,16 @@ class TomlTable:
     """What a file says at one `place`; it is refused where it says what nobody asks for."""
 
     def __init__(
-        self, values: dict[str, Any], text: "str | _LineNumbers", name: str, place: Place = ()
+        self,
+        values: dict[str, Any],
+        text: "str | _LineNumbers | None" = None,
+        name: str = "",
+        place: Place = (),
     ) -> None:
-        """The `values` that the `text` of a file of this `name` has at `place`."""
+        """The `values` that the `text` of a file of this `name` has at `place`.
+
+        Without a text no refusal names a line.
+        """
         self._lines = _LineNumbers(text) if isinstance(text, str) else text
         self._values, self._name, self.place = values, name, place
         self._asked: set[str] = set()
@@ -114,7 +140,8 @@ class TomlTable:
     def refusal(self, why: str, key: str = "") -> Refusal:
         """The refusal of what stands at `key`, with its line."""
         place = (*self.place, key) if key else self.place
-        return _Placed(f"{self._name}, line {self._lines.of(place)}: {_dotted(place)}{why}")
+        line = f"{self._name}, line {self._lines.of(place)}: " if self._lines else ""
+        return _Placed(f"{line}{_dotted(place)}{why}")
 
     @contextmanager
     def blamed(self, key: str = "") -> Generator[None]:
@@ -161,9 +188,12 @@ class TomlTable:
         return default
 
     def _as(self, value: Any, kind: Any, key: str) -> Any:
+        whole = kind
         if isinstance(kind, UnionType):
+            if value is None and NoneType in get_args(kind):
+                return None
             listed = isinstance(value, list)
-            kind = next(k for k in get_args(kind) if listed == (get_origin(k) is tuple))
+            kind = next((k for k in get_args(kind) if listed == (get_origin(k) is tuple)), kind)
         if get_origin(kind) is tuple and isinstance(value, list):
             kinds, values = get_args(kind), cast("list[Any]", value)
             each = kinds[:1] * len(values) if kinds[1:] == (...,) else kinds
@@ -174,7 +204,7 @@ class TomlTable:
                 return float(value)
         elif type(value) is kind:
             return value
-        raise self.refusal(f"expected {_expected(kind)}, got {value!r:.60}", key)
+        raise self.refusal(f"expected {_expected(whole)}, got {value!r:.60}", key)
 
     def table(self, key: str) -> "TomlTable":
         """The table at `key`; an empty one when there is none."""
@@ -201,17 +231,18 @@ class TomlTable:
         self,
         kind: Callable[..., _Made],
         limits: Mapping[str, Container[object]] | None = None,
+        complete: bool = False,
         **given: Any,
     ) -> _Made:
         """An instance of the dataclass `kind`, its fields as the table says, or as `given`.
 
-        Numbers must be within their `limits`, by key.
+        Numbers must be within their `limits`, by key; a `complete` table leaves out no field.
         """
         hints, values = get_type_hints(kind), dict(given)
         for field in fields(cast("Any", kind)):
             if field.init and field.name not in given:
-                required = field.default is MISSING and field.default_factory is MISSING
-                if required or field.name in self:
+                usual = field.default is not MISSING or field.default_factory is not MISSING
+                if complete or not usual or field.name in self:
                     values[field.name] = self.get(
                         field.name, hints[field.name], within=(limits or {}).get(field.name)
                     )
@@ -259,6 +290,8 @@ def _dotted(place: Place) -> str:
 
 
 def _expected(kind: Any) -> str:
+    if isinstance(kind, UnionType):
+        return " or ".join(_expected(one) for one in get_args(kind) if one is not NoneType)
     if get_origin(kind) is not tuple:
         return _KINDS.get(kind, str(kind))
     kinds = get_args(kind)

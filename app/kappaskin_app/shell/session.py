@@ -25,7 +25,8 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.badge import state_of
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.loads import Memo, tried
-from kappaskin_app.shell.settings import SceneSettings, Settings, part
+from kappaskin_app.shell.settings import EstimatorSettings, SceneSettings, Settings, part
+from kappaskin_app.shell.settings.asks import setup_values
 from kappaskin_app.shell.settings.load import Written
 from kappaskin_app.shell.settings.publishing import Sending
 from kappaskin_app.shell.settings.sensor import Scanning
@@ -129,12 +130,10 @@ def _setup_of(settings: Settings, sensor: Sensor | None = None, base: Setup = _B
 
     What no setting asks for is as in `base`.
     """
-    s, named = settings, {"calibration": None, "tare": None}
-    setup = replace(
-        base, Ni=s.functions_x, Nj=s.functions_y, edge=s.fit_edge, method=s.method, **named
-    )
+    chosen = setup_values(settings, EstimatorSettings)
+    setup = replace(base, **chosen, calibration=None, tare=None)
     for name in ("calibration", "tare"):
-        found: Calibration | Tare | None = getattr(s, name)
+        found: Calibration | Tare | None = getattr(settings, name)
         if found is not None and sensor is not None:
             with suppress(Refusal):
                 found.check(sensor)

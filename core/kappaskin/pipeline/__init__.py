@@ -1,7 +1,6 @@
 """Pipeline: frames to estimates, and files of readings to files of shapes."""
 
 from kappaskin.pipeline.pipeline import Pipeline as Pipeline
-from kappaskin.pipeline.pipeline import Setup as Setup
 from kappaskin.pipeline.quantities import ErrorBars as ErrorBars
 from kappaskin.pipeline.quantities import Quantities as Quantities
 from kappaskin.pipeline.reconstruct import reconstruct as reconstruct
@@ -24,3 +23,7 @@ from kappaskin.pipeline.reported import readouts as readouts
 from kappaskin.pipeline.reported import readouts_of as readouts_of
 from kappaskin.pipeline.reported import skin_colours as skin_colours
 from kappaskin.pipeline.reported import stored as stored
+from kappaskin.pipeline.setup import SETUP as SETUP
+from kappaskin.pipeline.setup import Setup as Setup
+from kappaskin.pipeline.setup import setup_from_text as setup_from_text
+from kappaskin.pipeline.setup import setup_to_text as setup_to_text

@@ -14,9 +14,10 @@ from kappaskin.bases import Basis, ValueMap, basis_for
 from kappaskin.calibration import Calibration, Corrector, DriftMonitor, Rest, Tare
 from kappaskin.contact import NO_CONTACT, LoadDetector, PointContact, contact_geometry
 from kappaskin.errors import RankDeficient, Refusal
-from kappaskin.estimation import METHODS, RIM_SD, Fit, estimator_for
+from kappaskin.estimation import Fit, estimator_for
 from kappaskin.frames import OVERTAKEN, Array, Estimate, Frame, Mask, Truth
 from kappaskin.health import Exclusion, exclude
+from kappaskin.pipeline.setup import Setup
 from kappaskin.sensing import Sensor
 
 _LOOSE = 100.0  # times the error bars with every reading: beyond it a shape is undetermined
@@ -61,29 +62,6 @@ class FrameAssembly(Stateful):
         known = (age >= 0) & (age < self._age)
         held = np.where(known, self._values, flat)
         return held.reshape(curvature.shape), np.isfinite(curvature)
-
-
-@dataclass(frozen=True)
-class Setup:
-    """Settings of a pipeline: Ni x Nj functions, a surface of nx x ny points.
-
-    `edge` says which functions; empty, those for the edge that the sensor says it has. `method` is
-    one of `METHODS`. A channel that a frame leaves out keeps its last reading until that is
-    `hold` s old. Readings are relative to the zero of the `tare` and corrected by the
-    `calibration`, both of which must be the sensor's own. A rim that gives is expected to move by
-    `rim_sd` in m.
-    """
-
-    Ni: int = 8
-    Nj: int = 8
-    nx: int = 65
-    ny: int = 65
-    edge: str = ""
-    method: str = next(iter(METHODS))
-    hold: float = 0.1
-    calibration: Calibration | None = None
-    tare: Tare | None = None
-    rim_sd: float = RIM_SD
 
 
 @dataclass(frozen=True)

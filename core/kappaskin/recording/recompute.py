@@ -4,22 +4,23 @@ import math
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 from typing import Any
 
 from kappaskin._state import StateArrays
 from kappaskin.bases import check_edge
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Estimate, Frame, Truth
-from kappaskin.pipeline import Pipeline, Setup
+from kappaskin.pipeline import Pipeline, Setup, setup_from_text
 from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import decode
 from kappaskin.recording.reading import RecordedMessage, Recording
-from kappaskin.recording.setup_text import setup_from_text
 from kappaskin.sensing import Sensor
 from kappaskin.sources import Accounting, ClockState, Decoder, Interpreter, RecordedClock, wire
 
 _UNREAD = 2**16  # messages kept until the device says what they are of
 _FUNCTIONS = 128  # of a truth along one side, at most
+_SETUPS = 500  # of a recording, the first of more
 
 
 class RecordedFrames:
@@ -237,3 +238,18 @@ def _shaped(fields: dict[str, Any]) -> Array:
         return fields["values"].reshape(fields["shape"])
     except ValueError as error:
         raise Refusal(f"expected what was remembered in its shape: {error!s:.80}") from error
+
+
+def recorded_setups(recording: Recording) -> list[tuple[float, Setup]]:
+    """The setups in a recording, each with the time in s from its beginning on which it was used.
+
+    A `Refusal` where one is none.
+    """
+    messages = recording.messages_on(m.SETUP)
+    return [
+        (
+            (message.stamp - recording.first) * 1e-9,
+            setup_from_text(decode(m.STRING, message.data)["data"], recording.attachment),
+        )
+        for message in islice(messages, _SETUPS)
+    ]

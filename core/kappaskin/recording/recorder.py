@@ -9,11 +9,10 @@ import numpy as np
 from kappaskin._state import StateArrays, Stateful
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Estimate, Event, Frame, Truth
-from kappaskin.pipeline import Pipeline
+from kappaskin.pipeline import Pipeline, setup_to_text
 from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import MessageLayout, encode
 from kappaskin.recording.disk import ReservedFile
-from kappaskin.recording.setup_text import setup_to_text
 from kappaskin.recording.writing import RecordingFile, RecordingStatus
 from kappaskin.scenes import Scene, write_scene
 from kappaskin.sources import ClockState

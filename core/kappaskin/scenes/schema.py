@@ -126,15 +126,16 @@ SKIN = Part(
         ),
         "tension": Key(
             "Tension",
-            "Tension of the skin, as of a drum head.",
+            "Tension of the skin, as of a drum head; 7 N/m double the stiffness of Table 1's patch.",
             Unit.same("N/m"),
             limits=Within(1e-9, 1e6, "N/m", or_zero=True),
             example=10.0,
         ),
         "foundation": Key(
             "Foam",
-            "Foam below the skin: its pressure per displacement.",
-            Unit.same("N/m^3", "N/m\N{SUPERSCRIPT THREE}"),
+            "Foam below the skin: its pressure per displacement; 14 kN/m^3 double the stiffness of "
+            "Table 1's patch.",
+            Unit("N/m^3", "kN/m\N{SUPERSCRIPT THREE}", 1e3),
             limits=Within(1e-9, 1e12, "N/m^3", or_zero=True),
             example=1e4,
         ),
@@ -268,10 +269,22 @@ AMPLIFIER = Part(
 CONVERTER = Part(
     "Converter",
     {
-        "bits": Key("Resolution", "Bits of a reading.", Unit.same("bits"), 8, 24, comment=""),
+        "bits": Key(
+            "Resolution",
+            "Bits of a reading; each halves its step.",
+            Unit.same("bits"),
+            8,
+            24,
+            comment="",
+        ),
         "full_scale": Key("Full scale", "Input range, from minus to plus this.", _VOLT, 0.0),
         "offset": Key("Offset", "Reading at zero input.", _VOLT),
-        "conversion_time": Key("Conversion", "Conversion time of one channel.", _US, 0.0),
+        "conversion_time": Key(
+            "Conversion",
+            "Conversion time of one channel; it limits the frame rate.",
+            _US,
+            0.0,
+        ),
     },
     (Converter,),
 )

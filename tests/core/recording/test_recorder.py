@@ -24,10 +24,10 @@ from kappaskin._processes import BackgroundProcess
 from kappaskin.calibration import Tare
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.live import STREAMING, Engine, Status
+from kappaskin.pipeline import setup_from_text
 from kappaskin.recording import Recording, Verification, decode, verify_steps
 from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import MessageLayout
-from kappaskin.recording.setup_text import setup_from_text
 from kappaskin.recording.writing import part_of
 from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, CorruptedFrames, Creep, DroppedFrames
 from kappaskin.sources import open_source

@@ -193,6 +193,10 @@ WRONG = {
         HEAD + f"[elements]\ngrid = [{10**4000}, {10**4000}]\n",
         "at most 21845",
     ),
+    "a list for a number or none": (
+        HEAD + '[[touch]]\nwhat = "sphere"\nx = 0.05\ny = 0.05\nradius = 0.02\ndepth = [1.0]\n',
+        "touch\\[1\\].depth: expected a number, got \\[1.0\\]",
+    ),
     "a number beyond computing": (f"rate = {10**400}\n" + HEAD, "line 1: rate: expected a number"),
     "an endless number": ("seed = " + "9" * 5000 + "\n" + HEAD, "a mistake in it: .*digits"),
     "lists in lists": ("a = " + "[" * 9999 + "]" * 9999 + HEAD, "nested too deep"),

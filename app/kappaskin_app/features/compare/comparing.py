@@ -12,7 +12,8 @@ from kappaskin.live import PipelineStatus, Status
 from kappaskin.pipeline import REPORTED, Setup, readouts
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
-from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings import Compared, EstimatorSettings, Settings
+from kappaskin_app.shell.settings.asks import settings_from, setup_values
 
 Array = NDArray[np.float64]
 
@@ -63,15 +64,11 @@ _COMPARED = {label for each in REPORTED if each.sd is not None for label in each
 
 def other_setup(settings: Settings, setup: Setup) -> Setup:
     """B: the `setup` in use, but for what `settings` say of it."""
-    s = settings
     return replace(
         setup,
-        Ni=s.other_x,
-        Nj=s.other_y,
-        method=s.other_method,
-        edge=s.other_edge,
-        calibration=setup.calibration if s.other_calibrated else None,
-        tare=setup.tare if s.other_tared else None,
+        **setup_values(settings, Compared),
+        calibration=setup.calibration if settings.other_calibrated else None,
+        tare=setup.tare if settings.other_tared else None,
     )
 
 
@@ -100,18 +97,9 @@ class Comparing(QObject):
     def swap(self) -> None:
         """Let what is in use and B change places, as one change."""
         s = self._history.settings
-        self._history.change(
-            "Swap A and B",
-            -1,
-            functions_x=s.other_x,
-            functions_y=s.other_y,
-            method=s.other_method,
-            fit_edge=s.other_edge,
-            other_x=s.functions_x,
-            other_y=s.functions_y,
-            other_method=s.method,
-            other_edge=s.fit_edge,
-        )
+        a, b = setup_values(s, EstimatorSettings), setup_values(s, Compared)
+        swapped = settings_from(b, EstimatorSettings) | settings_from(a, Compared)
+        self._history.change("Swap A and B", -1, **swapped)
 
     def _ask(self) -> None:
         wanted = None

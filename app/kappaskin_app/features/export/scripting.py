@@ -9,8 +9,7 @@ from typing import Any
 
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Region
-from kappaskin.pipeline import Setup
-from kappaskin.recording import setup_to_text
+from kappaskin.pipeline import Setup, setup_to_text
 from kappaskin.scenes import SCENES, read_scene_text, scene_file, write_scene
 from kappaskin_app.shell.session import RECORDED, Session
 from kappaskin_app.shell.settings import Settings

@@ -20,6 +20,8 @@ from kappaskin_app.shell.background import Newest
 from kappaskin_app.shell.folders import recordings_folder
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import RECORDED, Session
+from kappaskin_app.shell.settings import EstimatorSettings
+from kappaskin_app.shell.settings.asks import settings_from
 
 FILES = "Recording (*.mcap *.mcap.part)"
 _MENU = "&Recording"
@@ -162,10 +164,7 @@ class Replaying(QObject):
         self._history.change(
             f"Settings of {self.seen.path.name}",
             -1,
-            functions_x=setup.Ni,
-            functions_y=setup.Nj,
-            method=setup.method,
-            fit_edge=setup.edge,
+            **settings_from(vars(setup), EstimatorSettings),
             calibration=setup.calibration,
             tare=setup.tare,
         )

@@ -10,7 +10,6 @@ from kappaskin_app.shell.settings.asks import Range as Range
 from kappaskin_app.shell.settings.asks import Several as Several
 from kappaskin_app.shell.settings.asks import Switch as Switch
 from kappaskin_app.shell.settings.asks import Text as Text
-from kappaskin_app.shell.settings.compared import Compared as Compared
 from kappaskin_app.shell.settings.designed import Designed as Designed
 from kappaskin_app.shell.settings.load import FREE_CASES as FREE_CASES
 from kappaskin_app.shell.settings.load import LOAD_CASES as LOAD_CASES
@@ -26,8 +25,8 @@ from kappaskin_app.shell.settings.sensor import Electronics as Electronics
 from kappaskin_app.shell.settings.sensor import Scanning as Scanning
 from kappaskin_app.shell.settings.sensor import Spoils as Spoils
 from kappaskin_app.shell.settings.shown import COLOURS as COLOURS
-from kappaskin_app.shell.settings.shown import METHOD_NAMES as METHOD_NAMES
 from kappaskin_app.shell.settings.shown import METHOD_SHORT as METHOD_SHORT
+from kappaskin_app.shell.settings.shown import Compared as Compared
 from kappaskin_app.shell.settings.shown import EstimatorSettings as EstimatorSettings
 from kappaskin_app.shell.settings.shown import Looked, Reading, View
 from kappaskin_app.shell.settings.skin import Skin

@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass
 
-from kappaskin_app.shell.settings.asks import MILLIMETRES, Choice, Range, asked
+from kappaskin.scenes import PARTS
+from kappaskin_app.shell.settings.asks import MILLIMETRES, Choice, Range, asked, asked_as
 
-MICROSECONDS = (1e6, "\N{MICRO SIGN}s")
+_CONVERTER = PARTS["converter"]
 PER_CENT = (1e2, "%")
 
 
@@ -12,34 +13,16 @@ PER_CENT = (1e2, "%")
 class Electronics:
     """The chain from gage to count."""
 
-    electronics: str = asked(
+    electronics: str = asked_as(
+        PARTS["electronics"].key("like"),
         "modern",
-        Choice(
-            "Electronics",
-            "Gages, bridge, amplifier and converter (Figs. 4 and 5). The paper's prototypes "
-            "convert 12 bits in 20 \N{MICRO SIGN}s. Choosing one brings its converter.",
-            (
-                ("modern", "Fast converter"),
-                ("second", "Second prototype"),
-                ("first", "First prototype"),
-            ),
-        ),
+        label="Electronics",
+        tip="Gages, bridge, amplifier and converter (Figs. 4 and 5). The paper's prototypes "
+        "convert 12 bits in 20 \N{MICRO SIGN}s. Choosing one brings its converter.",
     )
-    bits: int = asked(
-        16, Range("Converter", "Bits of the converter; each halves its step.", 8, 24, 1, 1.0, "bit")
-    )
-    conversion_time: float = asked(
-        5e-6,
-        Range(
-            "Per channel",
-            "Time to settle and convert one channel; a frame takes as many of them as it has "
-            "channels, which bounds the frame rate.",
-            1e-6,
-            1e-3,
-            1e-6,
-            *MICROSECONDS,
-            decimals=1,
-        ),
+    bits: int = asked_as(_CONVERTER.key("bits"), 16)
+    conversion_time: float = asked_as(
+        _CONVERTER.key("conversion_time"), 5e-6, step=1e-6, decimals=1, least=1e-6, most=1e-3
     )
 
 

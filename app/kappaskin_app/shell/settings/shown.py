@@ -3,9 +3,15 @@
 from dataclasses import dataclass, make_dataclass
 from typing import Any
 
-from kappaskin.pipeline import skin_colours
-from kappaskin_app.shell.settings.asks import Choice, Range, Several, Switch, asked
-from kappaskin_app.shell.settings.skin import EDGE_NAMES
+from kappaskin.pipeline import SETUP, skin_colours
+from kappaskin_app.shell.settings.asks import (
+    Choice,
+    Range,
+    Several,
+    Switch,
+    asked,
+    asked_of_setup,
+)
 
 
 @dataclass(frozen=True)
@@ -39,55 +45,36 @@ class Reading:
 
 
 COLOURS = tuple((name, colour.label) for name, colour in skin_colours().items())
-METHOD_NAMES = (
-    ("least-squares", "Least squares"),
-    ("as-printed", "As printed (Eq. 6)"),
-    ("direct", "Direct, each frame anew"),
-    ("fast", "Fast, a regular grid"),
-    ("tracking", "Tracking, from frame to frame"),
-    ("bayes", "Bayes, a plate's prior"),
-    ("finite-slope", "Finite slope"),
-    ("robust", "Robust, leaves out bad elements"),
-)
-METHOD_SHORT = {name: words.split(",")[0].split(" (")[0] for name, words in METHOD_NAMES}
+METHOD_SHORT = {
+    name: words.split(",")[0].split(" (")[0] for name, words in SETUP.key("method").choices
+}
 
 
 @dataclass(frozen=True)
 class EstimatorSettings:
     """The functions that the shape is made of, and how they are fitted."""
 
-    functions_x: int = asked(
-        8,
-        Range(
-            "Functions along x",
-            "Ni, the number of functions along x (Eq. 1). More follow finer shapes and more noise; "
-            "with more than elements both along x and along y, readings cannot decide all of them.",
-            1,
-            64,
-            1,
-        ),
+    functions_x: int = asked_of_setup("Ni")
+    functions_y: int = asked_of_setup("Nj")
+    method: str = asked_of_setup("method")
+    fit_edge: str = asked_of_setup("edge")
+
+
+@dataclass(frozen=True)
+class Compared:
+    """B, held against the setup in use, A: another basis and estimator on the same readings.
+
+    It has the calibration and tare in use, or none.
+    """
+
+    other_x: int = asked_of_setup("Ni", 6)
+    other_y: int = asked_of_setup("Nj", 6)
+    other_method: str = asked_of_setup("method")
+    other_edge: str = asked_of_setup("edge")
+    other_calibrated: bool = asked(
+        True, Switch("Calibration", "Use the calibration in use for B too; without, Eq. 8 as is.")
     )
-    functions_y: int = asked(
-        8, Range("Functions along y", "Nj, the same along y (Eq. 1).", 1, 64, 1)
-    )
-    method: str = asked(
-        "least-squares",
-        Choice(
-            "Estimator",
-            "How the shape is found from the readings. Every way tells its error bars; Cost of "
-            "accuracy (F9) shows what each takes and gives.",
-            METHOD_NAMES,
-        ),
-    )
-    fit_edge: str = asked(
-        "",
-        Choice(
-            "Edge assumed",
-            "How the fit believes that the skin is held. Another edge than the skin's own shows "
-            "what a wrong belief costs: compare the errors above.",
-            (("", "As the skin says"), *EDGE_NAMES),
-        ),
-    )
+    other_tared: bool = asked(True, Switch("Tare", "Use the tare in use for B too."))
 
 
 def _cut(side: str, axis: str) -> Range:

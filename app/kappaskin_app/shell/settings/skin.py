@@ -4,9 +4,9 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from kappaskin.bases import EDGES
+from kappaskin.scenes import PARTS
 from kappaskin.skin import Disk, Patch, Polygon
-from kappaskin_app.shell.settings.asks import MILLIMETRES, Choice, Range, Switch, asked
+from kappaskin_app.shell.settings.asks import MILLIMETRES, Choice, Range, asked, asked_as
 
 _FINGERTIP = 0.0129  # m, the paper's
 
@@ -58,7 +58,7 @@ SHAPES = {
 """By name; `make` is called with the settings named in `asks`, in their order."""
 
 
-EDGE_NAMES = tuple((name, name.capitalize()) for name in EDGES)
+_SKIN = PARTS["skin"]
 
 
 def _side(axis: str, more: str = "") -> Range:
@@ -111,48 +111,10 @@ class Skin:
             decimals=1,
         ),
     )
-    edge: str = asked(
-        "hinged",
-        Choice(
-            "Edge",
-            "How the skin is held along its edges. Hinged: it cannot move there but turns freely, "
-            "and a bent one keeps its length; sliding: the ends of a bent one are free to slide; "
-            "clamped: it cannot turn either; elastic: the rim of a flat rectangle gives.",
-            EDGE_NAMES,
-        ),
-    )
+    edge: str = asked_as(_SKIN.key("edge"), "hinged")
     elements_x: int = asked(10, _elements("x", "m"))
     elements_y: int = asked(10, _elements("y", "n"))
     dead_elements: tuple[int, ...] = ()  # by a demonstration
-    tension: float = asked(
-        0.0,
-        Range(
-            "Tension",
-            "How strongly the skin is stretched, like a drum head; 7 N/m double the stiffness of "
-            "Table 1's patch.",
-            0.0,
-            1000.0,
-            1.0,
-            1.0,
-            "N/m",
-            1,
-        ),
-    )
-    foam: float = asked(
-        0.0,
-        Range(
-            "Foam",
-            "Foundation modulus of a foam below: its pressure per displacement; 14 kN/m\u00b3 "
-            "double the stiffness of Table 1's patch.",
-            0.0,
-            1e7,
-            1e3,
-            1e-3,
-            "kN/m\u00b3",
-            1,
-        ),
-    )
-    fluid: bool = asked(
-        False,
-        Switch("Fluid", "A fluid below keeps its volume: pressed in here, the skin bulges there."),
-    )
+    tension: float = asked_as(_SKIN.key("tension"), 0.0, decimals=1, most=1000.0)
+    foam: float = asked_as(_SKIN.key("foundation"), 0.0, step=1e3, decimals=1, most=1e7)
+    fluid: bool = asked_as(_SKIN.key("fluid"), False)

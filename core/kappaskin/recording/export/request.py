@@ -13,13 +13,12 @@ from typing import Any, NamedTuple, Protocol
 from kappaskin.calibration import Calibration, Tare
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate, Frame
-from kappaskin.pipeline import Pipeline, Reported, Setup
+from kappaskin.pipeline import Pipeline, Reported, Setup, setup_from_text
 from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import decode
 from kappaskin.recording.disk import is_there
 from kappaskin.recording.messages import Topic
 from kappaskin.recording.reading import Recording
-from kappaskin.recording.setup_text import setup_from_text
 from kappaskin.sensing import Sensor
 from kappaskin.sources import sensor_from_json
 

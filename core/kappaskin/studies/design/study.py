@@ -279,7 +279,6 @@ def read_draw(table: TomlTable) -> tuple[str, Distribution]:
 
 # The setup
 
-_NAME = "the study"
 _MOST_READINGS = 2**23  # in a block: 64 MB for each array of them
 _ELSEWHERE = ("file", "recorded")  # keys of a touch that name other files
 
@@ -385,10 +384,7 @@ def _scene(top: TomlTable, file: Path) -> Scene:
 
 def setup_of(content: dict[str, Any]) -> PointSetup:
     """The setup of a point's `content`; its refusals name no file."""
-    try:
-        return read_setup(TomlTable(content, "", _NAME), Path("study.toml"))
-    except Refusal as refusal:
-        raise Refusal(str(refusal).removeprefix(f"{_NAME}, line 1: ")) from refusal
+    return read_setup(TomlTable(content), Path("study.toml"))
 
 
 def estimator_of(content: dict[str, Any], setup: PointSetup) -> Estimator:

@@ -10,7 +10,7 @@ from kappaskin.studies import Cost, EffectCost, Refused, Setting
 from kappaskin_app.features.accuracy.cost_plot import CostPlot
 from kappaskin_app.features.accuracy.costing import in_words
 from kappaskin_app.shell.effects import called
-from kappaskin_app.shell.settings.shown import METHOD_NAMES
+from kappaskin_app.shell.settings.shown import METHOD_SHORT
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.widgets.text import duration, length
 
@@ -68,7 +68,7 @@ def test_what_is_predicted_and_what_is_measured_stand_beside_each_other(
     assert 0 < measured.costing.measured()[1] < 1
 
 
-@pytest.mark.parametrize("method", [name for name, _ in METHOD_NAMES])
+@pytest.mark.parametrize("method", METHOD_SHORT)
 def test_any_setting_in_use_is_read_whole(measured: MainWindow, method: str) -> None:
     line = measured.cost.setting
     line.show_text(in_words(Setting(method, (12, 12), (16, 16))))

@@ -1,0 +1,135 @@
+"""Setup of a pipeline: its schema, and a setup as text that names its calibration and tare."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from kappaskin._schema import Key, Part, Unit, Within
+from kappaskin._toml import json_table
+from kappaskin.bases import EDGES
+from kappaskin.calibration import (
+    Calibration,
+    Tare,
+    calibration_from_toml,
+    calibration_to_toml,
+    tare_from_toml,
+    tare_to_toml,
+)
+from kappaskin.errors import Refusal
+from kappaskin.estimation import METHODS, RIM_SD
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Settings of a pipeline: Ni x Nj functions, a surface of nx x ny points.
+
+    `edge` says which functions; empty, those for the edge that the sensor says it has. `method` is
+    one of `METHODS`. A channel that a frame leaves out keeps its last reading until that is
+    `hold` s old. Readings are relative to the zero of the `tare` and corrected by the
+    `calibration`, both of which must be the sensor's own. A rim that gives is expected to move by
+    `rim_sd` in m.
+    """
+
+    Ni: int = 8
+    Nj: int = 8
+    nx: int = 65
+    ny: int = 65
+    edge: str = ""
+    method: str = next(iter(METHODS))
+    hold: float = 0.1
+    calibration: Calibration | None = None
+    tare: Tare | None = None
+    rim_sd: float = RIM_SD
+
+
+_COUNT = Within(1, 4096, whole=True)
+_SHOWN = 64  # functions along one side that an editor offers at most
+
+SETUP = Part(
+    "Setup",
+    {
+        "Ni": Key(
+            "Functions along x",
+            "Ni, the number of functions along x (Eq. 1). More follow finer shapes and more noise; "
+            "with more than elements both along x and along y, readings cannot decide all of them.",
+            most=_SHOWN,
+            limits=_COUNT,
+        ),
+        "Nj": Key("Functions along y", "Nj, the same along y (Eq. 1).", most=_SHOWN, limits=_COUNT),
+        "nx": Key("Points along x", "Of the surface that is computed.", limits=_COUNT),
+        "ny": Key("Points along y", "The same along y.", limits=_COUNT),
+        "hold": Key(
+            "Hold",
+            "For how long a channel that a frame leaves out keeps its last reading.",
+            Unit.same("s"),
+            limits=Within(0.0),
+        ),
+        "rim_sd": Key(
+            "Rim movement",
+            "Standard deviation expected of the movement of a rim that gives.",
+            Unit("m", "mm", 1e-3),
+            limits=Within(0.0),
+        ),
+        "edge": Key(
+            "Boundary condition",
+            "How the fit assumes the skin to be held. Another edge than the skin's own shows what "
+            "a wrong assumption costs.",
+            choices=(("", "From sensor"), *((edge, edge.capitalize()) for edge in EDGES)),
+        ),
+        "method": Key(
+            "Estimator",
+            "How the shape is found from the readings. Every estimator reports its error bars; "
+            "Cost of accuracy (F9) shows what each takes and gives.",
+            choices=(
+                ("least-squares", "Least squares"),
+                ("as-printed", "As printed (Eq. 6)"),
+                ("direct", "Direct, each frame anew"),
+                ("fast", "Fast, a regular grid"),
+                ("tracking", "Tracking, from frame to frame"),
+                ("bayes", "Bayes, a plate's prior"),
+                ("finite-slope", "Finite slope"),
+                ("robust", "Robust, leaves out bad elements"),
+            ),
+        ),
+        "calibration": Key("Calibration", "The file that readings are corrected by.", kind=str),
+        "tare": Key("Tare", "The file of the zero that readings are relative to.", kind=str),
+    },
+    (Setup,),
+)
+"""All that a setup says; in text, a calibration and a tare are the names of their files."""
+
+_LONGEST = 2**16  # characters of a setup
+
+
+def setup_to_text(setup: Setup) -> tuple[str, dict[str, bytes]]:
+    """The text, and by name the files that it names."""
+    keys, files = {name: getattr(setup, name) for name in SETUP.keys}, dict[str, bytes]()
+    for name, to_toml in (("calibration", calibration_to_toml), ("tare", tare_to_toml)):
+        if (made := keys.pop(name)) is not None:
+            keys[name] = f"{name}-{made.digest[:16]}.toml"
+            files[keys[name]] = to_toml(made).encode()
+    return json.dumps(keys), files
+
+
+def setup_from_text(text: str, file: Callable[[str], bytes]) -> Setup:
+    """The setup that `text` tells of, `file` giving what a name stands for.
+
+    A `Refusal` when it is none.
+    """
+    try:
+        if len(text) > _LONGEST:
+            raise Refusal(f"expected at most {_LONGEST} characters, got {len(text)}")
+        table = json_table(text)
+        calibration, tare = (SETUP.value(table, name) for name in ("calibration", "tare"))
+        setup = SETUP.make(table, Setup, complete=True, calibration=None, tare=None)
+        table.done()
+    except Refusal as refusal:
+        raise Refusal(f"expected a setup as it was recorded: {refusal}") from refusal
+    return replace(
+        setup,
+        calibration=calibration_from_toml(file(calibration), Path(calibration))
+        if calibration
+        else None,
+        tare=tare_from_toml(file(tare), tare) if tare else None,
+    )
