@@ -1,4 +1,4 @@
-"""The guide's tables of what a scene file may say, from the schema of its keys.
+"""The tables of what a scene, a setup and a sensor's description say, from their schemas.
 
 Run `python tests/guide_keys.py` when a key came, went or changed.
 """
@@ -7,10 +7,15 @@ from pathlib import Path
 from types import UnionType
 from typing import Any, get_args, get_origin
 
-from kappaskin._schema import Key
+from kappaskin._schema import Key, Part
+from kappaskin.pipeline import SETUP
 from kappaskin.scenes import PARTS
+from kappaskin.sources.information import SENSOR
 
-PAGE = Path(__file__).parents[1] / "resources" / "kappaskin_resources" / "guide" / "scenes.md"
+_PAGES = Path(__file__).parents[1] / "resources" / "kappaskin_resources"
+PAGE = _PAGES / "guide" / "scenes.md"
+OTHERS = {_PAGES / "recording" / "recording.md": SETUP, _PAGES / "wire" / "wire.md": SENSOR}
+"""Pages that have one table, with what it is of."""
 HEADING = "## Every key"
 _OPENING = """
 Lengths in a file are in metres, whatever unit the window shows. A key without a default is
@@ -38,23 +43,31 @@ def told() -> str:
     """The last section of the page."""
     tables = [f"{HEADING}\n{_OPENING}"]
     for part, place in _PLACES.items():
-        tables.append(f"### {place}\n\n{_table(part)}")
+        tables.append(f"### {place}\n\n{_table(PARTS[part])}")
         if part == "effects":
-            tables.append(f"### `[effects.NAME]`, by its name\n\n{_table(part, of_kinds=True)}")
+            named = _table(PARTS[part], of_kinds=True)
+            tables.append(f"### `[effects.NAME]`, by its name\n\n{named}")
     return "\n".join(tables)
 
 
-def _table(name: str, of_kinds: bool = False) -> str:
+def told_of(page: Path) -> str:
+    """A page that has one table, with that as it is to be."""
+    text = page.read_text(encoding="utf-8")
+    before, _, rest = text.partition("\n| key |")
+    after = rest.partition("\n\n")[2]
+    return f"{before}\n{_table(OTHERS[page])}\n{after}"
+
+
+def _table(part: Part, of_kinds: bool = False) -> str:
     """The keys of a part: those that it has of no kind, or of all kinds, too."""
-    part = PARTS[name]
     rows: dict[tuple[str, ...], list[str]] = {}
-    of_some = {key for kind in part.kinds for key in _known(name, kind)}
+    of_some = {key for kind in part.kinds for key in _known(part, kind)}
     for key, declared in part.keys.items():
         if not of_kinds and (key not in of_some or not declared.offered):
             rows[_row(key, part.key(key))] = []
-    if of_kinds or name != "effects":
+    if of_kinds or part is not PARTS["effects"]:
         for kind in part.kinds:
-            for key in _known(name, kind):
+            for key in _known(part, kind):
                 rows.setdefault(_row(key, part.key(key, kind)), []).append(kind)
     there = any(rows.values())
     head = ("key", *(("of",) if there else ()), "value", "unit", "default", "meaning")
@@ -65,9 +78,9 @@ def _table(name: str, of_kinds: bool = False) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _known(name: str, kind: str) -> list[str]:
+def _known(part: Part, kind: str) -> list[str]:
     """The keys that a kind of a part has of its own, or shares with some others."""
-    of = PARTS[name].kinds[kind]
+    of = part.kinds[kind]
     return list(dict.fromkeys([*of.needs, *of.may, *of.keys]))
 
 
@@ -88,14 +101,15 @@ def _row(name: str, key: Key) -> tuple[str, ...]:
 def _value(key: Key) -> str:
     """Of what kind a value is, among which or within what range."""
     if key.choices:
-        return ", ".join(f"`{name}`" for name, _ in key.choices)
+        return ", ".join(f"`{name}`" if name else "empty" for name, _ in key.choices)
     if key.kind is None:
         return "steps" if isinstance(key.example, list) else "table"
-    low, high = (f"{bound:.6g}" for bound in key.bounds)
+    bounds = (key.limits.least, key.limits.most) if key.limits else key.bounds
+    low, high = (f"{bound:.6g}" for bound in bounds)
     least = "" if low == "-inf" else f", at least {low}"
     within = least if high == "inf" else f", {low} to {high}"
     if key.limits is not None and key.limits.or_zero:
-        within = f", 0 or {key.limits.least:.6g} to {high}"
+        within = f", 0 or {low} to {high}"
     return _kind(key.kind) + within
 
 
@@ -133,3 +147,5 @@ def _line(cells: tuple[str, ...]) -> str:
 if __name__ == "__main__":
     page = PAGE.read_text(encoding="utf-8").partition(HEADING)[0].rstrip()
     PAGE.write_text(f"{page}\n\n{told()}", encoding="utf-8", newline="\n")
+    for other in OTHERS:
+        other.write_text(told_of(other), encoding="utf-8", newline="\n")

@@ -18,6 +18,7 @@ from kappaskin.scenes.plan import plan as plan
 from kappaskin.scenes.plan import planned as planned
 from kappaskin.scenes.read import SCENES as SCENES
 from kappaskin.scenes.read import TABLE_1_NOISE as TABLE_1_NOISE
+from kappaskin.scenes.read import check_elements as check_elements
 from kappaskin.scenes.read import check_sides as check_sides
 from kappaskin.scenes.read import load_scene as load_scene
 from kappaskin.scenes.read import read_scene as read_scene

@@ -92,11 +92,15 @@ LIMITED = [(part, name) for part in TABLES for name in PARTS[part].limits]
 
 @pytest.mark.parametrize(("part", "name"), LIMITED)
 def test_numbers_beyond_the_limits_declared_are_refused_with_them(part, name):
-    within, said = PARTS[part].limits[name], {"scene": "", "skin": "", "cylinders": ""}
+    within = PARTS[part].limits[name]
     beyond = f"{within.most * 10:.0f}" if within.whole else f"{within.most * 10:g}"
-    said[part] = f"{name} = {f'[{beyond}]' if name == 'radii' else beyond}\n"
-    text = f"format = 1\n{said['scene']}[skin]\nsize = [0.1, 0.1]\n{said['skin']}"
-    text += f"[cylinders]\n{said['cylinders']}" if said["cylinders"] else ""
+    said = {table: {} for table in TABLES} | {"skin": {"size": "[0.1, 0.1]"}}
+    said[part][name] = f"[{beyond}]" if name == "radii" else beyond
+    text = "format = 1\n" + "".join(
+        header + "".join(f"{key} = {each}\n" for key, each in said[table].items())
+        for table, header in TABLES.items()
+        if said[table]
+    )
 
     with pytest.raises(Refusal, match=rf"line \d: .*{name}: expected") as refused:
         read_scene(text, Path("a.toml"))
@@ -106,6 +110,11 @@ def test_numbers_beyond_the_limits_declared_are_refused_with_them(part, name):
 def test_the_guide_tells_every_key_as_it_is_declared():
     page = GUIDE["PAGE"].read_text(encoding="utf-8")
     assert page.endswith(GUIDE["told"]()), "run python tests/guide_keys.py"
+
+
+@pytest.mark.parametrize("page", GUIDE["OTHERS"], ids=lambda page: page.stem)
+def test_the_pages_of_recordings_and_of_the_wire_tell_every_key_as_it_is_declared(page):
+    assert page.read_text(encoding="utf-8") == GUIDE["told_of"](page), "run tests/guide_keys.py"
 
 
 def test_the_guide_names_every_effect_where_it_comes_about():
