@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from kappaskin.mechanics import Load
-from kappaskin_app.features.scene.scene_text.changes import forced
-from kappaskin_app.features.scene.scene_text.places import instead, pressed, shifted
+from kappaskin_app.features.scene.scene_text import forced, instead, pressed, shifted
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.effects import called
 from kappaskin_app.shell.history import History

@@ -28,7 +28,7 @@ from PySide6.QtWidgets import (
 
 from kappaskin_app.features.scene.gallery import GalleryPanel
 from kappaskin_app.features.scene.plan import EffectsPanel
-from kappaskin_app.features.scene.scene_form.form import SceneForm
+from kappaskin_app.features.scene.scene_form import SceneForm
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import for_the_window
 from kappaskin_app.theme import LIGHT, Theme

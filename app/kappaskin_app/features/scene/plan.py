@@ -21,7 +21,7 @@ from kappaskin.live import Status
 from kappaskin.scenes import EffectSelection, Scene
 from kappaskin.scenes.effects import EFFECTS
 from kappaskin.studies import plan_updates
-from kappaskin_app.features.scene.scene_text.changes import OFF, ON, PLANNED
+from kappaskin_app.features.scene.scene_text import OFF, ON, PLANNED
 from kappaskin_app.shell.effects import called, explained
 from kappaskin_app.shell.session import Session
 from kappaskin_app.theme import LIGHT, Theme

@@ -12,15 +12,7 @@ from PySide6.QtCore import QObject, QPointF, QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QImage, QLinearGradient, QPainter, QPen, QPolygonF
 
 from kappaskin.errors import Refusal
-from kappaskin.scenes import (
-    AppliedLoads,
-    Indenter,
-    LoadingHistory,
-    Scene,
-    Stimulus,
-    load_scene,
-    survey_times,
-)
+from kappaskin.scenes import AppliedLoads, Indenter, LoadingHistory, Scene, Stimulus, load_scene
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.drawn_skin import FROM_THE_LEFT, DrawnSkin, Indices
 from kappaskin_app.shell.loads import footprint
@@ -137,7 +129,7 @@ def _hardest(scene: Scene, skin: DrawnSkin) -> tuple[Array, AppliedLoads | None]
     patch = scene.plate.patch
     ny, nx = skin.height.shape
     x, y = patch.grid(nx, ny)
-    times = survey_times(scene)
+    times = scene.survey_times
     if scene.laid is not None:
         bent = [scene.laid.curvature(t) for t in times]
         k_xx, k_yy, k_xy = max(bent, key=lambda k: float(np.abs(k).max()))

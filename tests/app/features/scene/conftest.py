@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication, QDoubleSpinBox
 
 from kappaskin.scenes import SCENES
 from kappaskin.sources import information
-from kappaskin_app.features.scene.scene_form.form import SceneForm
+from kappaskin_app.features.scene.scene_form import SceneForm
 from kappaskin_app.shell.window import MainWindow
 
 GALLERY, EDIT, EFFECTS_PAGE = range(3)

@@ -17,9 +17,9 @@ from PySide6.QtWidgets import (
 
 from kappaskin._schema import Key, Unit
 from kappaskin.scenes import SCENES
-from kappaskin_app.features.scene.scene_form.form import SceneForm
-from kappaskin_app.features.scene.scene_form.sections import sections_of
-from kappaskin_app.features.scene.scene_text import changes
+from kappaskin_app.features.scene import scene_text
+from kappaskin_app.features.scene.scene_form import SceneForm
+from kappaskin_app.features.scene.sections import sections_of
 
 from .conftest import TEXTS, box_at, said_by
 
@@ -133,7 +133,7 @@ def test_what_is_put_in_and_shown_again_says_the_same(name: str) -> None:
     text = TEXTS[name]
     for row in _rows(text):
         if not row.part:
-            assert changes.put(text, row.place, row.value) == text
+            assert scene_text.put(text, row.place, row.value) == text
 
 
 def test_lengths_are_shown_in_mm_and_angles_in_degrees_with_the_digits_they_need(

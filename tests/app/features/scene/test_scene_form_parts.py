@@ -14,9 +14,9 @@ from PySide6.QtWidgets import QComboBox, QToolButton
 
 from kappaskin.scenes import PARTS, read_scene
 from kappaskin.scenes.effects import EFFECTS
-from kappaskin_app.features.scene.scene_form.form import SceneForm
-from kappaskin_app.features.scene.scene_form.sections import Addition, Section, sections_of
-from kappaskin_app.features.scene.scene_text import changes
+from kappaskin_app.features.scene import scene_text
+from kappaskin_app.features.scene.scene_form import SceneForm
+from kappaskin_app.features.scene.sections import Addition, Section, sections_of
 
 from .conftest import TEXTS, TOUCHED, said_by
 
@@ -61,15 +61,15 @@ _KINDS = [
 def _with(part: str, kind: str) -> str:
     """A scene with one part of this kind."""
     if part == "touch":
-        return changes.add_touch(_PLAIN, kind)
+        return scene_text.add_touch(_PLAIN, kind)
     if part == "effects":
-        return changes.add_table(_PLAIN, ("effects", kind), PARTS["effects"].needed(kind))
+        return scene_text.add_table(_PLAIN, ("effects", kind), PARTS["effects"].needed(kind))
     if part == "skin":
-        named = changes.put_in(_PLAIN, ("skin",), "shape", "rectangle")
-        return changes.change_kind(named, ("skin", "shape"), "skin", kind)
-    touched = changes.add_touch(_PLAIN, "disc")
-    path = changes.put_in(touched, ("touch", 0), "path", PARTS["touch"].optional()["path"])
-    return changes.add_step(path, ("touch", 0, "path"), kind)
+        named = scene_text.put_in(_PLAIN, ("skin",), "shape", "rectangle")
+        return scene_text.change_kind(named, ("skin", "shape"), "skin", kind)
+    touched = scene_text.add_touch(_PLAIN, "disc")
+    path = scene_text.put_in(touched, ("touch", 0), "path", PARTS["touch"].optional()["path"])
+    return scene_text.add_step(path, ("touch", 0, "path"), kind)
 
 
 @pytest.mark.parametrize(("part", "kind"), _KINDS)
@@ -125,11 +125,11 @@ def test_a_step_is_added_and_removed_in_its_line(shown: Callable[[str], SceneFor
     said = said_by(form)
     _action(form, "Tap").trigger()
     assert '    { step = "tap", times = 3, seconds = 1.0 },\n]' in said[0]
-    assert changes.remove(said[0], ("touch", 0, "path", 4)) == TEXTS["pencil"]
+    assert scene_text.remove(said[0], ("touch", 0, "path", 4)) == TEXTS["pencil"]
 
 
 def test_a_step_that_presses_comes_before_the_release(folder: Path) -> None:
-    text = changes.add_step(TEXTS["pencil"], ("touch", 0, "path"), "hold")
+    text = scene_text.add_step(TEXTS["pencil"], ("touch", 0, "path"), "hold")
     hold, release = (
         '    { step = "hold", seconds = 1.0 },',
         '    { step = "release", seconds = 0.5 },',
@@ -156,13 +156,13 @@ def test_what_cannot_press_beside_what_is_there_is_not_offered(
 def test_the_last_step_takes_its_path_and_the_last_touch_its_array_along() -> None:
     text = TOUCHED
     for _ in range(2):
-        text = changes.remove(text, ("touch", 0, "path", 0))
+        text = scene_text.remove(text, ("touch", 0, "path", 0))
     assert "path" not in tomllib.loads(text)["touch"][0]
-    assert "touch" not in tomllib.loads(changes.remove(text, ("touch", 0)))
+    assert "touch" not in tomllib.loads(scene_text.remove(text, ("touch", 0)))
 
 
 def test_an_effect_that_goes_is_named_no_longer(folder: Path) -> None:
-    text = changes.remove(TEXTS["hum"], ("effects", "mains-hum"))
+    text = scene_text.remove(TEXTS["hum"], ("effects", "mains-hum"))
     assert tomllib.loads(text)["effects"] == {"choose": []}
     read_scene(text, folder)
 
@@ -187,7 +187,7 @@ def test_another_kind_of_touch_keeps_what_it_knows_and_gets_what_it_needs(
 
 def test_a_slide_that_becomes_a_turn_gets_an_angle() -> None:
     place = ("touch", 0, "path", 1, "step")
-    text = changes.change_kind(TEXTS["pencil"], place, "step", "turn")
+    text = scene_text.change_kind(TEXTS["pencil"], place, "step", "turn")
     assert tomllib.loads(text)["touch"][0]["path"][1] == {
         "step": "turn",
         "seconds": 1.0,
@@ -199,19 +199,19 @@ def test_a_slide_that_becomes_a_turn_gets_an_angle() -> None:
 
 
 def test_a_displacement_comes_instead_of_a_force_and_a_path_of_an_orbit() -> None:
-    text = changes.put_in(TEXTS["two-contacts"], ("touch", 1), "displacement", 0.002)
-    text = changes.put_in(text, ("touch", 1), "path", PARTS["touch"].optional()["path"])
+    text = scene_text.put_in(TEXTS["two-contacts"], ("touch", 1), "displacement", 0.002)
+    text = scene_text.put_in(text, ("touch", 1), "path", PARTS["touch"].optional()["path"])
     touch = tomllib.loads(text)["touch"][1]
     assert {"displacement", "path"} <= set(touch)
     assert not {"force", "orbit"} & set(touch)
 
 
 def test_a_touch_is_put_in_the_middle_of_the_skin_that_is_there(folder: Path) -> None:
-    text = changes.add_touch(TEXTS["on-foam"].replace("[0.1, 0.1]", "[0.2, 0.3]"), "punch")
+    text = scene_text.add_touch(TEXTS["on-foam"].replace("[0.1, 0.1]", "[0.2, 0.3]"), "punch")
     touch = tomllib.loads(text)["touch"][-1]
     assert (touch["x"], touch["y"]) == (0.1, 0.15)
 
 
 def test_headings_keep_an_empty_line_before_them_and_others_their_own() -> None:
-    text = changes.put_in(TOUCHED, ("electronics", "amplifier"), "gain", 50.0)
+    text = scene_text.put_in(TOUCHED, ("electronics", "amplifier"), "gain", 50.0)
     assert text == TOUCHED + "\n[electronics.amplifier]\ngain = 50.0\n"

@@ -8,7 +8,7 @@ from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QLineEdit
 
-from kappaskin_app.features.scene.scene_form.form import SceneForm
+from kappaskin_app.features.scene.scene_form import SceneForm
 
 from .conftest import TEXTS, TOUCHED, box_at, said_by
 

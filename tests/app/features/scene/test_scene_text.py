@@ -10,10 +10,9 @@ from PySide6.QtWidgets import QApplication
 
 from kappaskin import Refusal, load_scene, planned, read_scene
 from kappaskin.scenes import SCENES, scene_file
+from kappaskin_app.features.scene import scene_text
 from kappaskin_app.features.scene.editing import SceneEditing
-from kappaskin_app.features.scene.scene_text import changes
-from kappaskin_app.features.scene.scene_text.changes import OFF, ON, PLANNED, forced
-from kappaskin_app.features.scene.scene_text.places import shifted
+from kappaskin_app.features.scene.scene_text import OFF, ON, PLANNED, forced, shifted
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.loads import GrabbedStimulus, touches_at
 from kappaskin_app.shell.selection import LoadHandle
@@ -170,7 +169,7 @@ def test_a_step_is_added_before_the_last_release_under_headings_too() -> None:
         f'\n[[touch.path]]\nstep = "{one["step"]}"\nseconds = 1.0\n' for one in steps
     )
     assert tomllib.loads(text)["touch"][0]["path"] == steps
-    after = changes.add_step(text, ("touch", 0, "path"), "hold")
+    after = scene_text.add_step(text, ("touch", 0, "path"), "hold")
     path = tomllib.loads(after)["touch"][0]["path"]
     assert [path[0], path[2]] == steps
     assert path[1]["step"] == "hold"
@@ -178,5 +177,5 @@ def test_a_step_is_added_before_the_last_release_under_headings_too() -> None:
 
 
 def test_a_value_is_put_into_a_new_table_of_one_that_stands_in_a_line() -> None:
-    after = changes.put_in("electronics = { gain = 2.0 }\n", ("electronics", "bridge"), "k", 2.1)
+    after = scene_text.put_in("electronics = { gain = 2.0 }\n", ("electronics", "bridge"), "k", 2.1)
     assert tomllib.loads(after) == {"electronics": {"gain": 2.0, "bridge": {"k": 2.1}}}

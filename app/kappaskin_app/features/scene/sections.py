@@ -7,8 +7,8 @@ from typing import Any
 
 from kappaskin._schema import Key
 from kappaskin.scenes import PARTS
-from kappaskin_app.features.scene.scene_text import changes
-from kappaskin_app.features.scene.scene_text.changes import Place
+from kappaskin_app.features.scene import scene_text
+from kappaskin_app.features.scene.scene_text import Place
 from kappaskin_app.shell.effects import called, explained
 
 MOST_WHOLE = 2**31 - 1  # that a box for whole numbers can hold
@@ -75,8 +75,8 @@ class Row:
     def changed(self, text: str, value: Any) -> str:
         """The text with another value here."""
         if self.part:
-            return changes.change_kind(text, self.place, self.part, value)
-        return changes.put(text, self.place, value)
+            return scene_text.change_kind(text, self.place, self.part, value)
+        return scene_text.put(text, self.place, value)
 
 
 @dataclass(frozen=True)
@@ -217,7 +217,7 @@ def _more_touches(there: list[str]) -> Section:
     """A rigid object presses alone, and so do cylinders; loads may be many."""
     touch = PARTS["touch"]
     rigid = {kind for kind in touch.kinds if "depth" in touch.known(kind)}
-    offers = _offers_of_kinds("touch", lambda kind: lambda text: changes.add_touch(text, kind))
+    offers = _offers_of_kinds("touch", lambda kind: lambda text: scene_text.add_touch(text, kind))
     if rigid & set(there):
         offers = ()
     elif there:
@@ -227,7 +227,7 @@ def _more_touches(there: list[str]) -> Section:
         laid = Addition(
             "Cylinders",
             "Lay the skin on one cylinder after the other, as a calibration does.",
-            lambda text: changes.add_table(text, ("cylinders",), values),
+            lambda text: scene_text.add_table(text, ("cylinders",), values),
         )
         offers = (*offers, laid)
     tip = "" if offers else "A rigid object presses alone: remove it first, or change what it is."
@@ -253,11 +253,11 @@ def _effects(values: Values) -> Section:
 
 
 def _adding_effect(name: str) -> Change:
-    return lambda text: changes.add_table(text, ("effects", name), PARTS["effects"].needed(name))
+    return lambda text: scene_text.add_table(text, ("effects", name), PARTS["effects"].needed(name))
 
 
 def _adding_step(place: Place, kind: str) -> Change:
-    return lambda text: changes.add_step(text, place, kind)
+    return lambda text: scene_text.add_step(text, place, kind)
 
 
 def _offers_of_kinds(part: str, adding: Callable[[str], Change]) -> tuple[Addition, ...]:
@@ -312,4 +312,4 @@ def _offers(part: str, kind: str, values: Values, place: Place) -> tuple[Additio
 
 
 def _putting_in(place: Place, key: str, value: Any) -> Change:
-    return lambda text: changes.put_in(text, place, key, value)
+    return lambda text: scene_text.put_in(text, place, key, value)

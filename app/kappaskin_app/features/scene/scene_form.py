@@ -21,16 +21,16 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin_app.features.scene.scene_form.editors import Editor, editor_for
-from kappaskin_app.features.scene.scene_form.sections import (
+from kappaskin_app.features.scene import scene_text
+from kappaskin_app.features.scene.editors import Editor, editor_for
+from kappaskin_app.features.scene.scene_text import Place
+from kappaskin_app.features.scene.sections import (
     Addition,
     Change,
     Row,
     Section,
     sections_of,
 )
-from kappaskin_app.features.scene.scene_text import changes
-from kappaskin_app.features.scene.scene_text.changes import Place
 from kappaskin_app.guard import guarded
 
 _BUTTON, _EDGE = 20, 9  # px: the size of a small button, and how far in the last one stands
@@ -165,7 +165,7 @@ class SectionBox(QGroupBox):
     def _removing(self, place: Place) -> QToolButton:
         button = _tool("\N{MULTIPLICATION SIGN}", "Remove", place)
         button.clicked.connect(
-            guarded(lambda: self._request(lambda text: changes.remove(text, place)))
+            guarded(lambda: self._request(lambda text: scene_text.remove(text, place)))
         )
         self.stops.append(button)
         return button

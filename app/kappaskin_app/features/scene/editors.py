@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin._schema import Key, Unit
-from kappaskin_app.features.scene.scene_form.sections import MOST, MOST_WHOLE, Row
+from kappaskin_app.features.scene.sections import MOST, MOST_WHOLE, Row
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import ChoiceBox, RealBox, WholeBox, well_behaved
 

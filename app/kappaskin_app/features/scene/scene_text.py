@@ -1,23 +1,34 @@
-"""Edits of a scene's text: one value, table or name of an effect; the rest stays as written.
+"""Edits of a scene's text: values, tables, effects, places; the rest stays as written.
 
 Each raises `Refusal` for a text that is no TOML, and KeyError or IndexError for a place that there
 is not.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
 import tomlkit
+from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import AbstractTable, AoT, InlineTable, Table
 
+from kappaskin.errors import Refusal
 from kappaskin.scenes import PARTS
-from kappaskin_app.features.scene.scene_text.parsing import parsed
-from kappaskin_app.features.scene.scene_text.places import placed
 
 Place = tuple[str | int, ...]
 
 ON, OFF, PLANNED = "on", "off", "planned"
+_SIDE = 0.1  # m of the skin that the schema's examples have their places on
+
+
+def parsed(text: str) -> Any:
+    """The TOML document that can be changed and written again; raises `Refusal` for no TOML."""
+    try:
+        return tomlkit.parse(text)
+    except TOMLKitError as error:
+        raise Refusal(
+            f"expected a scene in TOML to change, got a mistake in it: {error}; mend its text first"
+        ) from error
 
 
 def put(text: str, place: Place, value: Any) -> str:
@@ -243,3 +254,79 @@ def _tidy(text: str, document: Any) -> str:
             continue
         tidy.append(line)
     return "\n".join(tidy) + "\n"
+
+
+# Places of touches
+
+
+def placed(values: dict[str, Any], skin: Any) -> dict[str, Any]:
+    """The `values` of a touch, its places moved to where they are on the skin that there is."""
+    sides = _sides(skin)
+    return {
+        key: float(f"{value * sides[key[0] == 'y'] / _SIDE:.4g}") if key[0] in "xy" else value
+        for key, value in values.items()
+    }
+
+
+def _sides(skin: Any) -> tuple[float, float]:
+    """Lengths of the skin in m along x and y, as far as the text tells them."""
+    values = skin if isinstance(skin, Mapping) else {}
+    corners = values.get("outline")
+    if isinstance(radius := values.get("rim_radius"), int | float):
+        sides: Any = (2 * radius, 2 * radius)
+    elif isinstance(corners, list) and corners and all(isinstance(c, Sequence) for c in corners):
+        sides = [max((c[axis] for c in corners if len(c) == 2), default=0) for axis in (0, 1)]
+    else:
+        sides = values.get("size")
+    usable = isinstance(sides, Sequence) and len(sides) == 2
+    if not (usable and all(isinstance(a, int | float) and 0 < a < 1e3 for a in sides)):
+        return _SIDE, _SIDE
+    return sides[0], sides[1]
+
+
+def shifted(text: str, touch: int, dx: float, dy: float) -> str:
+    """The text with a touch, counted from zero, moved by (dx, dy) in m, to a micrometre.
+
+    Raises `Refusal` for a text that is no TOML, or has no such touch.
+    """
+    document = parsed(text)
+    values = _touch(document, touch)
+    for key, by in (("x", dx), ("y", dy), ("x0", dx), ("y0", dy), ("x1", dx), ("y1", dy)):
+        if key in values:
+            values[key] = round(float(values[key]) + by, 6)
+    return tomlkit.dumps(document)
+
+
+def pressed(text: str, touch: int, times: float) -> str:
+    """The text with a touch, counted from zero, pressing so many `times` as hard.
+
+    Raises `Refusal` for a text that is no TOML, or has no such touch.
+    """
+    document = parsed(text)
+    values = _touch(document, touch)
+    for key in ("force", "depth", "displacement"):
+        if key in values:
+            values[key] = float(f"{float(values[key]) * times:.4g}")
+    return tomlkit.dumps(document)
+
+
+def instead(text: str, touch: int, values: Mapping[str, Any]) -> str:
+    """The text with a touch, counted from zero, that says this and nothing else.
+
+    Raises `Refusal` for a text that is no TOML, or has no such touch.
+    """
+    document = parsed(text)
+    table = _touch(document, touch)
+    for key in list(table):
+        del table[key]
+    for key, value in values.items():
+        table[key] = value
+    return tomlkit.dumps(document)
+
+
+def _touch(document: Any, touch: int) -> Any:
+    many = document.get("touch", ())
+    each = [many] if isinstance(many, AbstractTable) else many  # one by itself is an array of one
+    if not touch < len(each):
+        raise Refusal(f"expected a touch {touch + 1} to change, got a text with {len(each)}")
+    return each[touch]
