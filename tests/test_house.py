@@ -16,10 +16,10 @@ ROOMS = (
 )
 
 _FACES = (
-    *("kappaskin.scenes.effects", "kappaskin.sources.wire", "kappaskin.recording.messages"),
-    "kappaskin.cli.system",
+    *("kappaskin.scenes.cylinders", "kappaskin.scenes.effects", "kappaskin.sources.wire"),
+    *("kappaskin.recording.messages", "kappaskin.cli.system"),
 )
-"""Parts of rooms that are faces: the effects, two formats of messages, what a machine has."""
+"""Parts of rooms that are faces: cylinders, effects, formats of messages, what a machine has."""
 
 # What the house may come to at most; who brings a count down brings its limit down. The house is
 # to have 340 modules and 32,000 statements. A feature that raises a count says why beside it.

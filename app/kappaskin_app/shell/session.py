@@ -17,7 +17,8 @@ from kappaskin.frames import Estimate
 from kappaskin.live import Engine, ResumeInfo, Status
 from kappaskin.mechanics import Plate, PointLoad
 from kappaskin.pipeline import Setup
-from kappaskin.scenes import CylinderStep, Presentation, Scene
+from kappaskin.scenes import Scene
+from kappaskin.scenes.cylinders import CylinderStep, Presentation
 from kappaskin.sensing import Sensor
 from kappaskin.skin import Patch
 from kappaskin.sources import SCAN_LISTS_PER_SECOND

@@ -18,7 +18,7 @@ from kappaskin.calibration.identification import (
 from kappaskin.calibration.sweep import Sweep
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Array, Mask
-from kappaskin.scenes import FACES, FEWEST_RADII, CylinderStep, check_strain, step_pairs
+from kappaskin.scenes.cylinders import FACES, FEWEST_RADII, CylinderStep, check_strain, step_pairs
 from kappaskin.scenes.effects import RunningEffect
 from kappaskin.sensing import PrandtlIshlinskii, Sensor, StandardLinearSolid
 

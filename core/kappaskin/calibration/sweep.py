@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.frames import COMPONENTS, OVERTAKEN, Array, Frame
-from kappaskin.scenes import (
+from kappaskin.scenes import load_scene
+from kappaskin.scenes.cylinders import (
     ADVICE,
     CylinderStep,
     Presentation,
     applied_curvature,
     check_readable,
     check_strain,
-    load_scene,
     radii_for,
     schedule,
 )

@@ -31,7 +31,7 @@ from kappaskin.live.timing import ArrivalTimes, RateLimit
 from kappaskin.pipeline import Pipeline
 from kappaskin.publish import Publishing
 from kappaskin.recording import ReplayedSource
-from kappaskin.scenes import FROM_THE_BEGINNING, Scene
+from kappaskin.scenes import Playback, Scene
 from kappaskin.sensing import Sensor
 from kappaskin.sources import SimulatedSource, Source, open_source
 
@@ -338,9 +338,7 @@ class EngineLoop:
                 rate=self._arrivals.rate(now),
                 reader_gap=self._arrivals.gap(now),
                 last_frame=self._arrivals.last,
-                playing=source.playing
-                if isinstance(source, SimulatedSource)
-                else FROM_THE_BEGINNING,
+                playing=source.playing if isinstance(source, SimulatedSource) else Playback(),
                 health=self._health.health(self._main.pipeline, self._place),
                 replay=source.replay if isinstance(source, ReplayedSource) else None,
             )

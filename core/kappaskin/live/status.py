@@ -15,7 +15,7 @@ from kappaskin.live.tare_taking import TareStatus
 from kappaskin.pipeline import Setup
 from kappaskin.publish import PublishStatus, SourceState
 from kappaskin.recording import RecordingStatus, Replay
-from kappaskin.scenes import FROM_THE_BEGINNING, Playback
+from kappaskin.scenes import Playback
 from kappaskin.sensing import Sensor
 from kappaskin.sources import Accounting
 
@@ -61,7 +61,7 @@ class Status:
     reader_gap: float = math.nan
     last_frame: float = -math.inf
     reported: float = -math.inf
-    playing: Playback = FROM_THE_BEGINNING
+    playing: Playback = field(default_factory=Playback)
     events: tuple[Event, ...] = ()
     happened: int = 0
     temperature: float = math.nan

@@ -1,17 +1,5 @@
 """Scenes: a skin, what touches it, and which effects its readings call for; scene to frames."""
 
-from kappaskin.scenes.cylinders import ADVICE as ADVICE
-from kappaskin.scenes.cylinders import FACES as FACES
-from kappaskin.scenes.cylinders import FEWEST_RADII as FEWEST_RADII
-from kappaskin.scenes.cylinders import RADII as RADII
-from kappaskin.scenes.cylinders import CylinderStep as CylinderStep
-from kappaskin.scenes.cylinders import Presentation as Presentation
-from kappaskin.scenes.cylinders import applied_curvature as applied_curvature
-from kappaskin.scenes.cylinders import check_readable as check_readable
-from kappaskin.scenes.cylinders import check_strain as check_strain
-from kappaskin.scenes.cylinders import radii_for as radii_for
-from kappaskin.scenes.cylinders import schedule as schedule
-from kappaskin.scenes.cylinders import step_pairs as step_pairs
 from kappaskin.scenes.plan import Plan as Plan
 from kappaskin.scenes.plan import kept_effects as kept_effects
 from kappaskin.scenes.plan import plan as plan
@@ -25,15 +13,12 @@ from kappaskin.scenes.read import read_scene as read_scene
 from kappaskin.scenes.read import read_scene_text as read_scene_text
 from kappaskin.scenes.read import scene_file as scene_file
 from kappaskin.scenes.read import scene_of as scene_of
-from kappaskin.scenes.scene import FROM_THE_BEGINNING as FROM_THE_BEGINNING
 from kappaskin.scenes.scene import AppliedLoads as AppliedLoads
 from kappaskin.scenes.scene import EffectSelection as EffectSelection
 from kappaskin.scenes.scene import LoadingHistory as LoadingHistory
 from kappaskin.scenes.scene import Playback as Playback
 from kappaskin.scenes.scene import Scene as Scene
 from kappaskin.scenes.scene import scaled_to as scaled_to
-from kappaskin.scenes.scene import survey_duration as survey_duration
-from kappaskin.scenes.scene import survey_times as survey_times
 from kappaskin.scenes.schema import PARTS as PARTS
 from kappaskin.scenes.simulator import Simulator as Simulator
 from kappaskin.scenes.stimulus import Indenter as Indenter

@@ -44,6 +44,10 @@ LINEAR = EffectSelection(off=frozenset({"finite-slope"}))
 """All there is of the electronics, on a skin of which the gages sense what Eqs. 3-5 say."""
 
 
+_MOMENTS = 48  # evenly over the scene, besides those of its motions and those halfway
+_LONGEST = 60.0  # s of a scene that nothing repeats in: what drifts has this long to do so
+
+
 @dataclass(frozen=True, eq=False)
 class Scene:
     """A simulated skin and what happens to it; `stimuli` and `effects` may be empty.
@@ -151,6 +155,22 @@ class Scene:
         """Whether anything that touches the skin moves."""
         return any(stimulus.motion is not None for stimulus in self.stimuli)
 
+    @property
+    def survey_times(self) -> list[float]:
+        """The times in s, ascending, at which a survey samples the scene."""
+        if not (self.moves or self.laid):
+            return [0.0]
+        evenly = np.arange(_MOMENTS) * self.duration / _MOMENTS
+        each = [np.array(s.motion.moments) for s in self.stimuli if s.motion]
+        fastest = [(moments[1:] + moments[:-1]) / 2 for moments in each]  # of what eases
+        laid = self.laid.middles if self.laid else []
+        return np.unique(np.concatenate([evenly, *each, *fastest, laid])).tolist()
+
+    @property
+    def survey_duration(self) -> float:
+        """Seconds after which the scene repeats; `_LONGEST` of one in which nothing moves."""
+        return self.duration if self.moves or self.laid else _LONGEST
+
 
 def scaled_to(plate: Plate, load: Load, displacement: float, basis: Basis) -> Load:
     """The load whose point of application moves by `displacement` in m."""
@@ -184,9 +204,6 @@ class Playback:
     def time(self, device_time: float) -> float:
         """The time in s of the scene at `device_time` in s."""
         return self.at + self.speed * (device_time - self.since)
-
-
-FROM_THE_BEGINNING = Playback()
 
 
 class AppliedLoads(NamedTuple):
@@ -238,32 +255,14 @@ class LoadingHistory:
         return AppliedLoads(found.modal, found.centre, loads)
 
 
-_MOMENTS = 48  # evenly over the scene, besides those of its motions and those halfway
-_LONGEST = 60.0  # s of a scene that nothing repeats in: what drifts has this long to do so
 _STEP = 1e-3  # s over which a rate is taken; less of a motion that is as fast
-
-
-def survey_times(scene: Scene) -> list[float]:
-    """The times in s, ascending, at which a survey samples a scene."""
-    if not (scene.moves or scene.laid):
-        return [0.0]
-    evenly = np.arange(_MOMENTS) * scene.duration / _MOMENTS
-    each = [np.array(s.motion.moments) for s in scene.stimuli if s.motion]
-    fastest = [(moments[1:] + moments[:-1]) / 2 for moments in each]  # of what eases
-    laid = scene.laid.middles if scene.laid else []
-    return np.unique(np.concatenate([evenly, *each, *fastest, laid])).tolist()
-
-
-def survey_duration(scene: Scene) -> float:
-    """Seconds after which a scene repeats; `_LONGEST` of one in which nothing moves."""
-    return scene.duration if scene.moves or scene.laid else _LONGEST
 
 
 def survey(scene: Scene) -> Survey:
     """The survey of one repetition of `scene`, by which the sizes of effects are judged."""
     basis = scene.basis
     layout = replace(scene.layout, gage_length=0.0)
-    times = np.array(survey_times(scene))
+    times = np.array(scene.survey_times)
     M = layout.curvature_operator(basis)
     compliance = scene.plate.compliance(basis)
     pressing = LoadingHistory(scene, scene.plate)
@@ -288,6 +287,6 @@ def survey(scene: Scene) -> Survey:
         c,
         curvature,
         np.abs(compliance.after(later - forces) @ M.T).max(axis=0) / step,
-        survey_duration(scene),
+        scene.survey_duration,
         read_after,
     )

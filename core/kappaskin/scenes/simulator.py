@@ -21,10 +21,12 @@ from kappaskin.scenes.effects import (
     Temperature,
 )
 from kappaskin.scenes.plan import effects_of, kept_effects
-from kappaskin.scenes.scene import FROM_THE_BEGINNING, AppliedLoads, LoadingHistory, Playback, Scene
+from kappaskin.scenes.scene import AppliedLoads, LoadingHistory, Playback, Scene
 from kappaskin.sensing import Scan
 
 _ROOM = 20.0  # degrees Celsius
+
+_FROM_THE_BEGINNING = Playback()
 
 
 class Simulator:
@@ -35,7 +37,7 @@ class Simulator:
     of its start. Every effect draws from a random stream of its own.
     """
 
-    def __init__(self, scene: Scene, playing: Playback = FROM_THE_BEGINNING) -> None:
+    def __init__(self, scene: Scene, playing: Playback = _FROM_THE_BEGINNING) -> None:
         self.scene, self.playing = scene, playing
         self._still: Truth | None = None
         self._kept = kept_effects(scene)

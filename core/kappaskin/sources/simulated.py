@@ -11,7 +11,7 @@ from kappaskin.contact import ForceTorqueSensor, Wrench
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Scanner
 from kappaskin.frames import Event, Frame
-from kappaskin.scenes import FROM_THE_BEGINNING, Playback, Scene, Simulator, load_scene
+from kappaskin.scenes import Playback, Scene, Simulator, load_scene
 from kappaskin.sensing import Scan, Sensor
 from kappaskin.sources.clock import ClockState
 from kappaskin.sources.commands import in_few_runs
@@ -40,7 +40,7 @@ class SimulatedSource:
     ) -> None:
         self._clock, self._sleep = clock, sleep
         self._start, self._n = clock(), 0
-        self._become(scene, 0.0, FROM_THE_BEGINNING)
+        self._become(scene, 0.0, Playback())
         self._base_noise = np.random.default_rng(scene.seed)
         self._taken = 0.0  # device time of the last frame
         self._accepted = self._lost = 0

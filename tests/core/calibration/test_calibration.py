@@ -29,7 +29,7 @@ from kappaskin.calibration.calibration import fingerprint
 from kappaskin.calibration.identification import fit_lines, identify_hysteresis, play_thresholds
 from kappaskin.calibration.report import ChannelLimits
 from kappaskin.live.ring import Ring
-from kappaskin.scenes import Presentation, schedule
+from kappaskin.scenes.cylinders import Presentation, schedule
 from kappaskin.scenes.effects import (
     FIRST_GENERATION_LOOPS,
     SECOND_GENERATION_LOOPS,

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from kappaskin import Refusal, Transduction, load_scene
 from kappaskin.calibration import Procedure
-from kappaskin.scenes import RADII, CylinderStep, Presentation, radii_for, schedule
+from kappaskin.scenes.cylinders import RADII, CylinderStep, Presentation, radii_for, schedule
 from kappaskin.sensing import Amplifier, HalfBridge
 
 SENSOR = load_scene("calibration").sensor()

@@ -22,7 +22,7 @@ from kappaskin import Frame, Refusal, SensorLayout, Simulator, load_scene
 from kappaskin.calibration import calibrate, take_sweep
 from kappaskin.calibration.calibration import read_calibration
 from kappaskin.errors import SourceError
-from kappaskin.scenes import ADVICE, Presentation, schedule
+from kappaskin.scenes.cylinders import ADVICE, Presentation, schedule
 from kappaskin.scenes.effects import Creep, GaussianNoise, ReadingEffect, Size, Survey, Tolerance
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")

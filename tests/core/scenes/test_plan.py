@@ -18,15 +18,8 @@ from kappaskin import (
     Simulator,
     load_scene,
 )
-from kappaskin.scenes import (
-    SCENES,
-    EffectSelection,
-    Orbit,
-    Presentation,
-    kept_effects,
-    plan,
-    schedule,
-)
+from kappaskin.scenes import SCENES, EffectSelection, Orbit, kept_effects, plan
+from kappaskin.scenes.cylinders import Presentation, schedule
 from kappaskin.scenes.effects import EFFECTS, GaussianNoise
 from kappaskin.scenes.plan import effects_of
 from kappaskin.scenes.scene import survey

@@ -19,7 +19,7 @@ from kappaskin import (
     SineBasis,
     load_scene,
 )
-from kappaskin.scenes import SCENES, TABLE_1_NOISE, LoadingHistory, Orbit, scaled_to, survey_times
+from kappaskin.scenes import SCENES, TABLE_1_NOISE, LoadingHistory, Orbit, scaled_to
 from kappaskin.scenes.read import check_elements
 from kappaskin.scenes.stimulus import MotionPath, PressStep, ReleaseStep, SlideStep, contact_of
 
@@ -194,7 +194,7 @@ def test_a_scene_that_is_too_fast_for_its_converter_is_no_sensor():
 def test_a_scene_is_looked_at_all_over_once(name):
     scene = load_scene(name)
 
-    moments = np.array(survey_times(scene))
+    moments = np.array(scene.survey_times)
 
     assert moments[0] == 0
     assert (np.diff(moments) > 0).all()

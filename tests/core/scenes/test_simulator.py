@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from kappaskin import Patch, Plate, PointLoad, Refusal, Scene, SensorLayout, Simulator, load_scene
-from kappaskin.scenes import CylinderStep, Orbit, Presentation
+from kappaskin.scenes import Orbit
+from kappaskin.scenes.cylinders import CylinderStep, Presentation
 from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, Creep, GaussianNoise, UniformNoise
 
 PATCH = Patch(0.1, 0.1)

@@ -34,12 +34,11 @@ from kappaskin.scenes import (
     EffectSelection,
     Indenter,
     Orbit,
-    Presentation,
     kept_effects,
     plan,
     scene_file,
-    schedule,
 )
+from kappaskin.scenes.cylinders import Presentation, schedule
 from kappaskin.scenes.effects import (
     EFFECTS,
     FIRST_GENERATION_LOOPS,

@@ -23,7 +23,7 @@ from kappaskin.calibration import (
 from kappaskin.errors import Refusal
 from kappaskin.frames import OVERTAKEN, Estimate
 from kappaskin.live import Status
-from kappaskin.scenes import CylinderStep, schedule
+from kappaskin.scenes.cylinders import CylinderStep, schedule
 from kappaskin.sensing import Sensor
 from kappaskin_app.shell.history import History
 

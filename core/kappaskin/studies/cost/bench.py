@@ -26,8 +26,6 @@ from kappaskin.scenes import (
     kept_effects,
     plan,
     planned,
-    survey_duration,
-    survey_times,
 )
 from kappaskin.scenes.effects import (
     EFFECTS,
@@ -121,7 +119,7 @@ def with_elements(scene: Scene, elements: tuple[int, int] | None) -> Scene:
 def _pressed(scene: Scene, times: Array) -> list[AppliedLoads]:
     """What presses so many `times` in s after the skin is pressed hardest, or always then."""
     pressing = LoadingHistory(scene, scene.plate)
-    found = {t: pressing(t) for t in survey_times(scene)}
+    found = {t: pressing(t) for t in scene.survey_times}
     hardest = max(found, key=lambda t: sum(abs(load.force) for load in found[t].loads))
     after = [pressing(t) for t in (hardest + times).tolist()]
     pressed = all(np.isfinite(one.contact).all() for one in after)
@@ -410,7 +408,7 @@ class _EffectJudge:
         self._scanned = SCANS[setting.scanned](scene.layout, contact)
         frames = np.arange(SETTLING + _EACH) / scene.rate
         # One after the other, however short the scene.
-        apart = max(survey_duration(scene) / _PLACES, len(frames) / scene.rate)
+        apart = max(scene.survey_duration / _PLACES, len(frames) / scene.rate)
         self._times = np.add.outer(apart * np.arange(_PLACES), frames)
 
     def answer(self, scene: Scene, names: frozenset[str]) -> tuple[Array, Array]:

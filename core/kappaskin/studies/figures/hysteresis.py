@@ -12,7 +12,8 @@ from kappaskin.calibration import CalibrationReport, Procedure, Sweep, calibrate
 from kappaskin.estimation import LeastSquares
 from kappaskin.frames import Array
 from kappaskin.mechanics import Plate
-from kappaskin.scenes import RADII, Presentation, Scene, Simulator, load_scene, schedule
+from kappaskin.scenes import Scene, Simulator, load_scene
+from kappaskin.scenes.cylinders import RADII, Presentation, schedule
 from kappaskin.scenes.effects import (
     FIRST_GENERATION_LOOPS,
     SECOND_GENERATION_LOOPS,

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QApplication
 
 from kappaskin import Calibration, Estimate, Refusal, Setup, Simulator, Status, Tare, load_scene
 from kappaskin.calibration.calibration import fingerprint
-from kappaskin.scenes import RADII, CylinderStep, Presentation
+from kappaskin.scenes.cylinders import RADII, CylinderStep, Presentation
 from kappaskin.scenes.effects import Tolerance
 from kappaskin_app.features.calibration.calibrating import Calibrating, parsed_radii
 from kappaskin_app.shell.history import History

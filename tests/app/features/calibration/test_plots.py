@@ -8,7 +8,7 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QApplication, QWidget
 
 from kappaskin import Patch, SensorLayout
-from kappaskin.scenes import schedule
+from kappaskin.scenes.cylinders import schedule
 from kappaskin_app.features.calibration.plots import CylinderView, Loop, LoopPlot, PassMap
 from kappaskin_app.theme import letters
 from kappaskin_app.widgets.parts import Heading

@@ -8,7 +8,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QImage
 
 from kappaskin import load_scene
-from kappaskin.scenes import Presentation
+from kappaskin.scenes.cylinders import Presentation
 from kappaskin.scenes.stimulus import MotionPath, PressStep, ReleaseStep
 from kappaskin_app.features.scene.timeline import Timeline, profile
 from kappaskin_app.theme import DARK, LIGHT
