@@ -57,11 +57,11 @@ SETUP = Part(
             limits=_COUNT,
         ),
         "Nj": Key("Functions along y", "Nj, the same along y (Eq. 1).", most=_SHOWN, limits=_COUNT),
-        "nx": Key("Points along x", "Of the surface that is computed.", limits=_COUNT),
-        "ny": Key("Points along y", "The same along y.", limits=_COUNT),
+        "nx": Key("Points along x", "Points of the computed surface along x.", limits=_COUNT),
+        "ny": Key("Points along y", "Points of the computed surface along y.", limits=_COUNT),
         "hold": Key(
             "Hold",
-            "For how long a channel that a frame leaves out keeps its last reading.",
+            "Time for which a channel that a frame omits keeps its last reading.",
             Unit.same("s"),
             limits=Within(0.0),
         ),
@@ -73,8 +73,8 @@ SETUP = Part(
         ),
         "edge": Key(
             "Boundary condition",
-            "How the fit assumes the skin to be held. Another edge than the skin's own shows what "
-            "a wrong assumption costs.",
+            "The boundary condition that the fit assumes. Another than the skin's own shows what a "
+            "wrong assumption costs.",
             choices=(("", "From sensor"), *((edge, edge.capitalize()) for edge in EDGES)),
         ),
         "method": Key(

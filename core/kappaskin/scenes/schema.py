@@ -126,7 +126,8 @@ SKIN = Part(
         ),
         "tension": Key(
             "Tension",
-            "Tension of the skin, as of a drum head; 7 N/m double the stiffness of Table 1's patch.",
+            "Tension of the skin, as of a drum head; 7 N/m double the stiffness of Table 1's "
+            "patch.",
             Unit.same("N/m"),
             limits=Within(1e-9, 1e6, "N/m", or_zero=True),
             example=10.0,

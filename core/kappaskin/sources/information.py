@@ -24,14 +24,12 @@ SENSOR = Part(
     "Sensor",
     {
         "name": Key("Name", "What the sensor is called.", kind=str),
-        "serial_number": Key(
-            "Serial number", "Calibrations and tares are of the sensor that has it.", kind=str
-        ),
-        "firmware": Key("Firmware", "Its version.", kind=str),
-        "simulated": Key("Simulated", "Whether no real skin is read.", kind=bool),
+        "serial_number": Key("Serial number", "Calibrations and tares are stored by it.", kind=str),
+        "firmware": Key("Firmware", "Version of the firmware.", kind=str),
+        "simulated": Key("Simulated", "Whether the sensor is simulated.", kind=bool),
         "rate": Key(
             "Frame rate",
-            "The most frames of all channels.",
+            "Highest rate of frames with all channels.",
             Unit.same("frames/s"),
             kind=float,
         ),
@@ -39,20 +37,20 @@ SENSOR = Part(
         "size": _SKIN.key("size"),
         "base_curvature": Key(
             "Base curvature",
-            "Of the skin at rest along x: one over its radius.",
+            "Curvature of the skin at rest along x: one over its radius.",
             _PER_METRE,
             kind=float,
             default=0.0,
         ),
         "strip": Key(
             "Strip",
-            "Whether it is held at its two ends along x and alike all along y.",
+            "Whether the skin is held at its two ends along x and constant along y.",
             kind=bool,
             default=False,
         ),
         "outline": Key(
             "Outline",
-            "Of a skin that is no rectangle: `disk`, or x, y of one corner after the other.",
+            "For a skin that is no rectangle: `disk`, or x, y of each corner, in order.",
             _METRE,
             kind=str | tuple[tuple[float, float], ...],
             default=None,
@@ -69,12 +67,12 @@ SENSOR = Part(
         "gage_length": _ELEMENTS.key("gage_length"),
         "dead_channels": Key(
             "Dead channels",
-            "Readings that are never anything: `component * P + element`, from 0.",
+            "Readings without a working gage: `component * P + element`, from 0.",
             kind=tuple[int, ...],
         ),
         "channel_map": Key(
             "Channel map",
-            "Which reading each channel of the wire measures; the same number when left out.",
+            "The reading that each channel of the wire measures; the same number if omitted.",
             kind=tuple[int, ...],
             default=None,
         ),
