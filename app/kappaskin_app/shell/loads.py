@@ -25,7 +25,7 @@ from kappaskin.scenes import Indenter, Orbit, Scene, Stimulus, load_scene
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings.load import FREE_CASES, LOAD_CASES, SPREAD_CASES, TWO_ENDED
+from kappaskin_app.shell.settings.scene import FREE_CASES, LOAD_CASES, SPREAD_CASES, TWO_ENDED
 
 _Question = ParamSpec("_Question")
 _Answer = TypeVar("_Answer")

@@ -20,7 +20,7 @@ from kappaskin_app.shell.banner import Offered
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.parts import Parts
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings.load import Written
+from kappaskin_app.shell.settings.scene import Written
 from kappaskin_app.shell.simulation import settings_for
 
 VERSION = 1

@@ -28,9 +28,8 @@ from kappaskin_app.shell.history import History
 from kappaskin_app.shell.loads import Memo, tried
 from kappaskin_app.shell.settings import EstimatorSettings, SceneSettings, Settings, part
 from kappaskin_app.shell.settings.asks import setup_values
-from kappaskin_app.shell.settings.load import Written
 from kappaskin_app.shell.settings.publishing import Sending
-from kappaskin_app.shell.settings.sensor import Scanning
+from kappaskin_app.shell.settings.scene import Scanning, Written
 from kappaskin_app.shell.simulation import (
     named,
     plate_of,

@@ -38,8 +38,7 @@ from kappaskin.sensing import (
 from kappaskin.skin import Patch
 from kappaskin_app.shell.loads import Memo, compliance_of, free_loads, ready, reference_on, whole_on
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings.load import FREE_CASES, READY_CASES, Written
-from kappaskin_app.shell.settings.skin import SHAPES
+from kappaskin_app.shell.settings.scene import FREE_CASES, READY_CASES, SHAPES, Written
 
 _PLACING = ("load_case", "size", "size_y", "shape", "side_x", "side_y", "rim_radius")
 """What, when it changes, may leave a free load over the rim."""

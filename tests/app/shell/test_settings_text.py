@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from kappaskin import Refusal
 from kappaskin_app.shell.recovery import OF_SENSORS, settings_in, settings_text
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings.load import Written
+from kappaskin_app.shell.settings.scene import Written
 
 _OF = {
     bool: st.booleans(),

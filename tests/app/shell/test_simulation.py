@@ -21,8 +21,7 @@ from kappaskin.bases import EDGES
 from kappaskin.scenes import scene_file
 from kappaskin_app.shell.loads import dragged
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings.load import LOAD_CASES, SPREAD_CASES
-from kappaskin_app.shell.settings.skin import SHAPES
+from kappaskin_app.shell.settings.scene import LOAD_CASES, SHAPES, SPREAD_CASES
 from kappaskin_app.shell.simulation import (
     is_table_1,
     plate_of,

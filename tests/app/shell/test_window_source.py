@@ -7,7 +7,7 @@ import pytest
 
 from kappaskin.scenes import SCENES
 from kappaskin.sources import Port
-from kappaskin_app.shell.settings.load import READY_CASES
+from kappaskin_app.shell.settings.scene import READY_CASES
 from kappaskin_app.shell.window import MainWindow
 
 

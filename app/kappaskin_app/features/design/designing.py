@@ -23,7 +23,7 @@ from kappaskin_app.shell.history import History
 from kappaskin_app.shell.loads import ready, reference_on
 from kappaskin_app.shell.settings import Settings, part
 from kappaskin_app.shell.settings.designed import Designed
-from kappaskin_app.shell.settings.skin import SHAPES
+from kappaskin_app.shell.settings.scene import SHAPES
 
 _CANCELLED = "Cancelled; another design is computed again."
 

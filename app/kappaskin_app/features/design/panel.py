@@ -18,7 +18,7 @@ from kappaskin_app.shell.form import Form, well_behaved
 from kappaskin_app.shell.settings import Settings, ask_of
 from kappaskin_app.shell.settings.asks import Range
 from kappaskin_app.shell.settings.designed import Designed
-from kappaskin_app.shell.settings.skin import SHAPES
+from kappaskin_app.shell.settings.scene import SHAPES
 from kappaskin_app.theme import SEQUENTIAL, Theme
 from kappaskin_app.widgets.layout import row, scrolled
 from kappaskin_app.widgets.parts import ELLIPSIS, button, sentence, text_label

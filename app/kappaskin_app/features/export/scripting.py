@@ -13,7 +13,7 @@ from kappaskin.pipeline import Setup, setup_to_text
 from kappaskin.scenes import SCENES, read_scene_text, scene_file, write_scene
 from kappaskin_app.shell.session import RECORDED, Session
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings.load import Written
+from kappaskin_app.shell.settings.scene import Written
 from kappaskin_app.shell.simulation import OWN, region_of
 
 _NAMES = ("Region", "Setup", "load_scene", "planned", "read_scene", "setup_from_text")

@@ -7,9 +7,8 @@ from typing import Any
 from kappaskin.scenes import scene_file
 from kappaskin_app.features.lessons.expression import Expression
 from kappaskin_app.shell.settings import SceneSettings
-from kappaskin_app.shell.settings.sensor import Scanning
+from kappaskin_app.shell.settings.scene import SHAPES, Scanning
 from kappaskin_app.shell.settings.shown import EstimatorSettings, View
-from kappaskin_app.shell.settings.skin import SHAPES
 from kappaskin_app.shell.simulation import written
 
 UNITS = {

@@ -6,7 +6,7 @@ from typing import Any
 from kappaskin.errors import Refusal
 from kappaskin_app.shell.settings import SceneSettings, Settings, ask_of
 from kappaskin_app.shell.settings.asks import Ask, Choice, Range, Several, Switch
-from kappaskin_app.shell.settings.sensor import Scanning
+from kappaskin_app.shell.settings.scene import Scanning
 from kappaskin_app.shell.settings.shown import EstimatorSettings, View
 
 _OWN = ("theme", "show_start")  # matters of taste

@@ -14,7 +14,7 @@ from kappaskin_app.shell.history import History
 from kappaskin_app.shell.loads import GrabbedStimulus, dragged, most_times
 from kappaskin_app.shell.selection import LoadHandle
 from kappaskin_app.shell.session import Session
-from kappaskin_app.shell.settings.load import Written
+from kappaskin_app.shell.settings.scene import Written
 from kappaskin_app.shell.simulation import OWN, text_of
 
 

@@ -5,7 +5,7 @@ from PySide6.QtWidgets import QComboBox, QLabel, QWidget
 from kappaskin.live import Status
 from kappaskin_app.shell.form import SimulationForm
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings.load import (
+from kappaskin_app.shell.settings.scene import (
     FREE_CASES,
     LOAD_CASES,
     SIZES,

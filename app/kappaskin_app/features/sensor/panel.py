@@ -13,7 +13,7 @@ from kappaskin.sensing import Sensor
 from kappaskin_app.shell.badge import in_use
 from kappaskin_app.shell.form import Form, SimulationForm
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings.skin import SHAPES
+from kappaskin_app.shell.settings.scene import SHAPES
 from kappaskin_app.shell.simulation import patch_of
 
 _PREPARING = "Computing this skin; the last one stays until then."

@@ -7,8 +7,8 @@ from typing import Any
 from kappaskin.live import Status
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.settings import SceneSettings, Settings
+from kappaskin_app.shell.settings.scene import SHAPES
 from kappaskin_app.shell.settings.shown import EstimatorSettings
-from kappaskin_app.shell.settings.skin import SHAPES
 from kappaskin_app.shell.simulation import patch_of
 
 _PLAIN = {f.name: f.default for kind in (SceneSettings, EstimatorSettings) for f in fields(kind)}

@@ -11,25 +11,24 @@ from kappaskin_app.shell.settings.asks import Several as Several
 from kappaskin_app.shell.settings.asks import Switch as Switch
 from kappaskin_app.shell.settings.asks import Text as Text
 from kappaskin_app.shell.settings.designed import Designed as Designed
-from kappaskin_app.shell.settings.load import FREE_CASES as FREE_CASES
-from kappaskin_app.shell.settings.load import LOAD_CASES as LOAD_CASES
-from kappaskin_app.shell.settings.load import READY_CASES as READY_CASES
-from kappaskin_app.shell.settings.load import SIZES as SIZES
-from kappaskin_app.shell.settings.load import SPREAD_CASES as SPREAD_CASES
-from kappaskin_app.shell.settings.load import TABLE_1_CASES as TABLE_1_CASES
-from kappaskin_app.shell.settings.load import TWO_ENDED as TWO_ENDED
-from kappaskin_app.shell.settings.load import LoadSettings, Noise, Own
-from kappaskin_app.shell.settings.load import Written as Written
 from kappaskin_app.shell.settings.publishing import Sending as Sending
-from kappaskin_app.shell.settings.sensor import Electronics as Electronics
-from kappaskin_app.shell.settings.sensor import Scanning as Scanning
-from kappaskin_app.shell.settings.sensor import Spoils as Spoils
+from kappaskin_app.shell.settings.scene import FREE_CASES as FREE_CASES
+from kappaskin_app.shell.settings.scene import LOAD_CASES as LOAD_CASES
+from kappaskin_app.shell.settings.scene import READY_CASES as READY_CASES
+from kappaskin_app.shell.settings.scene import SIZES as SIZES
+from kappaskin_app.shell.settings.scene import SPREAD_CASES as SPREAD_CASES
+from kappaskin_app.shell.settings.scene import TABLE_1_CASES as TABLE_1_CASES
+from kappaskin_app.shell.settings.scene import TWO_ENDED as TWO_ENDED
+from kappaskin_app.shell.settings.scene import Electronics as Electronics
+from kappaskin_app.shell.settings.scene import LoadSettings, Noise, Own, Skin
+from kappaskin_app.shell.settings.scene import Scanning as Scanning
+from kappaskin_app.shell.settings.scene import Spoils as Spoils
+from kappaskin_app.shell.settings.scene import Written as Written
 from kappaskin_app.shell.settings.shown import COLOURS as COLOURS
 from kappaskin_app.shell.settings.shown import METHOD_SHORT as METHOD_SHORT
 from kappaskin_app.shell.settings.shown import Compared as Compared
 from kappaskin_app.shell.settings.shown import EstimatorSettings as EstimatorSettings
 from kappaskin_app.shell.settings.shown import Looked, Reading, View
-from kappaskin_app.shell.settings.skin import Skin
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,17 @@ PER_METRE = (1.0, "1/m")
 
 
 @dataclass(frozen=True)
-class Range:
-    """How a number is asked for: screen value = SI value times `scale`, in `unit`."""
+class Ask:
+    """How a setting is asked for: its words beside the editor, and what a tooltip says of it."""
 
     label: str
     tip: str
+
+
+@dataclass(frozen=True)
+class Range(Ask):
+    """How a number is asked for: screen value = SI value times `scale`, in `unit`."""
+
     least: float
     most: float
     step: float
@@ -26,40 +32,25 @@ class Range:
 
 
 @dataclass(frozen=True)
-class Choice:
+class Choice(Ask):
     """How one of several values is asked for: (value, words) pairs."""
 
-    label: str
-    tip: str
     options: tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
-class Several:
+class Several(Ask):
     """How some of several values are asked for, in their order: (value, words) pairs."""
 
-    label: str
-    tip: str
     options: tuple[tuple[str, str], ...]
 
 
-@dataclass(frozen=True)
-class Switch:
+class Switch(Ask):
     """How yes or no is asked for."""
 
-    label: str
-    tip: str
 
-
-@dataclass(frozen=True)
-class Text:
+class Text(Ask):
     """How a line of text is asked for."""
-
-    label: str
-    tip: str
-
-
-Ask = Range | Choice | Several | Switch | Text
 
 
 def asked(default: Any, how: Ask) -> Any:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from kappaskin_app.shell.settings.asks import MILLIMETRES, PER_METRE, Choice, Range, asked
-from kappaskin_app.shell.settings.skin import SHAPES
+from kappaskin_app.shell.settings.scene import SHAPES
 
 PLACINGS = (
     ("scene", "Regular grid"),

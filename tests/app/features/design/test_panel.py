@@ -17,7 +17,7 @@ from kappaskin_app.features.design.panel import DesignForm, _meant, _place
 from kappaskin_app.shell.settings import Settings, ask_of
 from kappaskin_app.shell.settings.asks import Range
 from kappaskin_app.shell.settings.designed import Designed
-from kappaskin_app.shell.settings.skin import SHAPES
+from kappaskin_app.shell.settings.scene import SHAPES
 from kappaskin_app.shell.simulation import with_consequences
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import DARK, SEQUENTIAL

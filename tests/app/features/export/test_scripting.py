@@ -23,7 +23,7 @@ from kappaskin_app.features.export.scripting import script_of
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings.load import Written
+from kappaskin_app.shell.settings.scene import Written
 from kappaskin_app.shell.simulation import scene_of, with_consequences, written
 from kappaskin_app.shell.window import MainWindow
 

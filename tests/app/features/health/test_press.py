@@ -6,7 +6,7 @@ from PySide6.QtGui import QKeySequence
 from PySide6.QtWidgets import QPushButton, QTabBar
 
 from kappaskin.scenes import scene_file
-from kappaskin_app.shell.settings.load import Written
+from kappaskin_app.shell.settings.scene import Written
 
 
 def test_no_key_of_the_page_is_that_of_a_menu_or_of_a_page_of_settings(window) -> None:

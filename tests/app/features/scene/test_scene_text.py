@@ -17,7 +17,7 @@ from kappaskin_app.shell.history import History
 from kappaskin_app.shell.loads import GrabbedStimulus, touches_at
 from kappaskin_app.shell.selection import LoadHandle
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings.load import Written
+from kappaskin_app.shell.settings.scene import Written
 
 READY = [name for name in SCENES if load_scene(name).stimuli]
 

@@ -9,7 +9,7 @@ from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, Creep, Tolerance, 
 from kappaskin.sensing import SECOND_GENERATION
 from kappaskin_app.features.sensor.panel import RegionPanel
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings.skin import SHAPES
+from kappaskin_app.shell.settings.scene import SHAPES
 from kappaskin_app.shell.simulation import region_of, scene_of, with_consequences
 
 
