@@ -253,14 +253,10 @@ class Part:
     def value(self, table: TomlTable, name: str, default: Any = REQUIRED) -> Any:
         """The value of a key in `table`, or its default, unless another `default` is given."""
         key = self.key(name)
-        return table.get(
-            name, key.kind, key.default if default is REQUIRED else default, key.limits
-        )
-
-    def choose(self, table: TomlTable, name: str) -> str:
-        """The one of its choices that `table` names at a key."""
-        key = self.key(name)
-        return table.choose(name, {choice: choice for choice, _ in key.choices}, key.default)
+        usual = key.default if default is REQUIRED else default
+        if key.choices:
+            return table.choose(name, {choice: choice for choice, _ in key.choices}, usual)
+        return table.get(name, key.kind, usual, key.limits)
 
     def make(
         self, table: TomlTable, made: type[_Made], complete: bool = False, **given: Any
@@ -271,5 +267,5 @@ class Part:
         """
         for name in fields_of(made).keys() & self.keys.keys():
             if name in table and name not in given and self.key(name).choices:
-                given[name] = self.choose(table, name)
+                given[name] = self.value(table, name)
         return table.make(made, self.limits, complete, **given)

@@ -171,12 +171,12 @@ def scene_of(top: TomlTable, file: Path) -> Scene:
 
 
 def _skin(table: TomlTable) -> tuple[Plate, str]:
-    shape = SKIN.choose(table, "shape")
+    shape = SKIN.value(table, "shape")
     with table.blamed():
         patch = _patch(table, shape)
         check_sides(patch)
     plate = SKIN.make(table, Plate, patch=patch)
-    edge = SKIN.choose(table, "edge")
+    edge = SKIN.value(table, "edge")
     table.done()
     return plate, edge
 
@@ -206,7 +206,7 @@ def _elements(table: TomlTable, patch: Patch) -> SensorLayout:
 
 
 def _electronics(table: TomlTable) -> Transduction:
-    chain = CHAINS[ELECTRONICS.choose(table, "like")]
+    chain = CHAINS[ELECTRONICS.value(table, "like")]
     parts = {
         name: _changed(table.table(name), getattr(chain, name))
         for name in ("bridge", "multiplexer", "amplifier", "converter")
@@ -291,7 +291,7 @@ def _stimulus(
 ) -> Stimulus:
     """What a [[touch]] of `plate` says; `moved` makes a load move its place so far in m."""
     what: Load | Indenter
-    if (name := TOUCH.choose(table, "what")) in OBJECTS:
+    if (name := TOUCH.value(table, "what")) in OBJECTS:
         what = table.make(Indenter, rigid=_object(table, OBJECTS[name].made, folder))
     else:
         what = load = table.make(cast("type[Load]", LOADS[name].made))
@@ -353,7 +353,7 @@ def _motion(table: TomlTable, folder: Path) -> Motion | None:
 
 
 def _step(table: TomlTable) -> MotionStep:
-    made = table.make(STEP.kinds[STEP.choose(table, "step")].made)
+    made = table.make(STEP.kinds[STEP.value(table, "step")].made)
     table.done()
     return made
 
