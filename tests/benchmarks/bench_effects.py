@@ -19,8 +19,7 @@ from kappaskin.scenes.effects import (
     Tolerance,
     UniformNoise,
 )
-from kappaskin.scenes.effects.electronics import CrossTalk, MainsHum
-from kappaskin.scenes.effects.noise import FlickerNoise
+from kappaskin.scenes.effects.electronics import CrossTalk, FlickerNoise, MainsHum
 from kappaskin.sensing import Amplifier, HalfBridge
 
 CHANNELS = 300

@@ -30,7 +30,7 @@ from kappaskin.scenes.effects import (
     Temperature,
     Tolerance,
 )
-from kappaskin.scenes.effects.noise import FlickerNoise
+from kappaskin.scenes.effects.electronics import FlickerNoise
 
 pytestmark = pytest.mark.slow
 

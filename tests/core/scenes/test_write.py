@@ -54,8 +54,7 @@ from kappaskin.scenes.effects import (
     Temperature,
     Tolerance,
 )
-from kappaskin.scenes.effects.electronics import CrossTalk, MainsHum
-from kappaskin.scenes.effects.noise import FlickerNoise
+from kappaskin.scenes.effects.electronics import CrossTalk, FlickerNoise, MainsHum
 from kappaskin.scenes.plan import effects_of
 from kappaskin.scenes.scene import LINEAR
 from kappaskin.scenes.stimulus import (

@@ -9,10 +9,13 @@ from kappaskin.scenes.effects.effect import Size as Size
 from kappaskin.scenes.effects.effect import SkinEffect as SkinEffect
 from kappaskin.scenes.effects.effect import Survey as Survey
 from kappaskin.scenes.effects.electronics import CrossTalk as CrossTalk
+from kappaskin.scenes.effects.electronics import FlickerNoise as FlickerNoise
+from kappaskin.scenes.effects.electronics import GaussianNoise as GaussianNoise
 from kappaskin.scenes.effects.electronics import MainsHum as MainsHum
 from kappaskin.scenes.effects.electronics import Quantisation as Quantisation
 from kappaskin.scenes.effects.electronics import Saturation as Saturation
 from kappaskin.scenes.effects.electronics import Skew as Skew
+from kappaskin.scenes.effects.electronics import UniformNoise as UniformNoise
 from kappaskin.scenes.effects.failures import CorruptedFrames as CorruptedFrames
 from kappaskin.scenes.effects.failures import DeadElements as DeadElements
 from kappaskin.scenes.effects.failures import DroppedFrames as DroppedFrames
@@ -27,9 +30,6 @@ from kappaskin.scenes.effects.gages import Hysteresis as Hysteresis
 from kappaskin.scenes.effects.gages import StrainLimit as StrainLimit
 from kappaskin.scenes.effects.gages import Temperature as Temperature
 from kappaskin.scenes.effects.gages import Tolerance as Tolerance
-from kappaskin.scenes.effects.noise import FlickerNoise as FlickerNoise
-from kappaskin.scenes.effects.noise import GaussianNoise as GaussianNoise
-from kappaskin.scenes.effects.noise import UniformNoise as UniformNoise
 from kappaskin.scenes.effects.skin import Fluid as Fluid
 from kappaskin.scenes.effects.skin import Foam as Foam
 from kappaskin.scenes.effects.skin import Tension as Tension

@@ -11,8 +11,7 @@ from scipy.signal import lfilter, welch
 
 from kappaskin import Refusal, Transduction
 from kappaskin.scenes.effects import Quantisation, Saturation, StrainLimit, Temperature
-from kappaskin.scenes.effects.electronics import CrossTalk, MainsHum
-from kappaskin.scenes.effects.noise import FlickerNoise
+from kappaskin.scenes.effects.electronics import CrossTalk, FlickerNoise, MainsHum
 from kappaskin.sensing import Amplifier, Converter, HalfBridge
 
 

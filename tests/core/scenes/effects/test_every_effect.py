@@ -27,8 +27,7 @@ from kappaskin.scenes.effects import (
     Tolerance,
     UniformNoise,
 )
-from kappaskin.scenes.effects.electronics import CrossTalk, MainsHum
-from kappaskin.scenes.effects.noise import FlickerNoise
+from kappaskin.scenes.effects.electronics import CrossTalk, FlickerNoise, MainsHum
 from kappaskin.sensing import Amplifier, HalfBridge
 
 DRAWS = 200_000

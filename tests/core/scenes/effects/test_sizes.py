@@ -43,8 +43,7 @@ from kappaskin.scenes.effects import (
     UniformNoise,
 )
 from kappaskin.scenes.effects.effect import LayoutEffect
-from kappaskin.scenes.effects.electronics import CrossTalk, MainsHum
-from kappaskin.scenes.effects.noise import FlickerNoise
+from kappaskin.scenes.effects.electronics import CrossTalk, FlickerNoise, MainsHum
 from kappaskin.sensing import Amplifier, HalfBridge, Scan
 
 DURATION, FRAMES = 2.0, 40
