@@ -36,7 +36,7 @@ from PySide6.QtWidgets import (
 from kappaskin.live import Status
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.settings import Settings, ask_of
-from kappaskin_app.shell.settings.asks import Choice, Range, Several, Switch, Text
+from kappaskin_app.shell.settings.asks import Ask, Choice, Range, Several, Switch, Text
 
 _ITS = QKeySequence.StandardKey
 _LEFT = (_ITS.Undo, _ITS.Redo, _ITS.DeleteEndOfLine)  # the last is Ctrl+K to an editor
@@ -289,7 +289,7 @@ def _several(how: Several, said: Callable[[Any], None]) -> _Editor:
     return _Editor(button, button.show_chosen)
 
 
-def _switch(how: Switch, said: Callable[[Any], None]) -> _Editor:
+def _switch(how: Ask, said: Callable[[Any], None]) -> _Editor:
     box = QCheckBox(how.label)
     box.toggled.connect(said)
     return _Editor(box, box.setChecked)
