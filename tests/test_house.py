@@ -60,6 +60,36 @@ def room(module: str) -> str:
     return first if whose == "kappaskin" and first in ROOMS else ""
 
 
+# There is no window yet; and a player of sound is a device that is fed, not something computed.
+_BESIDE = ("kappaskin_app.shell.background", "kappaskin_app.launch")
+_DEVICES = ("kappaskin_app.features.presenter.sound",)
+_WAYS = {
+    *("Thread", "Timer", "ThreadPoolExecutor", "ProcessPoolExecutor", "Process", "Popen"),
+    *("QThread", "QThreadPool", "QRunnable", "QProcess", "BackgroundProcess"),
+}
+
+
+def names(tree: ast.Module) -> set[str]:
+    """Every name that a module uses, of whatever object."""
+    found = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    found |= {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+    return found | {
+        alias.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for alias in node.names
+    }
+
+
+def test_a_background_task_is_the_one_way_to_run_something_beside_the_window() -> None:
+    found = {
+        module: sorted(names(tree) & _WAYS)
+        for module, tree in modules().items()
+        if module.startswith("kappaskin_app.") and module not in (*_BESIDE, *_DEVICES)
+    }
+    assert {module: ways for module, ways in found.items() if ways} == {}
+
+
 def test_core_is_sixteen_rooms() -> None:
     folders = {file.parent.name for file in PACKAGES["kappaskin"].glob("*/__init__.py")}
     assert folders == set(ROOMS)

@@ -108,6 +108,15 @@ def _watch_parent() -> None:
         os._exit(1)
 
 
+def items_of(make: Callable[..., Any], *about: object) -> Generator[Any]:
+    """What the generator `make(*about)` yields, or the one item that a function returns."""
+    made = make(*about)
+    if isinstance(made, Generator):
+        yield from cast("Generator[Any]", made)
+    else:
+        yield made
+
+
 def _send_items(
     pipe: "Connection[Any, None]", make: Callable[..., Iterable[Any]], about: tuple[Any, ...]
 ) -> None:

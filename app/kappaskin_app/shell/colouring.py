@@ -2,7 +2,6 @@
 
 import math
 import time
-from concurrent.futures import Future, ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +13,7 @@ from kappaskin.estimation import FAULTS, Estimator, estimator_for
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
 from kappaskin.pipeline import ErrorBars, Quantities, SkinColour, skin_colours
+from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.theme import DIVERGING, PULLED, SEQUENTIAL
 from kappaskin_app.widgets.text import round_up
@@ -153,14 +153,13 @@ class _Made(NamedTuple):
 
 
 class Colouring:
-    """Makes what a quantity takes when it is first asked for, error bars in a thread of its own."""
+    """Makes what a quantity takes when it is first asked for, error bars in the background."""
 
-    def __init__(self) -> None:
+    def __init__(self, tasks: Tasks) -> None:
         self._status = Status()
         self._key: tuple[object, ...] = ()
         self._quantities: Quantities | None = None
-        self._thread = ThreadPoolExecutor(1, "error-bars")
-        self._job: Future[_Made] | None = None
+        self._task = BackgroundTask(tasks, "", self._take)
         self._made = _Made((), None, 0.0)
         self._estimator: tuple[object, Estimator] | None = None
 
@@ -210,9 +209,6 @@ class Colouring:
 
     def error_bars(self, estimate: Estimate) -> ErrorBars | None:
         """Those of the setup of `estimate`, as soon as they are known."""
-        if self._job is not None and self._job.done():
-            job, self._job = self._job, None
-            self._made = job.result()
         found = self.quantities(estimate)
         if found is None or not np.isfinite(estimate.noise):
             return None
@@ -220,9 +216,9 @@ class Colouring:
         key = (*self._key, used.tobytes())
         made, now = self._made, time.monotonic()
         anew = self._estimator is not None and self._estimator[1].has_prior
-        if self._job is None and (made.key != key or (anew and now - made.at > _AGAIN)):
+        if not self._task.running and (made.key != key or (anew and now - made.at > _AGAIN)):
             readings = np.where(used, estimate.curvature, np.nan)
-            self._job = self._thread.submit(self._make, key, found, self._status, readings)
+            self._task.run(self._make, key, found, self._status, readings)
         return made.bars if made.key[:-1] == self._key else None
 
     def _make(
@@ -239,5 +235,5 @@ class Colouring:
             bars = None
         return _Made(key, bars, time.monotonic())
 
-    def close(self) -> None:
-        self._thread.shutdown(wait=True, cancel_futures=True)
+    def _take(self, made: _Made) -> None:
+        self._made = made

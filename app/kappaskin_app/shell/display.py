@@ -16,6 +16,7 @@ from kappaskin.estimation import FAULTS
 from kappaskin.frames import COMPONENTS, Estimate
 from kappaskin.live import Status
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.badge import GAP, LOST, OFF, STALE, WAITING, Badge
 from kappaskin_app.shell.centre import Centre
 from kappaskin_app.shell.colouring import SHADES, Colouring, Ranges
@@ -71,12 +72,12 @@ class Display(QObject):
     object_found = Signal(ContactObject, Estimate)
     drawn = Signal()
 
-    def __init__(self, session: Session, parent: QObject | None = None) -> None:
+    def __init__(self, session: Session, tasks: Tasks, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._session = session
         self.badge, self.notice = Badge(), Notice(_HINT)
         self.header, self.centre, self.foot = Header(self.badge), Centre(), StatusBar(self.notice)
-        self.colouring, self.ranges = Colouring(), Ranges()
+        self.colouring, self.ranges = Colouring(tasks), Ranges()
         self.settings = Settings()
         self.old = True
         """Whether what is shown is not coming in any more."""
@@ -196,10 +197,6 @@ class Display(QObject):
         if settings.region == "elements":
             dotted[[p for p in settings.region_elements if p < len(none)]] = True
         return crossed, dotted
-
-    def close(self) -> None:
-        """End what is computed in the background."""
-        self.colouring.close()
 
 
 def of_row(name: str, of_channels: NDArray[Any]) -> NDArray[Any]:

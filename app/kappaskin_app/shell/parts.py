@@ -43,13 +43,13 @@ class Parts(QMainWindow):
     def __init__(self, settings: Settings, engine: Engine | None = None) -> None:
         super().__init__()
         self.history = History(settings, self)
-        self.session = Session(self.history, engine or Engine(), self)
+        self.tasks = Tasks(self)
+        self.session = Session(self.history, engine or Engine(), self.tasks, self)
         self.requests = Requests(self.history, self.session)
         self.selection = Selection(self)
-        self.display = Display(self.session, self)
+        self.display = Display(self.session, self.tasks, self)
         self.actions_by_name = Actions(self, MENUS)
         self.docks, self.panels = Docks(self), Pages()
-        self.tasks = Tasks(self)
         self.opening = Opening(self, self.history, self.session)
         self.layouts = Layouts(self, self.docks, self.panels, self.history)
 

@@ -9,7 +9,6 @@ from typing import Any, TypeAlias
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
-from kappaskin._processes import BackgroundProcess
 from kappaskin.calibration import Calibration, Tare
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Region, ScanTradeoff, scan_tradeoff
@@ -23,6 +22,7 @@ from kappaskin.sensing import Sensor
 from kappaskin.skin import Patch
 from kappaskin.sources import SCAN_LISTS_PER_SECOND
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.badge import state_of
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.loads import Memo, tried
@@ -38,6 +38,8 @@ from kappaskin_app.shell.simulation import (
     scene_of,
     scene_or_why,
 )
+
+_MAKING = "Making the scene; Ctrl+Z takes it back"
 
 _Slow: TypeAlias = Written | tuple[Plate, str]
 _Answer: TypeAlias = tuple[str, tuple[object, ...], Any]
@@ -57,48 +59,37 @@ def _answers(slow: _Slow) -> Generator[_Answer]:
 
 
 class Ahead:
-    """Makes scenes once, in a process, so that they can be made at once thereafter.
+    """Makes scenes once, in a process, so that they can be made at once thereafter; then `ended`.
 
     Those are the written ones, which are read and planned, and those of unusual skins. In a thread
     of this one they took ten times as long, each step of theirs waiting for a drawing to end.
     """
 
-    def __init__(self) -> None:
-        self._work: BackgroundProcess[_Answer] | None = None
+    def __init__(self, tasks: Tasks, ended: Callable[[], object]) -> None:
+        # Where it is refused the process has died: the scene is made here.
+        self._task = BackgroundTask(tasks, _MAKING, self._learn, lambda _: None, ended)
         self._slow: _Slow | None = None
         self._begun: set[_Slow] = set()
 
     def ready(self, settings: Settings) -> bool:
         """Whether the scene of `settings` can be made, or refused, at once; if not, it is begun."""
         slow = _slow(settings)
-        if self._work is not None and slow != self._slow:
+        if self.busy and slow != self._slow:
             self._begun.discard(self._slow)  # nobody waits for it any more
-            self.close()
-        if self._work is None and slow is not None and slow not in self._begun:
+            self._task.stop()
+        if not self.busy and slow is not None and slow not in self._begun:
             self._begun.add(slow)
-            self._slow, self._work = slow, BackgroundProcess("kappaskin-scene", _answers, slow)
-        return self._work is None
+            self._slow = slow
+            self._task.compute(_answers, slow)
+        return not self.busy
 
     @property
     def busy(self) -> bool:
-        return self._work is not None
+        return self._task.running
 
-    def finished(self) -> bool:
-        """Whether what was begun is finished; true once."""
-        if self._work is None:
-            return False
-        with suppress(Refusal):  # it died: the scene is made here
-            for memo, question, answer in self._work.poll():
-                _MEMOS[memo].learn(question, answer)
-        if not self._work.done:
-            return False
-        self.close()
-        return True
-
-    def close(self) -> None:
-        if self._work is not None:
-            self._work.close()
-            self._work = None
+    def _learn(self, found: _Answer) -> None:
+        memo, question, answer = found
+        _MEMOS[memo].learn(question, answer)
 
 
 def _slow(settings: Settings) -> _Slow | None:
@@ -173,7 +164,9 @@ class Session(QObject):
     estimated = Signal(Estimate)
     reported = Signal(Status)
 
-    def __init__(self, history: History, engine: Engine, parent: QObject | None = None) -> None:
+    def __init__(
+        self, history: History, engine: Engine, tasks: Tasks, parent: QObject | None = None
+    ) -> None:
         super().__init__(parent)
         self._history = history
         self._settings = history.settings
@@ -183,7 +176,7 @@ class Session(QObject):
         self._anew, self.running = False, True
         self._sought: float | None = None
         self._sought_at = 0.0
-        self._ahead = Ahead()
+        self._ahead = Ahead(tasks, self._play)
         self.base: Setup | None = None
         if engine.resumed is None:
             self.asked = _setup_of(history.settings)
@@ -399,8 +392,6 @@ class Session(QObject):
         """Look for news; everything that shows it hangs on the two signals."""
         if self.closed:
             return  # asked for by a picture drawn while closing
-        if self._ahead.finished():
-            self._play()
         now = time.monotonic()
         if now >= self._next_status:
             self._next_status = now + _STATUS
@@ -446,5 +437,4 @@ class Session(QObject):
     def close(self) -> None:
         self.timer.stop()
         self.closed = True
-        self._ahead.close()
         self.engine.close()

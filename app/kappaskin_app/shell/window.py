@@ -71,13 +71,10 @@ class MainWindow(Parts):
         self.panels.read_wanted.connect(self.read_wanted)
         self.history.changed.connect(guarded(self._show_settings))
         session.reported.connect(guarded(self._show_status))
-        session.reported.connect(guarded(tasks.follow))
+        session.reported.connect(guarded(tasks.tell))
         tasks.told.connect(guarded(lambda words: activity.show_work(words, tasks.may_cancel)))
+        tasks.refused.connect(guarded(self.tell))
         activity.cancel_wanted.connect(guarded(tasks.cancel))
-        tasks.add("Making the scene; Ctrl+Z takes it back", lambda: session.making)
-        tasks.add(
-            "Computing the new settings; Ctrl+Z takes them back", lambda: session.status.computing
-        )
         for part in (self.opening, self.layouts):
             part.told.connect(guarded(self.tell))
 
@@ -161,7 +158,7 @@ class MainWindow(Parts):
             self.keeping.write()
             self.history.stack.blockSignals(True)  # it tells even while all is taken apart
             self.closing.emit()
+            self.tasks.close()
             self.session.close()
             self.closed.emit()
-            self.display.close()
         super().closeEvent(event)

@@ -1,10 +1,8 @@
 """What dialogs have in common whose work goes on beside the window: a bar, words, an end."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
 
-from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import (
     QDialog,
     QFormLayout,
@@ -19,36 +17,33 @@ from PySide6.QtWidgets import (
 
 from kappaskin.errors import Refusal
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.background import BackgroundTask, Tasks, Work
 
-_POLL = 100  # ms
 _WIDTH = 560  # px
-
-
-class Work(Protocol):
-    """Tells the shares that are done, and something else at its end; or a `Refusal`."""
-
-    def poll(self) -> Sequence[object]: ...
-
-    def close(self) -> None: ...
 
 
 class WorkDialog(QDialog):
     """Asks in a `form`, begins the `work` made of it, and shows how far that is.
 
-    `work` raises a `Refusal` where it cannot begin, `said` puts what came of it into words. It can
-    be cancelled, and is, when it closes.
+    `work` tells the shares that are done and something else at its end, which `said` puts into
+    words; it raises a `Refusal` where it cannot begin. It can be cancelled, and is, when it closes.
+    `doing` says at the foot of the window what goes on.
     """
 
     def __init__(
         self,
+        tasks: Tasks,
         title: str,
         verb: str,
+        doing: str,
         work: Callable[[], Work],
         said: Callable[[object], str],
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self._work, self._said = work, said
+        cancelled = "Cancelled; nothing was written."
+        self.task = BackgroundTask(tasks, doing, self._take, self._refuse, cancelled=cancelled)
         self.setWindowTitle(title)
         self.setMinimumWidth(_WIDTH)
         self.form, self.bar, self.words = QFormLayout(), QProgressBar(), QLabel()
@@ -61,10 +56,6 @@ class WorkDialog(QDialog):
         self.begin_button, self.cancel_button = QPushButton(verb), QPushButton("&Cancel")
         self.cancel_button.setAutoDefault(False)
         self.begin_button.setToolTip("Begin, beside the window; what is in the way is told below.")
-        self._going: Work | None = None
-        self._timer = QTimer(self)
-        self._timer.setInterval(_POLL)
-        self._timer.timeout.connect(guarded(self._follow))
         self.begin_button.clicked.connect(guarded(lambda *_: self._begin()))
         self.cancel_button.clicked.connect(guarded(lambda *_: self.cancel()))
 
@@ -87,7 +78,7 @@ class WorkDialog(QDialog):
 
     @property
     def busy(self) -> bool:
-        return self._going is not None
+        return self.task.running
 
     def ask(self) -> None:
         """Show it, as new unless it is at work."""
@@ -98,49 +89,30 @@ class WorkDialog(QDialog):
         self.raise_()
 
     def _begin(self) -> None:
-        self.bar.hide()
-        try:
-            self._going = self._work()
-        except Refusal as refusal:
-            self._end(str(refusal))
-            return
         self.words.setText("Writing\N{HORIZONTAL ELLIPSIS}")
         self.bar.setValue(0)
         self.bar.show()
-        self._timer.start()
+        self.task.begin(self._work)
         self._allow()
 
-    def _follow(self) -> None:
-        if self._going is None:
-            return
-        try:
-            for told in self._going.poll():
-                if isinstance(told, float):
-                    self.bar.setValue(round(self.bar.maximum() * told))
-                else:
-                    self.bar.setValue(self.bar.maximum())
-                    self._end(self._said(told))
-                    return
-        except Exception as error:  # whatever it is, it would come again at every look
-            self.bar.hide()
-            self._end(str(error) or type(error).__name__)
-            if not isinstance(error, Refusal):
-                raise
+    def _take(self, told: object) -> None:
+        if isinstance(told, float):
+            self.bar.setValue(round(self.bar.maximum() * told))
+        else:
+            self.bar.setValue(self.bar.maximum())
+            self._end(self._said(told))
+
+    def _refuse(self, error: Exception) -> None:
+        self.bar.hide()
+        self._end(str(error) or type(error).__name__)
 
     def cancel(self) -> None:
         """End what is at work, or close."""
-        if self._going is None:
-            self.reject()
-        else:
-            self.bar.hide()
-            self._end("Cancelled; nothing was written.")
+        self.task.cancel() if self.busy else self.reject()
 
     def _end(self, words: str) -> None:
         """Be done, in `words`."""
-        self._timer.stop()
-        going, self._going = self._going, None
-        if going is not None:
-            going.close()
+        self.task.stop()
         self.words.setText(words)
         high = self.heightForWidth(self.width())
         self.resize(self.width(), max(self.height(), high))  # or the fields would be pressed flat

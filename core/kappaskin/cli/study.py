@@ -77,12 +77,16 @@ def simulate(scene: str = "", *, frames: Whole, out: Path, seed: Whole | None = 
 
 def _measured(scene: "Scene") -> "list[Cost | Refused]":
     """What every setting costs; on a terminal, a progress bar on standard error."""
-    from kappaskin.studies import Cost, CostMeasurement, Refused, settings_to_try
+    from kappaskin._processes import BackgroundProcess
+    from kappaskin.studies import Cost, Refused, costs, settings_to_try
 
     settings, found = settings_to_try(scene), list[Cost | Refused]()
     try:
-        with CostMeasurement(scene, settings) as measurement, ProgressLine() as show_progress:
-            for cost in measurement.wait():
+        with (
+            BackgroundProcess("kappaskin-cost", costs, scene, settings) as process,
+            ProgressLine() as show_progress,
+        ):
+            for cost in process.wait():
                 found.append(cost)
                 done = 40 * len(found) // len(settings)
                 show_progress(f"[{'#' * done:<40}] {len(found)} of {len(settings)}")

@@ -7,7 +7,9 @@ from kappaskin.recording.export.request import ExportRequest as ExportRequest
 from kappaskin.recording.export.writing import Exported as Exported
 from kappaskin.recording.export.writing import ExportTask as ExportTask
 from kappaskin.recording.reading import Recording as Recording
+from kappaskin.recording.recompute import RecordingSummary as RecordingSummary
 from kappaskin.recording.recompute import recorded_setups as recorded_setups
+from kappaskin.recording.recompute import summary_of as summary_of
 from kappaskin.recording.recorder import Recorder as Recorder
 from kappaskin.recording.repair import Repaired as Repaired
 from kappaskin.recording.repair import RepairTask as RepairTask

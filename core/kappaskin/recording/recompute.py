@@ -3,8 +3,9 @@
 import math
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
 from kappaskin._state import StateArrays
@@ -253,3 +254,35 @@ def recorded_setups(recording: Recording) -> list[tuple[float, Setup]]:
         )
         for message in islice(messages, _SETUPS)
     ]
+
+
+@dataclass(frozen=True)
+class RecordingSummary:
+    """What there is to know of the recording at `path` before it is played; `length` is in s.
+
+    `setups` it was made with, each from a time in s on, and why they cannot be told.
+    """
+
+    path: Path
+    length: float = 0.0
+    whole: bool = True
+    setups: tuple[tuple[float, Setup], ...] = ()
+    trouble: str = ""
+
+    def setup_at(self, at: float) -> Setup | None:
+        """The one in use at `at` s; before the first, that."""
+        used = [setup for since, setup in self.setups if since <= at] or [
+            setup for _, setup in self.setups[:1]
+        ]
+        return used[-1] if used else None
+
+
+def summary_of(path: Path) -> RecordingSummary:
+    """What the file at `path` holds; a `Refusal` where it is no recording."""
+    with Recording(path) as recording:
+        length = (recording.last - recording.first) * 1e-9
+        try:
+            setups = tuple(recorded_setups(recording))
+        except Refusal as refusal:
+            return RecordingSummary(path, length, recording.whole, (), str(refusal))
+        return RecordingSummary(path, length, recording.whole, setups)

@@ -292,6 +292,10 @@ class RepairTask:
             "kappaskin-repair", repair_steps, path, out
         )
 
+    @property
+    def done(self) -> bool:
+        return self._task.done
+
     def poll(self) -> list[float | Repaired]:
         """The shares that are done since the last call, and in the end what was saved.
 

@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from kappaskin.studies.cost import cheapest as cheapest
     from kappaskin.studies.cost import frontier as frontier
     from kappaskin.studies.cost import settings_to_try as settings_to_try
-    from kappaskin.studies.cost.bench import CostMeasurement as CostMeasurement
     from kappaskin.studies.cost.bench import EffectCost as EffectCost
     from kappaskin.studies.cost.bench import EffectCosts as EffectCosts
+    from kappaskin.studies.cost.bench import cost_steps as cost_steps
     from kappaskin.studies.cost.bench import costs as costs
     from kappaskin.studies.cost.bench import effect_costs as effect_costs
     from kappaskin.studies.cost.bench import usual_setting as usual_setting
@@ -61,7 +61,7 @@ else:
         ("cost", "Cost Refused Setting cheapest frontier settings_to_try"),
         (
             "cost.bench",
-            "CostMeasurement EffectCost EffectCosts costs effect_costs usual_setting",
+            "EffectCost EffectCosts cost_steps costs effect_costs usual_setting",
         ),
         (
             "cost.report",

@@ -1,33 +1,241 @@
+"""Background tasks: each ends however it goes, and what it computes comes to the GUI's thread."""
+
+import math
+import multiprocessing
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+
 import pytest
 
-from kappaskin import Status
-from kappaskin_app.shell.background import Tasks
+from kappaskin import Refusal, Status
+from kappaskin_app import guard
+from kappaskin_app.shell.background import BackgroundTask, BackgroundThread, Cancelled, Tasks
 from kappaskin_app.shell.window import MainWindow
+
+_LONG = 600.0  # s: no test waits for it
+
+
+def alive() -> list[object]:
+    """The threads and processes of tasks that there are."""
+    threads = [each for each in threading.enumerate() if isinstance(each, BackgroundThread)]
+    return [*threads, *multiprocessing.active_children()]
+
+
+def ticking() -> Iterator[int]:
+    """Items without an end."""
+    for number in range(round(_LONG / 0.01)):
+        yield number
+        time.sleep(0.01)
+
+
+Begin = Callable[[BackgroundTask[object]], None]
+ENDLESS: dict[str, Begin] = {
+    "thread": lambda task: task.run(ticking),
+    "process": lambda task: task.compute(time.sleep, _LONG),
+}
+FAILING: dict[str, Begin] = {
+    "thread": lambda task: task.run(math.sqrt, -1.0),
+    "process": lambda task: task.compute(math.sqrt, -1.0),
+}
+
+
+class Slot:
+    """A task, and what came of it: items, errors, how often it ended, and in which threads."""
+
+    def __init__(self, tasks: Tasks) -> None:
+        self.items, self.errors, self.ends = list[object](), list[Exception](), 0
+        self.threads = set[threading.Thread]()
+        self.task = BackgroundTask[object](
+            tasks, "Counting", self.take, self.refuse, self.end, "Cancelled; it is not counted."
+        )
+
+    def take(self, item: object) -> None:
+        self.items.append(item)
+        self.threads.add(threading.current_thread())
+
+    def refuse(self, error: Exception) -> None:
+        self.errors.append(error)
+        self.threads.add(threading.current_thread())
+
+    def end(self) -> None:
+        self.ends += 1
+
+
+@pytest.fixture
+def tasks(qapp) -> Iterator[Tasks]:
+    made = Tasks()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def slot(tasks: Tasks) -> Slot:
+    return Slot(tasks)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", ["thread", "process"])
+def test_what_is_computed_comes_to_the_gui_thread_and_leaves_nothing(slot: Slot, how, until):
+    begin = {"thread": slot.task.run, "process": slot.task.compute}[how]
+    begin(math.hypot, 3.0, 4.0)
+    assert slot.task.running
+    until(lambda: not slot.task.running)
+    assert (slot.items, slot.errors, slot.ends) == ([5.0], [], 1)
+    assert slot.threads == {threading.main_thread()}
+    assert alive() == []
+
+
+def test_every_item_of_a_generator_comes_in_order(slot: Slot, until):
+    slot.task.run(ticking)
+    until(lambda: len(slot.items) > 3)
+    slot.task.stop()
+    assert slot.items == list(range(len(slot.items)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", ENDLESS)
+def test_cancelling_ends_it_and_says_so_once(slot: Slot, how: str, until):
+    ENDLESS[how](slot.task)
+    slot.task.cancel()
+    slot.task.cancel()  # there is nothing left to be cancelled
+    assert not slot.task.running
+    assert [str(error) for error in slot.errors] == ["Cancelled; it is not counted."]
+    assert isinstance(slot.errors[0], Cancelled)
+    assert slot.ends == 1
+    until(lambda: alive() == [])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", ENDLESS)
+def test_closing_ends_it_at_once_and_nothing_begins_any_more(tasks: Tasks, slot: Slot, how: str):
+    ENDLESS[how](slot.task)
+    tasks.close()
+    assert alive() == []
+    ENDLESS[how](slot.task)
+    assert not slot.task.running
+    assert alive() == []
+    assert (slot.errors, slot.ends) == ([], 0)
+
+
+def test_a_thread_that_does_not_end_holds_the_window_for_no_longer_than_a_second(tasks: Tasks):
+    hung = threading.Event()
+    Slot(tasks).task.run(lambda: hung.wait(_LONG))
+    begun = time.monotonic()
+    tasks.close()
+    assert 0.9 < time.monotonic() - begun < 10.0  # on a busy machine too
+    (thread,) = alive()
+    hung.set()
+    thread.join()
+
+
+@pytest.mark.slow
+@pytest.mark.fails_inside
+@pytest.mark.parametrize("how", FAILING)
+def test_an_exception_inside_ends_it_and_is_told_once(slot: Slot, how: str, until):
+    told: list[str] = []
+    guard.on_failure(told.append)
+    FAILING[how](slot.task)
+    until(lambda: not slot.task.running)
+    guard.forget(told.append)
+    assert (slot.items, len(slot.errors), slot.ends) == ([], 1, 1)
+    assert slot.threads == {threading.main_thread()}
+    if how == "thread":
+        assert told == [f"Something went wrong: {slot.errors[0]}"]
+    else:
+        assert "the background process ended unexpectedly" in str(slot.errors[0])
+    assert alive() == []
+
+
+def test_a_refusal_is_no_failure_and_is_told_where_no_place_is_better(tasks: Tasks, until):
+    def refused() -> None:
+        raise Refusal("expected another one")
+
+    told: list[str] = []
+    tasks.refused.connect(told.append)
+    BackgroundTask(tasks, "", told.append).run(refused)
+    until(lambda: told != [])
+    assert told == ["expected another one"]
+
+
+def test_what_cannot_begin_is_refused(slot: Slot):
+    def start() -> BackgroundThread:
+        raise Refusal("expected another one")
+
+    slot.task.begin(start)
+    assert not slot.task.running
+    assert [str(error) for error in slot.errors] == ["expected another one"]
+
+
+def test_a_result_that_comes_late_is_dropped(slot: Slot, until):
+    go_on = threading.Event()
+    slot.task.run(lambda: go_on.wait(_LONG) and "old")
+    slot.task.run(lambda: "new")
+    go_on.set()
+    until(lambda: not slot.task.running and alive() == [])
+    assert slot.items == ["new"]
+    assert slot.ends == 1
+
+
+def test_what_is_left_half_done_is_cleaned_up(slot: Slot, until):
+    left = []
+
+    def making() -> Iterator[int]:
+        try:
+            yield from ticking()
+        finally:
+            left.append("cleaned")
+
+    slot.task.run(making)
+    until(lambda: slot.items != [])
+    slot.task.stop()
+    until(lambda: left == ["cleaned"])
+
+
+class Counting:
+    """Work that goes on until it is closed."""
+
+    def __init__(self) -> None:
+        self.done = False
+
+    def poll(self) -> Sequence[object]:
+        return []
+
+    def close(self) -> None:
+        self.done = True
 
 
 class Bench:
     """Two tasks that go on while their names are in `going`, and what was told of them."""
 
     def __init__(self) -> None:
-        self.now, self.going, self.told = 0.0, set[str](), list[str]()
-        self.doing = Tasks(clock=lambda: self.now)
-        for name in ("Counting", "Sorting"):
-            self.doing.add(
-                name, lambda name=name: name in self.going, lambda name=name: self.end(name)
-            )
-        self.doing.told.connect(self.told.append)
+        self.now, self.told = 0.0, list[str]()
+        self.tasks = Tasks(clock=lambda: self.now)
+        self.named = {
+            name: BackgroundTask[object](self.tasks, name, self.told.append, cancelled="Cancelled.")
+            for name in ("Counting", "Sorting")
+        }
+        self.tasks.told.connect(self.told.append)
 
-    def end(self, name: str) -> None:
-        self.going.remove(name)
+    @property
+    def going(self) -> set[str]:
+        return {name for name, task in self.named.items() if task.running}
 
-    def at(self, now: float, *going: str) -> None:
-        self.now, self.going = now, set(going)
-        self.doing.follow(Status())
+    def at(self, now: float, *going: str, computing: bool = False) -> None:
+        self.now = now
+        for name, task in self.named.items():
+            if name not in going:
+                task.stop()
+            elif not task.running:
+                task.begin(Counting)
+        self.tasks.tell(Status(computing=computing))
 
 
 @pytest.fixture
-def bench() -> Bench:
-    return Bench()
+def bench(qapp) -> Iterator[Bench]:
+    made = Bench()
+    yield made
+    made.tasks.close()
 
 
 def test_what_takes_no_longer_than_a_moment_is_not_told(bench: Bench) -> None:
@@ -49,11 +257,28 @@ def test_the_longest_is_told_with_its_time_and_how_many_more(bench: Bench) -> No
 
 
 def test_cancel_ends_the_one_that_is_told_and_no_other(bench: Bench) -> None:
-    bench.doing.cancel()  # there is none
+    bench.tasks.cancel()  # there is none
     bench.at(0.0, "Sorting")
     bench.at(1.0, "Sorting", "Counting")
-    bench.doing.cancel()
+    bench.tasks.cancel()
     assert bench.going == {"Counting"}
+
+
+def test_what_the_engine_computes_is_told_and_cannot_be_cancelled(bench: Bench) -> None:
+    bench.at(0.0, computing=True)
+    bench.at(1.0, computing=True)
+    assert bench.told == ["Computing the new settings; Ctrl+Z takes them back: 1 s"]
+    assert not bench.tasks.may_cancel
+
+
+@pytest.mark.slow
+def test_closing_the_window_ends_what_runs(window: MainWindow) -> None:
+    slots = [Slot(window.tasks) for _ in ENDLESS]
+    for slot, begin in zip(slots, ENDLESS.values(), strict=True):
+        begin(slot.task)
+    window.close()
+    assert alive() == []
+    assert not any(slot.task.running for slot in slots)
 
 
 def test_what_is_told_at_the_foot_of_the_window_can_be_cancelled_there(
@@ -73,7 +298,7 @@ def test_what_is_told_at_the_foot_of_the_window_can_be_cancelled_there(
 def test_a_plan_that_was_cancelled_is_made_at_the_next_look(window: MainWindow) -> None:
     window.planning.watch(True)
     assert window.planning.waiting
-    window.planning.cancel()
+    window.planning.task.cancel()
     assert not window.planning.waiting
     window.planning.watch(True)
     assert window.planning.waiting

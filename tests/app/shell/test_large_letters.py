@@ -1,6 +1,5 @@
 """With letters twice as large, in a window of the usual size, nothing is cut."""
 
-import threading
 import time
 from collections.abc import Iterator
 
@@ -24,7 +23,6 @@ from kappaskin_app.theme import grown
 from kappaskin_app.widgets.line import Line
 
 _PATIENCE = 30.0  # s until what was said a moment ago has the room it asks for
-_THREADS = {"stability": "singular-values_0", "design": "design_0", "scene": "gallery_0"}
 
 
 @pytest.fixture(scope="module")
@@ -33,11 +31,6 @@ def shared(qapp: QApplication, until, window_class) -> Iterator[MainWindow]:
     window = window_class("sim:")
     window.show()
     until(lambda: bool(window.display.foot.object.text()))
-    # Their threads are those of no one test.
-    for name, thread in _THREADS.items():
-        window.docks.reveal(name)
-        until(lambda thread=thread: thread in {each.name for each in threading.enumerate()})
-        window.docks[name].hide()
     window.requests.set("letters", 200.0)
     yield window
     window.history.stack.setIndex(0)

@@ -1,7 +1,6 @@
 """Scenes that take long are made in a process beside, and no wait is for a skin left meanwhile."""
 
 import multiprocessing
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +8,7 @@ import pytest
 
 from kappaskin import Refusal, read_scene
 from kappaskin.scenes import scene_file
+from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.loads import Memo, tried
 from kappaskin_app.shell.session import Ahead
 from kappaskin_app.shell.settings import Settings
@@ -22,10 +22,15 @@ from kappaskin_app.shell.simulation import (
 
 
 @pytest.fixture
-def ahead():
-    made = Ahead()
-    yield made
-    made.close()
+def ahead(qapp):
+    tasks = Tasks()
+    yield Ahead(tasks, lambda: None)
+    tasks.close()
+
+
+@pytest.fixture
+def finish(ahead: Ahead, until):
+    return lambda: until(lambda: not ahead.busy)
 
 
 def shaped(name: str, rim_radius: float) -> Settings:
@@ -34,19 +39,12 @@ def shaped(name: str, rim_radius: float) -> Settings:
     return replace(settings, **changed | {"rim_radius": rim_radius})
 
 
-def finish(ahead: Ahead) -> None:
-    end = time.monotonic() + 30
-    while not ahead.finished():
-        assert time.monotonic() < end
-        time.sleep(0.01)
-
-
-def test_a_skin_is_computed_beside_and_as_it_would_be_here(ahead: Ahead, monkeypatch):
+def test_a_skin_is_computed_beside_and_as_it_would_be_here(ahead: Ahead, finish, monkeypatch):
     settings = shaped("disk", 0.047)
     skin = plate_of(settings), settings.edge
 
     assert not ahead.ready(settings)
-    finish(ahead)
+    finish()
     assert ahead.ready(settings)
     monkeypatch.setattr(tried, "_answer", None)  # it is known, not computed
 
@@ -54,14 +52,16 @@ def test_a_skin_is_computed_beside_and_as_it_would_be_here(ahead: Ahead, monkeyp
     assert np.array_equal(tried(*skin).values, here.values)
 
 
-def test_a_written_scene_is_read_beside_or_refused_in_the_same_words(ahead: Ahead, monkeypatch):
+def test_a_written_scene_is_read_beside_or_refused_in_the_same_words(
+    ahead: Ahead, finish, monkeypatch
+):
     good = replace(Settings(), written=written(scene_file("coin")))
     text = "[skin]\nside = 'wide'\n"
     bad = replace(good, written=replace(good.written, text=text))
 
     for settings in (good, bad):
         assert not ahead.ready(settings)
-        finish(ahead)
+        finish()
         assert ahead.ready(settings)
     monkeypatch.setattr(scene_or_why, "_answer", None)
 
@@ -73,23 +73,23 @@ def test_a_written_scene_is_read_beside_or_refused_in_the_same_words(ahead: Ahea
     assert str(beside.value) == str(here.value).replace(str(good.written.file), "coin.toml")
 
 
-def test_another_skin_is_not_kept_waiting_by_the_one_before(ahead: Ahead):
+def test_another_skin_is_not_kept_waiting_by_the_one_before(ahead: Ahead, finish):
     assert not ahead.ready(shaped("hexagon", 0.0461))
 
     assert not ahead.ready(shaped("disk", 0.0462))
-    finish(ahead)
+    finish()
 
     assert ahead.ready(shaped("disk", 0.0462))
     assert not ahead.ready(shaped("hexagon", 0.0461))  # begun anew
 
 
-def test_a_scene_is_made_here_when_the_process_dies(ahead: Ahead):
+def test_a_scene_is_made_here_when_the_process_dies(ahead: Ahead, finish):
     settings = shaped("disk", 0.0463)
     ahead.ready(settings)
 
     (process,) = multiprocessing.active_children()
     process.kill()
-    finish(ahead)
+    finish()
 
     assert ahead.ready(settings)
     assert scene_of(settings).plate == plate_of(settings)

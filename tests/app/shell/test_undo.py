@@ -1,6 +1,5 @@
 """What is no setting comes back too: where the camera stands, docks, pages, files."""
 
-import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -20,9 +19,8 @@ def shared(qapp: QApplication, until, window_class) -> Iterator[MainWindow]:
     qapp.setStyle("Fusion")
     window = window_class("sim:")
     window.show()
-    until(lambda: bool(window.display.foot.object.text()))  # its threads are those of no one test
+    until(lambda: bool(window.display.foot.object.text()))
     window.heatmaps["xx"].chosen.emit(0)
-    until(lambda: "error-bars_0" in {thread.name for thread in threading.enumerate()})
     window.history.stack.undo()
     window.docks["element"].hide()
     yield window

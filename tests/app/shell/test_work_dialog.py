@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from kappaskin import Refusal
+from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.work_dialog import WorkDialog, ended, with_ending
 
 
@@ -13,7 +14,7 @@ class Failing:
     """Work that fails whenever it is looked at."""
 
     def __init__(self, why: Exception) -> None:
-        self.why, self.looks, self.closed = why, 0, False
+        self.why, self.looks, self.closed, self.done = why, 0, False, False
 
     def poll(self) -> Sequence[object]:
         self.looks += 1
@@ -25,9 +26,9 @@ class Failing:
 
 @pytest.mark.fails_inside
 @pytest.mark.parametrize("why", [Refusal("the disk is full"), OSError("the disk is full")])
-def test_work_that_fails_is_ended_once_and_told(qtbot, until, why: Exception) -> None:
+def test_work_that_fails_is_ended_once_and_told(qapp, qtbot, until, why: Exception) -> None:
     work = Failing(why)
-    dialog = WorkDialog("Work", "Begin", lambda: work, str)
+    dialog = WorkDialog(Tasks(qapp), "Work", "Begin", "Working", lambda: work, str)
     qtbot.addWidget(dialog)
     dialog.begin_button.click()
     until(lambda: not dialog.busy)

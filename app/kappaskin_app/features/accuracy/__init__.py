@@ -11,14 +11,11 @@ class AccuracyFeature:
 
     def install(self, shell: MainWindow) -> None:
         session = shell.session
-        self.costing, self.cost = Costing(shell.history, session, shell), CostPanel()
+        self.costing = Costing(shell.history, session, shell.tasks, shell)
+        self.cost = CostPanel()
         shell.docks.put_below("cost", "Cost of accuracy", self.cost, "F9")
         shell.docks["cost"].visibilityChanged.connect(guarded(self.costing.watch))
         session.reported.connect(guarded(self.costing.follow))
         session.estimated.connect(guarded(self.costing.receive))
         self.cost.attend(self.costing)
         shell.theme_changed.connect(guarded(self.cost.show_theme))
-        shell.tasks.add(
-            "Measuring what accuracy costs", lambda: self.costing.running, self.costing.cancel
-        )
-        shell.closing.connect(guarded(self.costing.close))

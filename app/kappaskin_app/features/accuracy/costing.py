@@ -15,13 +15,14 @@ from kappaskin.scenes import Scene
 from kappaskin.scenes.effects import GaussianNoise, UniformNoise
 from kappaskin.studies import (
     Cost,
-    CostMeasurement,
     EffectCosts,
     Refused,
     Setting,
+    cost_steps,
     frontier,
     settings_to_try,
 )
+from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
@@ -75,7 +76,9 @@ class Costing(QObject):
 
     changed = Signal()
 
-    def __init__(self, history: History, session: Session, parent: QObject | None = None) -> None:
+    def __init__(
+        self, history: History, session: Session, tasks: Tasks, parent: QObject | None = None
+    ) -> None:
         super().__init__(parent)
         self._history, self._session = history, session
         self.scene: Scene | None = None
@@ -84,7 +87,13 @@ class Costing(QObject):
         self.refusal = self.about = ""
         self._of: tuple[bool, int, float] = (False, 0, 0.0)
         self._tried: tuple[Setting, ...] = ()
-        self._measuring: CostMeasurement | None = None
+        self.task = BackgroundTask(
+            tasks,
+            "Measuring what accuracy costs",
+            self._take_up,
+            self._refuse,
+            cancelled="Cancelled; Measure begins anew.",
+        )
         self._watched = False
         self._next = 0.0
         self._recent: deque[tuple[float, float, float]] = deque()
@@ -96,11 +105,11 @@ class Costing(QObject):
         """Measure what is still to be measured while somebody looks, and only then."""
         self._watched, self._next = watched, 0.0
         if not watched:
-            self._stop()
+            self.task.stop()
 
     def measure(self) -> None:
         """Measure everything, on the skin as it is now."""
-        self._stop()
+        self.task.stop()
         self.scene, self.costs, self._tried, self.refusal = None, {}, (), ""
         self.effects = {}
         self._next = 0.0
@@ -108,11 +117,10 @@ class Costing(QObject):
         self.changed.emit()
 
     def follow(self, _: Status) -> None:
-        """Take up what was measured meanwhile, and go on."""
+        """Measure what is still to be measured."""
         if not self._watched:
             return
-        self._take_up()
-        if self._measuring is None and not self.refusal:
+        if not self.running and not self.refusal:
             self._go_on()
         now = time.monotonic()
         if now >= self._next:
@@ -131,12 +139,6 @@ class Costing(QObject):
         while self._recent[0][0] < now - _SMOOTHED:
             self._recent.popleft()
 
-    def cancel(self) -> None:
-        """Measure no more, until that is asked for again."""
-        self._stop()
-        self.refusal = "Cancelled; Measure begins anew."
-        self.changed.emit()
-
     def choose(self, cost: Cost) -> None:
         """Switch to the setting of `cost`."""
         self._take(cost.setting)
@@ -152,14 +154,11 @@ class Costing(QObject):
             changed |= {"elements_x": elements[0], "elements_y": elements[1], **NO_ELEMENTS}
         self._history.change("Choice by its cost", -1, **changed)
 
-    def close(self) -> None:
-        self.watch(False)
-
     # What is so.
 
     @property
     def running(self) -> bool:
-        return self._measuring is not None
+        return self.task.running
 
     @property
     def progress(self) -> tuple[int, int]:
@@ -252,7 +251,7 @@ class Costing(QObject):
             if effects_with in self.effects or self.unlike():
                 effects_with = None
             if self.scene is not None and (missing or effects_with):
-                self._measuring = CostMeasurement(self.scene, missing, effects_with)
+                self.task.compute(cost_steps, self.scene, missing, effects_with)
         except Refusal as refusal:
             self.refusal = str(refusal)
 
@@ -297,22 +296,15 @@ class Costing(QObject):
         estimate = self._session.estimate
         return float("nan") if estimate is None else max(estimate.noise, 1e-9)
 
-    def _take_up(self) -> None:
-        if self._measuring is None:
-            return
-        try:
-            for cost in self._measuring.poll():
-                self.costs[cost.setting] = cost
-            self.effects |= self._measuring.effects
-        except Refusal as refusal:
-            self.refusal = str(refusal)
-        if self._measuring.done:
-            self._stop()
+    def _take_up(self, found: Cost | Refused | tuple[Setting, EffectCosts]) -> None:
+        if isinstance(found, tuple):
+            self.effects |= [found]
+        else:
+            self.costs[found.setting] = found
 
-    def _stop(self) -> None:
-        if self._measuring is not None:
-            self._measuring.close()
-            self._measuring = None
+    def _refuse(self, error: Exception) -> None:
+        self.refusal = str(error)
+        self.changed.emit()
 
 
 def _measurable(setting: Setting) -> bool:

@@ -16,7 +16,6 @@ from kappaskin_app.shell.window import MainWindow
 
 _CHECKSUM = "sha256"  # the line that a calibration has and a scene has not
 _HEAD = 4096  # characters, among which it is
-_STOPPED = "Cancelled while it was computed; what was taken is forgotten."
 
 
 class CalibrationFeature:
@@ -24,7 +23,7 @@ class CalibrationFeature:
 
     def install(self, shell: MainWindow) -> None:
         self._shell, panels = shell, shell.panels
-        self.calibrating = Calibrating(shell.history, shell)
+        self.calibrating = Calibrating(shell.history, shell.tasks, shell)
         tares = TareStore(tare_folder())
         self.taring = Taring(shell.history, shell.session.engine, tares, shell)
         self.tare = panels.add(LIVE, TarePanel())
@@ -44,11 +43,6 @@ class CalibrationFeature:
         calibrating.used.connect(guarded(shell.opening.note))
         shell.opening.add(
             Kind("calibration", (".toml",), self._use, is_calibration, needs_sensor=True)
-        )
-        shell.tasks.add(
-            "Computing the calibration",
-            lambda: calibrating.computing,
-            partial(calibrating.cancel, _STOPPED),
         )
 
     def _wire_tare(self, shell: MainWindow) -> None:

@@ -3,7 +3,6 @@
 import math
 import time
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -25,6 +24,7 @@ from kappaskin.frames import OVERTAKEN, Estimate
 from kappaskin.live import Status
 from kappaskin.scenes.cylinders import CylinderStep, schedule
 from kappaskin.sensing import Sensor
+from kappaskin_app.shell.background import BackgroundTask, Cancelled, Tasks
 from kappaskin_app.shell.history import History
 
 Array = NDArray[np.float64]
@@ -34,6 +34,7 @@ _SILENCE = 5.0  # s without a reading after which a step is given up
 _FEWEST_FRAMES = 10  # of one step, however short: their spread tells the noise
 _MOST_FRAMES = 5000  # kept of one step, evenly: more tell no more
 _LONGEST = 3600.0  # s on one step
+_STOPPED = "Cancelled while it was computed; what was taken is forgotten."
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +72,7 @@ class Calibrating(QObject):
     def __init__(
         self,
         history: History,
+        tasks: Tasks,
         parent: QObject | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -85,7 +87,9 @@ class Calibrating(QObject):
         self.unattended = False
         self._kept: list[Estimate] | None = None  # of the step that is being taken
         self._begun = self._heard = 0.0
-        self._computed: Future[CalibrationReport] | None = None
+        self._task = BackgroundTask(
+            tasks, "Computing the calibration", self._finish, self._refuse, cancelled=_STOPPED
+        )
 
     # What is so.
 
@@ -96,7 +100,7 @@ class Calibrating(QObject):
 
     @property
     def computing(self) -> bool:
-        return self._computed is not None
+        return self._task.running
 
     @property
     def taking(self) -> bool:
@@ -163,7 +167,8 @@ class Calibrating(QObject):
 
     def cancel(self, why: str = "") -> None:
         """End the procedure, and forget what was taken."""
-        self._kept, self._computed, self.unattended = None, None, False
+        self._kept, self.unattended = None, False
+        self._task.stop()
         was, self.procedure = self.procedure, None
         if was is not None:
             self.laid.emit(None)
@@ -210,9 +215,7 @@ class Calibrating(QObject):
     def follow(self, status: Status) -> None:
         """Take note of how the engine is doing, as often as it is told."""
         self._status = status
-        if self._computed is not None and self._computed.done():
-            self._finish(self._computed)
-        if self.procedure is None or self._computed is not None:
+        if self.procedure is None or self.computing:
             return
         if why := self._ended_by(status):
             self.cancel(why)
@@ -301,23 +304,15 @@ class Calibrating(QObject):
 
     def _compute(self, procedure: Procedure) -> None:
         """Begin to work it out, beside the drawing."""
-        worker = ThreadPoolExecutor(1, "calibration")
-        now = datetime.now(UTC)
-        self._computed = worker.submit(calibrate, procedure.sweep(), procedure.sensor, now)
-        worker.shutdown(wait=False)
+        self._task.run(calibrate, procedure.sweep(), procedure.sensor, datetime.now(UTC))
         self.unattended = False
         self._tell("")
 
-    def _finish(self, computed: "Future[CalibrationReport]") -> None:
-        procedure = self.procedure
-        if procedure is None:
-            return
-        try:
-            report = computed.result()
-        except Exception as error:  # whatever it is, it would come again at every look
-            self.cancel(f"No calibration came of it: {error or type(error).__name__}.")
-            if not isinstance(error, Refusal):
-                raise
-            return
-        self.result = Result(procedure.sensor, procedure.sweep(), report)
+    def _finish(self, report: CalibrationReport) -> None:
+        if self.procedure is not None:
+            self.result = Result(self.procedure.sensor, self.procedure.sweep(), report)
         self.cancel()
+
+    def _refuse(self, error: Exception) -> None:
+        why = f"No calibration came of it: {error or type(error).__name__}."
+        self.cancel(str(error) if isinstance(error, Cancelled) else why)

@@ -15,7 +15,7 @@ class ConnectionFeature:
         self._session = session = shell.session
         add = shell.actions_by_name.add
         self.connection = shell.panels.add(LIVE, ConnectionPanel())
-        self.plugs = Plugs(self.connection.sources, shell)
+        self.plugs = Plugs(self.connection.sources, shell.tasks, shell)
         self.connection.connect_wanted.connect(guarded(session.request_source))
         self.connection.disconnect_wanted.connect(guarded(session.disconnect_from))
         self.connection.ports_wanted.connect(guarded(self.plugs.look))
@@ -32,7 +32,6 @@ class ConnectionFeature:
             lambda: self._show(shell),
         )
         shell.begun.connect(guarded(self._begin))
-        shell.closing.connect(guarded(self.plugs.close))
 
     def _begin(self, _: ResumeInfo | None, source: str) -> None:
         """Show the source that was asked for, which is not read where another one goes on."""

@@ -1,7 +1,6 @@
 """The connection panel: where the readings come from, and the ports there are."""
 
 import time
-from concurrent.futures import Future, ThreadPoolExecutor
 
 from PySide6.QtCore import QObject, QSignalBlocker, Qt, QTimer, Signal
 from PySide6.QtGui import QGuiApplication
@@ -20,13 +19,13 @@ from kappaskin.live import Status
 from kappaskin.sensing import Sensor
 from kappaskin.sources import Port, serial_ports
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.form import well_behaved
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.widgets.parts import said
 from kappaskin_app.widgets.text import COMMAND, day
 
 _EVERY = 1000  # ms between two looks
-_SOON = 50  # ms until what was found is taken
 
 
 class Plugs(QObject):
@@ -34,11 +33,10 @@ class Plugs(QObject):
 
     found = Signal(list)
 
-    def __init__(self, watched: QWidget, parent: QObject | None = None) -> None:
+    def __init__(self, watched: QWidget, tasks: Tasks, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._watched = watched
-        self._thread = ThreadPoolExecutor(1, "port-finder")  # some systems take a second
-        self._looking: Future[list[Port]] | None = None
+        self._looking = BackgroundTask(tasks, "", self.found.emit)  # some systems take a second
         self._timer = QTimer(self, interval=_EVERY)  # pyright: ignore[reportCallIssue]
         self._timer.timeout.connect(guarded(self._look_if_seen))
         self._timer.start()
@@ -49,23 +47,8 @@ class Plugs(QObject):
 
     def look(self) -> None:
         """Look now, unless that is being done."""
-        if self._looking is None:
-            self._looking = self._thread.submit(serial_ports)
-            QTimer.singleShot(_SOON, self, guarded(self._take))
-
-    def _take(self) -> None:
-        if self._looking is None:
-            return
-        if not self._looking.done():
-            QTimer.singleShot(_SOON, self, guarded(self._take))
-            return
-        done, self._looking = self._looking, None
-        self.found.emit(done.result())
-
-    def close(self) -> None:
-        self._timer.stop()
-        self._looking = None
-        self._thread.shutdown(wait=True, cancel_futures=True)
+        if not self._looking.running:
+            self._looking.run(serial_ports)
 
 
 _SIMULATED = ("sim:", "Simulated skin")

@@ -26,7 +26,7 @@ class ContactFeature:
         self._shell, self._next = shell, 0.0
         display = shell.display
         self.readouts, self.numbers = Readouts(), NumbersPanel()
-        self.naming = Naming(shell)
+        self.naming = Naming(shell.tasks, shell)
         display.header.add(self.readouts)
         shell.docks.put_below("numbers", "Numbers", self.numbers, "Ctrl+Shift+T")
         display.foot.object.setToolTip(_OBJECT)
@@ -38,8 +38,6 @@ class ContactFeature:
         self.naming.named.connect(guarded(display.foot.object.show_text))
         self.naming.found.connect(display.object_found)
         shell.theme_changed.connect(guarded(self.readouts.show_theme))
-        shell.tasks.add("Learning what objects read like", lambda: self.naming.learning)
-        shell.closed.connect(guarded(self.naming.close))
 
     def _follow(self, status: Status) -> None:
         shell, now = self._shell, time.monotonic()

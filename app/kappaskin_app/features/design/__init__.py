@@ -10,7 +10,7 @@ class DesignFeature:
     name = "design"
 
     def install(self, shell: MainWindow) -> None:
-        self.design, self.designing = DesignPanel(), Designing(shell.history, shell)
+        self.design, self.designing = DesignPanel(), Designing(shell.history, shell.tasks, shell)
         shell.docks.put_below("design", "Design", self.design, "Ctrl+Alt+N")
         shell.docks["design"].visibilityChanged.connect(guarded(self.designing.watch))
         shell.session.reported.connect(guarded(self.designing.follow))
@@ -21,7 +21,3 @@ class DesignFeature:
         self.design.attend(self.designing)
         shell.settings_shown.connect(guarded(self.design.show_settings))
         shell.theme_changed.connect(guarded(self.design.show_theme))
-        cancel = self.designing.cancel
-        shell.tasks.add("Placing the design's elements", lambda: self.designing.predicting, cancel)
-        shell.tasks.add("Simulating the design", lambda: self.designing.checking, cancel)
-        shell.closing.connect(guarded(self.designing.close))

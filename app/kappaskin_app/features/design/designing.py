@@ -2,14 +2,11 @@
 
 import math
 from collections.abc import Generator
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin._processes import BackgroundProcess
 from kappaskin.bases import edges_of
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
@@ -19,13 +16,12 @@ from kappaskin.scenes.effects import GaussianNoise
 from kappaskin.sensing import SensorLayout, Transduction
 from kappaskin.skin import Patch
 from kappaskin.studies import Check, Design, Prospect, check, prospect
+from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.loads import ready, reference_on
 from kappaskin_app.shell.settings import Settings, part
 from kappaskin_app.shell.settings.designed import Designed
 from kappaskin_app.shell.settings.scene import SHAPES
-
-_CANCELLED = "Cancelled; another design is computed again."
 
 
 def patch_of(settings: Settings) -> Patch:
@@ -63,8 +59,8 @@ def design_of(settings: Settings) -> Design:
     return Design(scene_of(s), (s.design_functions_x, s.design_functions_y), s.design_place)
 
 
-def _prospects(settings: Settings) -> Generator[Prospect]:
-    yield prospect(design_of(settings))
+def _prospect(settings: Settings) -> Prospect:
+    return prospect(design_of(settings))
 
 
 def _placed(settings: Settings, found: Prospect) -> Scene:
@@ -76,7 +72,7 @@ def _placed(settings: Settings, found: Prospect) -> Scene:
 
 
 def _checks(settings: Settings, found: Prospect) -> Generator[Check]:
-    yield from check(replace(design_of(settings), scene=_placed(settings, found), by="scene"))
+    return check(replace(design_of(settings), scene=_placed(settings, found), by="scene"))
 
 
 class Designing(QObject):
@@ -88,18 +84,29 @@ class Designing(QObject):
 
     changed = Signal()
 
-    def __init__(self, history: History, parent: QObject | None = None) -> None:
+    def __init__(self, history: History, tasks: Tasks, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._history = history
         self.prospect: Prospect | None = None
         self.check: Check | None = None
         self.refusal = ""
-        self._thread = ThreadPoolExecutor(1, "design")
-        self._quick: Future[Prospect] | None = None
-        self._slow: BackgroundProcess[Prospect] | None = None
-        self._checking: BackgroundProcess[Check] | None = None
+        self.predicts = BackgroundTask(
+            tasks,
+            "Placing the design's elements",
+            self._take,
+            self._refuse,
+            ended=self.changed.emit,
+            cancelled="Cancelled; another design is computed again.",
+        )
+        self.checks = BackgroundTask(
+            tasks,
+            "Simulating the design",
+            self._take_check,
+            ended=self.changed.emit,
+            cancelled="Cancelled; Check by simulation begins anew.",
+        )
         self._asked: Settings | None = None
-        self._watched = False
+        self._watched = self._quick = False
 
     def watch(self, watched: bool) -> None:
         """Predict while somebody looks, and only then."""
@@ -107,76 +114,54 @@ class Designing(QObject):
         if not watched:
             self._stop()
             self._asked = None
+            self.changed.emit()
 
     @property
     def predicting(self) -> bool:
-        return self._quick is not None or self._slow is not None
+        return self.predicts.running
 
     @property
     def checking(self) -> bool:
-        return self._checking is not None
+        return self.checks.running
 
     def follow(self, _: Status) -> None:
-        """Take up what was computed meanwhile, and begin anew when something else is designed."""
-        if not self._watched:
-            return
-        self._take_up()
-        settings = self._history.settings
-        asked = self._asked
-        if asked is None or part(settings, Designed) != part(asked, Designed):
+        """Begin anew when something else is designed."""
+        settings, asked = self._history.settings, self._asked
+        another = asked is None or part(settings, Designed) != part(asked, Designed)
+        if self._watched and another:
             self._begin(settings)
 
     def _begin(self, settings: Settings) -> None:
-        if self._quick is not None:
+        if self.predicting and self._quick:
             return  # it is as good as done
         self._stop()
         self._asked, self.check, self.refusal = settings, None, ""
         # Where elements are placed, and where modes are computed, it takes seconds.
-        quick = "rim_radius" not in SHAPES[settings.design_shape].asks
-        if quick and settings.design_place in ("scene", "clustered"):
-            self._quick = self._thread.submit(lambda: prospect(design_of(settings)))
+        plain = "rim_radius" not in SHAPES[settings.design_shape].asks
+        self._quick = plain and settings.design_place in ("scene", "clustered")
+        if self._quick:
+            self.predicts.run(_prospect, settings)
         else:
-            self._slow = BackgroundProcess("kappaskin-design", _prospects, settings)
+            self.predicts.compute(_prospect, settings)
         self.changed.emit()
 
-    def _take_up(self) -> None:
-        try:
-            if self._quick is not None and self._quick.done():
-                done, self._quick = self._quick, None
-                self._show(done.result())
-            if self._slow is not None:
-                for found in self._slow.poll():
-                    self._show(found)
-            if self._checking is not None and (found := self._checking.poll()):
-                self.check = found[-1]
-                self.changed.emit()
-        except (Refusal, MemoryError, np.linalg.LinAlgError) as reason:
-            self.prospect, self.refusal = None, str(reason)
-            self.changed.emit()
-        for work in (self._slow, self._checking):
-            if work is not None and work.done:
-                self._end(work)
-
-    def _show(self, found: Prospect) -> None:
+    def _take(self, found: Prospect) -> None:
         self.prospect = found
+
+    def _take_check(self, found: Check) -> None:
+        self.check = found
         self.changed.emit()
+
+    def _refuse(self, error: Exception) -> None:
+        self.prospect, self.refusal = None, str(error)
 
     def simulate(self) -> None:
         """Begin to check the prediction by a simulation, or end that."""
-        if self._checking is not None:
-            self._end(self._checking)
+        if self.checking:
+            self.checks.stop()
         elif self._asked is not None and self.prospect is not None and not self.predicting:
             self.check = None
-            self._checking = BackgroundProcess(
-                "kappaskin-check", _checks, self._asked, self.prospect
-            )
-            self.changed.emit()
-
-    def cancel(self) -> None:
-        """Wait no more for what is computed."""
-        if self._slow is not None:
-            self.prospect, self.refusal = None, _CANCELLED
-        self._stop()
+            self.checks.compute(_checks, self._asked, self.prospect)
         self.changed.emit()
 
     def write(self, file: Path) -> None:
@@ -186,18 +171,5 @@ class Designing(QObject):
         file.write_text(write_scene(_placed(self._asked, self.prospect)), encoding="utf-8")
 
     def _stop(self) -> None:
-        for work in (self._slow, self._checking):
-            if work is not None:
-                self._end(work)
-
-    def _end(self, work: "BackgroundProcess[Prospect] | BackgroundProcess[Check]") -> None:
-        work.close()
-        if work is self._slow:
-            self._slow = None
-        else:
-            self._checking = None
-        self.changed.emit()
-
-    def close(self) -> None:
-        self.watch(False)
-        self._thread.shutdown(wait=True, cancel_futures=True)
+        self.predicts.stop()
+        self.checks.stop()

@@ -24,7 +24,7 @@ class ExportFeature:
 
     def install(self, shell: MainWindow) -> None:
         self._shell, add = shell, shell.actions_by_name.add
-        self.exports = Exports(shell.session, shell.display.centre, shell)
+        self.exports = Exports(shell.session, shell.display.centre, shell.tasks, shell)
         add("picture", menus.FILE, "Save &picture", self._save_picture, "Ctrl+S")
         copy = self._copy_python
         add("copy-python", menus.EDIT, "Copy as P&ython", copy, "Ctrl+Shift+C", _PYTHON)
@@ -32,8 +32,6 @@ class ExportFeature:
             add(name, menus.FIGURES, TITLES.get(name, name), partial(self._draw, name))
         self._register(shell)
         self.exports.told.connect(guarded(shell.tell))
-        dialog = self.exports.dialog
-        shell.tasks.add("Writing the export", lambda: dialog.busy, dialog.cancel)
         shell.closing.connect(guarded(self.exports.close))
 
     def _register(self, shell: MainWindow) -> None:
@@ -65,4 +63,4 @@ class ExportFeature:
 
     def _draw(self, name: str) -> None:
         """Draw a figure of the paper from a run of its own, in a window beside this one."""
-        FigureWindow(name, self._shell).show()
+        FigureWindow(name, self._shell.tasks, self._shell).show()

@@ -3,7 +3,6 @@
 import math
 import time
 from collections.abc import Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 
@@ -12,12 +11,12 @@ from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QFileDialog, QLineEdit, QWidget
 
 from kappaskin.errors import Refusal
-from kappaskin.live import Status
 from kappaskin.pipeline import Setup
 from kappaskin.recording import Exported, ExportRequest, ExportTask
 from kappaskin_app.features.export.filming import Filmed, Filming
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import WITHIN, Actions
+from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.centre import Centre
 from kappaskin_app.shell.pictures import caption_now, chosen_file, save_view, write_png
 from kappaskin_app.shell.session import Session
@@ -53,8 +52,9 @@ _EXPLAINED = {
 class ExportDialog(WorkDialog):
     """Asks what of a recording is to be written where, and writes it."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Export a recording", "&Export", self._begun, self._told, parent)
+    def __init__(self, tasks: Tasks, parent: QWidget | None = None) -> None:
+        how = "&Export", "Writing the export", self._begun, self._told
+        super().__init__(tasks, "Export a recording", *how, parent)
         self.setObjectName("export")
         self.recording, self.to = QLineEdit(), QLineEdit()
         self.settings = QComboBox()
@@ -168,17 +168,14 @@ class Exports(QObject):
 
     told = Signal(str)
 
-    def __init__(self, session: Session, centre: Centre, window: QWidget) -> None:
+    def __init__(self, session: Session, centre: Centre, tasks: Tasks, window: QWidget) -> None:
         super().__init__(window)
-        self._session, self._window = session, window
-        self.dialog = ExportDialog(window)
+        self._session, self._tasks, self._window = session, tasks, window
+        self.dialog = ExportDialog(tasks, window)
         self.filming: Filming | None = None
         if isinstance(centre.view, Filmed):
             self.filming = Filming(centre.view, self)
             self.filming.told.connect(guarded(self.told.emit))
-        self._thread = ThreadPoolExecutor(1, "picture-writer")
-        self._written: list[tuple[Path, Future[None]]] = []
-        session.reported.connect(guarded(self._follow))
 
     def register(
         self,
@@ -224,16 +221,8 @@ class Exports(QObject):
 
     def save(self, image: QImage, path: Path) -> None:
         """Write a picture beside the window: to pack it takes longer than to draw all anew."""
-        self._written.append((path, self._thread.submit(write_png, image, path)))
-
-    def _follow(self, _: Status) -> None:
-        while self._written and self._written[0][1].done():
-            path, done = self._written.pop(0)
-            try:
-                done.result()
-                self.told.emit(f"Saved {path}")
-            except Refusal as refusal:
-                self.told.emit(str(refusal))
+        task = BackgroundTask(self._tasks, "", lambda _: self.told.emit(f"Saved {path}"))
+        task.run(write_png, image, path)
 
     def film(self) -> None:
         """Ask for a file and film into it; or end the film that is made."""
@@ -251,8 +240,7 @@ class Exports(QObject):
                 self.told.emit(str(refusal))
 
     def close(self) -> None:
-        """End what is being written: films and pictures are whole, an export is not there."""
+        """End what is being written: a film is whole, an export is not there."""
         if self.filming is not None:
             self.filming.end()
         self.dialog.close()
-        self._thread.shutdown(wait=True)

@@ -1,14 +1,14 @@
-"""A figure of the paper, drawn anew by the command line beside the window and then shown."""
+"""A figure of the paper, drawn anew in the background and then shown."""
 
-import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from PySide6.QtCore import QProcess, QSize, Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QPixmap, QResizeEvent
 from PySide6.QtWidgets import QDialog, QLabel, QVBoxLayout, QWidget
 
-from kappaskin_app.guard import guarded
+from kappaskin.studies import write_figures
+from kappaskin_app.shell.background import BackgroundTask, Tasks
 
 TITLES = {
     "fig1": "Fig. 1: the construction, and a linear sensor",
@@ -24,7 +24,7 @@ _SIZE = QSize(1000, 620)
 class FigureWindow(QDialog):
     """One figure, as large as the window; the files it came from are the window's own."""
 
-    def __init__(self, name: str, parent: QWidget) -> None:
+    def __init__(self, name: str, tasks: Tasks, parent: QWidget) -> None:
         super().__init__(parent)
         self.setWindowTitle(TITLES.get(name, name))
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -38,24 +38,15 @@ class FigureWindow(QDialog):
         around.addWidget(self.label)
         self.setStyleSheet("background: white; color: #16191d;")  # figures are for paper
         self.resize(_SIZE)
-        # Another process: drawing takes a second or two, and the window goes on meanwhile.
-        self._process = QProcess(self)
-        self._process.finished.connect(guarded(self._done))
-        self._process.errorOccurred.connect(guarded(self._failed))
-        arguments = ["-m", "kappaskin", "figures", "--out", self._room.name, "--only", name]
-        self._process.start(sys.executable, arguments)
+        self._task = BackgroundTask(tasks, "", self._take, self._refuse)
+        self._task.compute(write_figures, Path(self._room.name), [name])
 
-    def _done(self, code: int, _: object) -> None:
-        path = Path(self._room.name) / f"{self.name}.png"
-        if code or not path.exists():
-            why = bytes(self._process.readAllStandardError().data()).decode(errors="replace")
-            self.label.setText(why.strip() or "The figure could not be drawn.")
-            return
-        self._picture = QPixmap(str(path))
+    def _take(self, _: object) -> None:
+        self._picture = QPixmap(f"{self._room.name}/{self.name}.png")
         self._show()
 
-    def _failed(self, _: object) -> None:
-        self.label.setText(self._process.errorString())
+    def _refuse(self, error: Exception) -> None:
+        self.label.setText(str(error))
 
     def _show(self) -> None:
         if not self._picture.isNull():
@@ -78,10 +69,6 @@ class FigureWindow(QDialog):
         self._show()
 
     def done(self, result: int) -> None:
-        if self._process.state() != QProcess.ProcessState.NotRunning:
-            self._process.finished.disconnect()
-            self._process.errorOccurred.disconnect()
-            self._process.kill()
-            self._process.waitForFinished(2000)
+        self._task.stop()
         self._room.cleanup()
         super().done(result)

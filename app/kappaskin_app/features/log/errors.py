@@ -2,10 +2,8 @@
 
 import io
 import json
-import threading
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -22,6 +20,7 @@ from kappaskin_app import guard
 from kappaskin_app.features.log.events import EventLog
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions
+from kappaskin_app.shell.background import BackgroundThread, Tasks
 from kappaskin_app.shell.folders import recordings_folder
 from kappaskin_app.shell.logbook import CRASHES, LOG, log_folder
 from kappaskin_app.shell.recovery import settings_text
@@ -48,42 +47,21 @@ class Told:
     estimate: Estimate | None = None
 
 
-class Reporting:
-    """Writes what is `told`, and the log files in `logs`, to `path` in a thread."""
-
-    def __init__(
-        self,
-        path: Path,
-        told: Told,
-        logs: Path,
-        doctor: Callable[[], Mapping[str, object]] = examine,
-    ) -> None:
-        if path.suffix.lower() != ".zip":
-            raise Refusal(f"{path.name}: expected a file that ends in .zip")
-        if path.exists():
-            raise Refusal(f"{path}: is there already; choose another name")
-        worker = ThreadPoolExecutor(1, "report")
-        self._stop = threading.Event()
-        wanted = lambda: not self._stop.is_set()  # noqa: E731
-        self._written = worker.submit(_write, path, wanted, told, logs, doctor)
-        worker.shutdown(wait=False)
-
-    def poll(self) -> Sequence[object]:
-        """The words of what was written, once it is."""
-        return [self._written.result()] if self._written.done() else []
-
-    def close(self) -> None:
-        """Leave nothing that is not done."""
-        self._stop.set()
-
-
-def _write(
+def write_report(
     path: Path,
-    wanted: Callable[[], bool],
     told: Told,
     logs: Path,
-    doctor: Callable[[], Mapping[str, object]],
-) -> str:
+    doctor: Callable[[], Mapping[str, object]] = examine,
+) -> Generator[float | str]:
+    """Write what is `told`, and the log files in `logs`, to the new file `path`.
+
+    The share that is done before each part, and at the end in words what was written. A `Refusal`
+    where `path` is no zip, is there already or cannot be written.
+    """
+    if path.suffix.lower() != ".zip":
+        raise Refusal(f"{path.name}: expected a file that ends in .zip")
+    if path.exists():
+        raise Refusal(f"{path}: is there already; choose another name")
     part = path.with_name(f".{path.name}.part")
     parts = {name: text.encode() for name, text in told.texts.items()}
     parts["doctor.json"] = json.dumps(doctor(), indent=1).encode()
@@ -97,14 +75,17 @@ def _write(
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as packed:
-            for name, content in parts.items():
+            for number, (name, content) in enumerate(parts.items()):
+                yield number / len(parts)
                 packed.writestr(name, content)
-        part.replace(path) if wanted() else part.unlink()
+        yield 1.0
+        part.replace(path)
     except OSError as error:
-        part.unlink(missing_ok=True)
         why = error.strerror or error
         raise Refusal(f"{path}: cannot be written ({why}); choose another place") from error
-    return f"{path}: {', '.join(parts)}"
+    finally:  # it was cancelled, maybe
+        part.unlink(missing_ok=True)
+    yield f"{path}: {', '.join(parts)}"
 
 
 def _content(file: Path) -> bytes:
@@ -127,8 +108,11 @@ class ReportDialog(WorkDialog):
     `tell` tells what is so when it is written, with what is shown or without; `logs` holds the log.
     """
 
-    def __init__(self, tell: Callable[[bool], Told], logs: Path, parent: QWidget) -> None:
-        super().__init__("Report what went wrong", "&Save", self._begun, self._told, parent)
+    def __init__(
+        self, tell: Callable[[bool], Told], logs: Path, tasks: Tasks, parent: QWidget
+    ) -> None:
+        how = "&Save", "Writing the report", self._begun, self._told
+        super().__init__(tasks, "Report what went wrong", *how, parent)
         self.setObjectName("report")
         self._tell, self._logs = tell, logs
         self.to, self.readings = QLineEdit(), QCheckBox("&With the readings that are shown")
@@ -164,9 +148,9 @@ class ReportDialog(WorkDialog):
             widget.setEnabled(not self.busy)
         self.begin_button.setEnabled(bool(self.to.text().strip()) and not self.busy)
 
-    def _begun(self) -> Reporting:
+    def _begun(self) -> BackgroundThread:
         told = self._tell(self.readings.isChecked())
-        return Reporting(path_in(self.to), told, self._logs)
+        return BackgroundThread(write_report, path_in(self.to), told, self._logs)
 
     def _told(self, result: object) -> str:
         return f"Saved {result}"
@@ -191,7 +175,7 @@ class Errors(QObject):
         self.count.setAccessibleName("No failures")
         self.count.clicked.connect(guarded(lambda *_: window.docks.reveal("log")))
         self.count.hide()
-        self.report = ReportDialog(self._tell, log_folder(), window)
+        self.report = ReportDialog(self._tell, log_folder(), window.tasks, window)
         guard.on_failure(self._take)
 
     def add_actions(self, actions: Actions, menu: str) -> None:

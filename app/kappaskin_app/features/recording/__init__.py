@@ -25,8 +25,8 @@ class RecordingFeature:
         self._shell, session = shell, shell.session
         self.recording = shell.panels.add(LIVE, RecordingPanel())
         self.transport, self.mark = Transport(), RecordingMark()
-        self.taping = Taping(session.engine, shell)
-        self.replaying = Replaying(shell.history, session, self.transport, shell)
+        self.taping = Taping(session.engine, shell.tasks, shell)
+        self.replaying = Replaying(shell.history, session, self.transport, shell.tasks, shell)
         self._shown = shell.display.header.add_mark(self.mark)
         self._shown.setVisible(False)
         shell.display.centre.add_below(self.transport)
@@ -42,16 +42,15 @@ class RecordingFeature:
         shell.closing.connect(guarded(self.taping.close))
 
     def _wire_taping(self, shell: MainWindow) -> None:
-        session, taping, repair = shell.session, self.taping, self.taping.repairs
+        session, taping = shell.session, self.taping
         session.reported.connect(guarded(taping.follow))
         self._entrusting = Entrusting(shell.history, session.engine)
         session.reported.connect(guarded(self._entrusting.follow))
         taping.changed.connect(guarded(self._show_mark))
         taping.told.connect(guarded(shell.tell))
         self.mark.clicked.connect(guarded(taping.dismiss))
-        repair.saved.connect(guarded(self.replaying.open_file))
+        taping.repairs.saved.connect(guarded(self.replaying.open_file))
         session.may_close.append(taping.may_close)
-        shell.tasks.add("Repairing the recording", lambda: repair.busy, repair.cancel)
 
     def _wire_replaying(self, shell: MainWindow) -> None:
         session, opening, replaying = shell.session, shell.opening, self.replaying
@@ -64,7 +63,6 @@ class RecordingFeature:
         opening.add(Kind("recording", (".mcap", ".part"), replaying.open_file))
         opening.others = lambda: newest(recordings_folder())
         opening.drops.take_key = self.transport.take_key
-        shell.tasks.add("Reading the recording", lambda: replaying.reading, replaying.stop_reading)
         shell.menus.welcome.add(
             4,
             f"&Play a recording{DOTS}",

@@ -7,21 +7,21 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QFileDialog, QWidget
 
-from kappaskin.errors import Damaged, Refusal
+from kappaskin.errors import Damaged
 from kappaskin.frames import Event
 from kappaskin.live import Status
 from kappaskin.pipeline import Setup
-from kappaskin.recording import Replay
-from kappaskin_app.features.recording.recorded import Peeking, Recorded, told_of
-from kappaskin_app.features.recording.transport import SPEEDS, Transport
+from kappaskin.recording import RecordingSummary, Replay, summary_of
+from kappaskin_app.features.recording.transport import SPEEDS, Transport, minutes
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions
-from kappaskin_app.shell.background import Newest
-from kappaskin_app.shell.folders import recordings_folder
+from kappaskin_app.shell.background import BackgroundTask, Cancelled, Newest, Tasks
+from kappaskin_app.shell.folders import recordings_folder, repairing
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import RECORDED, Session
 from kappaskin_app.shell.settings import EstimatorSettings
 from kappaskin_app.shell.settings.asks import settings_from
+from kappaskin_app.widgets.text import day
 
 FILES = "Recording (*.mcap *.mcap.part)"
 _MENU = "&Recording"
@@ -44,12 +44,17 @@ class Replaying(QObject):
     offered = Signal()
 
     def __init__(
-        self, history: History, session: Session, transport: Transport, window: QWidget
+        self,
+        history: History,
+        session: Session,
+        transport: Transport,
+        tasks: Tasks,
+        window: QWidget,
     ) -> None:
         super().__init__(window)
         self._history, self._session, self._transport = history, session, transport
         self._window = window
-        self.seen: Recorded | None = None
+        self.seen: RecordingSummary | None = None
         self.message, self.alarming = "", False
         self.damaged: Path | None = None
         self.speed, self._looped, self._goes = 1.0, False, True
@@ -59,7 +64,15 @@ class Replaying(QObject):
         self._begins = False  # once the settings are in use, from the beginning on
         self._before: dict[str, object] = {}
         self._changes: list[Event] = []
-        self._peeking = Peeking(self)
+        self._asked, self._connects = Path(), True
+        """The recording that is read, and whether the engine is to play it."""
+        self._reading = BackgroundTask(
+            tasks,
+            "Reading the recording",
+            self._play,
+            self._refuse,
+            cancelled="Cancelled; it is not opened",
+        )
         self._send, self._folder = Newest(self), recordings_folder()
         self._actions: Actions | None = None
         self._wire()
@@ -73,8 +86,6 @@ class Replaying(QObject):
         transport.play_wanted.connect(guarded(self.go))
         transport.speed_wanted.connect(guarded(self.play_at))
         transport.loop_wanted.connect(guarded(self.loop))
-        self._peeking.found.connect(guarded(self._play))
-        self._peeking.refused.connect(guarded(self._refuse))
         session.turning.connect(guarded(self._leave))
         session.reported.connect(guarded(self.follow))
 
@@ -123,28 +134,20 @@ class Replaying(QObject):
 
     def _look(self, path: Path, connects: bool) -> None:
         self.told.emit(f"Reading {path.name}{_DOTS}")
-        self._peeking.look(path, connects)
+        self._asked, self._connects = path, connects
+        self._reading.compute(summary_of, path)
 
-    @property
-    def reading(self) -> bool:
-        """Whether a file is looked into."""
-        return self._peeking.busy
+    def _refuse(self, error: Exception) -> None:
+        if not isinstance(error, Cancelled):
+            damaged = self._asked if isinstance(error, Damaged) else None
+            self._say(str(error), alarming=True, damaged=damaged)
+        self.told.emit(str(error))
 
-    def stop_reading(self) -> None:
-        """Play what was played before instead."""
-        self._peeking.stop()
-        self.told.emit("Cancelled; it is not opened")
-
-    def _refuse(self, path: Path, refusal: Refusal) -> None:
-        damaged = path if isinstance(refusal, Damaged) else None
-        self._say(str(refusal), alarming=True, damaged=damaged)
-        self.told.emit(str(refusal))
-
-    def _play(self, found: Recorded, connects: bool) -> None:
+    def _play(self, found: RecordingSummary) -> None:
         source = f"{RECORDED}{found.path}"
-        if connects:
+        if self._connects:
             self._session.connect_to(source)
-        self.seen, self._changes = found, found.changes()
+        self.seen, self._changes = found, _changes(found)
         self._goes, self._begins, self._sought = True, True, None
         self.speed, self._looped = 1.0, False
         self._folder = found.path.parent
@@ -152,7 +155,7 @@ class Replaying(QObject):
         now = self._history.settings
         self._before = {"calibration": now.calibration, "tare": now.tare}
         self._use(found.setup_at(0.0))
-        self._say(told_of(found), damaged=None if found.whole else found.path)
+        self._say(_told_of(found), damaged=None if found.whole else found.path)
         self.opened.emit(source)
         self.told.emit(self.message or f"Playing {found.path.name}, with the settings recorded")
 
@@ -335,7 +338,9 @@ class Replaying(QObject):
                     self._actions.allow(name, why_not)
 
     def _show_title(self, replay: Replay | None) -> None:
-        title = "Kappaskin" if replay is None or self.seen is None else self.seen.title(replay)
+        title = "Kappaskin"
+        if replay is not None and self.seen is not None:
+            title = f"{self.seen.path.name}, recorded {day(replay.begun)} \N{EN DASH} Kappaskin"
         if title != self._window.windowTitle():
             self._window.setWindowTitle(title)
 
@@ -347,4 +352,26 @@ class Replaying(QObject):
 
     def close(self) -> None:
         self._send.forget()
-        self._peeking.close()
+
+
+def _changes(found: RecordingSummary) -> list[Event]:
+    """Where another setup came into use, in words."""
+    return [
+        Event(since, "settings", f"{now.Ni} x {now.Nj} functions, {now.method}")
+        for (_, was), (since, now) in zip(found.setups, found.setups[1:], strict=False)
+        if now != was
+    ]
+
+
+def _told_of(found: RecordingSummary) -> str:
+    """What a person should know of a recording that is opened, or nothing."""
+    told: list[str] = []
+    if not found.whole:
+        told.append(
+            f"The recording {found.path.name} was never ended: it is played up to "
+            f"{minutes(found.length)}, where it breaks off. To make it whole: "
+            f"`{repairing(found.path)}`."
+        )
+    if found.trouble:
+        told.append(f"The settings recorded cannot be used: {found.trouble}")
+    return " ".join(told)

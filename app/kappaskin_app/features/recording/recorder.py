@@ -18,6 +18,7 @@ from kappaskin.live import LONGEST_NOTE, Engine, ResumeInfo, Status
 from kappaskin.recording import RecordingStatus, Repaired, RepairTask
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions
+from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.folders import proposed, recordings_folder, repaired, repairing, unfinished
 from kappaskin_app.shell.recovery import words
 from kappaskin_app.shell.work_dialog import WorkDialog, beside, choosing, ended, named, path_in
@@ -112,8 +113,9 @@ class RepairDialog(WorkDialog):
 
     saved = Signal(Path)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Repair a recording", "&Repair", self._begun, self._told, parent)
+    def __init__(self, tasks: Tasks, parent: QWidget | None = None) -> None:
+        how = "&Repair", "Repairing the recording", self._begun, self._told
+        super().__init__(tasks, "Repair a recording", *how, parent)
         self.setObjectName("repair")
         self.recording, self.to = QLineEdit(), QLineEdit()
         self.recording.setReadOnly(True)
@@ -176,7 +178,7 @@ class Taping(QObject):
     told = Signal(str)
     changed = Signal()
 
-    def __init__(self, engine: Engine, window: QWidget) -> None:
+    def __init__(self, engine: Engine, tasks: Tasks, window: QWidget) -> None:
         super().__init__(window)
         self._engine, self._window = engine, window
         self._replays = False
@@ -184,7 +186,7 @@ class Taping(QObject):
         """How it does, and why it ended by itself."""
         self.message, self.alarming = "", False
         self.damaged: Path | None = None
-        self.repairs = RepairDialog(window)
+        self.repairs = RepairDialog(tasks, window)
         self._question: QMessageBox | None = None
         self._actions: Actions | None = None
 

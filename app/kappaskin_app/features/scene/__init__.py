@@ -32,8 +32,8 @@ class SceneFeature:
         self._shell, session = shell, shell.session
         self.load = shell.panels.add(LIVE, LoadPanel())
         self.noise = shell.panels.add(LIVE, NoisePanel())
-        self.scene, self.timeline = ScenePanel(), Timeline()
-        self.planning = Planning(session, shell)
+        self.scene, self.timeline = ScenePanel(shell.tasks), Timeline()
+        self.planning = Planning(session, shell.tasks, shell)
         self.editing = SceneEditing(shell.history, session, shell.selection.load)
         self.staging = Staging(
             *(shell.history, session, self.editing, self.planning),
@@ -46,7 +46,7 @@ class SceneFeature:
         self._add_actions(shell)
 
     def _wire(self, shell: MainWindow) -> None:
-        session, gallery = shell.session, self.scene.gallery
+        session = shell.session
         session.refused.connect(guarded(self.load.show_refusal))
         session.pausing.connect(guarded(self._pause))
         self.staging.told.connect(guarded(shell.tell))
@@ -56,13 +56,7 @@ class SceneFeature:
         shell.display.unit_changed.connect(guarded(self.timeline.clock.show_unit))
         shell.opening.add(Kind("scene", (".toml",), self.staging.play))
         shell.opening.add(Kind("mesh", (".stl", ".ply", ".obj"), self._touch_with))
-        shell.tasks.add(
-            "Sizing and timing effects", lambda: self.planning.waiting, self.planning.cancel
-        )
-        shell.tasks.add("Painting the scenes", lambda: gallery.painting, gallery.rest)
         shell.menus.things.append(self._things)
-        shell.closing.connect(guarded(self.planning.close))
-        shell.closing.connect(guarded(gallery.close))
 
     def _add_actions(self, shell: MainWindow) -> None:
         add, staging = shell.actions_by_name.add, self.staging

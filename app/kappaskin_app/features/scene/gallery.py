@@ -38,6 +38,7 @@ from PySide6.QtWidgets import (
 from kappaskin.scenes import SCENES, Scene
 from kappaskin_app.features.scene.scene_picture import Look, Picturing
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.background import Tasks
 from kappaskin_app.theme import LIGHT, Theme, grown
 from kappaskin_app.widgets.layout import scrolled
 from kappaskin_app.widgets.parts import ELLIPSIS, button, in_a_row, text_label
@@ -220,7 +221,7 @@ class GalleryPanel(QWidget):
     chosen = Signal(str)
     open_wanted = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self, tasks: Tasks, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.cards = _Cards()
         self.items = {name: QListWidgetItem(_titled(name)) for name in in_order(SCENES)}
@@ -236,8 +237,8 @@ class GalleryPanel(QWidget):
         self._lay_out()
         self._scenes: dict[str, Scene | str] = {}
         self._theme, self._playing = LIGHT, ""
-        self._picturing = Picturing(list(self.items), self)
-        self._picturing.read.connect(guarded(self._take_scenes))
+        self._picturing = Picturing(list(self.items), tasks, self)
+        self._picturing.read.connect(guarded(self._take_scene))
         self._picturing.painted.connect(guarded(self._take_picture))
         self.cards.resized.connect(guarded(lambda: self._begin(_SETTLED)))
         self.cards.currentItemChanged.connect(guarded(self._show_words))
@@ -313,27 +314,13 @@ class GalleryPanel(QWidget):
         self._begin()
 
     def hideEvent(self, event: QHideEvent) -> None:
-        self.rest()
+        self._picturing.rest()
         super().hideEvent(event)
 
     def event(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.DevicePixelRatioChange:
             self._begin()
         return super().event(event)
-
-    def close(self) -> bool:
-        """End what makes the pictures, at most a picture later, and close."""
-        self._picturing.close()
-        return super().close()
-
-    @property
-    def painting(self) -> bool:
-        """Whether pictures are still to be made."""
-        return self._picturing.busy
-
-    def rest(self) -> None:
-        """Make no more pictures until it is shown again."""
-        self._picturing.rest()
 
     def _begin(self, after: int = 0) -> None:
         """Have what is missing made where it is seen, beginning `after` so many ms."""
@@ -342,11 +329,10 @@ class GalleryPanel(QWidget):
             look = Look(self._theme, size.width(), size.height(), ratio)
             self._picturing.paint(look, after)
 
-    def _take_scenes(self, scenes: dict[str, Scene | str]) -> None:
-        self._scenes = scenes
-        for name, scene in scenes.items():
-            if isinstance(scene, Scene):
-                self.items[name].setText(scene.title or _titled(name))
+    def _take_scene(self, name: str, scene: Scene | str) -> None:
+        self._scenes[name] = scene
+        if isinstance(scene, Scene):
+            self.items[name].setText(scene.title or _titled(name))
         self._show_words()
 
     def _take_picture(self, name: str, image: QImage) -> None:

@@ -30,6 +30,7 @@ from kappaskin_app.features.scene.gallery import GalleryPanel
 from kappaskin_app.features.scene.plan import EffectsPanel
 from kappaskin_app.features.scene.scene_form import SceneForm
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.form import for_the_window
 from kappaskin_app.theme import LIGHT, Theme
 from kappaskin_app.widgets.parts import button, text_label
@@ -257,9 +258,10 @@ class ScenePanel(QTabWidget):
 
     seen = Signal(bool)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self, tasks: Tasks, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.gallery, self.editor, self.effects = GalleryPanel(), SceneEditor(), EffectsPanel()
+        self.gallery = GalleryPanel(tasks)
+        self.editor, self.effects = SceneEditor(), EffectsPanel()
         for page, title in (
             (self.gallery, "&Gallery"),
             (self.editor, "&Edit"),

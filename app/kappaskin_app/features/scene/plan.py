@@ -15,13 +15,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin._processes import BackgroundProcess
-from kappaskin.errors import Refusal
 from kappaskin.live import Status
 from kappaskin.scenes import EffectSelection, Scene
 from kappaskin.scenes.effects import EFFECTS
 from kappaskin.studies import plan_updates
 from kappaskin_app.features.scene.scene_text import OFF, ON, PLANNED
+from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.effects import called, explained
 from kappaskin_app.shell.session import Session
 from kappaskin_app.theme import LIGHT, Theme
@@ -37,19 +36,26 @@ class Planning(QObject):
 
     changed = Signal()
 
-    def __init__(self, session: Session, parent: QObject | None = None) -> None:
+    def __init__(self, session: Session, tasks: Tasks, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._session = session
         self.scene: Scene | None = None
         self.rows: list[dict[str, Any]] = []
         self.refusal = ""
-        self._measuring: BackgroundProcess[list[dict[str, Any]]] | None = None
+        self.task = BackgroundTask(
+            tasks,
+            "Sizing and timing effects",
+            self._take,
+            self._refuse,
+            ended=self.changed.emit,
+            cancelled="Cancelled; it is planned when this is shown again.",
+        )
         self._watched = False
 
     @property
     def waiting(self) -> bool:
         """Whether not everything is known yet of the scene that is played."""
-        return self._measuring is not None
+        return self.task.running
 
     def watch(self, watched: bool) -> None:
         """Plan while somebody looks, and only then."""
@@ -58,44 +64,25 @@ class Planning(QObject):
             if self.refusal:
                 self.scene = None  # it may have been cancelled: begin anew
             self.follow(self._session.status)
-        elif self._measuring is not None:
-            self._end(self._measuring)
+        elif self.waiting:
+            self.task.stop()
             self.scene = None  # to be begun anew
-
-    def follow(self, _: Status) -> None:
-        """Take up what was measured meanwhile; begin anew when another scene is played."""
-        if not self._watched:
-            return
-        if self._measuring is not None:
-            self._take_up(self._measuring)
-        elif self._session.inside and self._session.scene is not self.scene:
-            self.scene, self.refusal = self._session.scene, ""
-            self._measuring = BackgroundProcess("kappaskin-plan", plan_updates, self.scene)
             self.changed.emit()
 
-    def cancel(self) -> None:
-        """Plan this scene no more, until somebody looks again."""
-        if self._measuring is not None:
-            self.rows, self.refusal = [], "Cancelled; it is planned when this is shown again."
-            self._end(self._measuring)
+    def follow(self, _: Status) -> None:
+        """Begin anew when another scene is played."""
+        idle = self._watched and not self.waiting
+        if idle and self._session.inside and self._session.scene is not self.scene:
+            self.scene, self.refusal = self._session.scene, ""
+            self.task.compute(plan_updates, self.scene)
+            self.changed.emit()
 
-    def close(self) -> None:
-        self.watch(False)
-
-    def _take_up(self, measuring: BackgroundProcess[list[dict[str, Any]]]) -> None:
-        try:
-            for rows in measuring.poll():
-                self.rows = rows
-                self.changed.emit()
-        except Refusal as refusal:
-            self.rows, self.refusal = [], str(refusal)
-        if measuring.done:
-            self._end(measuring)
-
-    def _end(self, measuring: BackgroundProcess[list[dict[str, Any]]]) -> None:
-        measuring.close()
-        self._measuring = None
+    def _take(self, rows: list[dict[str, Any]]) -> None:
+        self.rows = rows
         self.changed.emit()
+
+    def _refuse(self, error: Exception) -> None:
+        self.rows, self.refusal = [], str(error)
 
 
 _COLUMNS = ("Effect", "Simulated", "Kept", "Size", "If left out", "Time", "Why")

@@ -1,10 +1,8 @@
 """Small pictures of scenes, painted in the background."""
 
 import math
-from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Generator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +12,7 @@ from PySide6.QtGui import QColor, QImage, QLinearGradient, QPainter, QPen, QPoly
 from kappaskin.errors import Refusal
 from kappaskin.scenes import AppliedLoads, Indenter, LoadingHistory, Scene, Stimulus, load_scene
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.drawn_skin import FROM_THE_LEFT, DrawnSkin, Indices
 from kappaskin_app.shell.loads import footprint
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, SEQUENTIAL, Colours, Theme
@@ -155,9 +154,6 @@ def _path(stimulus: Stimulus, duration: float) -> list[Array]:
     return [place + piece for piece in pieces if np.ptp(piece, axis=0).max() > _STILL]
 
 
-_POLL = 30  # ms
-
-
 @dataclass(frozen=True)
 class Look:
     """How pictures look: in a `theme`, `width` by `height` in px of which each is `ratio` dots."""
@@ -168,6 +164,9 @@ class Look:
     ratio: float
 
 
+_Made = tuple[str, Look, Scene | str | QImage]
+
+
 class Picturing(QObject):
     """Reads the scenes with these `names` once, then paints each anew for every other look.
 
@@ -175,85 +174,72 @@ class Picturing(QObject):
     image for it.
     """
 
-    read = Signal(dict)
+    read = Signal(str, object)
     painted = Signal(str, QImage)
 
-    def __init__(self, names: list[str], parent: QObject | None = None) -> None:
+    def __init__(self, names: list[str], tasks: Tasks, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._names = names
-        self._scenes: dict[str, Scene] | None = None
+        self._scenes: dict[str, Scene | str] = {}
         self._reliefs: dict[str, Relief] = {}
         self._looks: dict[str, Look] = {}
         self._look: Look | None = None
-        self._closed = False
-        self._thread = ThreadPoolExecutor(1, "gallery")
-        self._busy: tuple[Future[Any], Callable[[Any], None]] | None = None
-        self._timer = QTimer(self)
-        self._timer.timeout.connect(guarded(self._work))
+        self._task = BackgroundTask(
+            tasks,
+            "Painting the scenes",
+            self._take,
+            cancelled="Cancelled; what is missing is painted when it is shown again.",
+        )
+        self._timer = QTimer(self, singleShot=True)  # pyright: ignore[reportCallIssue]
+        self._timer.timeout.connect(guarded(self._begin))
 
     def paint(self, look: Look, after: int) -> None:
         """Have what does not look so painted, beginning `after` so many ms."""
         self._look = look
-        if not self._closed:
-            self._timer.start(after)
-
-    @property
-    def busy(self) -> bool:
-        return self._timer.isActive()
+        self._timer.start(after)
 
     def rest(self) -> None:
-        """Begin nothing more until something is to be painted."""
+        """Make nothing more until something is to be painted."""
         self._timer.stop()
+        self._task.stop()
 
-    def close(self) -> None:
-        """End the thread, at most a picture later."""
-        self._closed = True
-        self.rest()
-        self._thread.shutdown(wait=True, cancel_futures=True)
+    def _begin(self) -> None:
+        missing = [name for name in self._names if self._looks.get(name) != self._look]
+        if missing:
+            self._task.run(self._made, self._look, missing)
 
-    def _work(self) -> None:
-        """Take what was made, and have the next thing made."""
-        self._timer.setInterval(_POLL)
-        if self._busy is not None:
-            future, take = self._busy
-            if not future.done():
-                return
-            self._busy = None
-            take(future.result())
-        if self._scenes is None:
-            self._scenes = {}  # asked for, whatever comes of it
-            self._busy = self._thread.submit(_loaded, self._names), self._take_scenes
-            return
-        look = self._look
-        for name, scene in self._scenes.items():
-            if look is not None and self._looks.get(name) != look:
-                self._looks[name] = look
-                made = self._thread.submit(self._paint, name, scene, look)
-                self._busy = made, lambda made: self.painted.emit(*made)
-                return
-        self._timer.stop()
+    def _made(self, look: Look, names: list[str]) -> Generator[_Made]:
+        """Each scene that is not known yet, or why it cannot be, then a picture of each."""
+        for name in self._names:
+            if name not in self._scenes:
+                self._scenes[name] = _loaded(name)
+                yield name, look, self._scenes[name]
+        for name in names:
+            scene = self._scenes[name]
+            if isinstance(scene, Scene):
+                yield name, look, self._painted(name, scene, look)
 
-    def _take_scenes(self, found: dict[str, Scene | str]) -> None:
-        self._scenes = {name: scene for name, scene in found.items() if isinstance(scene, Scene)}
-        self.read.emit(found)
+    def _take(self, made: _Made) -> None:
+        name, look, what = made
+        if isinstance(what, QImage):
+            self._looks[name] = look
+            self.painted.emit(name, what)
+        else:
+            self.read.emit(name, what)
 
-    def _paint(self, name: str, scene: Scene, look: Look) -> tuple[str, QImage]:
+    def _painted(self, name: str, scene: Scene, look: Look) -> QImage:
         if name not in self._reliefs:
             self._reliefs[name] = relief(scene)
         size = QSize(look.width, look.height)
-        return name, picture(self._reliefs[name], look.theme, size, look.ratio)
+        return picture(self._reliefs[name], look.theme, size, look.ratio)
 
 
-def _loaded(names: list[str]) -> dict[str, Scene | str]:
-    """The ready scenes, or in words why one cannot be."""
-
-    def loaded(name: str) -> Scene | str:
-        try:
-            return load_scene(name)
-        except Refusal as refusal:
-            return str(refusal)
-
-    return {name: loaded(name) for name in names}
+def _loaded(name: str) -> Scene | str:
+    """A ready scene, or in words why it cannot be."""
+    try:
+        return load_scene(name)
+    except Refusal as refusal:
+        return str(refusal)
 
 
 _FAR = 3.0  # times the skin's extent from its middle to the eye

@@ -16,7 +16,7 @@ class StabilityFeature:
     def install(self, shell: MainWindow) -> None:
         self._shell = shell
         session, stack = shell.session, shell.history.stack
-        self.seeing, self.stability = Seeing(shell.history, shell), StabilityPanel()
+        self.seeing, self.stability = Seeing(shell.history, shell.tasks, shell), StabilityPanel()
         self.demonstrating = Demonstrating(shell.history)
         shell.docks.put_below("stability", "Stability", self.stability, "F10")
         shell.docks["stability"].visibilityChanged.connect(guarded(self.seeing.watch))
@@ -37,10 +37,6 @@ class StabilityFeature:
             "silent": partial(self._figure, "silent"),
             "condition": partial(self._figure, "condition"),
         }
-        shell.tasks.add(
-            "Computing how shapes are seen", lambda: self.seeing.computing, self.seeing.cancel
-        )
-        shell.closing.connect(guarded(self.seeing.close))
 
     def _show_back(self, *_: object) -> None:
         self.stability.show_undo(self.demonstrating.demonstrates)

@@ -1,6 +1,5 @@
 """How well the elements see each shape of the basis, computed in the background."""
 
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,10 +7,10 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from kappaskin.bases import Basis, basis_for
-from kappaskin.errors import Refusal
 from kappaskin.estimation import singular_values
 from kappaskin.live import Status
 from kappaskin.sensing import Sensor, SensorLayout
+from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.history import History
 
 Array = NDArray[np.float64]
@@ -111,7 +110,7 @@ class Seeing(QObject):
 
     changed = Signal()
 
-    def __init__(self, history: History, parent: QObject | None = None) -> None:
+    def __init__(self, history: History, tasks: Tasks, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._history = history
         self.spectrum: Spectrum | None = None
@@ -119,8 +118,13 @@ class Seeing(QObject):
         self.chosen = 0
         """The number of the shape that is looked at, from 1; 0 while there is none."""
         self._picked = False
-        self._pool = ThreadPoolExecutor(1, "singular-values")
-        self._job: Future[Spectrum] | None = None
+        self.task = BackgroundTask(
+            tasks,
+            "Computing how shapes are seen",
+            self._show,
+            self._refuse,
+            cancelled="Cancelled; another basis or edge is computed again.",
+        )
         self._asked: tuple[object, ...] = ()
         self._watched = False
 
@@ -140,14 +144,9 @@ class Seeing(QObject):
         return None if spectrum is None or (spectrum.alike and not self._picked) else spectrum
 
     def follow(self, status: Status) -> None:
-        """Take up what was computed, and begin anew when something else is asked for."""
+        """Begin anew when something else is asked for."""
         if not self._watched or status.sensor is None:
             return
-        if self._job is not None:
-            if not self._job.done():
-                return
-            self._take_up(self._job)
-            self._job = None
         s, sensor = self._history.settings, status.sensor
         functions = s.functions_x, 1 if sensor.layout.patch.strip else s.functions_y
         edge = s.fit_edge or sensor.edge
@@ -155,18 +154,9 @@ class Seeing(QObject):
         if asked != self._asked:
             self._asked = asked
             if functions[0] * functions[1] <= MOST:
-                self._job = self._pool.submit(Spectrum.of, sensor, edge, functions)
+                self.task.run(Spectrum.of, sensor, edge, functions)
             else:
                 self._show(None, f"Shown for up to {MOST} functions.")
-
-    @property
-    def computing(self) -> bool:
-        return self._job is not None and not self._job.done()
-
-    def cancel(self) -> None:
-        """Wait no more for what is computed."""
-        self._job = None
-        self._show(None, "Cancelled; another basis or edge is computed again.")
 
     def choose(self, number: int) -> None:
         """Look at the shape `number`, from 1."""
@@ -174,18 +164,11 @@ class Seeing(QObject):
             self.chosen, self._picked = number, True
             self.changed.emit()
 
-    def _take_up(self, job: "Future[Spectrum]") -> None:
-        try:
-            self._show(job.result(), "")
-        except (Refusal, MemoryError, np.linalg.LinAlgError) as reason:
-            self._show(None, str(reason))
+    def _refuse(self, error: Exception) -> None:
+        self._show(None, str(error))
 
-    def _show(self, spectrum: Spectrum | None, refusal: str) -> None:
+    def _show(self, spectrum: Spectrum | None, refusal: str = "") -> None:
         self.spectrum, self.refusal = spectrum, refusal
         self.chosen = 0 if spectrum is None else len(spectrum.values)
         self._picked = False
         self.changed.emit()
-
-    def close(self) -> None:
-        self._watched = False
-        self._pool.shutdown(wait=True, cancel_futures=True)

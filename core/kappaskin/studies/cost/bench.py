@@ -12,7 +12,6 @@ from typing import TypeVar, cast
 import numpy as np
 import scipy
 
-from kappaskin._processes import BackgroundProcess
 from kappaskin.bases import Basis, basis_for
 from kappaskin.errors import Refusal
 from kappaskin.estimation import METHODS, Estimator, Fit, estimator_for
@@ -450,53 +449,25 @@ class _EffectJudge:
         return float(rms_distance(self._basis, fitted, self._reference, true).mean())
 
 
-# Costs measured in a background process
+# All of them, in the order in which they are waited for
 
 EffectCosts = tuple[EffectCost, ...] | Refused
 """What a scene's effects cost with a setting, or why that setting is refused."""
 
-_Item = Cost | Refused | tuple[Setting, EffectCosts]
 
+def cost_steps(
+    scene: Scene, settings: Sequence[Setting], effects_with: Setting | None = None
+) -> Generator[Cost | Refused | tuple[Setting, EffectCosts]]:
+    """What each of `settings` costs on `scene`, as soon as it is measured.
 
-def _effects(scene: Scene, setting: Setting) -> EffectCosts:
-    try:
-        return effect_costs(scene, setting)
-    except Refusal as refusal:
-        return Refused(setting, str(refusal))
-
-
-def _measured(
-    scene: Scene, settings: Sequence[Setting], effects_with: Setting | None
-) -> Generator[_Item]:
+    What the scene's effects cost with the setting `effects_with` comes after the first of them,
+    with that setting. Refuses what `Bench` refuses. To be run in a background process.
+    """
     found = costs(scene, settings)
     yield from islice(found, 1)  # the setting that is most waited for
     if effects_with is not None:
-        yield effects_with, _effects(scene, effects_with)
+        try:
+            yield effects_with, effect_costs(scene, effects_with)
+        except Refusal as refusal:
+            yield effects_with, Refused(effects_with, str(refusal))
     yield from found
-
-
-class CostMeasurement(BackgroundProcess[Cost | Refused]):
-    """Measures `settings` on a `scene` in a process of one thread; no call here but `wait` waits.
-
-    What the scene's effects cost with the setting `effects_with` comes after the first cost, and is
-    in `effects`, by setting, once it is known. Refuses a scene that `Bench` refuses. It ends when
-    it is done, when `close` is called, or when the process that started it is gone.
-    """
-
-    def __init__(
-        self, scene: Scene, settings: Sequence[Setting], effects_with: Setting | None = None
-    ) -> None:
-        Bench(scene)  # or refused here
-        self.effects: dict[Setting, EffectCosts] = {}
-        measured = cast("Callable[..., Iterable[Cost | Refused]]", _measured)
-        super().__init__("kappaskin-cost", measured, scene, settings, effects_with)
-
-    def _next(self) -> list[Cost | Refused]:
-        """The next cost; what the effects cost goes to `effects`."""
-        costs = list[Cost | Refused]()
-        for one in cast("list[_Item]", super()._next()):
-            if isinstance(one, tuple):
-                self.effects |= [one]
-            else:
-                costs.append(one)
-        return costs

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.usefixtures("few")
 
 def _processes() -> list[str]:
     names = [child.name for child in multiprocessing.active_children()]
-    return [name for name in names if name == "kappaskin-cost"]
+    return [name for name in names if name == "kappaskin-cost_steps"]
 
 
 def test_the_panel_is_hidden_until_f9_and_then_measures_by_itself(
@@ -29,7 +29,7 @@ def test_the_panel_is_hidden_until_f9_and_then_measures_by_itself(
     assert not _processes()
     qtbot.keyClick(window, Qt.Key.Key_F9)
     assert window.cost.isVisible()
-    until(lambda: _processes() == ["kappaskin-cost"])
+    until(lambda: _processes() == ["kappaskin-cost_steps"])
     until(lambda: window.cost.bar.isVisible())
     until(lambda: window.costing.progress[0] > 0, 60.0)
     drawn = len(window.membrane.ages)

@@ -14,6 +14,7 @@ from kappaskin.sources import Port
 from kappaskin_app.features.connection import panel as plugs
 from kappaskin_app.features.connection.panel import ConnectionPanel, Plugs
 from kappaskin_app.features.log.events import EventLog
+from kappaskin_app.shell.background import Tasks
 
 SKIN = Port("/dev/ttyACM0", "Fingertip of ten by ten elements", "Kappa Ltd", "SN-4711", (1, 2))
 BOARD = Port("/dev/ttyUSB0", "CP2102N", "Silicon Labs", "beef", (3, 4), opened=False)
@@ -127,7 +128,8 @@ def test_ports_are_looked_for_beside_the_window_and_only_while_the_list_is_seen(
     panel, found, until, qtbot
 ):
     panel.activateWindow()
-    seen = Plugs(panel.sources)
+    tasks = Tasks()
+    seen = Plugs(panel.sources, tasks, panel)
     taken = []
     seen.found.connect(panel.show_ports)
     seen.found.connect(taken.append)
@@ -142,7 +144,7 @@ def test_ports_are_looked_for_beside_the_window_and_only_while_the_list_is_seen(
     assert len(found) == count
     seen.look()  # asked for, it looks
     until(lambda: len(found) == count + 1)
-    seen.close()
+    tasks.close()
     assert not any(thread.is_alive() for thread in found)
 
 

@@ -123,7 +123,7 @@ def test_placing_takes_a_while_and_can_be_ended(window: MainWindow, until):
 
     window.requests.set("design_place", "A")
     until(lambda: designing.predicting)
-    designing.cancel()
+    designing.predicts.cancel()
     assert not designing.predicting
     assert "Cancelled" in designing.refusal
 

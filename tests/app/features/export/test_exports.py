@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QFileDialog
 
 from kappaskin import Refusal
 from kappaskin_app.features.export.exports import ExportDialog
+from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.pictures import save_view
 from kappaskin_app.shell.window import MainWindow
 
@@ -215,9 +216,9 @@ def test_only_what_makes_sense_is_asked(name: str, span: bool, at: bool, window)
 
 
 def test_a_name_without_an_ending_gets_that_of_the_format_chosen(
-    qtbot, named, monkeypatch, tmp_path
+    qapp, qtbot, named, monkeypatch, tmp_path
 ) -> None:
-    dialog, asked, names = ExportDialog(), list[str](), list[str]()
+    dialog, asked, names = ExportDialog(Tasks(qapp)), list[str](), list[str]()
     qtbot.addWidget(dialog)
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *a: asked.append(a[-1]) or ("", ""))
     dialog.choose_file.click()

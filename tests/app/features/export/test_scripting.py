@@ -20,6 +20,7 @@ from kappaskin import Engine, Estimate, Refusal, Tare
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.scenes import scene_file
 from kappaskin_app.features.export.scripting import script_of
+from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
@@ -79,9 +80,11 @@ class Asked:
 @pytest.fixture
 def asked(qapp: QApplication) -> Iterator[Asked]:
     history = History(Settings())
-    asked = Asked(history, Session(history, Engine()))
+    tasks = Tasks(qapp)
+    asked = Asked(history, Session(history, Engine(), tasks))
     asked.session.connect_to("sim:")
     yield asked
+    tasks.close()
     asked.session.close()
 
 

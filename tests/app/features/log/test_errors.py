@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication
 
 from kappaskin import Refusal
 from kappaskin_app import guard
-from kappaskin_app.features.log.errors import Reporting, Told
+from kappaskin_app.features.log.errors import Told, write_report
 from kappaskin_app.shell.logbook import CRASHES, LOG, Logbook
 from kappaskin_app.shell.window import MainWindow
 
@@ -104,19 +104,13 @@ def test_a_report_holds_readings_only_if_that_is_ticked(
     dialog.close()
 
 
-def finished(reporting: Reporting) -> object:
-    while not (told := reporting.poll()):
-        pass
-    return told[0]
-
-
 def test_a_report_names_no_home_folder_and_takes_the_log_along(tmp_path: Path) -> None:
     logs, path = tmp_path / "logs", tmp_path / "report.zip"
     logs.mkdir()
     (logs / LOG).write_text(f"in {Path.home()}/secret")
     (logs / f"{LOG}.1").write_text("older")
     told = Told({"happened.txt": f"{Path.home()} it was"})
-    finished(Reporting(path, told, logs, dict))
+    list(write_report(path, told, logs, dict))
     with zipfile.ZipFile(path) as report:
         assert set(report.namelist()) == {"happened.txt", "doctor.json", LOG, f"{LOG}.1"}
         assert report.read("happened.txt") == b"~ it was"
@@ -128,32 +122,29 @@ def test_a_home_folder_is_not_named_where_a_text_has_to_escape_it(tmp_path, monk
     monkeypatch.setattr(Path, "home", lambda: home)
     path = tmp_path / "report.zip"
     doctor = {"python": str(home / "bin" / "python")}
-    finished(Reporting(path, Told({}), tmp_path, lambda: doctor))
+    list(write_report(path, Told({}), tmp_path, lambda: doctor))
     with zipfile.ZipFile(path) as report:
         assert json.loads(report.read("doctor.json")) == {"python": "~/bin/python"}
 
 
 def test_a_log_that_cannot_be_read_is_told_in_the_report(tmp_path: Path) -> None:
     (tmp_path / LOG).mkdir()
-    finished(Reporting(tmp_path / "report.zip", Told({}), tmp_path, dict))
+    list(write_report(tmp_path / "report.zip", Told({}), tmp_path, dict))
     with zipfile.ZipFile(tmp_path / "report.zip") as report:
         assert report.read(LOG) == b"cannot be read (Is a directory)"
 
 
 def test_a_report_that_is_cancelled_leaves_nothing(tmp_path: Path) -> None:
-    go_on = threading.Event()
-    reporting = Reporting(
-        tmp_path / "report.zip", Told({}), tmp_path, lambda: {"waited": go_on.wait(10)}
-    )
-    reporting.close()
-    go_on.set()
-    finished(reporting)
+    writing = write_report(tmp_path / "report.zip", Told({}), tmp_path, dict)
+    assert next(writing) == 0.0
+    assert list(tmp_path.iterdir()) != []
+    writing.close()
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_report_is_written_over_nothing(tmp_path: Path) -> None:
     (tmp_path / "report.zip").write_bytes(b"mine")
     with pytest.raises(Refusal, match="is there already"):
-        Reporting(tmp_path / "report.zip", Told({}), tmp_path)
+        list(write_report(tmp_path / "report.zip", Told({}), tmp_path))
     with pytest.raises(Refusal, match="ends in"):
-        Reporting(tmp_path / "report.txt", Told({}), tmp_path)
+        list(write_report(tmp_path / "report.txt", Told({}), tmp_path))

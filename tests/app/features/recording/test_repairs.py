@@ -9,6 +9,7 @@ import pytest
 from kappaskin import Event, Recording
 from kappaskin.recording import Recorder
 from kappaskin_app.features.recording.recorder import RepairDialog
+from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.window import MainWindow
 
 
@@ -29,8 +30,8 @@ def broken(recording: Path, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def dialog(qtbot) -> RepairDialog:
-    dialog = RepairDialog()
+def dialog(qapp, qtbot) -> RepairDialog:
+    dialog = RepairDialog(Tasks(qapp))
     qtbot.addWidget(dialog)
     return dialog
 

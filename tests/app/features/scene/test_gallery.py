@@ -8,18 +8,21 @@ from PySide6.QtCore import Qt
 from kappaskin import load_scene
 from kappaskin.scenes import SCENES
 from kappaskin_app.features.scene.gallery import ORDER, PICTURE, PLAYING, GalleryPanel, in_order
+from kappaskin_app.shell.background import Tasks
 from kappaskin_app.theme import DARK, LIGHT
 
 
 @pytest.fixture
 def gallery(qtbot):
-    gallery = GalleryPanel()
+    tasks = Tasks()
+    gallery = GalleryPanel(tasks)
     qtbot.addWidget(gallery)
     gallery.resize(640, 240)
     gallery.names = []
     gallery.chosen.connect(gallery.names.append)
     yield gallery
     gallery.close()
+    tasks.close()
 
 
 def pictures(gallery) -> list:

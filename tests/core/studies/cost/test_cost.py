@@ -22,13 +22,13 @@ from kappaskin import (
     Transduction,
     load_scene,
 )
+from kappaskin._processes import BackgroundProcess
 from kappaskin.cli.common import FAILED, REFUSED
 from kappaskin.scenes import SCENES, Orbit
 from kappaskin.scenes.effects import GaussianNoise
 from kappaskin.sensing import Amplifier
 from kappaskin.studies import (
     Cost,
-    CostMeasurement,
     Refused,
     Setting,
     accuracy_verdict,
@@ -492,7 +492,7 @@ def test_a_plot_of_nothing_is_refused(tmp_path) -> None:
 
 def test_a_process_of_its_own_tells_the_same_errors_one_by_one() -> None:
     settings = EIGHT, replace(EIGHT, elements=(6, 6)), replace(EIGHT, functions=(4, 4))
-    with CostMeasurement(CENTRE, settings) as measuring:
+    with BackgroundProcess("kappaskin-cost", costs, CENTRE, settings) as measuring:
         found = [*measuring.poll(), *measuring.wait()]
         assert measuring.done
         assert measuring.poll() == []
@@ -502,19 +502,22 @@ def test_a_process_of_its_own_tells_the_same_errors_one_by_one() -> None:
 
 
 def test_measuring_ends_when_it_is_told_to() -> None:
-    with CostMeasurement(CENTRE, settings_to_try(CENTRE)) as measuring:
+    with BackgroundProcess("kappaskin-cost", costs, CENTRE, settings_to_try(CENTRE)) as measuring:
         assert isinstance(next(measuring.wait()), Cost)
     assert measuring.done
     assert measuring.poll() == []
 
 
-def test_what_cannot_be_measured_is_refused_before_a_process_is_started() -> None:
-    with pytest.raises(Refusal, match="is not pressed"):
-        CostMeasurement(CENTRE.touched_by(), [EIGHT])
+def test_what_cannot_be_measured_is_refused_by_the_process() -> None:
+    with (
+        BackgroundProcess("cost", costs, CENTRE.touched_by(), [EIGHT]) as measuring,
+        pytest.raises(Refusal, match="is not pressed"),
+    ):
+        list(measuring.wait())
 
 
 def test_a_process_that_dies_is_told_of() -> None:
-    with CostMeasurement(CENTRE, settings_to_try(CENTRE)) as measuring:
+    with BackgroundProcess("kappaskin-cost", costs, CENTRE, settings_to_try(CENTRE)) as measuring:
         (child,) = [p for p in multiprocessing.active_children() if p.name == "kappaskin-cost"]
         child.kill()
         with pytest.raises(Refusal, match="ended unexpectedly; try again"):
@@ -524,7 +527,7 @@ def test_a_process_that_dies_is_told_of() -> None:
 
 def test_what_was_measured_before_a_process_died_is_told_first() -> None:
     deadly = replace(EIGHT, functions=("eight", "eight"))
-    with CostMeasurement(CENTRE, [EIGHT, deadly]) as measuring:
+    with BackgroundProcess("kappaskin-cost", costs, CENTRE, [EIGHT, deadly]) as measuring:
         (child,) = [p for p in multiprocessing.active_children() if p.name == "kappaskin-cost"]
         child.join()
         (told,) = measuring.poll()

@@ -11,6 +11,7 @@ import pytest
 import kappaskin.studies
 import kappaskin.studies.simulation
 from kappaskin import Refusal, Scene, SensorLayout, load_scene
+from kappaskin._processes import BackgroundProcess
 from kappaskin.cli.common import REFUSED
 from kappaskin.scenes import EffectSelection, plan
 from kappaskin.scenes.effects import (
@@ -22,10 +23,10 @@ from kappaskin.scenes.effects import (
 )
 from kappaskin.studies import (
     Cost,
-    CostMeasurement,
     EffectCost,
     Refused,
     Setting,
+    cost_steps,
     effect_costs,
     effect_rows,
     effects_text,
@@ -296,24 +297,20 @@ def test_the_table_says_each_effect_in_a_line() -> None:
 
 def test_a_process_of_its_own_tells_of_effects_after_the_first_cost() -> None:
     settings = EIGHT, replace(EIGHT, functions=(4, 4))
-    with CostMeasurement(CENTRE, settings, EIGHT) as measuring:
-        costs_there = measuring.wait()
-        assert next(costs_there).setting == EIGHT
-        assert not measuring.effects
-        (other,) = costs_there
-    assert other.setting == settings[1]
+    with BackgroundProcess("cost", cost_steps, CENTRE, settings, EIGHT) as measuring:
+        first, (of, effects), other = measuring.wait()
+    assert (first.setting, of, other.setting) == (EIGHT, EIGHT, settings[1])
     here = ready("centre")
-    assert list(measuring.effects) == [EIGHT]
-    for cost in measuring.effects[EIGHT]:
+    for cost in effects:
         assert cost.rms_with == pytest.approx(here[cost.name].rms_with, rel=1e-9)
 
 
 def test_a_setting_that_cannot_judge_effects_leaves_the_others_alone() -> None:
     many = replace(EIGHT, functions=(12, 12))
-    with CostMeasurement(CENTRE, [], many) as measuring:
-        assert list(measuring.wait()) == []
-    assert isinstance(measuring.effects[many], Refused)
-    assert "140 of the 144" in measuring.effects[many].reason
+    ((of, effects),) = cost_steps(CENTRE, [], many)
+    assert of == many
+    assert isinstance(effects, Refused)
+    assert "140 of the 144" in effects.reason
 
 
 def test_the_command_tells_of_effects_alone(run) -> None:
