@@ -1,4 +1,4 @@
-"""Background tasks: the one way to run something beside the window, and to end it."""
+"""Background tasks: the one way to compute something while the window goes on, and to end it."""
 
 import threading
 import time
