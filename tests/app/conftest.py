@@ -82,7 +82,8 @@ def _lone_panels(qapp: QApplication) -> Iterator[LonePanels]:
     window = TestedWindow("sim:")
     window.session.engine.disconnect()
     window.session.timer.stop()
-    for signal in (window.panels.requested, window.panels.reset_requested):
+    panels = window.panels
+    for signal in (panels.requested, panels.reset_requested, panels.read_wanted):
         signal.disconnect()
     yield LonePanels(window)
     window.close()
