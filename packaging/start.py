@@ -3,13 +3,15 @@
     python3 packaging/start.py                     opens the app on a simulated skin
     python3 packaging/start.py app [ARGUMENTS]     opens the app, e.g. app --source sim:
     python3 packaging/start.py test [ARGUMENTS]    runs every check; ARGUMENTS go to pytest
+    python3 packaging/start.py full                runs all that a release needs
     python3 packaging/start.py lint                runs those that read, and run nothing
     python3 packaging/start.py fast [ARGUMENTS]    runs what of the library's tests takes a minute
     python3 packaging/start.py cover [ARGUMENTS]   tells which lines of the library no test runs
     python3 packaging/start.py bench [ARGUMENTS]   runs the benchmarks; --history tells how it went
     python3 packaging/start.py fuzz [SECONDS]      gives every reader bytes it has never seen
     python3 packaging/start.py mutate ROOM [COUNT] changes touch, wire, fit or scene, for tests
-    python3 packaging/start.py core [ARGUMENTS]    tests the library where no GUI is installed
+    python3 packaging/start.py core [ARGUMENTS]    tests the library where no GUI is installed;
+                                                   --python python3.12 with another Python
     python3 packaging/start.py bundle [--try]      makes the app one folder; --try only tries it
 
 Standard library only. A second start with nothing changed installs nothing.
@@ -31,6 +33,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
@@ -53,12 +56,26 @@ READING = (
 # Each process has a display of its own; -n0 among ARGUMENTS makes it one for all, on ours.
 # One that crashes ends the run: what it had in hand would be waited for without end.
 # Three of them: fewer leave the cores idle, more gain nothing.
-TESTS = ("pytest", "-n3", "--max-worker-restart=0")
+TESTS = ("pytest", "-n3", "--max-worker-restart=0", "-m", "not full")
 LIBRARY = "tests/core"
+ALL_CASES = ("-m", "")  # the last -m counts
 # Benchmark files are named so that plain pytest passes them by.
 BENCHMARKS = ("tests/benchmarks", "-o", "python_files=bench_*.py", "-q")
 CORE = (f"{ROOT}[plots,foxglove,hdf5]", "hypothesis", "mcap-ros2-support", "mpmath", "psutil")
 CORE += ("pytest", "pytest-xdist", "scikit-fem")
+
+
+# What a release runs, besides the library's tests with each other Python that is there.
+RELEASE = (
+    ("test", *ALL_CASES, f"--ignore={LIBRARY}"),
+    ("test", *ALL_CASES, "--without=presenter", "tests/app"),
+    ("cover",),
+    ("core",),
+    *(("mutate", room, "20") for room in ("touch", "wire", "fit", "scene")),
+    ("fuzz", "120"),
+    ("bench",),
+    ("bundle",),
+)
 
 
 class Stop(Exception):
@@ -125,19 +142,20 @@ def lint(arguments: list[str], shown: dict[str, str]) -> int:
     """Run the checks that only read the code, whatever the others say."""
     if arguments:
         raise Stop(f"expected nothing after lint, got {shlex.join(arguments)}")
-    failures: list[tuple[str, int]] = []
-    for command in READING:
-        say(shlex.join(command))
-        if code := run([tool(command[0]), *command[1:]], shown, cwd=ROOT):
-            failures.append((shlex.join(command), code))
-    if failures:
-        say("Failed: " + ", ".join(f"{check} (exit code {code})" for check, code in failures))
-    return failures[0][1] if failures else 0
+    return in_turn([[tool(name), *rest] for name, *rest in READING], shown)
+
+
+def full(arguments: list[str], shown: dict[str, str]) -> int:
+    """Run every task of a release, whatever the others say, on a machine that does nothing else."""
+    if arguments:
+        raise Stop(f"expected nothing after full, got {shlex.join(arguments)}")
+    steps = [*RELEASE, *(("core", "--python", python) for python in other_pythons())]
+    return in_turn([[tool("python"), __file__, *step] for step in steps], shown)
 
 
 def fast(arguments: list[str], shown: dict[str, str]) -> int:
     """Run the library's tests but those that are slow or start a process."""
-    command = [tool("pytest"), "-n2", "-q", "-m", "not slow", LIBRARY, *arguments]
+    command = [tool("pytest"), "-n2", "-q", "-m", "not slow and not full", LIBRARY, *arguments]
     return run(command, shown, cwd=ROOT)
 
 
@@ -164,8 +182,13 @@ def fuzz(arguments: list[str], shown: dict[str, str]) -> int:
 
 def core(arguments: list[str], shown: dict[str, str]) -> int:
     """Run the library's tests in a venv of its own, without any GUI library."""
-    install(CORE_VENV, *CORE, keep=Path(tool("python", CORE_VENV)).exists())
-    return run([tool("pytest", CORE_VENV), "-n2", "tests/core", *arguments], shown, cwd=ROOT)
+    python, venv = base_python(), CORE_VENV
+    if arguments[:1] == ["--python"]:
+        (python, *arguments) = arguments[1:] or [python]
+        venv = venv.with_name(f"{venv.name}-{Path(python).name}")
+    install(venv, *CORE, keep=Path(tool("python", venv)).exists(), python=python)
+    command = [tool("pytest", venv), "-n2", "-m", "not full", LIBRARY, *arguments]
+    return run(command, shown, cwd=ROOT)
 
 
 def bundle(arguments: list[str], shown: dict[str, str]) -> int:
@@ -181,7 +204,7 @@ def mutate(arguments: list[str], shown: dict[str, str]) -> int:
 
 TASKS = {
     task.__name__: task
-    for task in (app, test, lint, fast, cover, bench, fuzz, mutate, core, bundle)
+    for task in (app, test, full, lint, fast, cover, bench, fuzz, mutate, core, bundle)
 }
 
 
@@ -209,7 +232,18 @@ def stamp() -> str:
     return f"{platform.python_version()} {sys.base_prefix} {ROOT}\n{asked.hexdigest()}\n"
 
 
-def install(venv: Path, *asked: str, keep: bool) -> None:
+def base_python() -> str:
+    """The Python that venvs are made with: .venv's own would clear itself away."""
+    return getattr(sys, "_base_executable", sys.executable)
+
+
+def other_pythons() -> list[str]:
+    """The names of other Pythons on the path that the library is for."""
+    minors = set(range(OLDEST[1], 30)) - {sys.version_info.minor}
+    return [name for minor in sorted(minors) if shutil.which(name := f"python3.{minor}")]
+
+
+def install(venv: Path, *asked: str, keep: bool, python: str = "") -> None:
     """Fill a venv, made anew unless the one found was complete, to `keep`, and only out of date."""
     if not keep:
         if not importlib.util.find_spec("ensurepip"):
@@ -217,9 +251,7 @@ def install(venv: Path, *asked: str, keep: bool) -> None:
         if venv.is_symlink():  # which venv would follow, to clear what others use
             raise Stop(f"expected {venv} to be a folder of its own, it is a link; remove the link")
         say(f"Making {venv}")
-        # Started with .venv's own Python, we would clear it away under our feet.
-        base = getattr(sys, "_base_executable", sys.executable)
-        command = [base, "-m", "venv", "--clear", str(venv)]
+        command = [python or base_python(), "-m", "venv", "--clear", str(venv)]
         quietly(command, environment(pip=True), "repair this Python, or start with another")
     say("Updating the packages" if keep else "Installing the packages (minutes, up to 1.5 GB)")
     command = [tool("python", venv), "-m", "pip", "install", "-q", "-c", str(CONSTRAINTS)]
@@ -285,6 +317,20 @@ def environment(*, pip: bool = False) -> dict[str, str]:
     # For the isolated build too; pip before 25.3 knows the first alone. Spaces would separate.
     pins = CONSTRAINTS.as_uri()
     return kept | {"PIP_CONSTRAINT": pins, "PIP_BUILD_CONSTRAINT": pins}
+
+
+def in_turn(commands: list[list[str]], variables: dict[str, str]) -> int:
+    """The first exit code that is not 0 of commands that all run, whatever the others say."""
+    failures: list[tuple[str, int]] = []
+    for command in commands:
+        began, words = time.monotonic(), shlex.join([Path(command[0]).name, *command[1:]])
+        say(words)
+        if code := run(command, variables, cwd=ROOT):
+            failures.append((words, code))
+        say(f"{words}: {time.monotonic() - began:.0f} s")
+    if failures:
+        say("Failed: " + ", ".join(f"{words} (exit code {code})" for words, code in failures))
+    return failures[0][1] if failures else 0
 
 
 def run(

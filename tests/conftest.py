@@ -57,6 +57,10 @@ if _OWN_DISPLAYS and ("PYTEST_XDIST_WORKER" in os.environ or not os.environ.get(
     os.environ |= _display.enter_context(_start["virtual_display"](dict(os.environ)))
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--without", default="", help="the app's tests without this feature")
+
+
 def pytest_collection_finish() -> None:
     gc.freeze()
     gc.enable()
@@ -169,8 +173,27 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadFil
     return (LoadFileScheduling if _OWN_DISPLAYS else OneForWindows)(config, log)
 
 
+def _leave_cases_to_full(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark all cases of a test as `full` but those that its mark `cases` names."""
+    found: dict[tuple[str, str], bool] = {}
+    for item in items:
+        if mark := item.get_closest_marker("cases"):
+            test, _, case = item.nodeid.partition("[")
+            named = [part for part in mark.args if part in case]
+            found |= {
+                (test, part): part in named or found.get((test, part), False) for part in mark.args
+            }
+            if not named:
+                item.add_marker("full")
+    lost = [f"{test}: {part}" for (test, part), there in found.items() if not there]
+    if lost and not any("::" in asked for asked in config.args):
+        raise pytest.UsageError(f"expected each mark `cases` to name cases, {lost} are none")
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Begin with the files that take long: at the end one process would be alone with them."""
+    _leave_cases_to_full(config, items)
     if hasattr(config, "workerinput"):
         long = {item.path for item in items if item.get_closest_marker("slow")}
         long |= {item.path for item in items if item.nodeid.startswith("tests/app/")}

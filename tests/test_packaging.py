@@ -117,6 +117,37 @@ def test_every_task_is_told_in_its_help_and_to_those_who_contribute():
         assert task == "app" or f"start.py {task} " in contributing
 
 
+def test_full_runs_every_step_and_fails_where_one_does(monkeypatch, capfd):
+    start = runpy.run_path(str(ROOT / "packaging" / "start.py"))
+    known = start["full"].__globals__
+    assert {step[0] for step in start["RELEASE"]} <= set(start["TASKS"])
+    monkeypatch.setitem(known, "RELEASE", (("--help",), ("nothing",), ("--help",)))
+    monkeypatch.setitem(known, "other_pythons", list)
+
+    assert start["full"]([], start["environment"]()) == start["REFUSED"]
+
+    printed = capfd.readouterr().out
+    assert printed.count(start["__doc__"]) == 2
+    assert re.search(r"==> Failed: python \S*start\.py nothing \(exit code 2\)\n$", printed)
+
+
+def test_another_python_has_a_venv_of_its_own(monkeypatch):
+    start = runpy.run_path(str(ROOT / "packaging" / "start.py"))
+    made, ran = [], []
+    known = start["core"].__globals__
+    monkeypatch.setitem(
+        known, "install", lambda venv, *_, python, **__: made.append((venv, python))
+    )
+    monkeypatch.setitem(known, "run", lambda command, *_, **__: ran.append(command))
+
+    start["core"](["--python", "python3.99", "-x"], {})
+    start["core"]([], {})
+
+    (other, name), (own, _) = made
+    assert (other.name, name, own.name) == (".venv-core-python3.99", "python3.99", ".venv-core")
+    assert [str(other) in ran[0][0], ran[0][-1]] == [True, "-x"]
+
+
 def test_a_venv_that_is_a_link_is_never_cleared(tmp_path):
     start = runpy.run_path(str(ROOT / "packaging" / "start.py"))
     (tmp_path / "others").mkdir()

@@ -4,7 +4,8 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,13 +17,29 @@ from pyvistaqt import QtInteractor
 from shiboken6 import getAllValidWrappers
 
 from kappaskin import Engine
-from kappaskin_app import guard
-from kappaskin_app.features import FEATURES
+from kappaskin_app import features, guard
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.window import Feature, MainWindow
 
 if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
     pytest.exit("the app's tests need a display: run `python3 packaging/start.py test`", 2)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Take the line of a feature out, where `--without` names one."""
+    left_out = config.getoption("--without")
+    rest = tuple(made for made in features.FEATURES if made.name != left_out)
+    if left_out and rest == features.FEATURES:
+        names = ", ".join(made.name for made in rest)
+        raise pytest.UsageError(f"--without: expected one of {names}, got {left_out}")
+    features.FEATURES, TestedWindow.left_out = rest, left_out
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Pass by what is of a feature that is left out."""
+    left_out = config.getoption("--without")
+    folder = Path(__file__).with_name("features") / left_out
+    return True if left_out and collection_path.is_relative_to(folder) else None
 
 
 @pytest.fixture(autouse=True)
@@ -50,19 +67,22 @@ class TestedWindow(MainWindow):
     """A window with all features, or those given, whose parts are found by their names alone."""
 
     __test__ = False
+    left_out = ""
 
     def __init__(
         self,
         source: str = "sim:",
         engine: Engine | None = None,
-        features: Iterable[Callable[[], Feature]] = FEATURES,
+        installed: Sequence[Callable[[], Feature]] = (),
     ) -> None:
-        super().__init__([made() for made in features], source, engine)
+        super().__init__([made() for made in installed or features.FEATURES], source, engine)
 
     def __getattr__(self, name: str) -> Any:
-        features = self.__dict__.get("features", {}).values()
-        found = [vars(feature)[name] for feature in features if name in vars(feature)]
+        installed = self.__dict__.get("features", {}).values()
+        found = [vars(feature)[name] for feature in installed if name in vars(feature)]
         if not found:
+            if installed and self.left_out:
+                pytest.skip(f"{name} is of {self.left_out}, which is left out")
             raise AttributeError(f"no part of the shell and no feature's is called {name!r}")
         return found[0]
 
