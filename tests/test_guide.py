@@ -194,6 +194,18 @@ def _keep(block: Block) -> None:
     Path(name[1]).write_text(block.text, "utf-8")
 
 
+@pytest.mark.cases(
+    "front",
+    "accuracy",
+    "build",
+    "calibrate",
+    "checked-against-others",
+    "connect",
+    "numbers",
+    "paper",
+    "studies",
+    "trouble",
+)
 @pytest.mark.parametrize("page", PAGES, ids=NAMES)
 def test_what_a_page_shows_runs_and_prints_what_it_says(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, same_but_for_the_last_digit

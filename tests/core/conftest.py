@@ -64,6 +64,7 @@ class Held:
         return f"{self.name}-{self.edge}"
 
 
+_MORE_OF_A_KIND = ("long", "square", "triangle", "hexagon")  # a flat skin, a polygon: flat, L
 ALL = [Held(name, edge) for name, patch in SKINS.items() for edge in edges_of(patch)]
 
 
@@ -75,7 +76,11 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Give a test that asks for a `held_skin` every skin in every way that it can be held."""
     if "held_skin" in metafunc.fixturenames:
         which = metafunc.definition.get_closest_marker("where")
-        chosen = [held for held in ALL if which is None or which.kwargs["which"](held)]
+        chosen = [
+            pytest.param(held, marks=pytest.mark.full if held.name in _MORE_OF_A_KIND else ())
+            for held in ALL
+            if which is None or which.kwargs["which"](held)
+        ]
         metafunc.parametrize("held_skin", chosen, ids=str)
 
 

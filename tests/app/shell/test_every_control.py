@@ -112,6 +112,7 @@ def _use(control: QWidget) -> None:
         control.setValue(control.maximum())
 
 
+@pytest.mark.full
 def test_every_control_can_be_used(window: MainWindow, nothing_chosen, until) -> None:
     kinds = QAbstractButton, QAbstractSpinBox, QComboBox, QAbstractSlider
     pages = [window.panels.widget(number) for number in range(window.panels.count())]

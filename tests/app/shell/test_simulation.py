@@ -85,6 +85,7 @@ def test_the_fingertip_is_half_a_circle_of_the_papers_radius() -> None:
     assert patch.opening == pytest.approx(np.pi)
 
 
+@pytest.mark.cases("circle-flat-hinged", "off-centre-cylinder", "line-flat-sliding-fluid")
 @pytest.mark.parametrize("fluid", [False, True], ids=["empty", "fluid"])
 @pytest.mark.parametrize("edge", ["hinged", "sliding"])
 @pytest.mark.parametrize("shape", ["flat", "cylinder"])
@@ -101,6 +102,7 @@ def test_no_ready_case_drives_an_element_onto_a_rail_on_any_skin(
     assert np.max(bent) > 3  # and every one stands out of the noise of Table 1
 
 
+@pytest.mark.cases("hexagon")
 @pytest.mark.parametrize("shape", ["disk", "hexagon"])
 def test_every_ready_case_presses_a_tile_of_another_outline(shape: str) -> None:
     for case in READY:
@@ -240,6 +242,7 @@ def test_a_dragged_line_keeps_its_length() -> None:
     np.testing.assert_allclose(ends, [old.x1 - old.x0, old.y1 - old.y0])
 
 
+@pytest.mark.cases("rectangle")
 @pytest.mark.parametrize("case", SPREAD_CASES)
 @given(
     st.sampled_from(list(SHAPES)),

@@ -143,6 +143,7 @@ def test_every_button_and_editor_explains_itself(window: MainWindow) -> None:
                 assert widget.toolTip(), (panel.title(), widget.objectName())
 
 
+@pytest.mark.cases("flat")
 @pytest.mark.parametrize("shape", ["flat", "cylinder"])
 def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
     window: MainWindow, qtbot, shape: str

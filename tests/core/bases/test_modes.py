@@ -61,6 +61,7 @@ MODES = [
 ]
 
 
+@pytest.mark.cases("patch0", "patch5", "patch8", "patch11")
 @pytest.mark.parametrize(("patch", "edge"), MODES)
 def test_modes_share_no_energy_and_come_in_the_order_of_their_frequencies(patch, edge):
     bending, _ = energies(patch, edge)

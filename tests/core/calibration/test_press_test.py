@@ -91,6 +91,7 @@ def exchanged(a, b, axis):
     return np.take(GRID, lines, axis).ravel()
 
 
+@pytest.mark.cases("True-elements0", "True-elements4", "False-elements1", "False-elements5")
 @pytest.mark.parametrize(
     ("elements", "words"),
     [
@@ -136,6 +137,7 @@ def told_of(components):
     return f"{first} and {second} are swapped"
 
 
+@pytest.mark.cases("True-components0", "False-components3")
 @pytest.mark.parametrize("components", [(1, 0, 2), (2, 1, 0), (0, 2, 1), (1, 2, 0)])
 @pytest.mark.parametrize("quick", [True, False])
 def test_components_that_are_exchanged_are_told_and_set_right(components, quick):

@@ -208,6 +208,7 @@ def test_a_corrector_that_remembers_nothing_leaves_nothing():
 # Refused
 
 
+@pytest.mark.cases("demo", "fingertip", "line", "on-foam", "tapping", "two-contacts")
 @pytest.mark.parametrize("name", [name for name in SCENES if not load_scene(name).laid])
 def test_every_ready_scene_is_refused_while_it_presses_and_tared_when_it_does_not(name):
     scene = load_scene(name)

@@ -264,6 +264,7 @@ def test_a_channel_that_recovers_is_trusted_again_in_two_turns_of_the_load(spoil
     assert not looks[-1][1].any()
 
 
+@pytest.mark.cases("demo", "fingertip", "line", "on-foam", "tapping", "two-contacts")
 @pytest.mark.parametrize("name", [n for n in SCENES if n not in ("failing-elements", "saturation")])
 def test_no_healthy_scene_has_a_finding(name) -> None:
     scene = load_scene(name)

@@ -58,6 +58,7 @@ def test_every_known_effect_is_in_the_plan_with_its_size_and_why(name):
     json.dumps([entry.to_json() for entry in entries], allow_nan=False)
 
 
+@pytest.mark.cases("0.1-")
 @READY
 @pytest.mark.parametrize("accuracy", [0.01, 0.1])
 def test_what_is_left_out_changes_no_reading_by_more_than_the_accuracy(name, accuracy):

@@ -62,6 +62,23 @@ def table() -> Iterator[list[dict]]:
     print("\n" + drills_text(rows))
 
 
+@pytest.mark.cases(
+    "garbage-5-%",
+    "bits",
+    "cuts",
+    "baud-rate-too-low",
+    "stall",
+    "not-read",
+    "deaf",
+    "twice",
+    "restart",
+    "other-device",
+    "unplug",
+    "device-clock",
+    "engine-killed",
+    "disk-full",
+    "recording,-slow-disk",
+)
 @pytest.mark.parametrize("drill", DRILLS, ids=lambda drill: drill.name.replace(" ", "-"))
 def test_the_drill_is_held(drill, device, table) -> None:
     row = row_of(drill, device)

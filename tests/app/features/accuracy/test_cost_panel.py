@@ -68,6 +68,7 @@ def test_what_is_predicted_and_what_is_measured_stand_beside_each_other(
     assert 0 < measured.costing.measured()[1] < 1
 
 
+@pytest.mark.cases("least-squares", "as-printed", "robust")
 @pytest.mark.parametrize("method", METHOD_SHORT)
 def test_any_setting_in_use_is_read_whole(measured: MainWindow, method: str) -> None:
     line = measured.cost.setting

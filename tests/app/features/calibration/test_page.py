@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from kappaskin import Calibration
 from kappaskin.calibration.calibration import fingerprint
@@ -25,6 +26,7 @@ def _error(window: MainWindow, until: Callable[..., None]) -> float:
     return float(np.median(found))
 
 
+@pytest.mark.full
 def test_a_calibration_taken_in_the_window_mends_the_shape(
     opened: Callable[[str], MainWindow],
     until: Callable[..., None],

@@ -39,6 +39,7 @@ def recording(window: MainWindow, until, tmp_path) -> Path:
     return path
 
 
+@pytest.mark.cases("the window", "curvature xx")
 @pytest.mark.parametrize("name", ["the window", "the skin", "the map of curvature xx"])
 def test_a_png_is_what_was_seen_with_what_it_is(
     name: str, window, until, named, tmp_path, colours_of
@@ -201,6 +202,7 @@ def test_an_export_is_cancelled_with_nothing_left(window, recording) -> None:
     assert [path.name for path in recording.parent.iterdir()] == ["rec.mcap"]
 
 
+@pytest.mark.cases("a.stl", "a.pvd")
 @pytest.mark.parametrize(
     ("name", "span", "at"), [("a.vtp", False, True), ("a.stl", False, True), ("a.pvd", True, False)]
 )

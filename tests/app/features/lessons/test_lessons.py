@@ -79,6 +79,7 @@ def play(window: MainWindow, name: str, until) -> None:
     assert {row[3] for row in progress.rows()} == {"right at try 2"}
 
 
+@pytest.mark.full
 def test_every_lesson_can_be_played_through(window: MainWindow, until) -> None:
     before = window.history.settings
     window.teaching.look()

@@ -122,6 +122,7 @@ def test_nothing_is_ever_written_over(window: MainWindow, tmp_path: Path, until)
     assert not _mark(window).isVisible()  # it never began
 
 
+@pytest.mark.cases("/nowhere/at/all")
 @pytest.mark.skipif(os.name != "posix", reason="the names are of a POSIX system")
 @pytest.mark.parametrize("place", ["/proc/nowhere/x.mcap", "/nowhere/at/all.mcap"])
 def test_a_place_that_cannot_be_written_to_is_refused(

@@ -41,6 +41,7 @@ def test_the_simulated_skin_comes_back_to_the_panels(window, panel, until, qtbot
     assert window.history.settings.written is None
 
 
+@pytest.mark.cases("fingertip")
 @pytest.mark.parametrize("name", ["sphere", "fingertip", "calibration"])
 def test_a_scene_named_as_the_source_is_played_as_it_is_written(opened, until, name) -> None:
     window = opened(f"sim:{name}")

@@ -99,6 +99,7 @@ def test_a_bargain_is_of_the_frames_that_really_come(qapp, electronics, buys):
     assert "It costs accuracy: one frame tells" in panel.message.text()
 
 
+@pytest.mark.cases("tolerance")
 @pytest.mark.parametrize("name", ["creep", "tolerance", "region_share"])
 def test_a_share_is_shown_in_per_cent(window, name):
     window.requests.set(name, 0.15)
