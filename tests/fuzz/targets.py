@@ -31,7 +31,7 @@ from kappaskin.live.resume import resume_process
 from kappaskin.mechanics import HeightMap, Mesh
 from kappaskin.publish.foxglove import FoxgloveClient
 from kappaskin.publish.foxglove_channels import CHANNELS
-from kappaskin.recording import Recorder, ReplayedSource, Verification, repair_steps, verify_steps
+from kappaskin.recording import Recorder, Repaired, ReplayedSource, Verification
 from kappaskin.recording.messages import TOPICS
 from kappaskin.scenes import SCENES, read_scene
 from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, Creep
@@ -258,7 +258,7 @@ def _recording(data: bytes, folder: Path) -> None:
     path.write_bytes(data)
     out.unlink(missing_ok=True)
     with suppress(Refusal):
-        list(repair_steps(path, out))
+        list(Repaired.steps(path, out))
     for place in (path, out):
         if place.exists():
             with suppress(Refusal):
@@ -271,7 +271,7 @@ def _played(path: Path) -> None:
             with suppress(Refusal):
                 recording.attachment(name)
     with suppress(Refusal):
-        *_, verdict = verify_steps(path)
+        *_, verdict = Verification.steps(path)
         if not isinstance(verdict, Verification):
             raise TypeError(f"expected a verdict, got {verdict}")
     with closing(ReplayedSource(path, sleep=lambda seconds: None)) as source:

@@ -1,6 +1,5 @@
 """Recordings: MCAP files written, read, replayed, verified, repaired and exported."""
 
-from kappaskin.recording.cdr import decode as decode
 from kappaskin.recording.disk import ReservedFile as ReservedFile
 from kappaskin.recording.disk import is_written as is_written
 from kappaskin.recording.export.request import ExportRequest as ExportRequest
@@ -10,14 +9,11 @@ from kappaskin.recording.reading import Recording as Recording
 from kappaskin.recording.recorder import Recorder as Recorder
 from kappaskin.recording.repair import Repaired as Repaired
 from kappaskin.recording.repair import RepairTask as RepairTask
-from kappaskin.recording.repair import repair_steps as repair_steps
-from kappaskin.recording.replay import REPLAY as REPLAY
 from kappaskin.recording.replay import Replay as Replay
 from kappaskin.recording.replay import ReplayedSource as ReplayedSource
 from kappaskin.recording.setup_text import recorded_setups as recorded_setups
 from kappaskin.recording.setup_text import setup_from_text as setup_from_text
 from kappaskin.recording.setup_text import setup_to_text as setup_to_text
 from kappaskin.recording.verify import Verification as Verification
-from kappaskin.recording.verify import verify_steps as verify_steps
 from kappaskin.recording.writing import RecordingStatus as RecordingStatus
 from kappaskin.recording.writing import unused as unused

@@ -16,8 +16,6 @@ from kappaskin.calibration import (
 from kappaskin.errors import Refusal
 from kappaskin.estimation import METHODS
 from kappaskin.pipeline import Setup
-from kappaskin.recording import messages as m
-from kappaskin.recording.cdr import decode
 from kappaskin.recording.reading import Recording
 
 _WHOLE, _REAL, _TEXT = ("Ni", "Nj", "nx", "ny"), ("hold", "rim_sd"), ("edge", "method")
@@ -68,13 +66,9 @@ def recorded_setups(recording: Recording) -> list[tuple[float, Setup]]:
 
     A `Refusal` where one is none.
     """
-    messages = recording.messages_on(m.SETUP)
     return [
-        (
-            (message.stamp - recording.first) * 1e-9,
-            setup_from_text(decode(m.STRING, message.data)["data"], recording.attachment),
-        )
-        for message in islice(messages, _SETUPS)
+        (since, setup_from_text(text, recording.attachment))
+        for since, text in islice(recording.setups(), _SETUPS)
     ]
 
 

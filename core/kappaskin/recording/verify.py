@@ -64,22 +64,22 @@ class Verification:
             parts.append(f"the frames of {self.missing:,} more are not there")
         return "; ".join(parts)
 
+    @staticmethod
+    def steps(path: Path) -> "Generator[float | Verification]":
+        """Recompute everything that was recorded in `path`, and compare.
 
-def verify_steps(path: Path) -> Generator[float | Verification]:
-    """Work out everything that was recorded in `path` once more, and compare.
-
-    Now and then the share that is done, and the verdict at the end. To be run where the engine's
-    own arithmetic is, in one thread: others sum in another order. A `Refusal` where it is no
-    recording.
-    """
-    with Recording(path) as recording:
-        worker = _Worker(recording)
-        span = max(recording.last - recording.first, 1)
-        for n, message in enumerate(recording.messages()):
-            worker(message)
-            if n % _TOLD == 0:
-                yield (message.stamp - recording.first) / span
-        yield worker.verdict()
+        Yields the share that is done now and then, and the verdict at the end. To be run in one
+        thread, as the engine is: several sum in another order. A `Refusal` where it is no
+        recording.
+        """
+        with Recording(path) as recording:
+            worker = _Worker(recording)
+            span = max(recording.last - recording.first, 1)
+            for n, message in enumerate(recording.messages()):
+                worker(message)
+                if n % _TOLD == 0:
+                    yield (message.stamp - recording.first) / span
+            yield worker.verdict()
 
 
 class _Worker:
