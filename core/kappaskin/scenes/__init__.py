@@ -12,13 +12,13 @@ from kappaskin.scenes.cylinders import check_strain as check_strain
 from kappaskin.scenes.cylinders import radii_for as radii_for
 from kappaskin.scenes.cylinders import schedule as schedule
 from kappaskin.scenes.cylinders import step_pairs as step_pairs
+from kappaskin.scenes.effect_plan import Plan as Plan
+from kappaskin.scenes.effect_plan import kept_effects as kept_effects
+from kappaskin.scenes.effect_plan import plan as plan
+from kappaskin.scenes.effect_plan import planned as planned
 from kappaskin.scenes.keys import Key as Key
 from kappaskin.scenes.keys import Unit as Unit
 from kappaskin.scenes.keys import instead_of as instead_of
-from kappaskin.scenes.plan import Plan as Plan
-from kappaskin.scenes.plan import kept_effects as kept_effects
-from kappaskin.scenes.plan import plan as plan
-from kappaskin.scenes.plan import planned as planned
 from kappaskin.scenes.read import SCENES as SCENES
 from kappaskin.scenes.read import TABLE_1_NOISE as TABLE_1_NOISE
 from kappaskin.scenes.read import check_sides as check_sides

@@ -27,8 +27,8 @@ from kappaskin.scenes import (
     plan,
     schedule,
 )
+from kappaskin.scenes.effect_plan import effects_of
 from kappaskin.scenes.effects import EFFECTS, GaussianNoise
-from kappaskin.scenes.plan import effects_of
 from kappaskin.scenes.scene import survey
 from kappaskin.scenes.stimulus import (
     HoldStep,

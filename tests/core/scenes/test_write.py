@@ -40,6 +40,7 @@ from kappaskin.scenes import (
     scene_file,
     schedule,
 )
+from kappaskin.scenes.effect_plan import effects_of
 from kappaskin.scenes.effects import (
     EFFECTS,
     FIRST_GENERATION_LOOPS,
@@ -57,7 +58,6 @@ from kappaskin.scenes.effects import (
 )
 from kappaskin.scenes.effects.electronics import CrossTalk, MainsHum
 from kappaskin.scenes.effects.noise import FlickerNoise
-from kappaskin.scenes.plan import effects_of
 from kappaskin.scenes.scene import LINEAR
 from kappaskin.scenes.stimulus import (
     HoldStep,
