@@ -55,7 +55,7 @@ ROOMS = {
         "sources/wire sources/wire_vectors sources/diagnosis sources/interpreter",
     ),
     "fit": (
-        "estimation/estimator estimation/fit estimation/least_squares estimation/methods "
+        "estimation/estimator estimation/fit estimation/least_squares estimation/__init__ "
         "estimation/fast estimation/bayes estimation/kalman estimation/tracking estimation/robust "
         "estimation/placement",
         "estimation/estimators estimation/least_squares estimation/fast estimation/bayes "

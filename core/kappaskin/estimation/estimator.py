@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, DTypeLike
 
 from kappaskin.bases import Basis, curvature_at
 from kappaskin.errors import RankDeficient, Refusal
-from kappaskin.estimation.fit import Fit, Uncertainty, merged_fits
+from kappaskin.estimation.fit import Fit, Uncertainty
 from kappaskin.frames import Array, Mask
 from kappaskin.sensing import SensorLayout
 
@@ -36,9 +36,6 @@ class PatternCache(Generic[_Made]):
             self._made.popitem(last=False)
         return made
 
-
-RIM_SD = 0.2e-3
-"""Default standard deviation in m of the movement of an elastic rim."""
 
 # Powers of the largest number: the squares of readings over sigmas, added up, stay below it.
 _SAFE, _SAFE_SIGMA = 0.25, 0.2
@@ -80,6 +77,8 @@ class Estimator(ABC):
     float64.
     """
 
+    RIM_SD: ClassVar = 0.2e-3
+    """Default standard deviation in m of the movement of an elastic rim."""
     has_matrix: ClassVar = True
     """Whether it makes the curvature operator M, 3 P x Ni Nj numbers."""
     has_prior: ClassVar = False
@@ -190,7 +189,7 @@ class Estimator(ABC):
                 inner = error.__cause__
                 why = inner if isinstance(inner, RankDeficient) else error
                 raise RankDeficient(f"frame {first}: {why}") from why
-        return merged_fits(fits, np.argsort(np.argsort(which, kind="stable")))
+        return Fit.merged(fits, np.argsort(np.argsort(which, kind="stable")))
 
     def follow(self, curvature: Array, times: Array, held: Array) -> Fit:
         """Fit the next frame: `curvature` (3, P) in 1/m read at `times` (3, P) in s.

@@ -185,49 +185,49 @@ class Fit:
         """Standard deviations (..., P) of the displacement in m at `positions` (P, 2)."""
         return self.sd_of(self.estimator.basis.at(positions))
 
+    @staticmethod
+    def merged(fits: "Sequence[Fit]", order: NDArray[np.intp]) -> "Fit":
+        """One fit of T frames from fits of groups of them: frame t is number `order[t]` of all."""
 
-def merged_fits(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
-    """One fit of T frames from fits of groups of them: frame t is number `order[t]` of all."""
+        def joined(parts: list[Array]) -> Array:
+            return np.concatenate(parts)[order]
 
-    def joined(parts: list[Array]) -> Array:
-        return np.concatenate(parts)[order]
+        def of_each(name: str) -> Array:
+            return joined([np.broadcast_to(getattr(f, name), len(f.curvature)) for f in fits])
 
-    def of_each(name: str) -> Array:
-        return joined([np.broadcast_to(getattr(f, name), len(f.curvature)) for f in fits])
-
-    uncertainties: list[Uncertainty] = []
-    for fit in fits:
-        own = fit.uncertainty
-        uncertainties.extend(own if isinstance(own, Sequence) else [own] * len(fit.curvature))
-    told = [fit.known_noise for fit in fits if fit.known_noise is not None]
-    suspect: list[NDArray[np.uint8]] = [fit.suspect for fit in fits if fit.suspect is not None]
-    return Fit(
-        fits[0].estimator,
-        joined([fit.curvature for fit in fits]),
-        joined([fit.coefficients for fit in fits]),
-        [uncertainties[int(place)] for place in order],
-        of_each("spare"),
-        joined(told) if told else None,
-        of_each("steps"),
-        of_each("converged"),
-        np.concatenate(suspect)[order] if suspect else None,
-    )
-
-
-def stacked_fits(fits: Sequence[Fit]) -> Fit:
-    """One fit of T frames from T fits of one frame each."""
-
-    def alone(fit: Fit) -> Fit:
-        return replace(
-            fit,
-            curvature=fit.curvature[None],
-            coefficients=fit.coefficients[None],
-            uncertainty=[cast("Uncertainty", fit.uncertainty)],
-            spare=np.reshape(fit.spare, (1,)),
-            known_noise=None if fit.known_noise is None else np.reshape(fit.known_noise, (1,)),
-            steps=np.reshape(fit.steps, (1,)),
-            converged=np.reshape(fit.converged, (1,)),
-            suspect=None if fit.suspect is None else fit.suspect[None],
+        uncertainties: list[Uncertainty] = []
+        for fit in fits:
+            own = fit.uncertainty
+            uncertainties.extend(own if isinstance(own, Sequence) else [own] * len(fit.curvature))
+        told = [fit.known_noise for fit in fits if fit.known_noise is not None]
+        suspect: list[NDArray[np.uint8]] = [fit.suspect for fit in fits if fit.suspect is not None]
+        return Fit(
+            fits[0].estimator,
+            joined([fit.curvature for fit in fits]),
+            joined([fit.coefficients for fit in fits]),
+            [uncertainties[int(place)] for place in order],
+            of_each("spare"),
+            joined(told) if told else None,
+            of_each("steps"),
+            of_each("converged"),
+            np.concatenate(suspect)[order] if suspect else None,
         )
 
-    return merged_fits([alone(fit) for fit in fits], np.arange(len(fits)))
+    @staticmethod
+    def stacked(fits: "Sequence[Fit]") -> "Fit":
+        """One fit of T frames from T fits of one frame each."""
+
+        def alone(fit: Fit) -> Fit:
+            return replace(
+                fit,
+                curvature=fit.curvature[None],
+                coefficients=fit.coefficients[None],
+                uncertainty=[cast("Uncertainty", fit.uncertainty)],
+                spare=np.reshape(fit.spare, (1,)),
+                known_noise=None if fit.known_noise is None else np.reshape(fit.known_noise, (1,)),
+                steps=np.reshape(fit.steps, (1,)),
+                converged=np.reshape(fit.converged, (1,)),
+                suspect=None if fit.suspect is None else fit.suspect[None],
+            )
+
+        return Fit.merged([alone(fit) for fit in fits], np.arange(len(fits)))

@@ -218,26 +218,26 @@ class ScanTradeoff:
     def gain(self) -> float:
         return self.rate / self.full_rate
 
+    @staticmethod
+    def of(sensor: Sensor, region: Region, contact: PointLoad, noise: float) -> "ScanTradeoff":
+        """The tradeoff of `region` for a `contact` inside it, at `noise` in 1/m.
 
-def scan_tradeoff(sensor: Sensor, region: Region, contact: PointLoad, noise: float) -> ScanTradeoff:
-    """The tradeoff of `region` for a `contact` inside it, at `noise` in 1/m.
-
-    Rates are those that the scans allow. An element outside counts by how often it is scanned.
-    """
-    scanner = Scanner(sensor, region)
-    if region.around in (Region.SKIN, Region.INTRINSIC):
-        scanner.follow(contact.centre())
-    scan, full = scanner(), sensor.scan()
-    inside = scanner.inside
-    weight = np.full(len(sensor.layout), region.share if region.by_channel else 1.0)
-    if inside is not None and not inside.all():
-        outside = int((~inside).sum())
-        weight[~inside] = _elements_per_turn(region.share, outside) / outside
-    return ScanTradeoff(
-        len(scan.channels),
-        scan.duration,
-        scan.rate,
-        full.rate,
-        contact_bound(sensor, contact, noise, weight),
-        contact_bound(sensor, contact, noise),
-    )
+        Rates are those that the scans allow. An element outside counts by how often it is scanned.
+        """
+        scanner = Scanner(sensor, region)
+        if region.around in (Region.SKIN, Region.INTRINSIC):
+            scanner.follow(contact.centre())
+        scan, full = scanner(), sensor.scan()
+        inside = scanner.inside
+        weight = np.full(len(sensor.layout), region.share if region.by_channel else 1.0)
+        if inside is not None and not inside.all():
+            outside = int((~inside).sum())
+            weight[~inside] = _elements_per_turn(region.share, outside) / outside
+        return ScanTradeoff(
+            len(scan.channels),
+            scan.duration,
+            scan.rate,
+            full.rate,
+            contact_bound(sensor, contact, noise, weight),
+            contact_bound(sensor, contact, noise),
+        )

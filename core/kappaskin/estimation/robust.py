@@ -15,7 +15,7 @@ from kappaskin.bases import Basis
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation.bayes import MarginalLikelihood, prior_root
 from kappaskin.estimation.estimator import Estimator, PatternCache, real_array
-from kappaskin.estimation.fit import Fit, stacked_fits
+from kappaskin.estimation.fit import Fit
 from kappaskin.estimation.least_squares import LeastSquares
 from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import Plate
@@ -140,7 +140,7 @@ class Robust(Estimator, Stateful):
         if K.ndim == 2 or (there == there[:1]).all():
             return super().__call__(K)
         # Not grouped by missing readings: faults are identified from the frames before.
-        return stacked_fits([self._next(frame, t) for t, frame in enumerate(K)])
+        return Fit.stacked([self._next(frame, t) for t, frame in enumerate(K)])
 
     def _next(self, frame: Array, number: int) -> Fit:
         try:

@@ -14,7 +14,7 @@ from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
 from kappaskin.estimation.bayes import prior_root
 from kappaskin.estimation.estimator import Estimator, real_array
-from kappaskin.estimation.fit import Fit, stacked_fits
+from kappaskin.estimation.fit import Fit
 from kappaskin.estimation.kalman import START_SPEED, ModalKalmanFilter, SignalLevel
 from kappaskin.frames import Array, Mask
 
@@ -150,7 +150,7 @@ class Tracking(Estimator, Stateful):
         if not len(K):
             none = np.empty((0, *self.basis.shape), self.dtype)
             return Fit(self, K.astype(self.dtype), none, [], np.zeros(0), np.zeros(0))
-        return stacked_fits([self.follow(frame, np.full(frame.shape, self._next)) for frame in K])
+        return Fit.stacked([self.follow(frame, np.full(frame.shape, self._next)) for frame in K])
 
     @property
     def _next(self) -> float:

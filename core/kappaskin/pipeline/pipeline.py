@@ -14,7 +14,7 @@ from kappaskin.bases import Basis, ValueMap, basis_for
 from kappaskin.calibration import Calibration, Corrector, DriftMonitor, Rest, Tare
 from kappaskin.contact import NO_CONTACT, LoadDetector, PointContact, contact_geometry
 from kappaskin.errors import RankDeficient, Refusal
-from kappaskin.estimation import METHODS, RIM_SD, Fit, estimator_for
+from kappaskin.estimation import METHODS, Estimator, Fit, estimator_for
 from kappaskin.frames import OVERTAKEN, Array, Estimate, Frame, Mask, Truth
 from kappaskin.health import Exclusion, exclude
 from kappaskin.sensing import Sensor
@@ -83,7 +83,7 @@ class Setup:
     hold: float = 0.1
     calibration: Calibration | None = None
     tare: Tare | None = None
-    rim_sd: float = RIM_SD
+    rim_sd: float = Estimator.RIM_SD
 
 
 @dataclass(frozen=True)
