@@ -25,7 +25,7 @@ from kappaskin.frames import Array, Frame, Mask
 from kappaskin.mechanics import PointLoad
 from kappaskin.scenes import Scene, load_scene
 from kappaskin.sensing import Sensor, SensorLayout
-from kappaskin.sources import SIMULATION, SimulatedSource, open_source
+from kappaskin.sources import SimulatedSource, open_source
 
 _OFTEN = 0.005  # s between two readings that are kept
 _STILL = 0.4  # s without motion are a rest
@@ -330,8 +330,8 @@ def press_elements(
         raise Refusal(
             f"expected a patience above zero and at most {_LONGEST:g} s, got {patience:g}"
         )
-    if name.startswith(SIMULATION):
-        test = _simulated(name.removeprefix(SIMULATION), quick, report)
+    if name.startswith(SimulatedSource.SCHEME):
+        test = _simulated(name.removeprefix(SimulatedSource.SCHEME), quick, report)
         return test, test.verdict()
     with closing(open_source(name)) as source:
         listener = DeviceReadings(source)

@@ -23,7 +23,7 @@ from kappaskin.scenes import (
     schedule,
 )
 from kappaskin.sensing import Sensor
-from kappaskin.sources import SIMULATION, SimulatedSource, Source, open_source
+from kappaskin.sources import SimulatedSource, Source, open_source
 
 _FEWEST_FRAMES = 2  # whose spread gives the noise
 _SETTLED = 1.0  # s at the end of a hold that count as its reading
@@ -345,10 +345,10 @@ def take_sweep(
     for what, value in (("seconds", seconds), ("dwell", dwell or seconds), ("hold", hold or 1.0)):
         if not 0 < value <= _LONGEST:
             raise Refusal(f"expected {what} above zero and at most {_LONGEST:g} s, got {value}")
-    simulated = name.startswith(SIMULATION)
+    simulated = name.startswith(SimulatedSource.SCHEME)
     if simulated:
         dwell = dwell or seconds
-        source = _simulated(name.removeprefix(SIMULATION), radii, hold, dwell)
+        source = _simulated(name.removeprefix(SimulatedSource.SCHEME), radii, hold, dwell)
     else:
         source = open_source(name)
     with closing(source):

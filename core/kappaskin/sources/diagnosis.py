@@ -14,7 +14,7 @@ from kappaskin.sources import information
 from kappaskin.sources.clock import ClockMap
 from kappaskin.sources.commands import DeviceCommands, operation_name
 from kappaskin.sources.decoder import SEQUENCES, Accounting, Decoder
-from kappaskin.sources.ports import BaudRateSearch, SerialConnection, port_called
+from kappaskin.sources.ports import BaudRateSearch, Port, SerialConnection
 from kappaskin.sources.serial_source import SerialSource
 from kappaskin.sources.wire import VERSION, Command, FromDevice, Information, Reply, Samples
 
@@ -50,6 +50,19 @@ class Diagnosis:
     accounting: Accounting = field(default_factory=Accounting)
     events: tuple[Event, ...] = ()
 
+    @staticmethod
+    def of(url: str, clock: Callable[[], float] = time.monotonic) -> "Diagnosis":
+        """The diagnosis of the port or URL, after reading it for a few seconds."""
+        plug = Port.named(url).words
+        try:
+            source = SerialSource(url, clock)
+        except SourceError as error:
+            return Diagnosis(url, plug, str(error))
+        try:
+            return _diagnosed(source, plug, clock)
+        finally:
+            source.close()
+
     def to_json(self) -> dict[str, Any]:
         """Everything as JSON values; null for what is not known."""
         found = asdict(self) | {"well": not self.why}
@@ -57,19 +70,6 @@ class Diagnosis:
             key: None if isinstance(value, float) and not math.isfinite(value) else value
             for key, value in found.items()
         }
-
-
-def diagnose(url: str, clock: Callable[[], float] = time.monotonic) -> Diagnosis:
-    """What is on the port or URL, after reading it for a few seconds."""
-    plug = port_called(url).words
-    try:
-        source = SerialSource(url, clock)
-    except SourceError as error:
-        return Diagnosis(url, plug, str(error))
-    try:
-        return _diagnosed(source, plug, clock)
-    finally:
-        source.close()
 
 
 def _diagnosed(source: SerialSource, plug: str, clock: Callable[[], float]) -> Diagnosis:

@@ -15,10 +15,9 @@ from kappaskin.sources.decoder import Accounting, Decoder, SequenceCounter
 from kappaskin.sources.interpreter import Interpreter
 from kappaskin.sources.ports import (
     BaudRateSearch,
+    Port,
     SerialConnection,
     holders,
-    port_called,
-    serial_ports,
 )
 from kappaskin.sources.source import InputRecorder, register_scheme
 from kappaskin.sources.wire import (
@@ -50,7 +49,7 @@ class SerialSource:
 
     def __init__(self, url: str, clock: Callable[[], float] = time.monotonic) -> None:
         self.url, self._clock = url, clock
-        self._plug = port_called(url)
+        self._plug = Port.named(url)
         self._decoder = Decoder()
         self._interpreter = Interpreter(url)
         self._events = _EventLog(self._decoder.sequence, clock)
@@ -120,7 +119,7 @@ class SerialSource:
 
     def _present_url(self) -> str:
         known = self._plug.serial_number
-        here = (port.port for port in serial_ports() if port.same_plug(self._plug)) if known else ()
+        here = (port.port for port in Port.found() if port.same_plug(self._plug)) if known else ()
         return next(iter(here), self.url)
 
     def reset(self) -> None:

@@ -9,8 +9,6 @@ from kappaskin.sensing import Sensor
 from kappaskin.sources.clock import ClockState
 from kappaskin.sources.decoder import Accounting
 
-SIMULATION = "sim:"
-
 
 class InputRecorder(Protocol):
     """Records all that a source's frames are made of, in order, before they are computed with."""

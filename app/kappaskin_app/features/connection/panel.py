@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 from kappaskin.calibration import Calibration
 from kappaskin.live import Status
 from kappaskin.sensing import Sensor
-from kappaskin.sources import Port, serial_ports
+from kappaskin.sources import Port
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import well_behaved
 from kappaskin_app.shell.panel import Panel
@@ -50,7 +50,7 @@ class Plugs(QObject):
     def look(self) -> None:
         """Look now, unless that is being done."""
         if self._looking is None:
-            self._looking = self._thread.submit(serial_ports)
+            self._looking = self._thread.submit(Port.found)
             QTimer.singleShot(_SOON, self, guarded(self._take))
 
     def _take(self) -> None:
