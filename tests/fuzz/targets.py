@@ -25,8 +25,8 @@ from kappaskin import (
     Setup,
     load_scene,
 )
-from kappaskin.calibration import Tare, TareStore, calibration_to_toml
-from kappaskin.calibration.calibration import digest, fingerprint, read_calibration
+from kappaskin.calibration import Tare, TareStore
+from kappaskin.calibration.calibration import digest, fingerprint
 from kappaskin.live.resume import resume_process
 from kappaskin.mechanics import HeightMap, Mesh
 from kappaskin.publish.foxglove import FoxgloveClient
@@ -185,7 +185,7 @@ def _resealed(data: bytes) -> bytes:
 def _calibration(data: bytes, folder: Path) -> None:
     path = folder / "a.toml"
     path.write_bytes(_resealed(data))
-    read_calibration(path).check(SMALL)
+    Calibration.read(path).check(SMALL)
 
 
 def _tares(data: bytes, folder: Path) -> None:
@@ -221,7 +221,7 @@ def _npy(values: "np.ndarray") -> bytes:
 
 def _calibrated(channels: int) -> bytes:
     ones = np.ones(channels)
-    return calibration_to_toml(
+    return Calibration.to_toml(
         Calibration(
             "skin", "1", "2", "layout", datetime(2026, 1, 1, tzinfo=UTC), ones, 0 * ones, 0 * ones,
             0 * ones, SECOND_GENERATION_LOOPS.operator(channels), Creep(0.03, 20.0).solid(channels),

@@ -138,27 +138,6 @@ class PressDetector:
         return now - self._pressed > _STILL and self._whole() and self._still(self._last())
 
 
-def elements_to_press(layout: SensorLayout, quick: bool) -> tuple[int, ...]:
-    """The elements to press, all that are live, or of a grid a few in each row and column.
-
-    Those few have two elements in each column and in each row. They reveal any exchange of rows, of
-    columns and of components, but not of two elements that are both left out.
-    """
-    live = cast("Mask", layout.live[:2].any(axis=0))
-    chosen = np.flatnonzero(live)
-    if quick and layout.shape and min(layout.shape) > 2:
-        m, n = layout.shape
-        k = np.arange(max(m, n))
-        some = np.unique([k % m + m * (k % n), k % m + m * ((k + 1) % n)])
-        chosen = some[live[some]]
-    if not 0 < len(chosen) <= _MOST_ELEMENTS:
-        raise Refusal(
-            f"expected 1 to {_MOST_ELEMENTS} elements to press, got {len(chosen)}; of a grid "
-            "a few will do"
-        )
-    return tuple(chosen.tolist())
-
-
 class PressTest:
     """Asks for one of the `elements` after the other, and takes the readings of each press.
 
@@ -174,6 +153,27 @@ class PressTest:
         self.sensor, self.elements = sensor, elements
         self.done: list[PressResult] = []
         self._listen()
+
+    @staticmethod
+    def choose_elements(layout: SensorLayout, quick: bool) -> tuple[int, ...]:
+        """The elements to press, all that are live, or of a grid a few in each row and column.
+
+        Those few have two elements in each column and in each row. They reveal any exchange of
+        rows, of columns and of components, but not of two elements that are both left out.
+        """
+        live = cast("Mask", layout.live[:2].any(axis=0))
+        chosen = np.flatnonzero(live)
+        if quick and layout.shape and min(layout.shape) > 2:
+            m, n = layout.shape
+            k = np.arange(max(m, n))
+            some = np.unique([k % m + m * (k % n), k % m + m * ((k + 1) % n)])
+            chosen = some[live[some]]
+        if not 0 < len(chosen) <= _MOST_ELEMENTS:
+            raise Refusal(
+                f"expected 1 to {_MOST_ELEMENTS} elements to press, got {len(chosen)}; of a grid "
+                "a few will do"
+            )
+        return tuple(chosen.tolist())
 
     def _listen(self) -> None:
         resolution = self.sensor.transduction.resolution
@@ -288,7 +288,7 @@ def _simulated(name: str, quick: bool, report: Report) -> PressTest:
     clock, pressed = VirtualClock(), _finger(load_scene(name))
     bare = replace(pressed(0), stimuli=())
     source = SimulatedSource(bare, clock, clock.sleep)
-    test = PressTest(source.sensor, elements_to_press(bare.layout, quick))
+    test = PressTest(source.sensor, PressTest.choose_elements(bare.layout, quick))
     _ask(test, report)
     while (asked := test.asked) is not None:
         for scene, until in ((bare, PressPhase.PRESS), (pressed(asked), PressPhase.RELEASE)):
@@ -335,6 +335,6 @@ def press_elements(
         return test, test.verdict()
     with closing(open_source(name)) as source:
         listener = DeviceReadings(source)
-        test = PressTest(listener.sensor, elements_to_press(listener.sensor.layout, quick))
+        test = PressTest(listener.sensor, PressTest.choose_elements(listener.sensor.layout, quick))
         _follow(listener, test, patience, report)
         return test, test.verdict()

@@ -111,11 +111,11 @@ def _recorded(
 
 
 def _use_tare(engine: "Engine", sensor: "Sensor") -> None:
-    from kappaskin.calibration import TareStore, tare_folder
+    from kappaskin.calibration import TareStore
     from kappaskin.pipeline import Setup
 
     if not sensor.simulated:
-        tare = TareStore(tare_folder()).load(sensor.serial_number).fit_for(sensor)
+        tare = TareStore(TareStore.user_folder()).load(sensor.serial_number).fit_for(sensor)
         engine.set_up(replace(Setup(), tare=tare))
 
 

@@ -7,12 +7,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, cast
 
-from kappaskin.calibration import (
-    calibration_from_toml,
-    calibration_to_toml,
-    tare_from_toml,
-    tare_to_toml,
-)
+from kappaskin.calibration import Calibration, TareStore
 from kappaskin.errors import Refusal
 from kappaskin.estimation import METHODS
 from kappaskin.pipeline import Setup
@@ -30,10 +25,10 @@ def setup_to_text(setup: Setup) -> tuple[str, dict[str, bytes]]:
     files: dict[str, bytes] = {}
     if setup.calibration is not None:
         keys["calibration"] = f"calibration-{setup.calibration.digest[:16]}.toml"
-        files[keys["calibration"]] = calibration_to_toml(setup.calibration).encode()
+        files[keys["calibration"]] = setup.calibration.to_toml().encode()
     if setup.tare is not None:
         keys["tare"] = f"tare-{setup.tare.digest[:16]}.toml"
-        files[keys["tare"]] = tare_to_toml(setup.tare).encode()
+        files[keys["tare"]] = TareStore.to_toml(setup.tare).encode()
     return json.dumps(keys), files
 
 
@@ -55,9 +50,9 @@ def setup_from_text(text: str, file: Callable[[str], bytes]) -> Setup:
     except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise Refusal(f"expected a setup as it was recorded: {error!s:.120}") from error
     if name := keys.get("calibration"):
-        values["calibration"] = calibration_from_toml(file(str(name)), Path(str(name)))
+        values["calibration"] = Calibration.from_toml(file(str(name)), Path(str(name)))
     if name := keys.get("tare"):
-        values["tare"] = tare_from_toml(file(str(name)), str(name))
+        values["tare"] = TareStore.from_toml(file(str(name)), str(name))
     return Setup(**values)
 
 

@@ -3,7 +3,7 @@
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QGridLayout, QProgressBar, QVBoxLayout, QWidget
 
-from kappaskin.calibration import MapVerdict, PressPhase, PressTest, elements_to_press
+from kappaskin.calibration import MapVerdict, PressPhase, PressTest
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
@@ -44,7 +44,7 @@ class MapTesting(QObject):
             sensor = self._status.sensor
             if sensor is None or self._status.state != "streaming":
                 raise Refusal("no sensor is connected; connect one, then begin")
-            self.test = PressTest(sensor, elements_to_press(sensor.layout, quick))
+            self.test = PressTest(sensor, PressTest.choose_elements(sensor.layout, quick))
         except Refusal as refusal:
             self._tell(str(refusal))
             return
