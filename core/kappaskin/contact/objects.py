@@ -8,8 +8,13 @@ import numpy as np
 import scipy
 
 from kappaskin.contact.elastic_skin import ElasticSkin
-from kappaskin.contact.hypotheses import Hypotheses, fit_hypotheses, log_likelihoods
-from kappaskin.contact.interior import Hypothesis, Width
+from kappaskin.contact.hypotheses import (
+    Hypotheses,
+    Hypothesis,
+    Width,
+    fit_hypotheses,
+    log_likelihoods,
+)
 from kappaskin.frames import Array, Contact
 from kappaskin.mechanics import Block, Cylinder, PlacedObject, Plate, RigidObject, Sphere, Wedge
 from kappaskin.sensing import SensorLayout

@@ -6,6 +6,7 @@ from kappaskin.recording.export.request import ExportRequest as ExportRequest
 from kappaskin.recording.export.writing import Exported as Exported
 from kappaskin.recording.export.writing import ExportTask as ExportTask
 from kappaskin.recording.reading import Recording as Recording
+from kappaskin.recording.recompute import Verification as Verification
 from kappaskin.recording.recorder import Recorder as Recorder
 from kappaskin.recording.repair import Repaired as Repaired
 from kappaskin.recording.repair import RepairTask as RepairTask
@@ -14,6 +15,5 @@ from kappaskin.recording.replay import ReplayedSource as ReplayedSource
 from kappaskin.recording.setup_text import recorded_setups as recorded_setups
 from kappaskin.recording.setup_text import setup_from_text as setup_from_text
 from kappaskin.recording.setup_text import setup_to_text as setup_to_text
-from kappaskin.recording.verify import Verification as Verification
 from kappaskin.recording.writing import RecordingStatus as RecordingStatus
 from kappaskin.recording.writing import unused as unused
