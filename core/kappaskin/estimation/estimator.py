@@ -83,7 +83,7 @@ class Estimator(ABC):
     """Whether it makes the curvature operator M, 3 P x Ni Nj numbers."""
     has_prior: ClassVar = False
     """Whether a prior decides what the readings do not, so that no basis is too large."""
-    remembers: ClassVar = False
+    has_memory: ClassVar = False
     """Whether a fit depends on earlier frames: `follow` each frame once, in order."""
 
     def __init__(
@@ -166,7 +166,9 @@ class Estimator(ABC):
         So do readings too large to compute with: 4e9 in float32, 1e77 in float64. Raises
         `RankDeficient` when the readings do not determine the shape.
         """
-        K = real_array(curvature, "curvature", self.dtype)  # ours: residuals are told from it later
+        K = real_array(
+            curvature, "curvature", self.dtype
+        )  # a copy: residuals are computed from it later
         self._check_shape(K)
         flat = K.reshape(*K.shape[:-2], 3 * len(self.layout))
         if self._all_readable and _squared(K.reshape(-1)) <= self._largest**2:
@@ -254,16 +256,16 @@ class Estimator(ABC):
             )
         if layout.shape and not missing:
             m, n = layout.shape
-            # Along each direction, mode m + q looks like m - q at the cell centres.
+            # Along each direction, mode m + q equals m - q at the cell centres.
             return RankDeficient(
-                f"{what}: functions beyond the elements look like lower ones; "
+                f"{what}: functions finer than the elements read as coarser ones; "
                 f"use at most {min(Ni, m)} x {min(Nj, n)} functions, or more elements, or a prior "
                 "(bayes)"
             )
         why = (
             f"{missing} of {channels} readings are missing"
             if missing
-            else ("the elements do not tell these functions apart")
+            else ("the elements cannot distinguish these functions")
         )
         return RankDeficient(
             f"{what}: {why}; use a smaller basis (at most {rank} functions), more elements, or a "

@@ -1,4 +1,4 @@
-"""Robust estimator: least squares without outlying elements, and the likely fault of each."""
+"""Robust estimator: least squares without outliers, and the likely fault of each."""
 
 from collections import deque
 from collections.abc import Mapping
@@ -118,10 +118,10 @@ class Robust(Estimator, Stateful):
 
     def _load_gain(self, residuals: "_Residuals", test: _OutlierTest) -> Array:
         """Drop (G,) of chi-squared when a load is added at each place."""
-        seen = test.beyond + test.by_load @ (1 - residuals.w)
-        known = seen > _UNSEEN
+        observed = test.beyond + test.by_load @ (1 - residuals.w)
+        known = observed > _UNSEEN
         return np.divide(
-            (residuals.r @ self._forces) ** 2, seen, where=known, out=np.zeros_like(seen)
+            (residuals.r @ self._forces) ** 2, observed, where=known, out=np.zeros_like(observed)
         )
 
     def _outlier_test(self, used: Mask) -> _OutlierTest:

@@ -216,7 +216,7 @@ class _Views:
         self._cloud = MessageLayout(m.POINT_CLOUD, cloud)
         self._cloud_size = {"height": 1, "width": P, "point_step": step, "row_step": P * step}
         fit = pipeline.fit
-        self.every = isinstance(fit, Stateful) and not fit.remembers
+        self.every = isinstance(fit, Stateful) and not fit.has_memory
         """Whether estimates depend on which others were made, and so all have to be recorded."""
         bytes_each = 4 * C + 4 * C + 8 * 3 * P + 8 * math.prod(N) + P * step
         self.affordable = _RateLimit(min(_HEAVY, _BYTES / bytes_each))

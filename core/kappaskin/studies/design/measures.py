@@ -65,7 +65,7 @@ class FrameBlock:
     def fit(self) -> Fit:
         """The fit of all frames, each of which is taken in once by what remembers."""
         return (
-            Fit.stacked(self.fits) if self.estimator.remembers else self.estimator(self.curvature)
+            Fit.stacked(self.fits) if self.estimator.has_memory else self.estimator(self.curvature)
         )
 
     @cached_property
