@@ -313,8 +313,8 @@ def _recorded() -> tuple[bytes, bytes]:
         recorder.plays(scene)
         pipeline = Pipeline(source.sensor, Setup(Ni=3, Nj=3, nx=5, ny=5))
         recorder.set_up(pipeline)
-        recorder.remembered(pipeline.state())
-        recorder.happened(Event(0.0, "note", "seed"))
+        recorder.add_memory(pipeline.state())
+        recorder.add_event(Event(0.0, "note", "seed"))
         frames: list[Frame] = []
         while len(frames) < 4:
             frames += source.read(0.1)

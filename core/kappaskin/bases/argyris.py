@@ -88,8 +88,8 @@ def _along_rim(line: Outline, spacing: float, blunt: float) -> Array:
     share, parts = np.linspace(0, 1, 257), list[Array]()
     for start, along, length in zip(line.corners, line.along, line.lengths, strict=True):
         sizes = _sizes(start + share[:, None] * along, corners, finest, spacing)
-        wanted = length / sizes
-        steps = np.append(0.0, np.cumsum((wanted[1:] + wanted[:-1]) / 2)) / 256
+        target = length / sizes
+        steps = np.append(0.0, np.cumsum((target[1:] + target[:-1]) / 2)) / 256
         count = int(np.ceil(steps[-1] - 1e-9))
         at = np.asarray(np.interp(np.arange(count) / count * steps[-1], steps, share), float)
         parts.append(start + at[:, None] * along)
@@ -104,15 +104,15 @@ def _inside(line: Outline, rim: Array, spacing: float) -> Array:
     nx, ny = (int(np.ceil(length / side)) for length in box)
     first = (box - np.array([nx - 1, ny - 1]) * side) / 2
     squares: Array = first + side * np.indices((nx, ny)).reshape(2, -1).T
-    quarters, kept = np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]]) / 4, list[Array]()
+    quarters, accepted = np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]]) / 4, list[Array]()
     while len(squares):
-        wanted, far = _sizes(squares, rim, sizes, spacing), line.depth(squares)
-        small = side <= 1.01 * wanted
-        kept.append(squares[small & (far > _FREE * wanted)])
+        target, far = _sizes(squares, rim, sizes, spacing), line.depth(squares)
+        small = side <= 1.01 * target
+        accepted.append(squares[small & (far > _FREE * target)])
         squares = squares[~small & (far > -side)]
         squares = (squares[:, None] + side * quarters).reshape(-1, 2)
         side /= 2
-    return np.vstack(kept)
+    return np.vstack(accepted)
 
 
 def _joined(points: Array) -> Triangles:
@@ -137,8 +137,8 @@ def _smoothed(line: Outline, points: Array, triangles: Triangles) -> Array:
             np.add.at(total, triangles[:, i], points[triangles[:, j]])
             np.add.at(count, triangles[:, i], 1)
     mean = total / np.maximum(count, 1)[:, None]
-    kept = line.depth(mean) > 0.5 * line.depth(points)
-    return np.where(kept[:, None], mean, points)
+    accepted = line.depth(mean) > 0.5 * line.depth(points)
+    return np.where(accepted[:, None], mean, points)
 
 
 _NEAREST = 10  # triangles that a point is looked for in first

@@ -1,4 +1,4 @@
-"""Calibration of one device: gains, offsets, hysteresis and creep; applied, saved and loaded."""
+"""Calibration of one device: gains, offsets, hysteresis and creep."""
 
 import copy
 import hashlib

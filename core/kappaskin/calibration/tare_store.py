@@ -1,4 +1,4 @@
-"""Tare store: the last tares of every sensor, and the one in use, in a file for each sensor."""
+"""Storage of the tares of every sensor."""
 
 import hashlib
 import os

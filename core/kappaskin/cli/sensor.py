@@ -221,7 +221,7 @@ def press(
         "words": list(verdict.words),
         "order": None if verdict.order is None else verdict.order.tolist(),
         "pressed": [
-            {"asked": p.asked, "verdict": p.verdict, "answered": p.element} for p in test.done
+            {"asked": p.target, "verdict": p.verdict, "answered": p.element} for p in test.done
         ],
     }
     print_result(value, json, lambda: "\n".join(verdict.words))

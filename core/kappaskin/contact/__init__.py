@@ -1,4 +1,4 @@
-"""Contact: where it is, how hard, what object it is, and the geometry of the skin there."""
+"""Contact: position, force, object, and local geometry of the skin."""
 
 from kappaskin.contact.geometry import CurvatureFormMap as CurvatureFormMap
 from kappaskin.contact.geometry import contact_geometry as contact_geometry

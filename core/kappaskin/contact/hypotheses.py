@@ -182,7 +182,7 @@ def _width(skin: ElasticSkin, optimum: Optimum, curvature: float, force: float) 
     # On its bound, q is where the readings would have it.
     low = least_width(skin)
     q = float(optimum.parameters[-1])
-    q += float(optimum.ahead[-1]) if q <= low * 1.001 else 0.0
+    q += float(optimum.prevented[-1]) if q <= low * 1.001 else 0.0
     sd = math.hypot(math.sqrt(optimum.covariance[-1, -1]), (_BLUNT * skin.half_wave) ** 2)
     q0 = float(_resolved(skin, optimum)[-1])
     return Width(q, sd, curvature, q0, skin.bend * abs(force))
@@ -257,7 +257,7 @@ def fit_hypotheses(
     edge = min((frame.edged(edge), frame.edged(cylinder)), key=_cost)
     cylinder = frame.rounded(cylinder, edge)
     if cylinder.cost > edge.cost:  # of which an edge is the narrowest
-        cylinder = min(cylinder, frame.rounded(frame.beside(edge), edge), key=_cost)
+        cylinder = min(cylinder, frame.rounded(frame.next_to(edge), edge), key=_cost)
     noise *= frame.spread((sphere, edge, cylinder))
     return Hypotheses(
         fitted_sphere(skin, sphere),
@@ -317,10 +317,10 @@ class _WeightedReadings:
         )
 
     def edge(self, pair: Array, forces: Array) -> Optimum:
-        force, apart = float(forces.sum()), pair[0] - pair[1]
+        force, between = float(forces.sum()), pair[0] - pair[1]
         share = float(np.clip(forces[0] / force - 0.5, -0.4, 0.4))
-        angle = math.atan2(apart[1], apart[0])
-        start = [*(forces @ pair / force), force, angle, max(apart @ apart, self._least), share]
+        angle = math.atan2(between[1], between[0])
+        start = [*(forces @ pair / force), force, angle, max(between @ between, self._least), share]
         return self._climb(ends(0.0), np.array(start), 6)
 
     def cylinder(self, edge: Optimum) -> Optimum:
@@ -350,7 +350,7 @@ class _WeightedReadings:
         edge = self.again(near, ends(share), 6)
         return self.again(edge, ends(middle(self.skin, edge)), 6) if share else edge
 
-    def beside(self, edge: Optimum) -> Optimum:
+    def next_to(self, edge: Optimum) -> Optimum:
         """The cylinder next to an edge."""
         return self._climb(arcs(EVEN, 0.0), np.append(edge.parameters, self._start / 10), 4)
 

@@ -1,4 +1,4 @@
-"""Object recognition: which kind of object presses on the skin, and how curved it is."""
+"""Object recognition: the kind and curvature of the object that presses on the skin."""
 
 import math
 from dataclasses import dataclass

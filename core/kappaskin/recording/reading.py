@@ -1,4 +1,4 @@
-"""MCAP files to the messages in them: whole files, and unfinished ones up to where they break off.
+"""MCAP reader, for whole files and for unfinished ones up to where they break off.
 
 Every size is checked against what is there: no file takes more memory than a few times `LARGEST`.
 """

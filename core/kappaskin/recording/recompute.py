@@ -1,4 +1,4 @@
-"""Recomputation: recorded messages to frames and estimates, and their verification bit for bit."""
+"""Recomputation of recorded frames and estimates, and their verification."""
 
 import math
 from collections import deque

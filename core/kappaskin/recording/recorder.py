@@ -130,7 +130,7 @@ class Recorder:
         self._file.put(m.SETUP, self._now, encode(m.STRING, {"data": text}))
         self._views = _Views(pipeline)
 
-    def remembered(self, memory: StateArrays) -> None:
+    def add_memory(self, memory: StateArrays) -> None:
         """The pipeline goes on from this."""
         for name, values in memory.items():
             fields = {"name": name, "shape": values.shape, "values": values.ravel()}
@@ -141,7 +141,7 @@ class Recorder:
         fields = {"kinds": kinds, "badness": badness}
         self._file.put(m.LEFT_OUTS, self._now, encode(m.LEFT_OUT, fields))
 
-    def happened(self, event: Event) -> None:
+    def add_event(self, event: Event) -> None:
         stamp = self._file.stamp(event.time)
         fields = {
             "stamp.sec": stamp // 10**9,

@@ -1,4 +1,4 @@
-"""A damaged MCAP file, whoever wrote it, to a whole one with all that can be trusted of it."""
+"""Repair of damaged MCAP files."""
 
 import mmap
 import struct

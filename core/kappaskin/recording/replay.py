@@ -87,7 +87,7 @@ class ReplayedSource:
             )
         self._first = recording.first
         self.length = recording.seconds(recording.last)
-        self._gaps, self._happened = self._landmarks()
+        self._gaps, self._all_events = self._landmarks()
         self._speed, self._looped = 1.0, False
         self._sensor: Sensor | None = None
         self._made: dict[str, Sensor] = {}
@@ -116,7 +116,7 @@ class ReplayedSource:
     @property
     def replay(self) -> Replay:
         where = min(max(self._at(), 0.0), self.length)
-        rest = self._speed, self._looped, self._gaps, self._happened
+        rest = self._speed, self._looped, self._gaps, self._all_events
         return Replay(where, self.length, *rest, self._first * 1e-9, self._recording.whole)
 
     def _at(self) -> float:
@@ -160,14 +160,14 @@ class ReplayedSource:
 
         Those that were asked for the same way before, and were not given yet, are added.
         """
-        ahead, back = (self._steps, self._back) if self._moves and self._steps else (0, 0)
+        forward, back = (self._steps, self._back) if self._moves and self._steps else (0, 0)
         self.seek(None, 0.0)
         if self._ready and self._ready[0] is self._last:  # asked for again, and not given yet
             self._ready.popleft()
         self._back = back - frames if frames < 0 else 0
         if self._back:
             self._go_back(self._back)
-        self._steps, self._moves = 1 if self._back else ahead + max(frames, 1), True
+        self._steps, self._moves = 1 if self._back else forward + max(frames, 1), True
 
     @property
     def stands(self) -> bool:

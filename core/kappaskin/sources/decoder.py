@@ -1,4 +1,4 @@
-"""Decoder and interpreter: bytes of a device to messages and frames, with their accounting."""
+"""Decoder and interpreter of the wire: bytes to messages and frames, with accounting."""
 
 from binascii import crc32, crc_hqx
 from collections import Counter
@@ -123,10 +123,10 @@ class SequenceCounter:
         if self._next is None:
             self._first = sequence
         expected = sequence if self._next is None else self._next
-        ahead = (sequence - expected) % SEQUENCES
-        if ahead < SEQUENCES // 2:
-            self._advance(sequence, ahead)
-        elif SEQUENCES - ahead > _LATE:
+        gap = (sequence - expected) % SEQUENCES
+        if gap < SEQUENCES // 2:
+            self._advance(sequence, gap)
+        elif SEQUENCES - gap > _LATE:
             self.restarts += 1
             self._missing.clear()
             self._advance(sequence, 0)

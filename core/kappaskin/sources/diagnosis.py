@@ -1,4 +1,4 @@
-"""Diagnosis of a port: what is on it and how well it works, and a monitor of its messages."""
+"""Diagnosis of a port, and a monitor of its messages."""
 
 import math
 import time
@@ -100,9 +100,9 @@ def _diagnosed(source: SerialSource, plug: str, clock: Callable[[], float]) -> D
 
 def _settled(source: SerialSource) -> bool:
     """Whether the trouble is one that no other baud rate can solve."""
-    seen = source.accounting()
-    understood = seen.good > 0 or seen.other_version is not None
-    return bool(source.trouble) and (understood or not seen.bytes_in)
+    counts = source.accounting()
+    understood = counts.good > 0 or counts.other_version is not None
+    return bool(source.trouble) and (understood or not counts.bytes_in)
 
 
 def _frame_rate(frames: list[Frame]) -> tuple[float, float]:
@@ -224,13 +224,13 @@ class WireMonitor:
 
     def summary(self) -> str:
         """Totals in one line: messages, bytes, and the rate."""
-        seen, lasted = self.accounting(), max(self._clock() - self._began, 1e-9)
-        reasons = ", ".join(f"{count} {reason}" for reason, count in seen.discarded) or "none"
+        counts, lasted = self.accounting(), max(self._clock() - self._began, 1e-9)
+        reasons = ", ".join(f"{count} {reason}" for reason, count in counts.discarded) or "none"
         return (
-            f"{lasted:.1f} s at {self._connection.baud_rate} baud: {seen.bytes_in} bytes in, "
-            f"{seen.bytes_good} good, {seen.buffered} waiting, discarded: {reasons}; "
-            f"{seen.accepted} messages accepted, {seen.lost} lost, {seen.duplicate} twice, "
-            f"{seen.restarts} restarts; {self._samples / lasted:.1f} scans/s"
+            f"{lasted:.1f} s at {self._connection.baud_rate} baud: {counts.bytes_in} bytes in, "
+            f"{counts.bytes_good} good, {counts.buffered} waiting, discarded: {reasons}; "
+            f"{counts.accepted} messages accepted, {counts.lost} lost, {counts.duplicate} twice, "
+            f"{counts.restarts} restarts; {self._samples / lasted:.1f} scans/s"
         )
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Device information: a sensor's description as JSON on the wire, and back."""
+"""Device information: a sensor's description as JSON."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Serial ports: which there are, opening one, its baud rates, and a thread that reads it."""
+"""Serial ports: discovery, connection, baud rates and reader thread."""
 
 import errno
 import os
@@ -103,11 +103,11 @@ def open_port(url: str) -> serial.SerialBase:
         )
     except (serial.SerialException, OSError, ValueError, LookupError, re.error) as error:
         raise SourceError(_why_not(url, error)) from error
-    _keep_lines(port)
+    _preserve_lines(port)
     return port
 
 
-def _keep_lines(port: serial.SerialBase) -> None:
+def _preserve_lines(port: serial.SerialBase) -> None:
     """Ask the system not to drop DTR when the port is closed."""
     if sys.platform == "win32" or not isinstance(port, serial.Serial):
         return

@@ -52,7 +52,7 @@ class Finger:
         return self.read(np.zeros(300), 0.3)
 
     def press_all(self):
-        while (asked := self.test.asked) is not None:
+        while (asked := self.test.target) is not None:
             assert self.press(asked) is not None
         return self.test.verdict()
 
@@ -257,9 +257,9 @@ def test_back_asks_for_the_last_one_again():
 
     test.back()
 
-    assert test.asked == 5
+    assert test.target == 5
     assert finger.press(5).verdict == "ok"
-    assert test.asked == 6
+    assert test.target == 6
 
 
 def test_a_strip_has_elements_to_press_but_no_components_to_exchange():

@@ -97,7 +97,7 @@ class MapTesting(QObject):
         self._phase = None if test is None else test.phase
         if test is not None and test.over and self.verdict is None:
             self.verdict = test.verdict()
-        now = test.asked if test is not None and self.running else None
+        now = test.target if test is not None and self.running else None
         self.asked.emit(-1 if now is None else now)
         self.changed.emit()
 
@@ -220,7 +220,7 @@ class PressPage(QWidget):
             widget.setVisible(not running)
 
     def _asked(self, test: PressTest | None, running: bool) -> str:
-        if test is None or test.asked is None or not running:
+        if test is None or test.target is None or not running:
             return _WHAT + (_DRAG if self._inside else "")
-        x, y = test.sensor.layout.positions[test.asked] * 1e3
-        return f"<b>Element {test.asked}</b>, at ({x:.0f}, {y:.0f}) mm. {_WAIT[test.phase]}"
+        x, y = test.sensor.layout.positions[test.target] * 1e3
+        return f"<b>Element {test.target}</b>, at ({x:.0f}, {y:.0f}) mm. {_WAIT[test.phase]}"

@@ -1,4 +1,4 @@
-"""What is to be exported, and what every exported file says of its recording."""
+"""Export requests, and the facts that exported files state of their recording."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Export of a recording: frames recomputed and written, by a process of its own."""
+"""Export of a recording in a background process."""
 
 import math
 import shutil
