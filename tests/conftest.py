@@ -255,7 +255,7 @@ def recording(
     setups = [Setup()]
     first = source()
     play(first, 0.5)
-    recorder.happened(Event(now[0], "note", "the object is changed"))
+    recorder.add_event(Event(now[0], "note", "the object is changed"))
     play(first, 0.7)
     setups.append(Setup(6, 7))
     recorder.set_up(Pipeline(first.sensor, setups[-1]))

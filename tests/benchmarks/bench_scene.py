@@ -8,8 +8,8 @@ import pytest
 
 from kappaskin import PointLoad, Simulator, load_scene
 from kappaskin.scenes import SCENES, EffectSelection, kept_effects
+from kappaskin.scenes.effect_plan import effects_of
 from kappaskin.scenes.effects import EFFECTS
-from kappaskin.scenes.plan import effects_of
 
 NONE = EffectSelection(off=frozenset(EFFECTS))
 

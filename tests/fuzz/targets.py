@@ -25,13 +25,13 @@ from kappaskin import (
     Setup,
     load_scene,
 )
-from kappaskin.calibration import Tare, TareStore, calibration_to_toml
-from kappaskin.calibration.calibration import digest, fingerprint, read_calibration
+from kappaskin.calibration import Tare, TareStore
+from kappaskin.calibration.calibration import digest, fingerprint
 from kappaskin.live.resume import resume_process
 from kappaskin.mechanics import HeightMap, Mesh
 from kappaskin.publish.foxglove import FoxgloveClient
 from kappaskin.publish.foxglove_channels import CHANNELS
-from kappaskin.recording import Recorder, ReplayedSource, Verification, repair_steps, verify_steps
+from kappaskin.recording import Recorder, Repaired, ReplayedSource, Verification
 from kappaskin.recording.messages import TOPICS
 from kappaskin.scenes import SCENES, read_scene
 from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, Creep
@@ -185,7 +185,7 @@ def _resealed(data: bytes) -> bytes:
 def _calibration(data: bytes, folder: Path) -> None:
     path = folder / "a.toml"
     path.write_bytes(_resealed(data))
-    read_calibration(path).check(SMALL)
+    Calibration.read(path).check(SMALL)
 
 
 def _tares(data: bytes, folder: Path) -> None:
@@ -221,7 +221,7 @@ def _npy(values: "np.ndarray") -> bytes:
 
 def _calibrated(channels: int) -> bytes:
     ones = np.ones(channels)
-    return calibration_to_toml(
+    return Calibration.to_toml(
         Calibration(
             "skin", "1", "2", "layout", datetime(2026, 1, 1, tzinfo=UTC), ones, 0 * ones, 0 * ones,
             0 * ones, SECOND_GENERATION_LOOPS.operator(channels), Creep(0.03, 20.0).solid(channels),
@@ -258,7 +258,7 @@ def _recording(data: bytes, folder: Path) -> None:
     path.write_bytes(data)
     out.unlink(missing_ok=True)
     with suppress(Refusal):
-        list(repair_steps(path, out))
+        list(Repaired.steps(path, out))
     for place in (path, out):
         if place.exists():
             with suppress(Refusal):
@@ -271,7 +271,7 @@ def _played(path: Path) -> None:
             with suppress(Refusal):
                 recording.attachment(name)
     with suppress(Refusal):
-        *_, verdict = verify_steps(path)
+        *_, verdict = Verification.steps(path)
         if not isinstance(verdict, Verification):
             raise TypeError(f"expected a verdict, got {verdict}")
     with closing(ReplayedSource(path, sleep=lambda seconds: None)) as source:
@@ -313,8 +313,8 @@ def _recorded() -> tuple[bytes, bytes]:
         recorder.plays(scene)
         pipeline = Pipeline(source.sensor, Setup(Ni=3, Nj=3, nx=5, ny=5))
         recorder.set_up(pipeline)
-        recorder.remembered(pipeline.state())
-        recorder.happened(Event(0.0, "note", "seed"))
+        recorder.add_memory(pipeline.state())
+        recorder.add_event(Event(0.0, "note", "seed"))
         frames: list[Frame] = []
         while len(frames) < 4:
             frames += source.read(0.1)

@@ -45,17 +45,17 @@ _ARGUMENTS = ["-x", "-q", "--assert=plain", "--rootdir", str(ROOT)]
 
 ROOMS = {
     "touch": (
-        "contact/point contact/load_detection contact/objects contact/hypotheses contact/interior "
+        "contact/point contact/load_detection contact/objects contact/hypotheses "
         "contact/elastic_skin",
         "contact/contact contact/point_products contact/objects contact/hypotheses "
         "contact/elastic_skin contact/rigid_object_of_a_kind contact/every_skin calibration/tare",
     ),
     "wire": (
-        "sources/wire sources/decoder sources/interpreter",
+        "sources/wire sources/decoder",
         "sources/wire sources/wire_vectors sources/diagnosis sources/interpreter",
     ),
     "fit": (
-        "estimation/estimator estimation/fit estimation/least_squares estimation/methods "
+        "estimation/estimator estimation/fit estimation/least_squares estimation/__init__ "
         "estimation/fast estimation/bayes estimation/kalman estimation/tracking estimation/robust "
         "estimation/placement",
         "estimation/estimators estimation/least_squares estimation/fast estimation/bayes "

@@ -1,6 +1,5 @@
 """The user's folder of recordings: what is in it, and what the next one is called."""
 
-import itertools
 import shlex
 from contextlib import suppress
 from datetime import datetime
@@ -8,7 +7,7 @@ from pathlib import Path
 
 import platformdirs
 
-from kappaskin.recording import is_written
+from kappaskin.recording import is_written, unused
 
 _OFFERED = 8  # recent ones
 _PART = ".part"
@@ -21,17 +20,7 @@ def recordings_folder() -> Path:
 
 def proposed(folder: Path, now: datetime) -> Path:
     """What a recording that begins `now` is called: nothing that is there already."""
-    return _free(folder / f"kappaskin-{now:%Y%m%d-%H%M%S}.mcap")
-
-
-def _free(plain: Path) -> Path:
-    """`plain`, or one that is numbered, where nothing is."""
-    others = (plain.with_stem(f"{plain.stem}-{n}") for n in itertools.count(2))
-    return next(path for path in itertools.chain([plain], others) if not _taken(path))
-
-
-def _taken(path: Path) -> bool:
-    return path.exists() or path.with_name(path.name + _PART).exists()
+    return unused(folder / f"kappaskin-{now:%Y%m%d-%H%M%S}.mcap")
 
 
 def newest(folder: Path) -> list[Path]:
@@ -47,7 +36,7 @@ def unfinished(folder: Path) -> list[Path]:
 def repaired(file: Path) -> Path:
     """What the recording `file` is called once it is repaired: nothing that is there already."""
     stem = Path(file.name.removesuffix(_PART)).stem
-    return _free(file.with_name(f"{stem}-repaired.mcap"))
+    return unused(file.with_name(f"{stem}-repaired.mcap"))
 
 
 def repairing(file: Path) -> str:

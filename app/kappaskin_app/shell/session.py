@@ -11,7 +11,7 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
 from kappaskin.calibration import Calibration, Tare
 from kappaskin.errors import Refusal
-from kappaskin.estimation import Region, ScanTradeoff, scan_tradeoff
+from kappaskin.estimation import Region, ScanTradeoff
 from kappaskin.frames import Estimate
 from kappaskin.live import Engine, ResumeInfo, Status
 from kappaskin.mechanics import Plate, PointLoad
@@ -383,7 +383,7 @@ class Session(QObject):
         try:
             x, y = (float(place) for place in touch.position)
             contact = PointLoad(x, y, touch.force)
-            return scan_tradeoff(sensor, region, contact, estimate.noise)
+            return ScanTradeoff.of(sensor, region, contact, estimate.noise)
         except Refusal:  # elements chosen on another skin: the status says so
             return None
 

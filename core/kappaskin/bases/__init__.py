@@ -1,17 +1,56 @@
 """Bases: sets of functions on a skin that satisfy its boundary conditions."""
 
+from collections.abc import Callable
+from functools import partial
+
 from kappaskin.bases.basis import ORDERS as ORDERS
 from kappaskin.bases.basis import Basis as Basis
 from kappaskin.bases.basis import CurvatureMap as CurvatureMap
 from kappaskin.bases.basis import ValueMap as ValueMap
 from kappaskin.bases.basis import curvature_at as curvature_at
 from kappaskin.bases.basis import curvature_terms as curvature_terms
-from kappaskin.bases.edges import EDGES as EDGES
-from kappaskin.bases.edges import basis_for as basis_for
-from kappaskin.bases.edges import check_edge as check_edge
-from kappaskin.bases.edges import edges_of as edges_of
+from kappaskin.bases.modes import DiskBasis, PolygonBasis
+from kappaskin.bases.product import ClampedBasis
 from kappaskin.bases.product import ElasticBasis as ElasticBasis
 from kappaskin.bases.product import ProductBasis as ProductBasis
 from kappaskin.bases.product import SineBasis as SineBasis
 from kappaskin.bases.product import gauss as gauss
 from kappaskin.bases.product import overlaps as overlaps
+from kappaskin.errors import Refusal
+from kappaskin.skin import Disk, Patch, Polygon
+
+_Maker = Callable[[Patch, int, int], Basis]
+_MAKERS: dict[type[Patch], dict[str, _Maker]] = {
+    Patch: {
+        "hinged": SineBasis,
+        "sliding": partial(SineBasis, sliding=True),
+        "clamped": ClampedBasis,
+        "elastic": ElasticBasis,
+    },
+    Disk: {"hinged": DiskBasis, "clamped": partial(DiskBasis, clamped=True)},
+    Polygon: {"hinged": PolygonBasis, "clamped": partial(PolygonBasis, clamped=True)},
+}
+
+EDGES = tuple(_MAKERS[Patch])
+"""Boundary conditions by name.
+
+`hinged`, with the ends of an arc pinned; `sliding`, with these free to slide; `clamped`, which
+holds the slope too; `elastic`, a flat rectangle whose rim gives.
+"""
+
+
+def edges_of(patch: Patch) -> tuple[str, ...]:
+    """The boundary conditions that `patch` can have, the default first."""
+    return tuple(e for e in _MAKERS[type(patch)] if not (patch.base_curvature and e == "elastic"))
+
+
+def check_edge(patch: Patch, edge: str) -> None:
+    """Raise a `Refusal` for a boundary condition that `patch` cannot have."""
+    if edge not in (edges := edges_of(patch)):
+        raise Refusal(f"expected an edge of a {patch.name} among {', '.join(edges)}; got {edge!r}")
+
+
+def basis_for(patch: Patch, edge: str, Ni: int, Nj: int) -> Basis:
+    """The basis of Ni x Nj functions for a patch with the boundary condition `edge`."""
+    check_edge(patch, edge)
+    return _MAKERS[type(patch)][edge](patch, Ni, Nj)

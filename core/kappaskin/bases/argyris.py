@@ -1,11 +1,19 @@
 """Finite elements: a triangle mesh, Argyris' quintic elements, and modes of polygonal plates."""
 
+import hashlib
+import io
 import math
+import os
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
+import platformdirs
+import scipy
 from numpy.typing import NDArray
 from scipy.sparse import block_diag, coo_array, csc_array, diags_array, eye_array
 from scipy.sparse.linalg import eigsh
@@ -13,7 +21,6 @@ from scipy.spatial import Delaunay, KDTree
 from scipy.special import perm
 
 from kappaskin.bases.basis import ORDERS, Order
-from kappaskin.bases.cache import cached
 from kappaskin.bases.product import gauss
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
@@ -81,8 +88,8 @@ def _along_rim(line: Outline, spacing: float, blunt: float) -> Array:
     share, parts = np.linspace(0, 1, 257), list[Array]()
     for start, along, length in zip(line.corners, line.along, line.lengths, strict=True):
         sizes = _sizes(start + share[:, None] * along, corners, finest, spacing)
-        wanted = length / sizes
-        steps = np.append(0.0, np.cumsum((wanted[1:] + wanted[:-1]) / 2)) / 256
+        target = length / sizes
+        steps = np.append(0.0, np.cumsum((target[1:] + target[:-1]) / 2)) / 256
         count = int(np.ceil(steps[-1] - 1e-9))
         at = np.asarray(np.interp(np.arange(count) / count * steps[-1], steps, share), float)
         parts.append(start + at[:, None] * along)
@@ -97,15 +104,15 @@ def _inside(line: Outline, rim: Array, spacing: float) -> Array:
     nx, ny = (int(np.ceil(length / side)) for length in box)
     first = (box - np.array([nx - 1, ny - 1]) * side) / 2
     squares: Array = first + side * np.indices((nx, ny)).reshape(2, -1).T
-    quarters, kept = np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]]) / 4, list[Array]()
+    quarters, accepted = np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]]) / 4, list[Array]()
     while len(squares):
-        wanted, far = _sizes(squares, rim, sizes, spacing), line.depth(squares)
-        small = side <= 1.01 * wanted
-        kept.append(squares[small & (far > _FREE * wanted)])
+        target, far = _sizes(squares, rim, sizes, spacing), line.depth(squares)
+        small = side <= 1.01 * target
+        accepted.append(squares[small & (far > _FREE * target)])
         squares = squares[~small & (far > -side)]
         squares = (squares[:, None] + side * quarters).reshape(-1, 2)
         side /= 2
-    return np.vstack(kept)
+    return np.vstack(accepted)
 
 
 def _joined(points: Array) -> Triangles:
@@ -130,8 +137,8 @@ def _smoothed(line: Outline, points: Array, triangles: Triangles) -> Array:
             np.add.at(total, triangles[:, i], points[triangles[:, j]])
             np.add.at(count, triangles[:, i], 1)
     mean = total / np.maximum(count, 1)[:, None]
-    kept = line.depth(mean) > 0.5 * line.depth(points)
-    return np.where(kept[:, None], mean, points)
+    accepted = line.depth(mean) > 0.5 * line.depth(points)
+    return np.where(accepted[:, None], mean, points)
 
 
 _NEAREST = 10  # triangles that a point is looked for in first
@@ -392,3 +399,53 @@ def _lowest(K: Any, M: Any, allowed: csc_array, count: int) -> Array:
         eigsh(scaled.T @ K @ scaled, count, scaled.T @ M @ scaled, sigma=0, v0=start),
     )
     return np.asarray(scaled @ vectors[:, np.argsort(squares)])
+
+
+_MEANING = 1  # to be changed by whatever makes other arrays of the same key
+_MOST = 16  # files
+_MARK = hashlib.sha256().digest_size  # bytes: what a file begins with
+_LARGEST = 64_000_000  # bytes of one: more is read no faster than it is computed
+
+
+def cached(key: str, compute: Callable[[], dict[str, Array]]) -> dict[str, Array]:
+    """The arrays of `compute()`, by name: read from the cache where `key` is there.
+
+    The same bits whether cached or computed. A damaged file and those of other versions of numpy
+    or scipy are not used; where none can be written, the arrays are computed every time.
+    """
+    versioned = f"{_MEANING} {np.__version__} {scipy.__version__} {key}"
+    file = _folder() / f"{hashlib.sha256(versioned.encode()).hexdigest()[:24]}.npz"
+    with suppress(OSError):
+        data = file.read_bytes()
+        if data.startswith(_mark(data[_MARK:])):
+            file.touch()  # the oldest go first
+            return dict(np.load(io.BytesIO(data[_MARK:])))
+    arrays = compute()
+    if sum(values.nbytes for values in arrays.values()) <= _LARGEST:
+        with suppress(OSError):
+            _write(file, arrays)
+    return arrays
+
+
+def _mark(data: bytes) -> bytes:
+    return hashlib.sha256(data).digest()
+
+
+def _folder() -> Path:
+    return platformdirs.user_cache_path("kappaskin", appauthor=False) / "modes"
+
+
+def _write(file: Path, arrays: dict[str, Array]) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    part = file.with_suffix(f".{os.getpid()}")  # whole when it has its name
+    made = io.BytesIO()
+    np.savez(made, **arrays)  # pyright: ignore[reportArgumentType]
+    data = made.getvalue()
+    try:
+        part.write_bytes(_mark(data) + data)
+        part.replace(file)
+    finally:
+        part.unlink(missing_ok=True)
+    there = sorted(file.parent.iterdir(), key=lambda one: one.stat().st_mtime, reverse=True)
+    for old in there[_MOST:]:
+        old.unlink(missing_ok=True)

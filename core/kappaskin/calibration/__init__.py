@@ -2,18 +2,12 @@
 
 from kappaskin.calibration.calibration import Calibration as Calibration
 from kappaskin.calibration.calibration import Corrector as Corrector
-from kappaskin.calibration.calibration import calibration_from_toml as calibration_from_toml
-from kappaskin.calibration.calibration import calibration_to_toml as calibration_to_toml
-from kappaskin.calibration.calibration import check_writable as check_writable
 from kappaskin.calibration.calibration import load_calibration as load_calibration
-from kappaskin.calibration.calibration import save_calibration as save_calibration
 from kappaskin.calibration.channel_map import MapVerdict as MapVerdict
 from kappaskin.calibration.press_test import PressPhase as PressPhase
 from kappaskin.calibration.press_test import PressTest as PressTest
-from kappaskin.calibration.press_test import elements_to_press as elements_to_press
 from kappaskin.calibration.press_test import press_elements as press_elements
 from kappaskin.calibration.report import CalibrationReport as CalibrationReport
-from kappaskin.calibration.report import ChannelLimits as ChannelLimits
 from kappaskin.calibration.report import calibrate as calibrate
 from kappaskin.calibration.sweep import Procedure as Procedure
 from kappaskin.calibration.sweep import Sweep as Sweep
@@ -24,6 +18,3 @@ from kappaskin.calibration.tare import Rest as Rest
 from kappaskin.calibration.tare import Tare as Tare
 from kappaskin.calibration.tare import TareMeasurement as TareMeasurement
 from kappaskin.calibration.tare_store import TareStore as TareStore
-from kappaskin.calibration.tare_store import tare_folder as tare_folder
-from kappaskin.calibration.tare_store import tare_from_toml as tare_from_toml
-from kappaskin.calibration.tare_store import tare_to_toml as tare_to_toml

@@ -1,4 +1,4 @@
-"""Calibration of one device: gains, offsets, hysteresis and creep; applied, saved and loaded."""
+"""Calibration of one device: gains, offsets, hysteresis and creep."""
 
 import copy
 import hashlib
@@ -30,9 +30,10 @@ OLDEST = timedelta(days=180)
 
 _AHEAD = timedelta(days=1)  # that the clock of the machine that calibrated may have been ahead
 _LARGEST = 2**26  # bytes
+_LINE = ("gain", "offset", "gain_sd", "offset_sd")
 _KEYS = {
     "device": {"name", "serial_number", "firmware", "layout", "date"},
-    "line": {"gain", "offset", "gain_sd", "offset_sd"},
+    "line": set(_LINE),
     "hysteresis": {"thresholds", "weights", "linear", "stretch"},
     "creep": {"share", "time_constant"},
 }
@@ -104,10 +105,7 @@ class Calibration:
                 "layout": self.layout,
                 "date": self.date,
             },
-            "line": {
-                name: getattr(self, name).tolist()
-                for name in ("gain", "offset", "gain_sd", "offset_sd")
-            },
+            "line": {name: getattr(self, name).tolist() for name in _LINE},
             "failures": {str(channel): reason for channel, reason in self.failures},
         }
         if self.hysteresis:
@@ -149,6 +147,68 @@ class Calibration:
     def start(self) -> "Corrector":
         """The correction of readings of a skin that was at rest until now."""
         return Corrector(self)
+
+    def to_toml(self) -> str:
+        """The text of the file."""
+        tables = [table("", {"format": FORMAT, "sha256": self.digest})]
+        tables += [table(f"[{heading}]", values) for heading, values in self.content.items()]
+        return "\n".join(tables)
+
+    @staticmethod
+    def check_writable(path: Path) -> None:
+        """Refuse a `path` that cannot be written to, before a person spends minutes on a sweep."""
+        place = path.parent
+        if path.is_dir() or not (place.is_dir() and os.access(place, os.W_OK)):
+            raise Refusal(
+                f"{path}: expected a file in a folder that exists and may be written to; choose "
+                "another place"
+            )
+
+    def save(self, path: Path) -> None:
+        """Write `path` whole or not at all."""
+        self.check_writable(path)
+        part = path.with_name(f".{path.name}.part")
+        try:
+            with part.open("w", encoding="utf-8") as file:
+                file.write(self.to_toml())
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(part, path)
+        except (OSError, UnicodeEncodeError) as error:
+            raise Refusal(f"{path}: cannot be written ({error}); choose another place") from error
+        finally:
+            part.unlink(missing_ok=True)
+
+    @staticmethod
+    def read(path: Path) -> "Calibration":
+        """The calibration in `path`, of any sensor and however old."""
+        return Calibration.from_toml(_contents(path), path)
+
+    @staticmethod
+    def from_toml(data: bytes, path: Path) -> "Calibration":
+        """The calibration in the `data` of a file that refusals call `path`."""
+        content = _checked(path, _parsed(path, data))
+        device, hysteresis, creep = (
+            content["device"],
+            content.get("hysteresis"),
+            content.get("creep"),
+        )
+        try:
+            if not all(isinstance(device[key], str) for key in _KEYS["device"] - {"date"}):
+                raise TypeError(f"expected texts for the device, got {device}")
+            return Calibration(
+                *(device[key] for key in ("name", "serial_number", "firmware", "layout", "date")),
+                *(_array(content["line"][key]) for key in _LINE),
+                hysteresis=PrandtlIshlinskii(**{k: _array(v) for k, v in hysteresis.items()})
+                if hysteresis
+                else None,
+                creep=StandardLinearSolid(_array(creep["share"]), float(creep["time_constant"]))
+                if creep
+                else None,
+                failures=tuple((int(c), str(why)) for c, why in content["failures"].items()),
+            )
+        except (ValueError, TypeError, AttributeError, OverflowError) as error:
+            raise Refusal(f"{path}: cannot be used ({error}); {_AGAIN}") from error
 
 
 def digest(content: dict[str, dict[str, Any]]) -> str:
@@ -217,39 +277,6 @@ class Corrector(Stateful):
         return left
 
 
-def calibration_to_toml(calibration: Calibration) -> str:
-    """The text of the file."""
-    tables = [table("", {"format": FORMAT, "sha256": calibration.digest})]
-    tables += [table(f"[{heading}]", values) for heading, values in calibration.content.items()]
-    return "\n".join(tables)
-
-
-def check_writable(path: Path) -> None:
-    """Refuse a `path` that cannot be written to, before a person spends minutes on a sweep."""
-    place = path.parent
-    if path.is_dir() or not (place.is_dir() and os.access(place, os.W_OK)):
-        raise Refusal(
-            f"{path}: expected a file in a folder that exists and may be written to; choose "
-            "another place"
-        )
-
-
-def save_calibration(calibration: Calibration, path: Path) -> None:
-    """Write `path` whole or not at all."""
-    check_writable(path)
-    part = path.with_name(f".{path.name}.part")
-    try:
-        with part.open("w", encoding="utf-8") as file:
-            file.write(calibration_to_toml(calibration))
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, path)
-    except (OSError, UnicodeEncodeError) as error:
-        raise Refusal(f"{path}: cannot be written ({error}); choose another place") from error
-    finally:
-        part.unlink(missing_ok=True)
-
-
 def _contents(path: Path) -> bytes:
     try:
         with path.open("rb") as file:
@@ -303,38 +330,11 @@ def _array(values: Any) -> Array:
     return np.array(values, float)
 
 
-def read_calibration(path: Path) -> Calibration:
-    """The calibration in `path`, of any sensor and however old."""
-    return calibration_from_toml(_contents(path), path)
-
-
-def calibration_from_toml(data: bytes, path: Path) -> Calibration:
-    """The calibration in the `data` of a file that refusals call `path`."""
-    content = _checked(path, _parsed(path, data))
-    device, hysteresis, creep = content["device"], content.get("hysteresis"), content.get("creep")
-    try:
-        if not all(isinstance(device[key], str) for key in _KEYS["device"] - {"date"}):
-            raise TypeError(f"expected texts for the device, got {device}")
-        return Calibration(
-            *(device[key] for key in ("name", "serial_number", "firmware", "layout", "date")),
-            *(_array(content["line"][key]) for key in ("gain", "offset", "gain_sd", "offset_sd")),
-            hysteresis=PrandtlIshlinskii(**{k: _array(v) for k, v in hysteresis.items()})
-            if hysteresis
-            else None,
-            creep=StandardLinearSolid(_array(creep["share"]), float(creep["time_constant"]))
-            if creep
-            else None,
-            failures=tuple((int(c), str(why)) for c, why in content["failures"].items()),
-        )
-    except (ValueError, TypeError, AttributeError, OverflowError) as error:
-        raise Refusal(f"{path}: cannot be used ({error}); {_AGAIN}") from error
-
-
 def load_calibration(
     path: Path, sensor: Sensor, now: datetime, oldest: timedelta = OLDEST
 ) -> Calibration:
     """The calibration in `path`, if it is of this `sensor` and at `now` no older than `oldest`."""
-    calibration = read_calibration(path)
+    calibration = Calibration.read(path)
     try:
         calibration.check(sensor)
     except Refusal as refusal:

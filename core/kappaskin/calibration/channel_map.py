@@ -1,4 +1,4 @@
-"""Channel map: which element answers to which press, and what is wrong with the map."""
+"""Verification of the channel map by pressing elements."""
 
 from dataclasses import dataclass
 from itertools import permutations
@@ -27,12 +27,12 @@ _NAMED = 6  # of them one by one
 
 @dataclass(frozen=True, eq=False)
 class PressResult:
-    """The result of pressing the element `asked` for; `verdict` is `OK`, `ELSEWHERE` and so on.
+    """The result of pressing the element `target` for; `verdict` is `OK`, `ELSEWHERE` and so on.
 
     `element` responded most, None where none did. `answer` (3, P) in 1/m is the change of all.
     """
 
-    asked: int
+    target: int
     verdict: str
     element: int | None
     answer: Array
@@ -40,17 +40,17 @@ class PressResult:
 
     def __str__(self) -> str:
         if self.verdict == ELSEWHERE:
-            return f"element {self.element} answers in the place of element {self.asked}"
+            return f"element {self.element} answers in the place of element {self.target}"
         words = {
             OK: "answers",
             NOTHING: "does not answer, nor does any other",
             SKIPPED: "was not pressed",
         }
-        return f"element {self.asked} {words.get(self.verdict, f'is not clear: {self.why}')}"
+        return f"element {self.target} {words.get(self.verdict, f'is not clear: {self.why}')}"
 
 
-def judge_press(layout: SensorLayout, asked: int, answer: Array) -> PressResult:
-    """Which element was pressed, by the change `answer` (3, P) of all, and if it was `asked`.
+def judge_press(layout: SensorLayout, target: int, answer: Array) -> PressResult:
+    """Which element was pressed, by the change `answer` (3, P) of all, and if it was `target`.
 
     Where a skin is pressed it bends most, whichever of its components is read as which: neither a
     fit nor the map of other elements is needed.
@@ -58,23 +58,23 @@ def judge_press(layout: SensorLayout, asked: int, answer: Array) -> PressResult:
     # Where it bulges it was let go: under a finger that moved on from elsewhere.
     strength = np.linalg.norm(np.where(layout.live, np.minimum(answer, 0.0), 0.0), axis=0)
     peak = int(strength.argmax())
-    apart = np.linalg.norm(layout.positions - layout.positions[peak], axis=1)
-    near = apart <= _BESIDE * _pitch(layout)
+    distance = np.linalg.norm(layout.positions - layout.positions[peak], axis=1)
+    near = distance <= _BESIDE * _pitch(layout)
     also = np.where(near, 0.0, strength)
     if also.max() > _ALSO * strength[peak]:
         why = f"elements {peak} and {int(also.argmax())} answer alike"
-        return PressResult(asked, UNCLEAR, peak, answer, why)
-    if near[asked] and strength[asked] >= _AS_GOOD * strength[peak]:
-        peak = asked
-    return PressResult(asked, OK if peak == asked else ELSEWHERE, peak, answer)
+        return PressResult(target, UNCLEAR, peak, answer, why)
+    if near[target] and strength[target] >= _AS_GOOD * strength[peak]:
+        peak = target
+    return PressResult(target, OK if peak == target else ELSEWHERE, peak, answer)
 
 
 def _pitch(layout: SensorLayout) -> float:
     """The median distance in m of an element to the nearest other one."""
     if len(layout) < 2:
         return 1.0
-    apart, _ = scipy.spatial.KDTree(layout.positions).query(layout.positions, 2)
-    return float(np.median(np.asarray(apart)[:, 1]))
+    distance, _ = scipy.spatial.KDTree(layout.positions).query(layout.positions, 2)
+    return float(np.median(np.asarray(distance)[:, 1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,7 @@ def map_verdict(sensor: Sensor, done: tuple[PressResult, ...]) -> MapVerdict:
     layout = sensor.layout
     answered = [pressed for pressed in done if pressed.verdict in (OK, ELSEWHERE)]
     open_ = [str(pressed) for pressed in done if pressed.verdict not in (OK, ELSEWHERE)]
-    found = {p.asked: p.element for p in answered if p.element is not None}
+    found = {p.target: p.element for p in answered if p.element is not None}
     elements, words = _elements(layout, found)
     if elements is None:
         return MapVerdict(False, (*words, *_some(open_)), None)
@@ -129,7 +129,7 @@ def _some(words: list[str]) -> list[str]:
 def _elements(layout: SensorLayout, found: dict[int, int]) -> tuple[Indices | None, list[str]]:
     """The element that answers for each (P,), and what is wrong in words; None if that is open."""
     every = np.arange(len(layout))
-    wrong = {asked: element for asked, element in found.items() if asked != element}
+    wrong = {target: element for target, element in found.items() if target != element}
     if not wrong:
         return every, []
     words = [f"element {q} answers in the place of element {p}" for p, q in wrong.items()]
@@ -168,10 +168,10 @@ def _by_lines(layout: SensorLayout, found: dict[int, int]) -> tuple[Indices, lis
     if layout.shape is None:
         return None
     m, n = layout.shape
-    asked, element = (np.array(list(part)) for part in (found.keys(), found.values()))
+    target, element = (np.array(list(part)) for part in (found.keys(), found.values()))
     for turned in (False, True) if m == n else (False,):
         first, second = (element // m, element % m) if turned else (element % m, element // m)
-        columns, rows = _line_map(asked % m, first, m), _line_map(asked // m, second, n)
+        columns, rows = _line_map(target % m, first, m), _line_map(target // m, second, n)
         if columns is None or rows is None:
             continue
         p, q = np.arange(m * n) % m, np.arange(m * n) // m
@@ -181,10 +181,10 @@ def _by_lines(layout: SensorLayout, found: dict[int, int]) -> tuple[Indices, lis
     return None
 
 
-def _line_map(asked: Indices, answered: Indices, count: int) -> Indices | None:
+def _line_map(target: Indices, answered: Indices, count: int) -> Indices | None:
     """Which of `count` lines answers for each (count,), None where that is open."""
     to = np.full(count, -1)
-    for line, other in zip(asked.tolist(), answered.tolist(), strict=True):
+    for line, other in zip(target.tolist(), answered.tolist(), strict=True):
         if to[line] not in (-1, other):
             return None
         to[line] = other
@@ -209,7 +209,7 @@ def _components(
     if sensor.layout.patch.strip or not answered:
         return right, []
     read = np.array([pressed.answer[:, elements] for pressed in answered])  # (N, 3, P)
-    due = _expected(sensor, [pressed.asked for pressed in answered])
+    due = _expected(sensor, [pressed.target for pressed in answered])
     live = sensor.layout.live & sensor.layout.live[:, elements]
     read, due = np.where(live, read, 0.0), np.where(live, due, 0.0)
     cost = np.array([_residual(read[:, list(order)], due) for order in _ORDERS])  # (6, P)
@@ -218,7 +218,7 @@ def _components(
         return np.repeat(np.array(_ORDERS[best])[:, None], P, axis=1), [_order_words(best)]
     each = cost.argmin(axis=0)
     wrong = cost.min(axis=0) < _CLEARLY * cost[0]
-    wrong &= np.isin(np.arange(P), [pressed.asked for pressed in answered])
+    wrong &= np.isin(np.arange(P), [pressed.target for pressed in answered])
     for p in np.flatnonzero(wrong):
         right[:, p] = _ORDERS[each[p]]
     words = [f"{_order_words(int(each[p]))} of element {p}" for p in np.flatnonzero(wrong)]

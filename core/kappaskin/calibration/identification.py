@@ -281,9 +281,9 @@ def identify_creep(moments: Array, course: Array, least: float) -> StandardLinea
 
     def solved(log_tau: float) -> tuple[Array, Array]:
         """A and B (2, C), and the squares (C,) that they leave."""
-        gone = np.column_stack([np.ones(n), np.exp(-t / np.exp(log_tau))])
-        found: Array = np.linalg.lstsq(gone, y)[0].astype(float)
-        return found, ((y - gone @ found) ** 2).sum(axis=0)
+        basis = np.column_stack([np.ones(n), np.exp(-t / np.exp(log_tau))])
+        found: Array = np.linalg.lstsq(basis, y)[0].astype(float)
+        return found, ((y - basis @ found) ** 2).sum(axis=0)
 
     bounds = float(np.log(length / 100)), float(np.log(length))
     best = minimize_scalar(lambda v: solved(v)[1].sum(), bounds=bounds, method="bounded")

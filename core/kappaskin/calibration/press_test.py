@@ -1,4 +1,4 @@
-"""Press test: elements are pressed one by one to verify the channel map."""
+"""Press test of the channel map, element by element."""
 
 import math
 import time
@@ -25,7 +25,7 @@ from kappaskin.frames import Array, Frame, Mask
 from kappaskin.mechanics import PointLoad
 from kappaskin.scenes import Scene, load_scene
 from kappaskin.sensing import Sensor, SensorLayout
-from kappaskin.sources import SIMULATION, SimulatedSource, open_source
+from kappaskin.sources import SimulatedSource, open_source
 
 _OFTEN = 0.005  # s between two readings that are kept
 _STILL = 0.4  # s without motion are a rest
@@ -66,21 +66,21 @@ class PressDetector:
         self.phase = PressPhase.REST
         self.peak: Array | None = None
         self._held = np.full(channels, np.nan)
-        self._kept: deque[tuple[float, Array]] = deque()
+        self._recent: deque[tuple[float, Array]] = deque()
         self._rest, self._noise, self._least = np.zeros(channels), math.nan, resolution
         self._hardest, self._most, self._pressed = np.zeros(channels), 0.0, 0.0
 
     def __call__(self, time: float, readings: Array) -> None:
         """Take the `readings` (C,) in 1/m at `time` in s, NaN where one is missing."""
-        if self._kept and time < self._kept[-1][0]:  # a device that restarted
-            self._kept.clear()
+        if self._recent and time < self._recent[-1][0]:  # a device that restarted
+            self._recent.clear()
         # A reading that is missing now, as on a rail, is taken for the last one there was.
         self._held = np.where(np.isnan(readings), self._held, readings)
-        if self._kept and time - self._kept[-1][0] < _OFTEN:
+        if self._recent and time - self._recent[-1][0] < _OFTEN:
             return
-        self._kept.append((time, self._held))
-        while time - self._kept[0][0] > _STILL:
-            self._kept.popleft()
+        self._recent.append((time, self._held))
+        while time - self._recent[0][0] > _STILL:
+            self._recent.popleft()
         if self.phase is PressPhase.REST:
             self._settle()
         elif self.peak is None:
@@ -88,32 +88,32 @@ class PressDetector:
 
     def _last(self, count: int | None = None) -> Array:
         """The readings (n, C) kept last, at most `count` of them."""
-        kept = list(self._kept) if count is None else list(self._kept)[-count:]
-        return np.array([reading for _, reading in kept])
+        recent = list(self._recent) if count is None else list(self._recent)[-count:]
+        return np.array([reading for _, reading in recent])
 
     def _whole(self) -> bool:
         """Whether what is kept is long enough to be a rest."""
-        return self._kept[-1][0] - self._kept[0][0] >= _WHOLE * _STILL
+        return self._recent[-1][0] - self._recent[0][0] >= _WHOLE * _STILL
 
-    def _still(self, kept: Array) -> bool:
-        """Whether nothing moved from the first half of `kept` (n, C) to the second."""
-        half = len(kept) // 2
-        moved = np.nan_to_num(np.abs(kept[half:].mean(axis=0) - kept[:half].mean(axis=0)))
-        return bool(moved.max() <= _MOVING * self._noise * 2 / math.sqrt(len(kept)))
+    def _still(self, recent: Array) -> bool:
+        """Whether nothing moved from the first half of `recent` (n, C) to the second."""
+        half = len(recent) // 2
+        moved = np.nan_to_num(np.abs(recent[half:].mean(axis=0) - recent[:half].mean(axis=0)))
+        return bool(moved.max() <= _MOVING * self._noise * 2 / math.sqrt(len(recent)))
 
     def _settle(self) -> None:
         """Call it a rest once nothing has moved for a while."""
-        if len(self._kept) < _FEWEST_AT_REST or not self._whole():
+        if len(self._recent) < _FEWEST_AT_REST or not self._whole():
             return
-        kept = self._last()
-        noise = np.sqrt(np.mean(np.diff(kept, axis=0) ** 2, axis=0) / 2)
+        recent = self._last()
+        noise = np.sqrt(np.mean(np.diff(recent, axis=0) ** 2, axis=0) / 2)
         self._noise = max(float(np.median(noise[~np.isnan(noise)])), self._least)
-        if self._still(kept):
-            self._rest, self.phase = kept.mean(axis=0), PressPhase.PRESS
+        if self._still(recent):
+            self._rest, self.phase = recent.mean(axis=0), PressPhase.PRESS
 
     def _follow(self) -> None:
-        now = self._kept[-1][0]
-        count = sum(when >= now - _LATELY for when, _ in self._kept)
+        now = self._recent[-1][0]
+        count = sum(when >= now - _LATELY for when, _ in self._recent)
         lately = self._last(max(count, _FEWEST))
         change = lately.mean(axis=0) - self._rest
         change[np.isnan(change)] = 0.0
@@ -122,7 +122,7 @@ class PressDetector:
         if clear and change.max() > _LET_GO * -change.min():
             # It bulges: it was pressed already when it was called at rest.
             self.phase, self._hardest, self._most = PressPhase.REST, 0 * change, 0.0
-            self._kept.clear()
+            self._recent.clear()
             return
         if most > self._most:
             self._hardest, self._most = change, most
@@ -138,31 +138,10 @@ class PressDetector:
         return now - self._pressed > _STILL and self._whole() and self._still(self._last())
 
 
-def elements_to_press(layout: SensorLayout, quick: bool) -> tuple[int, ...]:
-    """The elements to press, all that are live, or of a grid a few in each row and column.
-
-    Those few have two elements in each column and in each row. They reveal any exchange of rows, of
-    columns and of components, but not of two elements that are both left out.
-    """
-    live = cast("Mask", layout.live[:2].any(axis=0))
-    chosen = np.flatnonzero(live)
-    if quick and layout.shape and min(layout.shape) > 2:
-        m, n = layout.shape
-        k = np.arange(max(m, n))
-        some = np.unique([k % m + m * (k % n), k % m + m * ((k + 1) % n)])
-        chosen = some[live[some]]
-    if not 0 < len(chosen) <= _MOST_ELEMENTS:
-        raise Refusal(
-            f"expected 1 to {_MOST_ELEMENTS} elements to press, got {len(chosen)}; of a grid "
-            "a few will do"
-        )
-    return tuple(chosen.tolist())
-
-
 class PressTest:
     """Asks for one of the `elements` after the other, and takes the readings of each press.
 
-    `asked` is the element to press now, `phase` whether a rest, the press or its end is waited
+    `target` is the element to press now, `phase` whether a rest, the press or its end is waited
     for, `done` holds the results of those before. A test is over when none is asked for; then its
     `verdict` is complete.
     """
@@ -175,12 +154,33 @@ class PressTest:
         self.done: list[PressResult] = []
         self._listen()
 
+    @staticmethod
+    def choose_elements(layout: SensorLayout, quick: bool) -> tuple[int, ...]:
+        """The elements to press, all that are live, or of a grid a few in each row and column.
+
+        Those few have two elements in each column and in each row. They reveal any exchange of
+        rows, of columns and of components, but not of two elements that are both left out.
+        """
+        live = cast("Mask", layout.live[:2].any(axis=0))
+        chosen = np.flatnonzero(live)
+        if quick and layout.shape and min(layout.shape) > 2:
+            m, n = layout.shape
+            k = np.arange(max(m, n))
+            some = np.unique([k % m + m * (k % n), k % m + m * ((k + 1) % n)])
+            chosen = some[live[some]]
+        if not 0 < len(chosen) <= _MOST_ELEMENTS:
+            raise Refusal(
+                f"expected 1 to {_MOST_ELEMENTS} elements to press, got {len(chosen)}; of a grid "
+                "a few will do"
+            )
+        return tuple(chosen.tolist())
+
     def _listen(self) -> None:
         resolution = self.sensor.transduction.resolution
         self._listener = PressDetector(self.sensor.channels, resolution)
 
     @property
-    def asked(self) -> int | None:
+    def target(self) -> int | None:
         """The element to press, None when all are done."""
         return None if self.over else self.elements[len(self.done)]
 
@@ -199,14 +199,14 @@ class PressTest:
         """
         if readings.shape != (self.sensor.channels,):
             raise Refusal(f"expected readings ({self.sensor.channels},), got {readings.shape}")
-        asked = self.asked
-        if asked is None:
+        target = self.target
+        if target is None:
             return None
         self._listener(time, readings)
         if self._listener.peak is None:
             return None
         answer = self._listener.peak.reshape(3, -1)
-        return self._note(judge_press(self.sensor.layout, asked, answer))
+        return self._note(judge_press(self.sensor.layout, target, answer))
 
     def _note(self, pressed: PressResult) -> PressResult:
         self.done.append(pressed)
@@ -222,10 +222,10 @@ class PressTest:
         return self._go_on(SKIPPED)
 
     def _go_on(self, verdict: str) -> PressResult | None:
-        if self.asked is None:
+        if self.target is None:
             return None
         nothing = np.zeros((3, len(self.sensor.layout)))
-        return self._note(PressResult(self.asked, verdict, None, nothing))
+        return self._note(PressResult(self.target, verdict, None, nothing))
 
     def back(self) -> None:
         """Press the last one again."""
@@ -238,24 +238,24 @@ class PressTest:
         return map_verdict(self.sensor, tuple(self.done))
 
 
-def _ask(test: PressTest, report: Report) -> None:
-    layout, asked = test.sensor.layout, test.asked
-    if asked is not None:
-        x, y = layout.positions[asked] * 1e3
+def _announce(test: PressTest, report: Report) -> None:
+    layout, target = test.sensor.layout, test.target
+    if target is not None:
+        x, y = layout.positions[target] * 1e3
         number = f"{len(test.done) + 1}/{len(test.elements)}"
-        report(f"{number}  press element {asked}, at ({x:.1f}, {y:.1f}) mm, and let go")
+        report(f"{number}  press element {target}, at ({x:.1f}, {y:.1f}) mm, and let go")
 
 
 def _take_frames(test: PressTest, sensor: Sensor, frames: list[Frame], report: Report) -> None:
     for frame in frames:
         if pressed := test.take(frame.device_time, sensor.nominal(frame)):
             report(f"    {pressed}")
-            _ask(test, report)
+            _announce(test, report)
 
 
 def _follow(listener: DeviceReadings, test: PressTest, patience: float, report: Report) -> None:
     """Wait for whoever presses; after `patience` s without a response it is the next element."""
-    _ask(test, report)
+    _announce(test, report)
     done, waited = 0, time.monotonic()
     while not test.over:
         _take_frames(test, listener.sensor, listener.frames(), report)
@@ -263,7 +263,7 @@ def _follow(listener: DeviceReadings, test: PressTest, patience: float, report: 
             done, waited = len(test.done), time.monotonic()
         elif time.monotonic() - waited > patience and (pressed := test.nothing_came()):
             report(f"    {pressed}")
-            _ask(test, report)
+            _announce(test, report)
 
 
 def _finger(scene: Scene) -> Callable[[int], Scene]:
@@ -288,10 +288,10 @@ def _simulated(name: str, quick: bool, report: Report) -> PressTest:
     clock, pressed = VirtualClock(), _finger(load_scene(name))
     bare = replace(pressed(0), stimuli=())
     source = SimulatedSource(bare, clock, clock.sleep)
-    test = PressTest(source.sensor, elements_to_press(bare.layout, quick))
-    _ask(test, report)
-    while (asked := test.asked) is not None:
-        for scene, until in ((bare, PressPhase.PRESS), (pressed(asked), PressPhase.RELEASE)):
+    test = PressTest(source.sensor, PressTest.choose_elements(bare.layout, quick))
+    _announce(test, report)
+    while (target := test.target) is not None:
+        for scene, until in ((bare, PressPhase.PRESS), (pressed(target), PressPhase.RELEASE)):
             source.play(scene)
             _wait(source, test, report, lambda until=until: test.phase is until)
         end = clock() + _HELD
@@ -307,14 +307,14 @@ def _wait(
 ) -> None:
     """Read until `ended()`, or for so long that nothing will respond."""
     frames = 0
-    while not ended() and test.asked is not None:
+    while not ended() and test.target is not None:
         came = source.read(_READ)
         frames += len(came)
         _take_frames(test, source.sensor, came, report)
         if frames > _GIVEN_UP * source.sensor.rate:
             if pressed := test.nothing_came():
                 report(f"    {pressed}")
-                _ask(test, report)
+                _announce(test, report)
             return
 
 
@@ -330,11 +330,11 @@ def press_elements(
         raise Refusal(
             f"expected a patience above zero and at most {_LONGEST:g} s, got {patience:g}"
         )
-    if name.startswith(SIMULATION):
-        test = _simulated(name.removeprefix(SIMULATION), quick, report)
+    if name.startswith(SimulatedSource.SCHEME):
+        test = _simulated(name.removeprefix(SimulatedSource.SCHEME), quick, report)
         return test, test.verdict()
     with closing(open_source(name)) as source:
         listener = DeviceReadings(source)
-        test = PressTest(listener.sensor, elements_to_press(listener.sensor.layout, quick))
+        test = PressTest(listener.sensor, PressTest.choose_elements(listener.sensor.layout, quick))
         _follow(listener, test, patience, report)
         return test, test.verdict()

@@ -1,4 +1,4 @@
-"""Calibration report: a sweep to a calibration, how good it is, and which channels failed."""
+"""Calibration from a sweep: residual errors, and the channels that failed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -318,11 +318,11 @@ def _gaps(sweep: Sweep, values: Array) -> Array:
 def _needed(loops: PrandtlIshlinskii, passed: Mask) -> PrandtlIshlinskii | None:
     """The loops without those of failed channels and without plays that no channel needs."""
     p = np.where(passed, loops.weights, 0.0)
-    kept = p.any(axis=1)
-    if not kept.any():
+    needed = p.any(axis=1)
+    if not needed.any():
         return None
     q, a = (np.where(passed, part, 1.0) for part in (loops.linear, loops.stretch))
-    return PrandtlIshlinskii(loops.thresholds[kept], p[kept], q, a)
+    return PrandtlIshlinskii(loops.thresholds[needed], p[needed], q, a)
 
 
 def calibrate(

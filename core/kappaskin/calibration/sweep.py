@@ -1,4 +1,4 @@
-"""Calibration sweep: what every channel reads on every cylinder, step by step."""
+"""Calibration sweep: the readings of every channel on every cylinder."""
 
 import math
 import time
@@ -23,7 +23,7 @@ from kappaskin.scenes.cylinders import (
     schedule,
 )
 from kappaskin.sensing import Sensor
-from kappaskin.sources import SIMULATION, SimulatedSource, Source, open_source
+from kappaskin.sources import SimulatedSource, Source, open_source
 
 _FEWEST_FRAMES = 2  # whose spread gives the noise
 _SETTLED = 1.0  # s at the end of a hold that count as its reading
@@ -260,26 +260,26 @@ class DeviceReadings:
         return times, np.array(readings).reshape(len(frames), self.sensor.channels)
 
 
-def _keep_frame(kept: list[Frame], frame: Frame, seconds: float) -> None:
-    """Add `frame` to those `kept` of a step of so many `seconds`, unless it is too early."""
-    after = frame.device_time - kept[-1].device_time if kept else math.inf
+def _add_frame(collected: list[Frame], frame: Frame, seconds: float) -> None:
+    """Add `frame` to those `collected` of a step of so many `seconds`, unless it is too early."""
+    after = frame.device_time - collected[-1].device_time if collected else math.inf
     # One that others overtook is left out; a clock that went back is refused by the procedure.
     if after >= seconds / _MOST_FRAMES or after < -OVERTAKEN:
-        kept.append(frame)
+        collected.append(frame)
 
 
 def _follow(
     listener: DeviceReadings, procedure: Procedure, laid: Presentation, report: Report
 ) -> None:
     """Take the steps as they are presented, by the device's own clock."""
-    kept: list[Frame] = []
+    collected: list[Frame] = []
     while not procedure.done:
         for frame in listener.frames():
             index, step = laid.index(frame.device_time), procedure.step
-            if step and index == step.number and kept:
-                taken = procedure.take(*listener.read(kept))
+            if step and index == step.number and collected:
+                taken = procedure.take(*listener.read(collected))
                 report(f"{step.number}/{len(laid.steps)}  {step}\n    {taken}")
-                kept, step = [], procedure.step
+                collected, step = [], procedure.step
             if step is None:
                 return
             if index != step.number - 1:
@@ -288,19 +288,19 @@ def _follow(
                     "restart it, then run this command at once"
                 )
             if laid.settled(frame.device_time):
-                _keep_frame(kept, frame, max(laid.dwell, step.hold))
+                _add_frame(collected, frame, max(laid.dwell, step.hold))
 
 
 def _recorded(listener: DeviceReadings, seconds: float) -> list[Frame]:
     """The frames of the next `seconds`: what came before was read while the skin was moved."""
     begun = now = time.monotonic()
-    kept: list[Frame] = []
+    collected: list[Frame] = []
     while now < begun + seconds:
         for frame in listener.frames():
             now = frame.host_time
             if now >= begun:
-                _keep_frame(kept, frame, seconds)
-    return kept
+                _add_frame(collected, frame, seconds)
+    return collected
 
 
 def _prompt(step: CylinderStep, total: int, again: bool) -> str:
@@ -309,7 +309,7 @@ def _prompt(step: CylinderStep, total: int, again: bool) -> str:
     return f"{step.number}/{total}  {step}: {then}{redo}: "
 
 
-def _ask_for_steps(
+def _prompt_steps(
     listener: DeviceReadings, procedure: Procedure, seconds: float, prompt: Prompt, report: Report
 ) -> None:
     """Ask for each step and take it, until all are done."""
@@ -345,10 +345,10 @@ def take_sweep(
     for what, value in (("seconds", seconds), ("dwell", dwell or seconds), ("hold", hold or 1.0)):
         if not 0 < value <= _LONGEST:
             raise Refusal(f"expected {what} above zero and at most {_LONGEST:g} s, got {value}")
-    simulated = name.startswith(SIMULATION)
+    simulated = name.startswith(SimulatedSource.SCHEME)
     if simulated:
         dwell = dwell or seconds
-        source = _simulated(name.removeprefix(SIMULATION), radii, hold, dwell)
+        source = _simulated(name.removeprefix(SimulatedSource.SCHEME), radii, hold, dwell)
     else:
         source = open_source(name)
     with closing(source):
@@ -356,7 +356,7 @@ def take_sweep(
         steps = _steps(listener.sensor, radii, hold)
         procedure = Procedure(listener.sensor, steps)
         if dwell is None:
-            _ask_for_steps(listener, procedure, seconds, prompt, report)
+            _prompt_steps(listener, procedure, seconds, prompt, report)
         else:
             _follow(listener, procedure, Presentation(steps, dwell), report)
         return listener.sensor, procedure.sweep()

@@ -1,4 +1,4 @@
-"""Tare store: the last tares of every sensor, and the one in use, in a file for each sensor."""
+"""Storage of the tares of every sensor."""
 
 import hashlib
 import os
@@ -43,16 +43,16 @@ class SavedTares:
         return None
 
 
-def tare_folder() -> Path:
-    """The folder of this user's tares."""
-    return platformdirs.user_data_path("kappaskin", appauthor=False) / "tares"
-
-
 class TareStore:
     """The tares saved in a `folder`."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+
+    @staticmethod
+    def user_folder() -> Path:
+        """The folder of this user's tares."""
+        return platformdirs.user_data_path("kappaskin", appauthor=False) / "tares"
 
     def path(self, serial_number: str) -> Path:
         """The file of a sensor of any serial number.
@@ -116,21 +116,23 @@ class TareStore:
                 f"{path}: cannot be written ({error}); make room, or check its permissions"
             ) from error
 
+    @staticmethod
+    def to_toml(tare: Tare) -> str:
+        """The text of a file with one tare."""
+        return _text(SavedTares((tare,), tare))
 
-def tare_to_toml(tare: Tare) -> str:
-    """The text of a file with one tare."""
-    return _text(SavedTares((tare,), tare))
-
-
-def tare_from_toml(data: bytes, name: str) -> Tare:
-    """The tare in the `data` that `tare_to_toml` made, of a file that refusals call `name`."""
-    try:
-        saved = _parsed(data, None)
-    except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
-        raise Refusal(f"{name}: is no tare ({error!s:.120}); expected it as it was made") from error
-    if saved.used is None:
-        raise Refusal(f"{name}: expected one tare that is in use, got {len(saved.tares)}")
-    return saved.used
+    @staticmethod
+    def from_toml(data: bytes, name: str) -> Tare:
+        """The tare in the `data` that `to_toml` made, of a file that refusals call `name`."""
+        try:
+            saved = _parsed(data, None)
+        except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
+            raise Refusal(
+                f"{name}: is no tare ({error!s:.120}); expected it as it was made"
+            ) from error
+        if saved.used is None:
+            raise Refusal(f"{name}: expected one tare that is in use, got {len(saved.tares)}")
+        return saved.used
 
 
 def _content(saved: SavedTares) -> dict[str, Any]:

@@ -47,7 +47,7 @@ def publish(
     from kappaskin.live import Engine
     from kappaskin.publish import targets_of
     from kappaskin.scenes import load_scene
-    from kappaskin.sources import SIMULATION
+    from kappaskin.sources import SimulatedSource
 
     check_time(seconds, "publish")
     places = foxglove if foxglove != [] else [""]
@@ -56,8 +56,8 @@ def publish(
     if not targets:
         raise Refusal("expected somebody to send to: give --udp HOST:PORT, or --foxglove")
     targets_of(targets)  # or refused here
-    if source.startswith(SIMULATION):
-        load_scene(source.removeprefix(SIMULATION))  # or refused here
+    if source.startswith(SimulatedSource.SCHEME):
+        load_scene(source.removeprefix(SimulatedSource.SCHEME))  # or refused here
     stopped = stops()
     with Engine() as engine:
         engine.publish(targets)

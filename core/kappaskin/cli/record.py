@@ -53,10 +53,10 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
         How long to record.
     """
     from kappaskin.live import Engine
-    from kappaskin.recording import REPLAY
+    from kappaskin.recording import ReplayedSource
 
     check_time(seconds, "record")
-    if source.startswith(REPLAY):
+    if source.startswith(ReplayedSource.SCHEME):
         raise Refusal(f"expected a live source to record, got {source}; copy its file")
     stopped = stops()
     with Engine() as engine:
@@ -111,11 +111,11 @@ def _recorded(
 
 
 def _use_tare(engine: "Engine", sensor: "Sensor") -> None:
-    from kappaskin.calibration import TareStore, tare_folder
+    from kappaskin.calibration import TareStore
     from kappaskin.pipeline import Setup
 
     if not sensor.simulated:
-        tare = TareStore(tare_folder()).load(sensor.serial_number).fit_for(sensor)
+        tare = TareStore(TareStore.user_folder()).load(sensor.serial_number).fit_for(sensor)
         engine.set_up(replace(Setup(), tare=tare))
 
 
@@ -174,25 +174,16 @@ def _contents_text(file: Path, contents: dict[str, Any]) -> str:
 
 
 def _contents(recording: "Recording") -> dict[str, Any]:
-    from kappaskin.recording import decode
-    from kappaskin.recording import messages as m
-
-    def texts(topic: m.Topic) -> list[str]:
-        return [decode(m.STRING, got.data)["data"] for got in recording.messages_on(topic)]
-
-    def when(stamp: int) -> float:
-        return (stamp - recording.first) * 1e-9
-
-    events = [(when(got.stamp), decode(m.LOG, got.data)) for got in recording.messages_on(m.EVENTS)]
+    devices = dict.fromkeys(text for _, text in recording.devices())
     return {
         "began": datetime.fromtimestamp(recording.first * 1e-9, UTC).isoformat(),
-        "seconds": when(recording.last),
+        "seconds": recording.seconds(recording.last),
         "library": recording.library,
         "whole": recording.whole,
-        "devices": [_device(text) for text in dict.fromkeys(texts(m.DEVICE))],
-        "setups": texts(m.SETUP),
+        "devices": [_device(text) for text in devices],
+        "setups": [text for _, text in recording.setups()],
         "attachments": list(recording.attachments),
-        "events": [f"{time:.3f} s {event['name']}: {event['msg']}" for time, event in events],
+        "events": [f"{e.time:.3f} s {e.kind}: {e.text}" for e in recording.events()],
         "messages": recording.counts,
     }
 
@@ -219,9 +210,9 @@ def verify(file: Path) -> int:
     """
     # As the engine does: products are summed in another order by more than one thread.
     from kappaskin._processes import BackgroundProcess
-    from kappaskin.recording import Verification, verify_steps
+    from kappaskin.recording import Verification
 
-    with BackgroundProcess[float | Verification]("verify", verify_steps, file) as work:
+    with BackgroundProcess[float | Verification]("verify", Verification.steps, file) as work:
         verdict = result_of(work.wait(), Verification)
     print(f"{file}: {verdict.words}")
     return 0 if verdict.same else FAILED
@@ -245,9 +236,9 @@ def repair(file: Path, *, out: Path) -> int:
     out
         The new recording; it must not exist yet.
     """
-    from kappaskin.recording import Repaired, repair_steps
+    from kappaskin.recording import Repaired
 
-    done = result_of(repair_steps(file, out), Repaired)
+    done = result_of(Repaired.steps(file, out), Repaired)
     if not (done.total or done.attachments):
         print(f"{file}: {done.words}")
         return _NOTHING

@@ -72,11 +72,11 @@ def calibrate(
     json
         Print one JSON object with every channel instead of a summary.
     """
+    from kappaskin.calibration import Calibration, take_sweep
     from kappaskin.calibration import calibrate as calibrated
-    from kappaskin.calibration import check_writable, save_calibration, take_sweep
     from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
 
-    check_writable(out)
+    Calibration.check_writable(out)
     try:
         sensor, sweep = take_sweep(
             source,
@@ -88,7 +88,7 @@ def calibrate(
             dwell=dwell,
         )
         report = calibrated(sweep, sensor, datetime.now(UTC))
-        save_calibration(report.calibration, out)
+        report.calibration.save(out)
     except KeyboardInterrupt:
         print(file=sys.stderr)
         raise Refusal("stopped before the last step; nothing was written") from None
@@ -115,12 +115,12 @@ def tare(source: str, *, undo: Switch = False) -> None:
         Stop using this sensor's tare instead of taking one.
     """
     # All of it before the source is opened: while modules load, readings wait.
-    from kappaskin.calibration import TareMeasurement, TareStore, tare_folder
+    from kappaskin.calibration import TareMeasurement, TareStore
     from kappaskin.contact import LoadDetector
     from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
     from kappaskin.sources import open_source
 
-    tares = TareStore(tare_folder())
+    tares = TareStore(TareStore.user_folder())
     with closing(open_source(source)) as opened:
         sensor = _answering(opened)
         if undo:
@@ -221,7 +221,7 @@ def press(
         "words": list(verdict.words),
         "order": None if verdict.order is None else verdict.order.tolist(),
         "pressed": [
-            {"asked": p.asked, "verdict": p.verdict, "answered": p.element} for p in test.done
+            {"asked": p.target, "verdict": p.verdict, "answered": p.element} for p in test.done
         ],
     }
     print_result(value, json, lambda: "\n".join(verdict.words))

@@ -82,7 +82,7 @@ def _display() -> str:
 
 def examine() -> dict[str, Any]:
     """Everything that `kappaskin doctor` shows, as JSON values."""
-    from kappaskin.sources import serial_ports
+    from kappaskin.sources import Port
 
     missing = _missing()
     line = f"apt-get install -y --no-install-recommends {' '.join(missing)}" if missing else ""
@@ -92,7 +92,7 @@ def examine() -> dict[str, Any]:
         "system": platform.platform(),
         "packages": {package: _version(package) for package in PACKAGES},
         "display": _display(),
-        "serial_ports": [asdict(port) for port in serial_ports()],
+        "serial_ports": [asdict(port) for port in Port.found()],
         "missing": missing,
         "install": line,
     }
@@ -114,13 +114,13 @@ def doctor(port: str = "", *, json: Switch = False) -> int:
     json
         Print one JSON object instead of text.
     """
-    from kappaskin.sources import diagnose
+    from kappaskin.sources import Diagnosis
 
     if not port:
         machine = examine()
         print_result(machine, json, lambda: _machine_text(machine))
         return 0
-    found = diagnose(port)
+    found = Diagnosis.of(port)
     print_result(found.to_json(), json, lambda: _port_text(found))
     return FAILED if found.why else 0
 
@@ -150,14 +150,14 @@ def _line(name: str, text: str) -> str:
 
 def _machine_text(found: dict[str, Any]) -> str:
     """What `examine` found, for people."""
-    from kappaskin.sources import Port, permission_line
+    from kappaskin.sources import Port
 
     lines = [_line(name, found[name]) for name in ("kappaskin", "python", "system")]
     for package, version in found["packages"].items():
         lines.append(_line(package, version or "not installed"))
     lines.append(_line("display", found["display"] or "none (`xvfb-run` gives a virtual one)"))
     for port in (Port(**port) for port in found["serial_ports"]):
-        may = "" if port.opened else f"  no permission. {permission_line(port.port)}"
+        may = "" if port.opened else f"  no permission. {port.permission_help}"
         lines.append(_line("serial port", f"{port.words}{may}"))
     if not found["serial_ports"]:
         lines.append(_line("serial ports", "none found"))

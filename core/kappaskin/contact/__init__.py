@@ -1,4 +1,4 @@
-"""Contact: where it is, how hard, what object it is, and the geometry of the skin there."""
+"""Contact: position, force, object, and local geometry of the skin."""
 
 from kappaskin.contact.geometry import CurvatureFormMap as CurvatureFormMap
 from kappaskin.contact.geometry import contact_geometry as contact_geometry
@@ -6,7 +6,6 @@ from kappaskin.contact.geometry import local_geometry as local_geometry
 from kappaskin.contact.geometry import surface_geometry as surface_geometry
 from kappaskin.contact.intrinsic import ForceTorqueSensor as ForceTorqueSensor
 from kappaskin.contact.intrinsic import IntrinsicContact as IntrinsicContact
-from kappaskin.contact.intrinsic import IntrinsicEstimate as IntrinsicEstimate
 from kappaskin.contact.intrinsic import Wrench as Wrench
 from kappaskin.contact.load_detection import LoadDetector as LoadDetector
 from kappaskin.contact.objects import KINDS as KINDS

@@ -1,4 +1,4 @@
-"""Rigid objects on an elastic skin as point forces: models, readings, and their best fit."""
+"""Point-force models of rigid objects on an elastic skin, and their best fit."""
 
 import math
 from collections.abc import Callable
@@ -84,7 +84,7 @@ def _at_ends(parameters: Array, across: Array, middle: float) -> PointForces:
     """Forces beside the axis by `across` (2, k) times the root of the last parameter."""
     force, angle, length, share = *parameters[2:4], math.sqrt(parameters[4]), parameters[5]
     axis = np.array([math.cos(angle), math.sin(angle)])
-    beside = np.array([-axis[1], axis[0]])
+    normal = np.array([-axis[1], axis[0]])
     k, n, rest, sign = across.shape[1], len(parameters), 1 - middle, np.array([1.0, -1.0])
     of_end = rest * (0.5 + sign * share)
     if middle:
@@ -95,13 +95,13 @@ def _at_ends(parameters: Array, across: Array, middle: float) -> PointForces:
     u, v = place * length, off * a
     moves = np.zeros((n, across.size, 2))
     moves[0, :, 0] = moves[1, :, 1] = 1
-    moves[3] = np.multiply.outer(u, beside) - np.multiply.outer(v, axis)
+    moves[3] = np.multiply.outer(u, normal) - np.multiply.outer(v, axis)
     moves[4] = np.multiply.outer(place / (2 * length), axis)
     moves[5] = -rest * length * axis
     if n > 6:
-        moves[6] = np.multiply.outer(off / (2 * a), beside)
+        moves[6] = np.multiply.outer(off / (2 * a), normal)
     growth[2], growth[5] = np.repeat(of_end, k) / k, rest * sign * force / k
-    points = parameters[:2] + np.multiply.outer(u, axis) + np.multiply.outer(v, beside)
+    points = parameters[:2] + np.multiply.outer(u, axis) + np.multiply.outer(v, normal)
     return PointForces(points, force * growth[2], moves, growth)
 
 
@@ -179,8 +179,8 @@ class ElasticSkin:
 
         It matters only for elements within a half wave or two of a force.
         """
-        apart = self._layout.positions[:, None] - forces.points
-        waves = np.hypot(apart[..., 0], apart[..., 1]) / self.half_wave
+        away = self._layout.positions[:, None] - forces.points
+        waves = np.hypot(away[..., 0], away[..., 1]) / self.half_wave
         blur = (_BLUR * self.bend * forces.weights) ** 2 * np.maximum(waves, 0.2) ** (-2 * _FALL)
         return np.tile(blur.sum(axis=1), 3)
 
@@ -226,8 +226,8 @@ class Prior:
 class Optimum:
     """The best parameters (n,) of a contact, and their covariance (n, n).
 
-    `cost` is chi-squared with the prior, `squares` that of the readings alone; `ahead` (n,) is the
-    step that a bound prevented.
+    `cost` is chi-squared with the prior, `squares` that of the readings alone; `prevented` (n,) is
+    the step that a bound prevented.
     """
 
     contact: ForceModel
@@ -235,7 +235,7 @@ class Optimum:
     covariance: Array
     cost: float
     squares: float
-    ahead: Array
+    prevented: Array
 
 
 def optimise(

@@ -1,4 +1,4 @@
-"""Load detection: a load in readings whose zero is unknown, as opposed to offsets."""
+"""Load detection in readings whose zero is unknown."""
 
 import math
 from dataclasses import dataclass
@@ -73,9 +73,9 @@ class LoadDetector:
         Q: Array = U[:, s > _FAINT * s.max(initial=0.0)]
         T = self._T[used] - Q @ (Q.T @ self._T[used])
         squares = np.einsum("rg,rg->g", T, T)
-        seen = squares > _FAINT * squares.max(initial=0.0)
+        observed = squares > _FAINT * squares.max(initial=0.0)
         spare = len(Q) - Q.shape[1]
-        return _LoadTables(Q, T, np.where(seen, squares, math.inf), _by_chance(spare))
+        return _LoadTables(Q, T, np.where(observed, squares, math.inf), _by_chance(spare))
 
     def __call__(
         self, readings: Array, variance: float, share: float = _SHARE

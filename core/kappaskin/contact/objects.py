@@ -1,4 +1,4 @@
-"""Object recognition: which kind of object presses on the skin, and how curved it is."""
+"""Object recognition: the kind and curvature of the object that presses on the skin."""
 
 import math
 from dataclasses import dataclass
@@ -8,8 +8,13 @@ import numpy as np
 import scipy
 
 from kappaskin.contact.elastic_skin import ElasticSkin
-from kappaskin.contact.hypotheses import Hypotheses, fit_hypotheses, log_likelihoods
-from kappaskin.contact.interior import Hypothesis, Width
+from kappaskin.contact.hypotheses import (
+    Hypotheses,
+    Hypothesis,
+    Width,
+    fit_hypotheses,
+    log_likelihoods,
+)
 from kappaskin.frames import Array, Contact
 from kappaskin.mechanics import Block, Cylinder, PlacedObject, Plate, RigidObject, Sphere, Wedge
 from kappaskin.sensing import SensorLayout

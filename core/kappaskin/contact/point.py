@@ -1,4 +1,4 @@
-"""Point contact: the position and force of the point load that explains the readings best."""
+"""Point contact: position and force of the point load that fits the readings best."""
 
 import math
 from collections.abc import Callable
@@ -154,11 +154,11 @@ def _waves(count: int, k: float) -> tuple[Array, Array, Array]:
     """
     i, j = np.indices((count, count)) + 1
     n = np.arange(2 * count + 1)[:, None, None]
-    apart, both = np.abs(i - j), i + j
-    sines = (n > apart) & (n < both) & ((n - apart) % 2 == 1)
-    at_apart, at_both = n == apart, n == both
-    slopes = k**2 * i * j / 2 * (1.0 * at_apart + at_both)
-    mixed = k * i / 2 * (at_both - np.sign(i - j) * at_apart)
+    difference, both = np.abs(i - j), i + j
+    sines = (n > difference) & (n < both) & ((n - difference) % 2 == 1)
+    at_difference, at_both = n == difference, n == both
+    slopes = k**2 * i * j / 2 * (1.0 * at_difference + at_both)
+    mixed = k * i / 2 * (at_both - np.sign(i - j) * at_difference)
     return sines.astype(float), slopes, mixed
 
 
@@ -375,9 +375,9 @@ class PointContact:
         which is finer than the fit's functions.
         """
         shape, covariance = fit.jet(x, y)
-        fitted, seen = float(shape[0]), float(covariance[0, 0])
-        seen = math.sqrt(seen) if seen >= 0 else math.nan
-        return fitted, math.hypot(seen, fitted - place.force * place.gives)
+        fitted, observed = float(shape[0]), float(covariance[0, 0])
+        observed = math.sqrt(observed) if observed >= 0 else math.nan
+        return fitted, math.hypot(observed, fitted - place.force * place.gives)
 
 
 class _NewtonStep:

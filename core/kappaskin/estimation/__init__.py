@@ -1,23 +1,21 @@
 """Estimation: readings to coefficients with error bars; element placement; scanned regions."""
 
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike
+
+from kappaskin.bases import Basis
+from kappaskin.errors import Refusal
 from kappaskin.estimation.bayes import Bayes as Bayes
-from kappaskin.estimation.estimator import RIM_SD as RIM_SD
 from kappaskin.estimation.estimator import Estimator as Estimator
 from kappaskin.estimation.estimator import PatternCache as PatternCache
 from kappaskin.estimation.estimator import column_lengths as column_lengths
 from kappaskin.estimation.fast import Fast as Fast
 from kappaskin.estimation.fit import Fit as Fit
 from kappaskin.estimation.fit import Uncertainty as Uncertainty
-from kappaskin.estimation.fit import merged_fits as merged_fits
 from kappaskin.estimation.fit import propagated_covariance as propagated_covariance
-from kappaskin.estimation.fit import stacked_fits as stacked_fits
-from kappaskin.estimation.least_squares import AsPrinted as AsPrinted
-from kappaskin.estimation.least_squares import Direct as Direct
+from kappaskin.estimation.least_squares import AsPrinted, Direct
 from kappaskin.estimation.least_squares import FiniteSlopeLeastSquares as FiniteSlopeLeastSquares
 from kappaskin.estimation.least_squares import LeastSquares as LeastSquares
-from kappaskin.estimation.methods import METHODS as METHODS
-from kappaskin.estimation.methods import check_method as check_method
-from kappaskin.estimation.methods import estimator_for as estimator_for
 from kappaskin.estimation.placement import PLACEMENTS as PLACEMENTS
 from kappaskin.estimation.placement import check_placement as check_placement
 from kappaskin.estimation.placement import place_elements as place_elements
@@ -26,9 +24,38 @@ from kappaskin.estimation.placement import singular_values as singular_values
 from kappaskin.estimation.region import Region as Region
 from kappaskin.estimation.region import Scanner as Scanner
 from kappaskin.estimation.region import ScanTradeoff as ScanTradeoff
-from kappaskin.estimation.region import contact_bound as contact_bound
-from kappaskin.estimation.region import scan_tradeoff as scan_tradeoff
 from kappaskin.estimation.robust import FAULTS as FAULTS
 from kappaskin.estimation.robust import Robust as Robust
-from kappaskin.estimation.spectrum import amplitude_spectrum as amplitude_spectrum
 from kappaskin.estimation.tracking import Tracking as Tracking
+from kappaskin.sensing import SensorLayout
+
+METHODS: dict[str, type[Estimator]] = {
+    "least-squares": LeastSquares,
+    "as-printed": AsPrinted,
+    "direct": Direct,
+    "fast": Fast,
+    "bayes": Bayes,
+    "finite-slope": FiniteSlopeLeastSquares,
+    "robust": Robust,
+    "tracking": Tracking,
+}
+"""Estimators by name, the default first."""
+
+
+def check_method(method: str) -> None:
+    """Raise a `Refusal` for an unknown `method`."""
+    if method not in METHODS:
+        raise Refusal(f"expected a method among {', '.join(METHODS)}, got {method!r}")
+
+
+def estimator_for(
+    method: str,
+    basis: Basis,
+    layout: SensorLayout,
+    sigma: ArrayLike | None = None,
+    rim_sd: float = Estimator.RIM_SD,
+    dtype: DTypeLike = np.float64,
+) -> Estimator:
+    """The estimator named `method`; raises a `Refusal` for an unknown or impossible one."""
+    check_method(method)
+    return METHODS[method](basis, layout, sigma, rim_sd, dtype)

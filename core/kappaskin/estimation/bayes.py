@@ -80,7 +80,7 @@ class PosteriorUncertainty:
 # sigma^2, and what is orthogonal to U has sigma^2. Of sigma^2 the most likely value for each gamma
 # is sigma^2 = (sum_k y_k^2 / d_k + rest) / R, so that one number is left to search:
 #     -2 ln p(K | gamma) = R ln sigma^2 + sum_k ln d_k,
-# or, where sigma is told and the readings are in units of it, sum_k y_k^2 / d_k + ln d_k. Where
+# or, where sigma is given and the readings are in units of it, sum_k y_k^2 / d_k + ln d_k. Where
 # noise hides the signal this may be least at tau = 0, and where there are more functions than
 # readings at sigma = 0, with error bars of nothing. A density that grows as a power of both keeps
 # it from there (doi:10.1007/s11336-013-9328-2): -2 p ln (tau sigma) = -p ln gamma - 2 p ln sigma^2
@@ -88,13 +88,13 @@ class PosteriorUncertainty:
 class MarginalLikelihood:
     """The scale of the prior and the noise that make readings K = A z most likely, A (R, F)."""
 
-    def __init__(self, A: Array, told: bool, floor: float) -> None:
+    def __init__(self, A: Array, sigma_known: bool, floor: float) -> None:
         U, s, Vt = linalg.svd(A, full_matrices=len(A) < A.shape[1])
         k = len(s)
         self.U, self.V = U[:, :k], Vt.T
         self.s2 = np.zeros(len(Vt))
         self.s2[:k] = s**2
-        self._k, self._told = k, told
+        self._k, self._sigma_known = k, sigma_known
         self._readings = max(len(A) - 2 * _AWAY, 1.0)  # less what the density of sigma takes
         self._top = math.log(self.s2[0]) if s[0] > 0 else 0.0
         self._floor = floor  # of the readings' own power: what their rounding leaves
@@ -106,7 +106,7 @@ class MarginalLikelihood:
         y = K @ self.U
         rest = K - y @ self.U.T
         power = np.vecdot(K, K)
-        # Rounding looks like noise: below it there is none to be told.
+        # Rounding looks like noise: below it there is none to be found.
         left = np.maximum(np.vecdot(rest, rest), self._floor * power)
         y2 = y**2
         fit = y2 @ self._share.T + left[:, None]
@@ -114,13 +114,13 @@ class MarginalLikelihood:
         best = np.argmin(cost, axis=1)
         t = self._refined(_GRID[best], y2, left)
         gamma = np.exp(t - self._top)
-        if self._told:
+        if self._sigma_known:
             return y, gamma, np.ones(len(K))
         fit = np.vecdot(y2, 1 / (1 + gamma[:, None] * self.s2[: self._k])) + left
         return y, gamma, np.sqrt(fit / self._readings)
 
     def _cost(self, fit: Array, volume: Array) -> Array:
-        if self._told:
+        if self._sigma_known:
             return fit + volume
         tiny = np.finfo(float).tiny
         return self._readings * np.log(np.maximum(fit, tiny)) + volume
@@ -138,7 +138,7 @@ class MarginalLikelihood:
             # d fit / dt and d2 fit / dt2; d volume / dt = sum q, d2 = sum q (1 - q).
             f1, f2 = -np.vecdot(e, q), np.vecdot(e, q * (2 * q - 1))
             v1, v2 = q.sum(axis=1), (q * (1 - q)).sum(axis=1)
-            if self._told:
+            if self._sigma_known:
                 slope, bend = f1 + v1 - _AWAY, f2 + v2
             else:
                 fit = np.maximum(fit, np.finfo(float).tiny)
@@ -177,8 +177,8 @@ class Bayes(Estimator):
 
     def _made(self, used: Mask) -> _BayesSolver:
         A = self.weight[used, None] * (self.M[used] @ self._root)
-        told, rounding = self.sigma is not None, float(np.finfo(self.dtype).eps)
-        likelihood = MarginalLikelihood(A, told, rounding**2)
+        sigma_known, rounding = self.sigma is not None, float(np.finfo(self.dtype).eps)
+        likelihood = MarginalLikelihood(A, sigma_known, rounding**2)
         return _BayesSolver(likelihood, self._root @ likelihood.V)
 
     def _fit(self, flat: Array, used: Mask) -> Fit:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, DTypeLike
 
 from kappaskin.bases import Basis, curvature_at
 from kappaskin.errors import RankDeficient, Refusal
-from kappaskin.estimation.fit import Fit, Uncertainty, merged_fits
+from kappaskin.estimation.fit import Fit, Uncertainty
 from kappaskin.frames import Array, Mask
 from kappaskin.sensing import SensorLayout
 
@@ -36,9 +36,6 @@ class PatternCache(Generic[_Made]):
             self._made.popitem(last=False)
         return made
 
-
-RIM_SD = 0.2e-3
-"""Default standard deviation in m of the movement of an elastic rim."""
 
 # Powers of the largest number: the squares of readings over sigmas, added up, stay below it.
 _SAFE, _SAFE_SIGMA = 0.25, 0.2
@@ -80,11 +77,13 @@ class Estimator(ABC):
     float64.
     """
 
+    RIM_SD: ClassVar = 0.2e-3
+    """Default standard deviation in m of the movement of an elastic rim."""
     has_matrix: ClassVar = True
     """Whether it makes the curvature operator M, 3 P x Ni Nj numbers."""
     has_prior: ClassVar = False
     """Whether a prior decides what the readings do not, so that no basis is too large."""
-    remembers: ClassVar = False
+    has_memory: ClassVar = False
     """Whether a fit depends on earlier frames: `follow` each frame once, in order."""
 
     def __init__(
@@ -167,7 +166,9 @@ class Estimator(ABC):
         So do readings too large to compute with: 4e9 in float32, 1e77 in float64. Raises
         `RankDeficient` when the readings do not determine the shape.
         """
-        K = real_array(curvature, "curvature", self.dtype)  # ours: residuals are told from it later
+        K = real_array(
+            curvature, "curvature", self.dtype
+        )  # a copy: residuals are computed from it later
         self._check_shape(K)
         flat = K.reshape(*K.shape[:-2], 3 * len(self.layout))
         if self._all_readable and _squared(K.reshape(-1)) <= self._largest**2:
@@ -190,7 +191,7 @@ class Estimator(ABC):
                 inner = error.__cause__
                 why = inner if isinstance(inner, RankDeficient) else error
                 raise RankDeficient(f"frame {first}: {why}") from why
-        return merged_fits(fits, np.argsort(np.argsort(which, kind="stable")))
+        return Fit.merged(fits, np.argsort(np.argsort(which, kind="stable")))
 
     def follow(self, curvature: Array, times: Array, held: Array) -> Fit:
         """Fit the next frame: `curvature` (3, P) in 1/m read at `times` (3, P) in s.
@@ -255,16 +256,16 @@ class Estimator(ABC):
             )
         if layout.shape and not missing:
             m, n = layout.shape
-            # Along each direction, mode m + q looks like m - q at the cell centres.
+            # Along each direction, mode m + q equals m - q at the cell centres.
             return RankDeficient(
-                f"{what}: functions beyond the elements look like lower ones; "
+                f"{what}: functions finer than the elements read as coarser ones; "
                 f"use at most {min(Ni, m)} x {min(Nj, n)} functions, or more elements, or a prior "
                 "(bayes)"
             )
         why = (
             f"{missing} of {channels} readings are missing"
             if missing
-            else ("the elements do not tell these functions apart")
+            else ("the elements cannot distinguish these functions")
         )
         return RankDeficient(
             f"{what}: {why}; use a smaller basis (at most {rank} functions), more elements, or a "

@@ -51,8 +51,8 @@ class _GridSide:
 
         transform = dct if cosines or self.constant else dst
         parts: Array = transform(K, 2, axis=axis, norm="ortho", overwrite_x=spend)
-        kept = slice(int(cosines), int(cosines) + self.count)
-        return parts[..., kept] if axis == -1 else parts[..., kept, :]
+        used = slice(int(cosines), int(cosines) + self.count)
+        return parts[..., used] if axis == -1 else parts[..., used, :]
 
     def summed(self, parts: Array, axis: int, cosines: bool) -> Array:
         """The sum of unit sines or cosines, each times its part: the transpose of `analysed`."""
@@ -173,7 +173,7 @@ _SURE = 1e-6  # of its part in a random shape: what is left of one that was seen
 _ROUNDING = 10  # times the rounding of the readings is where transforms cannot tell what is left
 _AT_ONCE = 2**18  # readings transformed together: about what a cache holds
 _Number = TypeVar("_Number", bound=np.generic)
-_MISSING = 4096  # readings that may be missing when error bars are asked for
+_MISSING = 4096  # readings that may be missing when error bars are requested
 
 
 def _parts(count: int, readings: int) -> list[slice]:
@@ -202,31 +202,31 @@ def _least_eigenvalue(A: ScaledOperator, least: float) -> float:
     """
     left = np.random.default_rng(0).normal(size=A.root.shape)
     step, size = left, float(_squares(left, 2))
-    diagonal, beside, carried = list[float](), list[float](), 0.0
+    diagonal, off_diagonal, carried = list[float](), list[float](), 0.0
     for number in range(1, _STEPS + 1):
-        seen = A.forward(step)
-        bend = float(_squares(seen, 3))
+        image = A.forward(step)
+        bend = float(_squares(image, 3))
         if bend <= least * float(_squares(step, 2)):
             break
         length = size / bend
-        left = left - length * A.back(seen)
+        left = left - length * A.back(image)
         before, size = size, float(_squares(left, 2))
         diagonal.append(1 / length + carried)
         ended = size <= _SURE**2  # each of the parts was about 1
         if ended or number % _LOOK == 0:
-            share = _least_of(diagonal, beside)
+            share = _least_of(diagonal, off_diagonal)
             if ended or share < least:
                 return share
         ratio = size / before
-        beside.append(math.sqrt(ratio) / length)
+        off_diagonal.append(math.sqrt(ratio) / length)
         carried = ratio / length
         step = left + ratio * step
     return 0.0
 
 
-def _least_of(diagonal: list[float], beside: list[float]) -> float:
+def _least_of(diagonal: list[float], off_diagonal: list[float]) -> float:
     """The least eigenvalue of a symmetric tridiagonal matrix."""
-    return float(eigvalsh_tridiagonal(diagonal, beside, select="i", select_range=(0, 0))[0])
+    return float(eigvalsh_tridiagonal(diagonal, off_diagonal, select="i", select_range=(0, 0))[0])
 
 
 def _conjugate_gradients(A: ScaledOperator, K: Array) -> tuple[Array, NDArray[np.intp]] | None:
@@ -248,11 +248,11 @@ def _conjugate_gradients(A: ScaledOperator, K: Array) -> tuple[Array, NDArray[np
     while (going := slope > end).any():
         if steps.max() == _STEPS:
             return None
-        seen = A.forward(step)
-        length = np.divide(slope, _squares(seen, 3), where=going, out=np.zeros_like(slope))
+        image = A.forward(step)
+        length = np.divide(slope, _squares(image, 3), where=going, out=np.zeros_like(slope))
         g += of_each(length, g) * step
-        seen *= of_each(length, seen)
-        left -= seen
+        image *= of_each(length, image)
+        left -= image
         gradient = A.back(left)
         before, slope = slope, np.where(going, _squares(gradient, 2), slope)
         ratio = np.divide(slope, before, where=going, out=np.zeros_like(slope))
@@ -296,7 +296,7 @@ class _GridUncertainty:
         if k > _MISSING:
             raise Refusal(
                 f"expected at most {_MISSING} of {self._readings} readings to be missing or to "
-                f"weigh other than most when error bars are asked for, got {k}; ask for the "
+                f"weigh other than most when error bars are requested, got {k}; request the "
                 "coefficients alone"
             )
         G, unit = np.empty((k, k)), np.eye(k)
@@ -306,7 +306,7 @@ class _GridUncertainty:
 
     @property
     def sd(self) -> Array:
-        return self._sd.copy()  # who asked may write on it
+        return self._sd.copy()  # a copy, which the caller may change
 
     @cached_property
     def _sd(self) -> Array:
@@ -316,7 +316,7 @@ class _GridUncertainty:
             variance += np.sum(self._shape(unit) * self._shape(X[part]), axis=0)
         return (self._A.root * np.sqrt(variance)).T.ravel()
 
-    def _seen(self, rows: Array) -> tuple[Array, Array]:
+    def _projected(self, rows: Array) -> tuple[Array, Array]:
         """`rows` (R, N) for the scaled unknowns, (R, N), and what B reads of them, (R, k)."""
         Nj, Ni = self._A.root.shape
         g = self._A.root * rows.reshape(-1, Ni, Nj).swapaxes(-1, -2)
@@ -329,11 +329,11 @@ class _GridUncertainty:
     def covariance_of(self, rows: Array) -> Array:
         if rows.ndim > 2:
             return np.stack([self.covariance_of(one) for one in rows])
-        g, read = self._seen(rows)
+        g, read = self._projected(rows)
         return g @ g.T + read @ self._X @ read.T
 
     def sd_of(self, rows: Array) -> Array:
-        g, read = self._seen(rows)
+        g, read = self._projected(rows)
         variance: Array = np.vecdot(read @ self._X, read)
         variance += np.vecdot(g, g)
         return np.sqrt(variance)

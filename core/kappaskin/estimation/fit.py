@@ -111,12 +111,12 @@ class Fit:
             return np.sqrt(squares / self.spare)
         return np.sqrt(squares / np.where(np.greater(self.spare, 0), self.spare, np.nan))
 
-    def _each(self, told: Callable[[Uncertainty], Array], shape: tuple[int, ...]) -> Array:
-        """`told(uncertainty)` in this `shape`, for each frame when there are several."""
+    def _each(self, quantity: Callable[[Uncertainty], Array], shape: tuple[int, ...]) -> Array:
+        """`quantity(uncertainty)` in this `shape`, for each frame when there are several."""
         if not isinstance(self.uncertainty, Sequence):
-            return told(self.uncertainty).reshape(shape)
+            return quantity(self.uncertainty).reshape(shape)
         once = {id(one): one for one in self.uncertainty}
-        known = {number: told(one) for number, one in once.items()}
+        known = {number: quantity(one) for number, one in once.items()}
         frames = [known[id(one)] for one in self.uncertainty]
         return np.reshape(frames, (len(frames), *shape))
 
@@ -128,9 +128,9 @@ class Fit:
     @property
     def sd(self) -> Array:
         """Standard deviations (..., Ni, Nj) of the coefficients in m."""
-        seen = self.noise[..., None, None] * self.unit_sd
+        observed = self.noise[..., None, None] * self.unit_sd
         undecided = np.linalg.norm(self.estimator.undecided, axis=1)
-        return np.hypot(seen, undecided.reshape(self.estimator.basis.shape))
+        return np.hypot(observed, undecided.reshape(self.estimator.basis.shape))
 
     @property
     def covariance(self) -> Array:
@@ -138,7 +138,7 @@ class Fit:
         if (N := self.estimator.basis.size) > _MOST:
             raise Refusal(
                 f"expected at most {_MOST} coefficients whose covariance is made, got {N} x {N} "
-                "numbers; ask for the covariance_of what is wanted"
+                "numbers; use covariance_of with the rows that are needed"
             )
         return self.covariance_of(np.eye(N))
 
@@ -155,11 +155,11 @@ class Fit:
             noise = noise.reshape(noise.shape + (1,) * (unit.ndim - noise.ndim))
         else:
             unit = uncertainty.covariance_of(rows)
-        seen = noise**2 * unit
+        observed = noise**2 * unit
         if not self.estimator.undecided.size:
-            return seen
+            return observed
         undecided = rows @ self.estimator.undecided
-        return seen + undecided @ undecided.swapaxes(-1, -2)
+        return observed + undecided @ undecided.swapaxes(-1, -2)
 
     @cached_property
     def _jets(self) -> dict[tuple[float, float], tuple[Array, Array]]:
@@ -178,56 +178,56 @@ class Fit:
 
     def sd_of(self, rows: Array) -> Array:
         """Standard deviations (..., R) of `rows` (R, N) times the flattened coefficients."""
-        seen = self.noise[..., None] * self._each(lambda one: one.sd_of(rows), (len(rows),))
-        return np.hypot(seen, np.linalg.norm(rows @ self.estimator.undecided, axis=-1))
+        observed = self.noise[..., None] * self._each(lambda one: one.sd_of(rows), (len(rows),))
+        return np.hypot(observed, np.linalg.norm(rows @ self.estimator.undecided, axis=-1))
 
     def surface_sd(self, positions: Array) -> Array:
         """Standard deviations (..., P) of the displacement in m at `positions` (P, 2)."""
         return self.sd_of(self.estimator.basis.at(positions))
 
+    @staticmethod
+    def merged(fits: "Sequence[Fit]", order: NDArray[np.intp]) -> "Fit":
+        """One fit of T frames from fits of groups of them: frame t is number `order[t]` of all."""
 
-def merged_fits(fits: Sequence[Fit], order: NDArray[np.intp]) -> Fit:
-    """One fit of T frames from fits of groups of them: frame t is number `order[t]` of all."""
+        def joined(parts: list[Array]) -> Array:
+            return np.concatenate(parts)[order]
 
-    def joined(parts: list[Array]) -> Array:
-        return np.concatenate(parts)[order]
+        def of_each(name: str) -> Array:
+            return joined([np.broadcast_to(getattr(f, name), len(f.curvature)) for f in fits])
 
-    def of_each(name: str) -> Array:
-        return joined([np.broadcast_to(getattr(f, name), len(f.curvature)) for f in fits])
-
-    uncertainties: list[Uncertainty] = []
-    for fit in fits:
-        own = fit.uncertainty
-        uncertainties.extend(own if isinstance(own, Sequence) else [own] * len(fit.curvature))
-    told = [fit.known_noise for fit in fits if fit.known_noise is not None]
-    suspect: list[NDArray[np.uint8]] = [fit.suspect for fit in fits if fit.suspect is not None]
-    return Fit(
-        fits[0].estimator,
-        joined([fit.curvature for fit in fits]),
-        joined([fit.coefficients for fit in fits]),
-        [uncertainties[int(place)] for place in order],
-        of_each("spare"),
-        joined(told) if told else None,
-        of_each("steps"),
-        of_each("converged"),
-        np.concatenate(suspect)[order] if suspect else None,
-    )
-
-
-def stacked_fits(fits: Sequence[Fit]) -> Fit:
-    """One fit of T frames from T fits of one frame each."""
-
-    def alone(fit: Fit) -> Fit:
-        return replace(
-            fit,
-            curvature=fit.curvature[None],
-            coefficients=fit.coefficients[None],
-            uncertainty=[cast("Uncertainty", fit.uncertainty)],
-            spare=np.reshape(fit.spare, (1,)),
-            known_noise=None if fit.known_noise is None else np.reshape(fit.known_noise, (1,)),
-            steps=np.reshape(fit.steps, (1,)),
-            converged=np.reshape(fit.converged, (1,)),
-            suspect=None if fit.suspect is None else fit.suspect[None],
+        uncertainties: list[Uncertainty] = []
+        for fit in fits:
+            own = fit.uncertainty
+            uncertainties.extend(own if isinstance(own, Sequence) else [own] * len(fit.curvature))
+        known_noises = [fit.known_noise for fit in fits if fit.known_noise is not None]
+        suspect: list[NDArray[np.uint8]] = [fit.suspect for fit in fits if fit.suspect is not None]
+        return Fit(
+            fits[0].estimator,
+            joined([fit.curvature for fit in fits]),
+            joined([fit.coefficients for fit in fits]),
+            [uncertainties[int(place)] for place in order],
+            of_each("spare"),
+            joined(known_noises) if known_noises else None,
+            of_each("steps"),
+            of_each("converged"),
+            np.concatenate(suspect)[order] if suspect else None,
         )
 
-    return merged_fits([alone(fit) for fit in fits], np.arange(len(fits)))
+    @staticmethod
+    def stacked(fits: "Sequence[Fit]") -> "Fit":
+        """One fit of T frames from T fits of one frame each."""
+
+        def alone(fit: Fit) -> Fit:
+            return replace(
+                fit,
+                curvature=fit.curvature[None],
+                coefficients=fit.coefficients[None],
+                uncertainty=[cast("Uncertainty", fit.uncertainty)],
+                spare=np.reshape(fit.spare, (1,)),
+                known_noise=None if fit.known_noise is None else np.reshape(fit.known_noise, (1,)),
+                steps=np.reshape(fit.steps, (1,)),
+                converged=np.reshape(fit.converged, (1,)),
+                suspect=None if fit.suspect is None else fit.suspect[None],
+            )
+
+        return Fit.merged([alone(fit) for fit in fits], np.arange(len(fits)))

@@ -1,4 +1,4 @@
-"""Kalman filter of a moving skin in square-root form, and the noise and signal it learns."""
+"""Square-root Kalman filter of a moving skin, with estimates of noise and signal."""
 
 import math
 from dataclasses import dataclass
@@ -117,7 +117,7 @@ class ModalKalmanFilter(Stateful):
 
     def absorb(self, A: Array, lag: Array, readings: Array) -> KalmanUpdate:
         """Update with `readings` (R,), A (R, F) times modes + unit noise, `lag` (R,) s from now."""
-        ahead = readings - self.foreseen(A, lag)
+        innovation = readings - self.foreseen(A, lag)
         S1, S2 = self.halves
         Z, R = S1 @ A.T + (S2 @ A.T) * lag, len(readings)  # their covariance is V = 1 + Z'Z
         one = np.eye(R, dtype=Z.dtype, order="F")
@@ -128,13 +128,13 @@ class ModalKalmanFilter(Stateful):
         learned, self.root, _ = self._tpmqrt(
             0, reflectors, t, nothing, self.root, trans="T", overwrite_a=1
         )
-        white = self._trsm(1.0, U, ahead[:, None], trans_a=1)
+        white = self._trsm(1.0, U, innovation[:, None], trans_a=1)
         self.mean = self.mean + (learned.T @ white[:, 0]).reshape(self.mean.shape)
-        left = self._trsm(1.0, U, white)[:, 0]  # V^-1 ahead
-        seen: Array = self._trsm(1.0, U, Z.T, trans_a=1).astype(float)  # 1 - V^-1, but for a turn
-        seen = seen @ seen.T
+        left = self._trsm(1.0, U, white)[:, 0]  # V^-1 innovation
+        part: Array = self._trsm(1.0, U, Z.T, trans_a=1).astype(float)  # 1 - V^-1, but for a turn
+        part = part @ part.T
         surprise = float(np.sum((Z @ left).astype(float) ** 2))
-        return KalmanUpdate(left, surprise, float(np.trace(seen)), float(np.sum(seen**2)) / 2)
+        return KalmanUpdate(left, surprise, float(np.trace(part)), float(np.sum(part**2)) / 2)
 
 
 START_SPEED = 0.1  # m/s, of a contact of which nothing is known
@@ -184,8 +184,8 @@ class SignalLevel(Stateful):
         unit amplitude.
         """
         U, s, _ = np.linalg.svd(A.astype(float), full_matrices=False)
-        R, seen = len(readings), float(s @ s) / len(readings)
-        signal = seen if seen > _UNSEEN * signal else signal
+        R, observed = len(readings), float(s @ s) / len(readings)
+        signal = observed if observed > _UNSEEN * signal else signal
         squares = _RATIOS[self._most >= _RATIOS] / signal
         within = (U.T @ readings) ** 2
         beyond = max(float(readings @ readings - within.sum()), 0.0)
@@ -203,9 +203,9 @@ class SignalLevel(Stateful):
         self.variance, self.count = float(total[best]) / (known + R), known
         return math.sqrt(squares[best])
 
-    def renew(self, A: Array, ahead: Array, signal: float) -> float:
-        """The amplitude of what is new in the innovation `ahead` (R,) of readings A (R, F)."""
-        extra = self.explain(A, ahead, signal)
+    def renew(self, A: Array, innovation: Array, signal: float) -> float:
+        """The amplitude of what is new in the `innovation` (R,) of readings A (R, F)."""
+        extra = self.explain(A, innovation, signal)
         self.amplitude = max(self.amplitude, extra)
         self.speed = max(self.speed, START_SPEED)
         return extra

@@ -1,4 +1,4 @@
-"""Least-squares estimators: factored once, solved per frame, and for finite slopes."""
+"""Least-squares estimators, also for finite slopes."""
 
 from dataclasses import dataclass
 from typing import cast
@@ -70,8 +70,8 @@ class LeastSquares(Estimator):
     ) -> _FactoredSolver:
         """The solver root X U^T, whose covariance is root X root^T; X = 1 without an `inverse`."""
         left = root if inverse is None else root @ inverse
-        seen = U if self.sigma is None else self.weight[used, None] * U
-        factors = ((left @ seen.T).T,) if self.condition <= _MILD else (seen, left.T)
+        weighted = U if self.sigma is None else self.weight[used, None] * U
+        factors = ((left @ weighted.T).T,) if self.condition <= _MILD else (weighted, left.T)
         spread = DenseUncertainty(lambda: left @ root.T)
         return _FactoredSolver(used, tuple(f.astype(self.dtype) for f in factors), spread, len(U))
 
@@ -135,7 +135,7 @@ class AsPrinted(_PerFrame):
         except np.linalg.LinAlgError as error:
             raise RankDeficient(
                 "Eq. 6 as printed divides by zero: M^T M has no inverse; use least-squares, which "
-                "says what is not determined"
+                "reports what is not determined"
             ) from error
 
         def covariance() -> Array:

@@ -49,7 +49,7 @@ _SWEEPS = 20  # over all elements at most; most placements are done after three 
 _GAIN = 1e-6  # of a criterion: a smaller one is not worth an exchange
 _CROWD = 1.6  # the power that draws clustered elements to the middle
 _MOST_CANDIDATES = 10_000
-_RIDGE = 1e-9  # of what a reading tells on average, so that too few elements are no error
+_RIDGE = 1e-9  # of the information of a reading on average, so that too few elements are no error
 
 Placement = Callable[[SensorLayout, Basis, float], SensorLayout]
 """A function of layout, basis to determine, and least distance in m; a layout as large."""
@@ -71,11 +71,11 @@ def _at(places: Array, layout: SensorLayout) -> SensorLayout:
     return replace(SensorLayout.scattered(layout.patch, places), gage_length=layout.gage_length)
 
 
-def _as_they_are(layout: SensorLayout, basis: Basis, apart: float) -> SensorLayout:
+def _as_they_are(layout: SensorLayout, basis: Basis, spacing: float) -> SensorLayout:
     return layout
 
 
-def _clustered(layout: SensorLayout, basis: Basis, apart: float) -> SensorLayout:
+def _clustered(layout: SensorLayout, basis: Basis, spacing: float) -> SensorLayout:
     """The same elements, drawn towards the middle of the skin."""
     half = np.array([layout.patch.a, layout.patch.b]) / 2
     u = layout.positions / half - 1
@@ -83,7 +83,7 @@ def _clustered(layout: SensorLayout, basis: Basis, apart: float) -> SensorLayout
 
 
 def _optimal(det: bool) -> Placement:
-    return lambda layout, basis, apart: _exchanged(layout, basis, apart, det)
+    return lambda layout, basis, spacing: _exchanged(layout, basis, spacing, det)
 
 
 PLACEMENTS: dict[str, Placement] = {
@@ -103,37 +103,37 @@ def check_placement(layout: SensorLayout, by: str) -> None:
         raise Refusal("expected live elements where they are placed anew, got dead ones among them")
 
 
-def place_elements(layout: SensorLayout, basis: Basis, by: str, apart: float) -> SensorLayout:
+def place_elements(layout: SensorLayout, basis: Basis, by: str, spacing: float) -> SensorLayout:
     """As many elements as `layout` has, placed by the name `by` to determine `basis`.
 
-    At least `apart` in m from each other where the placement is optimal.
+    At least `spacing` in m from each other where the placement is optimal.
     """
-    return PLACEMENTS[by](layout, basis, apart)
+    return PLACEMENTS[by](layout, basis, spacing)
 
 
-def _candidates(layout: SensorLayout, apart: float) -> Array:
-    """Candidate places (C, 2) in m on the skin, at least `apart` in m from each other."""
+def _candidates(layout: SensorLayout, spacing: float) -> Array:
+    """Candidate places (C, 2) in m on the skin, at least `spacing` in m from each other."""
     patch = layout.patch
-    m, n = (math.floor(side / apart + 1e-9) for side in (patch.a, patch.b))
+    m, n = (math.floor(side / spacing + 1e-9) for side in (patch.a, patch.b))
     places = np.empty((0, 2))
     if 0 < m * n <= _MOST_CANDIDATES:
         places = SensorLayout.regular(patch, m, n).positions
         places = places[patch.depth(places) >= layout.gage_length / 2]
     if len(places) <= len(layout):
         raise Refusal(
-            f"expected a distance apart that leaves more than {len(layout)} places on a tiling of "
-            f"at most {_MOST_CANDIDATES}, got {m} x {n} at {apart:g} m"
+            f"expected a spacing that leaves more than {len(layout)} places on a tiling of "
+            f"at most {_MOST_CANDIDATES}, got {m} x {n} at {spacing:g} m"
         )
     return places
 
 
-def _exchanged(layout: SensorLayout, basis: Basis, apart: float, det: bool) -> SensorLayout:
+def _exchanged(layout: SensorLayout, basis: Basis, spacing: float, det: bool) -> SensorLayout:
     """The layout after every exchange of one element for a free place that gains (Fedorov's).
 
     It starts from the free places nearest to the scene's elements, and takes the best exchange for
     one element after the other, until none gains.
     """
-    places = _candidates(layout, apart)
+    places = _candidates(layout, spacing)
     rows, products = _scaled(layout, basis, places)
     chosen = _nearest(layout.positions, places)
     free = np.ones(len(places), bool)
@@ -184,12 +184,12 @@ def _exchange(
     rV = r @ V
     S = np.eye(3) + rV @ r.swapaxes(1, 2)
     if det:
-        told = np.linalg.slogdet(S)[1]
+        information = np.linalg.slogdet(S)[1]
     else:
         shared = np.linalg.solve(S, rV @ products @ rV.swapaxes(1, 2))
-        told = np.trace(shared, axis1=1, axis2=2) / np.trace(V @ products)
-    best = int(np.argmax(told))
-    if not told[best] > told[-1] + _GAIN:
+        information = np.trace(shared, axis1=1, axis2=2) / np.trace(V @ products)
+    best = int(np.argmax(information))
+    if not information[best] > information[-1] + _GAIN:
         return False
     free[chosen[n]], free[here[best]] = True, False
     chosen[n] = here[best]

@@ -1,4 +1,4 @@
-"""Scanned regions: which channels the next frame reads, and what accuracy that gives."""
+"""Scanned regions: the channels of each frame, and the accuracy that they give."""
 
 import math
 from dataclasses import dataclass
@@ -188,13 +188,13 @@ def contact_bound(
     weights = np.where(layout.live, 1.0 if weight is None else weight, 0.0)
     J: Array = np.sqrt(weights).reshape(-1, 1) * (layout.curvature_operator(basis) @ slopes)
     length = np.linalg.norm(J, axis=0)
-    seen = length > 0  # not y on a strip, nor where a contact of no force is
+    observed = length > 0  # not y on a strip, nor where a contact of no force is
     bound = np.full(3, np.inf)
-    if seen.any():
+    if observed.any():
         # Metres and newtons: scaled to unit length, then inverted.
-        _, s, Vt = np.linalg.svd(J[:, seen] / length[seen], full_matrices=False)
-        if s[-1] > _SINGULAR * s[0] and len(s) == seen.sum():
-            bound[seen] = noise * np.linalg.norm(Vt.T / s, axis=1) / length[seen]
+        _, s, Vt = np.linalg.svd(J[:, observed] / length[observed], full_matrices=False)
+        if s[-1] > _SINGULAR * s[0] and len(s) == observed.sum():
+            bound[observed] = noise * np.linalg.norm(Vt.T / s, axis=1) / length[observed]
     return bound
 
 
@@ -218,26 +218,26 @@ class ScanTradeoff:
     def gain(self) -> float:
         return self.rate / self.full_rate
 
+    @staticmethod
+    def of(sensor: Sensor, region: Region, contact: PointLoad, noise: float) -> "ScanTradeoff":
+        """The tradeoff of `region` for a `contact` inside it, at `noise` in 1/m.
 
-def scan_tradeoff(sensor: Sensor, region: Region, contact: PointLoad, noise: float) -> ScanTradeoff:
-    """The tradeoff of `region` for a `contact` inside it, at `noise` in 1/m.
-
-    Rates are those that the scans allow. An element outside counts by how often it is scanned.
-    """
-    scanner = Scanner(sensor, region)
-    if region.around in (Region.SKIN, Region.INTRINSIC):
-        scanner.follow(contact.centre())
-    scan, full = scanner(), sensor.scan()
-    inside = scanner.inside
-    weight = np.full(len(sensor.layout), region.share if region.by_channel else 1.0)
-    if inside is not None and not inside.all():
-        outside = int((~inside).sum())
-        weight[~inside] = _elements_per_turn(region.share, outside) / outside
-    return ScanTradeoff(
-        len(scan.channels),
-        scan.duration,
-        scan.rate,
-        full.rate,
-        contact_bound(sensor, contact, noise, weight),
-        contact_bound(sensor, contact, noise),
-    )
+        Rates are those that the scans allow. An element outside counts by how often it is scanned.
+        """
+        scanner = Scanner(sensor, region)
+        if region.around in (Region.SKIN, Region.INTRINSIC):
+            scanner.follow(contact.centre())
+        scan, full = scanner(), sensor.scan()
+        inside = scanner.inside
+        weight = np.full(len(sensor.layout), region.share if region.by_channel else 1.0)
+        if inside is not None and not inside.all():
+            outside = int((~inside).sum())
+            weight[~inside] = _elements_per_turn(region.share, outside) / outside
+        return ScanTradeoff(
+            len(scan.channels),
+            scan.duration,
+            scan.rate,
+            full.rate,
+            contact_bound(sensor, contact, noise, weight),
+            contact_bound(sensor, contact, noise),
+        )

@@ -1,4 +1,4 @@
-"""Robust estimator: least squares without outlying elements, and the likely fault of each."""
+"""Robust estimator: least squares without outliers, and the likely fault of each."""
 
 from collections import deque
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from kappaskin.bases import Basis
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation.bayes import MarginalLikelihood, prior_root
 from kappaskin.estimation.estimator import Estimator, PatternCache, real_array
-from kappaskin.estimation.fit import Fit, stacked_fits
+from kappaskin.estimation.fit import Fit
 from kappaskin.estimation.least_squares import LeastSquares
 from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import Plate
@@ -118,10 +118,10 @@ class Robust(Estimator, Stateful):
 
     def _load_gain(self, residuals: "_Residuals", test: _OutlierTest) -> Array:
         """Drop (G,) of chi-squared when a load is added at each place."""
-        seen = test.beyond + test.by_load @ (1 - residuals.w)
-        known = seen > _UNSEEN
+        observed = test.beyond + test.by_load @ (1 - residuals.w)
+        known = observed > _UNSEEN
         return np.divide(
-            (residuals.r @ self._forces) ** 2, seen, where=known, out=np.zeros_like(seen)
+            (residuals.r @ self._forces) ** 2, observed, where=known, out=np.zeros_like(observed)
         )
 
     def _outlier_test(self, used: Mask) -> _OutlierTest:
@@ -140,7 +140,7 @@ class Robust(Estimator, Stateful):
         if K.ndim == 2 or (there == there[:1]).all():
             return super().__call__(K)
         # Not grouped by missing readings: faults are identified from the frames before.
-        return stacked_fits([self._next(frame, t) for t, frame in enumerate(K)])
+        return Fit.stacked([self._next(frame, t) for t, frame in enumerate(K)])
 
     def _next(self, frame: Array, number: int) -> Fit:
         try:

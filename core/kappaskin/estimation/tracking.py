@@ -1,4 +1,4 @@
-"""Tracking estimator: a moving skin from readings that each have their own time."""
+"""Tracking estimator of a moving skin from readings at their own times."""
 
 import math
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
 from kappaskin.estimation.bayes import prior_root
 from kappaskin.estimation.estimator import Estimator, real_array
-from kappaskin.estimation.fit import Fit, stacked_fits
+from kappaskin.estimation.fit import Fit
 from kappaskin.estimation.kalman import START_SPEED, ModalKalmanFilter, SignalLevel
 from kappaskin.frames import Array, Mask
 
@@ -23,41 +23,41 @@ _AT_ONCE = 8  # of them, as good in the end as one by one
 
 
 def most_informative(
-    A: Array, P: Array, wanted: Array, worth: Array, count: int
+    A: Array, P: Array, quantities: Array, worth: Array, count: int
 ) -> NDArray[np.intp]:
-    """The `count` most informative of R readings about the quantities `wanted` (q, F), greedily.
+    """The `count` most informative of R readings about `quantities` (q, F), greedily.
 
     The readings are A (R, F) times modes of the covariance P (F, F) in units of the noise. Each
-    reduces the summed variances of the quantities by (wanted P A')^2 over its own variance, times
-    its `worth` (R,).
+    reduces the summed variances of the quantities by (quantities P A')^2 over its own variance,
+    times its `worth` (R,).
     """
     AP = A @ P
-    E = AP @ wanted.T
+    E = AP @ quantities.T
     first = worth * np.vecdot(E, E) / (1 + np.vecdot(AP, A))
     most = min(max(_CANDIDATES, count), len(first))
     left = np.argpartition(-first, most - 1)[:most]
     return left[_greedy(AP[left] @ A[left].T, E[left], worth[left], count)]
 
 
-def _greedy(shared: Array, wanted: Array, worth: Array, count: int) -> NDArray[np.intp]:
+def _greedy(shared: Array, quantities: Array, worth: Array, count: int) -> NDArray[np.intp]:
     """The same for all R readings, whose signals have the covariance `shared` (R, R).
 
     A Cholesky factor of the covariance of those chosen, (count, R), grows some rows at a time.
     """
     R, variance = len(worth), 1 + shared.diagonal()
-    both = np.hstack([shared, wanted])
+    both = np.hstack([shared, quantities])
     factor, chosen = np.empty((count, both.shape[1])), np.empty(count, np.intp)
     for first in range(0, count, _AT_ONCE):
-        told = worth * np.vecdot(wanted, wanted) / variance
-        told[chosen[:first]] = -1.0
-        k = np.argsort(-told, kind="stable")[: min(_AT_ONCE, count - first)]
+        information = worth * np.vecdot(quantities, quantities) / variance
+        information[chosen[:first]] = -1.0
+        k = np.argsort(-information, kind="stable")[: min(_AT_ONCE, count - first)]
         chosen[first : first + len(k)] = k
         before = factor[:first]
         left = both[k] - before[:, k].T @ before
         L = np.linalg.cholesky(left[:, k] + np.eye(len(k)))
         factor[first : first + len(k)] = rows = np.linalg.solve(L, left)
         # Given those readings, the others are less uncertain by what they share with them.
-        wanted = wanted - rows[:, :R].T @ rows[:, R:]
+        quantities = quantities - rows[:, :R].T @ rows[:, R:]
         variance = np.maximum(variance - np.sum(rows[:, :R] ** 2, axis=0), 1.0)
     return chosen
 
@@ -66,7 +66,7 @@ _MOST = 100  # readings that share one step of the filter
 _PHASE = 0.5  # rad that the fastest mode turns meanwhile at most, or
 _SHORTEST = 1e-3  # s, if that is longer: a step must not take longer than its readings
 _PERIOD = 6e-3  # s that a frame takes which comes without times: the paper's 300 channels
-_HELD = 0.1  # s after which a reading no longer tells what lies between the modes
+_HELD = 0.1  # s after which a reading no longer determines what lies between the modes
 _BACK = 0.05  # s by which a clock may go back within one run of a device
 _FORGOTTEN = 1e9  # s: of what is so long ago nothing is left, and squares are still numbers
 _COARSE = 8  # modes that make nearly all of the displacement
@@ -108,7 +108,7 @@ class Tracking(Estimator, Stateful):
     mean a contact or its end; the uncertainty of the modes then grows to that of the start.
     """
 
-    remembers: ClassVar = True
+    has_memory: ClassVar = True
     has_prior: ClassVar = True
     STATE = ("_filter", "_level", "_now", "_left", "_read")
 
@@ -150,7 +150,7 @@ class Tracking(Estimator, Stateful):
         if not len(K):
             none = np.empty((0, *self.basis.shape), self.dtype)
             return Fit(self, K.astype(self.dtype), none, [], np.zeros(0), np.zeros(0))
-        return stacked_fits([self.follow(frame, np.full(frame.shape, self._next)) for frame in K])
+        return Fit.stacked([self.follow(frame, np.full(frame.shape, self._next)) for frame in K])
 
     @property
     def _next(self) -> float:
@@ -189,8 +189,8 @@ class Tracking(Estimator, Stateful):
             self._advance(float(t[scanned].max()))
         return self._fitted()
 
-    def choose(self, count: int, position: Array, ahead: float) -> NDArray[np.intp]:
-        """The `count` channels to read next, `ahead` s from now, in increasing order.
+    def choose(self, count: int, position: Array, lead: float) -> NDArray[np.intp]:
+        """The `count` channels to read next, `lead` s from now, in increasing order.
 
         Those that reduce most the uncertainty of the surface, and of the place of the contact at
         `position` (2,) in m, NaN without one. They follow from the covariance alone. A channel that
@@ -198,12 +198,14 @@ class Tracking(Estimator, Stateful):
         reading is not noise that averages out.
         """
         x, rate = self._filter.halves
-        S, count = x + ahead * rate, min(count, int(self.readable.sum()))
+        S, count = x + lead * rate, min(count, int(self.readable.sum()))
         readable = np.flatnonzero(self.readable)
-        A, worth = self._A[readable], self._aged(ahead)[readable]
-        return np.sort(readable[most_informative(A, S.T @ S, self._wanted(position), worth, count)])
+        A, worth = self._A[readable], self._aged(lead)[readable]
+        return np.sort(
+            readable[most_informative(A, S.T @ S, self._quantities(position), worth, count)]
+        )
 
-    def _wanted(self, position: Array) -> Array:
+    def _quantities(self, position: Array) -> Array:
         """Quantities (q, F) of interest of the modes: displacements in m, the contact's place."""
         coarse = np.diag(self._displacements)[: min(_COARSE, self.unknowns)]
         if not np.isfinite(position).all():
@@ -214,13 +216,13 @@ class Tracking(Estimator, Stateful):
         share = _PLACE * abs(w) / self.basis.patch.a / max(abs(xx + yy) / 2, 1e-30)
         return np.vstack([coarse, share * jet[1:3]])
 
-    def _aged(self, ahead: float) -> Array:
+    def _aged(self, lead: float) -> Array:
         """Share (3 P,) of the next reading of each channel that would be new."""
         level = self._level
         if level is None:  # nothing was read yet
             return np.ones(len(self._read))
         finest = math.sqrt(3) * level.speed * float(self._wavenumbers.max())
-        return -np.expm1(-finest * (self._now + ahead - self._read))
+        return -np.expm1(-finest * (self._now + lead - self._read))
 
     def _begin(self, times: Array) -> None:
         """Restart where the clock went back."""
@@ -244,8 +246,8 @@ class Tracking(Estimator, Stateful):
 
     def _start(self, readings: Array, A: Array) -> None:
         """Start with the most likely amplitude for the first readings."""
-        told = (0.0, 0.0) if self.sigma is None else (1.0, math.inf)
-        self._level = SignalLevel(*told, float(np.finfo(self.dtype).eps))
+        noise = (0.0, 0.0) if self.sigma is None else (1.0, math.inf)
+        self._level = SignalLevel(*noise, float(np.finfo(self.dtype).eps))
         self._filter.expect(self._level.renew(A, readings, self._signal), START_SPEED)
 
     def _advance(self, time: float) -> None:
@@ -262,14 +264,14 @@ class Tracking(Estimator, Stateful):
         A, lag = self._A[channels], (t - self._now).astype(self.dtype)
         readings = (self.weight[channels] * K).astype(self.dtype)
         mean, root = filter_.mean, filter_.root
-        ahead = (readings - filter_.foreseen(A, lag)).astype(float)
+        innovation = (readings - filter_.foreseen(A, lag)).astype(float)
         learned = filter_.absorb(A, lag, readings)
-        power = float(ahead @ learned.left)  # chi-squared, times the noise's variance
+        power = float(innovation @ learned.left)  # chi-squared, times the noise's variance
         if level.surprised(power, len(K)):
             filter_.mean, filter_.root = mean, root
-            filter_.expect(level.renew(A, ahead, self._signal), level.speed)
+            filter_.expect(level.renew(A, innovation, self._signal), level.speed)
             learned = filter_.absorb(A, lag, readings)
-            power = float(ahead @ learned.left)
+            power = float(innovation @ learned.left)
         else:
             level.pace(learned)
         self._left[channels] = learned.left / self.weight[channels]

@@ -1,4 +1,4 @@
-"""Findings: the fault of each channel, and what its exclusion costs in accuracy."""
+"""Faults of channels, and the loss of accuracy by their exclusion."""
 
 import math
 from contextlib import suppress
@@ -21,8 +21,8 @@ _MOST_LISTED = 256  # findings that are listed one by one
 class Finding:
     """The fault of one channel: `kind` is a word of `FAULTS`, `figure` says by how much.
 
-    `since` when, in s on the clock of `Frame.host_time`. `kept` means that it is in the fit all the
-    same, as the shape is not determined without it.
+    `since` when, in s on the clock of `Frame.host_time`. `retained` means that it is in the fit all
+    the same, as the shape is not determined without it.
     """
 
     channel: int
@@ -31,11 +31,11 @@ class Finding:
     kind: str
     since: float
     figure: str
-    kept: bool = False
+    retained: bool = False
 
     def __str__(self) -> str:
-        kept = "; kept, as the shape is not determined without it" if self.kept else ""
-        return f"{self.component} of element {self.element} {self.kind}: {self.figure}{kept}"
+        retained = "; kept, as the shape is not determined without it" if self.retained else ""
+        return f"{self.component} of element {self.element} {self.kind}: {self.figure}{retained}"
 
 
 @dataclass(frozen=True)
@@ -44,33 +44,33 @@ class Health:
 
     `findings` are the first of them by channel, at most 256 of the `count` there are. Their
     exclusion makes the error bars of the shape `cost` times as wide, and that of the displacement
-    at the contact `contact_cost` times, NaN without a contact. `kept` of them are in the fit all
-    the same.
+    at the contact `contact_cost` times, NaN without a contact. `retained` of them are in the fit
+    all the same.
     """
 
     findings: tuple[Finding, ...] = ()
     count: int = 0
-    kept: int = 0
+    retained: int = 0
     cost: float = 1.0
     contact_cost: float = math.nan
 
     def __str__(self) -> str:
         if not self.count:
             return "all channels OK"
-        out = self.count - self.kept
+        out = self.count - self.retained
         words = [f"{out} channel{'' if out == 1 else 's'} excluded"]
         words.append(f"error bars {100 * (self.cost - 1):+.0f} %")
         if math.isfinite(self.contact_cost):
             words.append(f"at the contact {100 * (self.contact_cost - 1):+.0f} %")
-        if self.kept:
-            words.append(f"{self.kept} faulty but kept: without, the shape is not determined")
+        if self.retained:
+            words.append(f"{self.retained} faulty but kept: without, the shape is not determined")
         return ", ".join(words)
 
 
 def findings(
-    kinds: NDArray[np.uint8], since: Array, figures: Array, kept: NDArray[np.bool_]
+    kinds: NDArray[np.uint8], since: Array, figures: Array, retained: NDArray[np.bool_]
 ) -> tuple[Finding, ...]:
-    """The findings for C channels with `kinds`, `since` and `kept` (C,), `figures` (C, 2)."""
+    """The findings for C channels with `kinds`, `since` and `retained` (C,), `figures` (C, 2)."""
     P = len(kinds) // 3
     return tuple(
         Finding(
@@ -85,7 +85,7 @@ def findings(
                 float(figures[channel, 1]),
                 P,
             ),
-            bool(kept[channel]),
+            bool(retained[channel]),
         )
         for channel in np.flatnonzero(kinds)[:_MOST_LISTED]
     )
@@ -179,8 +179,8 @@ def _means(values: Array) -> Array:
 
 def _amounts(values: Array) -> Array:
     """Standard deviations (n,) of `values` (T, n) without NaN."""
-    apart, known = centred(values), np.count_nonzero(~np.isnan(values), axis=0)
-    return np.sqrt(np.sum(apart**2, axis=0) / np.maximum(known, 1))
+    deviation, known = centred(values), np.count_nonzero(~np.isnan(values), axis=0)
+    return np.sqrt(np.sum(deviation**2, axis=0) / np.maximum(known, 1))
 
 
 def _trend(left: Array) -> tuple[Array, Array]:
@@ -219,13 +219,13 @@ FaultCodes = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Exclusion:
-    """The channels excluded from a fit: those with a fault in `kinds` (3, P) that are not `kept`.
+    """The channels excluded from a fit: with a fault in `kinds` (3, P) and not `retained`.
 
     `ideal` is the fit at rest with every channel of such a skin, `fit` the one without these.
     """
 
     kinds: FaultCodes
-    kept: Mask
+    retained: Mask
     ideal: Fit
     fit: Fit
     _out: Mask | None
@@ -284,10 +284,12 @@ def exclude(
     worst = found[np.argsort(-badness[found], kind="stable")]
     fit, count = _most(estimator, worst, loosest)
     out = np.isin(np.arange(kinds.size), worst[:count]).reshape(shape)
-    kept = np.isin(np.arange(kinds.size), worst[count:]).reshape(shape)
+    retained = np.isin(np.arange(kinds.size), worst[count:]).reshape(shape)
     own = kinds.reshape(shape).copy()
     worst_of: FaultCodes = own.max(axis=0)
-    return replace(was, kinds=own, kept=kept, fit=fit, _out=out if count else None, _worst=worst_of)
+    return replace(
+        was, kinds=own, retained=retained, fit=fit, _out=out if count else None, _worst=worst_of
+    )
 
 
 def _most(estimator: Estimator, worst: NDArray[np.intp], loosest: float) -> tuple[Fit, int]:

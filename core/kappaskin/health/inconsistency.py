@@ -1,4 +1,4 @@
-"""Inconsistency test: what each channel reads against what its neighbours predict."""
+"""Inconsistency test of each channel against the prediction of its neighbours."""
 
 import math
 from collections.abc import Iterator
@@ -112,16 +112,16 @@ _ELEMENTS_AT_ONCE = 512  # elements whose weights are computed together: 15 MB e
 Indices = NDArray[np.intp]
 
 
-def _covariance(apart: Array) -> Array:
-    """Covariances (3, 3, ...) of the curvatures of two elements at the distance `apart` (2, ...).
+def _covariance(distance: Array) -> Array:
+    """Covariances (3, 3, ...) of the curvatures of two elements at a `distance` (2, ...).
 
     Of a displacement with the covariance exp(-r^2/2 l^2), the mean over the lengths l: its fourth
     derivatives are He_m(x/l) He_n(y/l) exp(-r^2/2 l^2), m + n = 4, with Hermite's polynomials.
     Scaled so that the variance of xx and of yy is 1, and that of xy 1/3.
     """
-    total = np.zeros((3, 3, *apart.shape[1:]))
+    total = np.zeros((3, 3, *distance.shape[1:]))
     for length in _LENGTHS:
-        u, v = apart / length
+        u, v = distance / length
         bell = np.exp(-(u**2 + v**2) / 2) / (3 * len(_LENGTHS))
         uu, vv = u**2 - 1, v**2 - 1
         total[0, 0] += (uu * (uu - 4) - 2) * bell
@@ -145,16 +145,16 @@ class Neighbours:
     def __init__(self, layout: SensorLayout) -> None:
         P = len(layout)
         k = min(_COUNT, P - 1)
-        apart, near = scipy.spatial.KDTree(layout.positions).query(layout.positions, k + 1)
+        distance, near = scipy.spatial.KDTree(layout.positions).query(layout.positions, k + 1)
         near = cast("Indices", near).reshape(P, k + 1)[:, 1:]
-        pitch = float(np.median(np.reshape(apart, (P, k + 1))[:, 1:2])) if k else 1.0
+        pitch = float(np.median(np.reshape(distance, (P, k + 1))[:, 1:2])) if k else 1.0
         self._at = layout.positions.T / (pitch or 1.0)
         self.near = near
         """The elements (P, k) around each."""
         self.channels: Indices = (near[:, None] + P * np.arange(3)[:, None]).reshape(P, 3 * k)
-        self.beside: Indices = self.channels.reshape(P, 3, k)[:, :, :_BESIDE].reshape(P, -1)
+        self.adjacent: Indices = self.channels.reshape(P, 3, k)[:, :, :_BESIDE].reshape(P, -1)
         """The channels (P, c) of the elements next to each."""
-        close = (np.reshape(apart, (P, k + 1))[:, 1:] < _CLOSE * pitch).sum(axis=1)
+        close = (np.reshape(distance, (P, k + 1))[:, 1:] < _CLOSE * pitch).sum(axis=1)
         self.alone: Array = _BESIDE / np.clip(close, 1, _BESIDE)
         """Ratio (P,) of the close neighbours inside a grid to those of each element."""
         self.weights = np.zeros((P, 3, 3 * k))
@@ -175,14 +175,14 @@ class Neighbours:
         k = near.shape[2]
         between = _covariance(near[:, :, :, None] - near[:, :, None])
         S = between.transpose(2, 0, 3, 1, 4).reshape(E, 3 * k, 3 * k)
-        apart = _covariance(near - self._at[:, elements, None])
-        beside = apart.transpose(2, 1, 3, 0).reshape(E, 3 * k, 3)
+        covariance = _covariance(near - self._at[:, elements, None])
+        adjacent = covariance.transpose(2, 1, 3, 0).reshape(E, 3 * k, 3)
         noise = np.where(missing[self.channels[elements]], _MISSING, _NOISE)
         S[:, np.arange(3 * k), np.arange(3 * k)] += noise
-        W = np.linalg.solve(S, beside)
+        W = np.linalg.solve(S, adjacent)
         own = np.diag(_covariance(np.zeros(2)))
         self.weights[elements] = W.swapaxes(1, 2)
-        self.spread[elements] = np.maximum(own - np.sum(W * beside, axis=1), 0.0)
+        self.spread[elements] = np.maximum(own - np.sum(W * adjacent, axis=1), 0.0)
 
     def predict(self, readings: Array, elements: Indices) -> tuple[Array, Array]:
         """Predicted readings of `elements` (E,) and their variance, (T, 3, E) each.
@@ -266,7 +266,7 @@ class InconsistencyTest:
         self.changed, self.predicted, self.variance = (
             np.full((_KEPT, C), np.nan) for _ in range(3)
         )
-        self._beside = np.zeros((_KEPT, len(layout)))
+        self._adjacent = np.zeros((_KEPT, len(layout)))
         """Largest change (T, P) in 1/m of the elements next to each."""
         self._typical = np.zeros(_KEPT)  # in 1/m, how far off healthy channels are
         self.usual = 0.0
@@ -308,8 +308,8 @@ class InconsistencyTest:
         self.changed[-T:] = changed
         self._predict(self._every, slice(_KEPT - T, None))
         heard = np.nan_to_num(np.where(self.missing, 0.0, np.abs(self.changed[-T:])))
-        self._beside[:-T] = self._beside[T:]
-        self._beside[-T:] = heard[:, self.neighbours.beside].max(axis=2, initial=0.0)
+        self._adjacent[:-T] = self._adjacent[T:]
+        self._adjacent[-T:] = heard[:, self.neighbours.adjacent].max(axis=2, initial=0.0)
         return T
 
     def _compare(self, T: int) -> None:
@@ -353,7 +353,7 @@ class InconsistencyTest:
         s2 += white + self._typical[self.recent, None] ** 2
         with np.errstate(invalid="ignore", divide="ignore"):
             self.distance = rms(left / np.sqrt(s2))
-            sharp = _SHARP * np.tile(self.neighbours.alone * self._beside[self.recent], 3)
+            sharp = _SHARP * np.tile(self.neighbours.alone * self._adjacent[self.recent], 3)
             beyond = np.nan_to_num(np.abs(left) / (_FAR * np.sqrt(s2) + sharp))
         self.beyond = np.partition(beyond, _OFTEN, axis=0)[_OFTEN]
         changed, predicted = (

@@ -1,4 +1,4 @@
-"""Health monitor: frames to the faults of channels."""
+"""Health monitor: the faults of channels from frames."""
 
 import math
 from collections.abc import Iterator
@@ -108,9 +108,9 @@ class HealthMonitor:
         nothing = np.isin(self.kinds, (DEAD, SATURATED, STUCK))
         return np.where(self.kinds > 0, self._test.off, 0.0) + np.where(nothing, 1e9, 0.0)
 
-    def findings(self, kept: Mask) -> tuple[Finding, ...]:
-        """The findings, of which some channels are `kept` (C,) in the fit all the same."""
-        return findings(self.kinds, self._since, self._figures, kept)
+    def findings(self, retained: Mask) -> tuple[Finding, ...]:
+        """The findings, of which some channels are `retained` (C,) in the fit all the same."""
+        return findings(self.kinds, self._since, self._figures, retained)
 
     def _find(self, which: Mask, kind: int, since: float) -> None:
         self._since[which & (self.kinds == 0)] = since

@@ -40,7 +40,7 @@ class LiveHealthMonitor:
         if self._monitor is None or pipeline is None:
             return Health()
         out, kinds = pipeline.left_out, self._monitor.kinds
-        kept = out.kept.ravel()
+        kept = out.retained.ravel()
         return Health(
             self._monitor.findings(kept),
             int(np.count_nonzero(kinds)),

@@ -44,7 +44,7 @@ class LiveRecorder:
         self.connect(source)
         if host.pipeline is not None:
             recorder.set_up(host.pipeline)
-            recorder.remembered(host.pipeline.state())
+            recorder.add_memory(host.pipeline.state())
             if host.excluded is not None:
                 recorder.left_out(*host.excluded)
 
@@ -83,7 +83,7 @@ class LiveRecorder:
 
     def add_event(self, event: Event) -> None:
         if self._recorder is not None:
-            self._recorder.happened(event)
+            self._recorder.add_event(event)
 
     def take(self, frame: Frame, estimate: Estimate) -> None:
         if self._recorder is not None and self._live:

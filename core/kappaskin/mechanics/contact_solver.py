@@ -100,10 +100,10 @@ class _ActiveSet:
             np.block([[self.gives, between], [between.T, other.gives]]),
         )
 
-    def only(self, kept: Mask) -> "_ActiveSet":
-        """Those of them that are `kept` (a,)."""
+    def only(self, active: Mask) -> "_ActiveSet":
+        """Those of them that are `active` (a,)."""
         return _ActiveSet(
-            self.at[kept], self.felt[kept], self.answer[kept], self.gives[kept][:, kept]
+            self.at[active], self.felt[active], self.answer[active], self.gives[active][:, active]
         )
 
 
@@ -148,16 +148,16 @@ class _ContactProblem:
 
     def pushing(self, places: _ActiveSet, forces: Array, target: Array) -> tuple[_ActiveSet, Array]:
         """Fewer points, and forces (a,) that only push, between `forces` and the `target`."""
-        kept = target > 0
-        fewer, all_kept = places.only(kept), target[kept]
-        if self.depth is None and len(all_kept):
-            all_kept *= self.force / (self.under.slant[fewer.at] @ all_kept)
-        if len(all_kept) and self.energy(fewer, all_kept) < self.energy(places, forces):
-            return fewer, all_kept
+        active = target > 0
+        fewer, active_forces = places.only(active), target[active]
+        if self.depth is None and len(active_forces):
+            active_forces *= self.force / (self.under.slant[fewer.at] @ active_forces)
+        if len(active_forces) and self.energy(fewer, active_forces) < self.energy(places, forces):
+            return fewer, active_forces
         share = np.full(len(forces), np.inf)
-        share[~kept] = forces[~kept] / (forces[~kept] - target[~kept])
-        kept = share > (step := share.min())
-        return places.only(kept), (forces + step * (target - forces))[kept]
+        share[~active] = forces[~active] / (forces[~active] - target[~active])
+        active = share > (step := share.min())
+        return places.only(active), (forces + step * (target - forces))[active]
 
     def bearing(self, places: _ActiveSet, forces: Array, depth: float, step: int) -> ContactForces:
         """The solution if these are all the points in contact."""

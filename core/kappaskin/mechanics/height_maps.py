@@ -272,8 +272,8 @@ class Mesh:
 def _lowest(triangles: Array, nx: int, ny: int) -> Array:
     """The least z (ny, nx) of `triangles` (F, 3, 3) over whole x < nx and y < ny; else infinite."""
     heights = np.full((ny, nx), np.inf)
-    seen = np.abs(doubled_area(*np.moveaxis(triangles[..., :2], 1, 0))) > _EDGE_ON
-    triangles = triangles[seen]
+    visible = np.abs(doubled_area(*np.moveaxis(triangles[..., :2], 1, 0))) > _EDGE_ON
+    triangles = triangles[visible]
     first = np.maximum(np.ceil(triangles[..., :2].min(axis=1)), 0).astype(int)
     last = np.minimum(np.floor(triangles[..., :2].max(axis=1)), (nx - 1, ny - 1)).astype(int)
     across, up = np.maximum(last - first + 1, 0).T

@@ -111,8 +111,8 @@ class PlacedObject:
         (origin,), (up,) = patch.at_rest(self.place[None])
         space, normals = patch.at_rest(points)
         away = space - origin
-        beside = np.column_stack([away @ [up[2], 0.0, -up[0]], away[:, 1]])
-        return self.object_.height(_turned(beside, -self.turn)) - away @ up, normals @ up
+        across = np.column_stack([away @ [up[2], 0.0, -up[0]], away[:, 1]])
+        return self.object_.height(_turned(across, -self.turn)) - away @ up, normals @ up
 
     def meets(self, patch: Patch) -> bool:
         """Whether any of the default nodes of the skin, or a point of its keel, lies under it."""

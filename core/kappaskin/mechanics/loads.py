@@ -57,25 +57,34 @@ _t, _w = np.polynomial.legendre.leggauss(96)
 _LINE = (_t + 1) / 2, _w / 2  # Gauss points and weights on [0, 1]: exact for our functions
 
 
+class CentredLoad:
+    """A force in N about (x, y) in m."""
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]  # every kind is a dataclass
+    x: float
+    y: float
+    force: float
+
+    def centre(self) -> Array:
+        return np.array([self.x, self.y])
+
+    def shifted(self, dx: float, dy: float) -> Self:
+        return replace(self, x=self.x + dx, y=self.y + dy)
+
+    def scaled(self, factor: float) -> Self:
+        return replace(self, force=self.force * factor)
+
+
 @dataclass(frozen=True)
-class PointLoad:
+class PointLoad(CentredLoad):
     """A force in N at (x, y) in m."""
 
     x: float
     y: float
     force: float = 1.0
 
-    def centre(self) -> Array:
-        return np.array([self.x, self.y])
-
     def check(self, patch: Patch) -> None:
         check_on(self, patch, self.centre()[None])
-
-    def shifted(self, dx: float, dy: float) -> "PointLoad":
-        return replace(self, x=self.x + dx, y=self.y + dy)
-
-    def scaled(self, factor: float) -> "PointLoad":
-        return replace(self, force=self.force * factor)
 
     def modal(self, basis: Basis) -> Array:
         return self.force * basis.at(self.centre()[None]).reshape(basis.shape)
@@ -136,17 +145,12 @@ def is_point(load: Load) -> bool:
 _INSIDE = 1 - 1e-9  # of a load's size: one that touches an edge is on the patch, as computed
 
 
-class DistributedLoad(ABC):
+class DistributedLoad(CentredLoad, ABC):
     """A force in N distributed about (x, y) in m, symmetric about the two axes through it.
 
     By the symmetry, the mean of sin(k x) sin(l y) under the load is the product at its centre times
     the mean of cos(k x) cos(l y) about it: a multiplier per function (Eq. 9, extended).
     """
-
-    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]  # every kind is a dataclass
-    x: float
-    y: float
-    force: float
 
     @abstractmethod
     def _wave(self, k: Array, l: Array) -> Array:
@@ -163,17 +167,8 @@ class DistributedLoad(ABC):
         Exact to rounding for functions with up to `count` half waves across the load.
         """
 
-    def centre(self) -> Array:
-        return np.array([self.x, self.y])
-
     def check(self, patch: Patch) -> None:
         check_on(self, patch, self.centre() + _INSIDE * self._rim())
-
-    def shifted(self, dx: float, dy: float) -> Self:
-        return replace(self, x=self.x + dx, y=self.y + dy)
-
-    def scaled(self, factor: float) -> Self:
-        return replace(self, force=self.force * factor)
 
     def modal(self, basis: Basis) -> Array:
         if isinstance(basis, SineBasis):

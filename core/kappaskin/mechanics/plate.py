@@ -143,8 +143,8 @@ class Plate:
         volume = weights @ basis.at(points)
         swelling = float(volume @ Compliance(values).after(volume[None])[0])
         # A skin whose ends are pinned keeps the volume already: no pressure moves it.
-        kept = swelling <= 1e-12 * (volume @ volume) * np.abs(values).max()
-        return Compliance(values, None if kept else volume)
+        isochoric = swelling <= 1e-12 * (volume @ volume) * np.abs(values).max()
+        return Compliance(values, None if isochoric else volume)
 
     def _stiffness(self, basis: Basis) -> tuple[Array, Array]:
         """Stiffness matrix (N, N) in N/m, and the same without its negative terms, for scaling."""

@@ -3,7 +3,7 @@
 from kappaskin.pipeline.pipeline import Pipeline as Pipeline
 from kappaskin.pipeline.quantities import ErrorBars as ErrorBars
 from kappaskin.pipeline.quantities import Quantities as Quantities
-from kappaskin.pipeline.reconstruct import reconstruct as reconstruct
+from kappaskin.pipeline.reconstruction import reconstruct as reconstruct
 from kappaskin.pipeline.reported import ACROSS as ACROSS
 from kappaskin.pipeline.reported import ALONG as ALONG
 from kappaskin.pipeline.reported import COLUMN as COLUMN

@@ -180,7 +180,7 @@ class Pipeline:
         self.left_out = exclude(self.left_out, self.fit, kinds, badness, self._loosest)
 
     def _followed(self, frame: Frame, curvature: Array, held: Array) -> Fit:
-        if not self.fit.remembers:
+        if not self.fit.has_memory:
             return self.fit(held)
         times = np.full(curvature.size, np.nan)
         times[frame.channels] = frame.device_time + self._read_at[: len(frame.channels)]
@@ -277,7 +277,7 @@ class Pipeline:
 
     def pass_over(self, frame: Frame) -> None:
         """Take the readings of a frame without an estimate."""
-        if self.past.correct is None and not self.fit.remembers:
+        if self.past.correct is None and not self.fit.has_memory:
             # Readings that a later scan of every channel replaces need never be computed.
             if self.past.hold.is_whole(frame):
                 self.past.passed.clear()
@@ -286,7 +286,7 @@ class Pipeline:
         self._catch_up(frame)
         curvature = self.curvature(frame)
         held, _ = self.past.hold(frame, curvature)
-        if self.fit.remembers:
+        if self.fit.has_memory:
             with suppress(RankDeficient):
                 out = self.left_out
                 self._followed(frame, out(curvature), out(held))

@@ -8,16 +8,9 @@ from pathlib import Path
 from kappaskin._schema import Key, Part, Unit, Within
 from kappaskin._toml import json_table
 from kappaskin.bases import EDGES
-from kappaskin.calibration import (
-    Calibration,
-    Tare,
-    calibration_from_toml,
-    calibration_to_toml,
-    tare_from_toml,
-    tare_to_toml,
-)
+from kappaskin.calibration import Calibration, Tare, TareStore
 from kappaskin.errors import Refusal
-from kappaskin.estimation import METHODS, RIM_SD
+from kappaskin.estimation import METHODS, Estimator
 
 
 @dataclass(frozen=True)
@@ -40,7 +33,7 @@ class Setup:
     hold: float = 0.1
     calibration: Calibration | None = None
     tare: Tare | None = None
-    rim_sd: float = RIM_SD
+    rim_sd: float = Estimator.RIM_SD
 
 
 _COUNT = Within(1, 4096, whole=True)
@@ -105,7 +98,7 @@ _LONGEST = 2**16  # characters of a setup
 def setup_to_text(setup: Setup) -> tuple[str, dict[str, bytes]]:
     """The text, and by name the files that it names."""
     keys, files = {name: getattr(setup, name) for name in SETUP.keys}, dict[str, bytes]()
-    for name, to_toml in (("calibration", calibration_to_toml), ("tare", tare_to_toml)):
+    for name, to_toml in (("calibration", Calibration.to_toml), ("tare", TareStore.to_toml)):
         if (made := keys.pop(name)) is not None:
             keys[name] = f"{name}-{made.digest[:16]}.toml"
             files[keys[name]] = to_toml(made).encode()
@@ -128,8 +121,8 @@ def setup_from_text(text: str, file: Callable[[str], bytes]) -> Setup:
         raise Refusal(f"expected a setup as it was recorded: {refusal}") from refusal
     return replace(
         setup,
-        calibration=calibration_from_toml(file(calibration), Path(calibration))
+        calibration=Calibration.from_toml(file(calibration), Path(calibration))
         if calibration
         else None,
-        tare=tare_from_toml(file(tare), tare) if tare else None,
+        tare=TareStore.from_toml(file(tare), tare) if tare else None,
     )

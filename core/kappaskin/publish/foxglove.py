@@ -205,8 +205,8 @@ class FoxgloveClient:
                 ]
                 self._subscribe(pairs)
             elif request["op"] == "unsubscribe":
-                gone = set(request["subscriptionIds"])
-                self.subscribed = {c: n for c, n in self.subscribed.items() if n not in gone}
+                ended = set(request["subscriptionIds"])
+                self.subscribed = {c: n for c, n in self.subscribed.items() if n not in ended}
             else:
                 return False
         except (ValueError, KeyError, TypeError, RecursionError):
@@ -281,7 +281,7 @@ class Foxglove:
     def __init__(self, server: socket.socket) -> None:
         self._server = server
         self._clients: tuple[FoxgloveClient, ...] = ()  # replaced whole: two threads read it
-        self._gone = (0, 0)
+        self._disconnected = (0, 0)
         self._latest: EstimateMessage | None = None
         self._drawn: EstimateMessage | None = None
         self._cloud, self._next_cloud = Cloud(), 0.0
@@ -300,7 +300,7 @@ class Foxglove:
 
     @property
     def counts(self) -> tuple[int, int]:
-        sent, dropped = self._gone
+        sent, dropped = self._disconnected
         for client in self._clients:
             sent, dropped = sent + client.sent, dropped + client.dropped
         return sent, dropped
@@ -374,8 +374,8 @@ class Foxglove:
     def _drop(self, client: FoxgloveClient) -> None:
         self._selector.unregister(client.socket)
         client.close()
-        sent, dropped = self._gone
-        self._gone = sent + client.sent, dropped + client.dropped
+        sent, dropped = self._disconnected
+        self._disconnected = sent + client.sent, dropped + client.dropped
         self._clients = tuple(other for other in self._clients if other is not client)
 
     def _draw(self) -> None:

@@ -1,4 +1,4 @@
-"""Publishing: targets such as `udp://HOST:PORT`, opened in the background and sent to."""
+"""Publishing: targets such as `udp://HOST:PORT`."""
 
 import importlib
 import math

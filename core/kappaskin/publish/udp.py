@@ -1,4 +1,4 @@
-"""UDP transport: messages as datagrams of JSON, and a listener that prints them."""
+"""UDP transport: JSON datagrams, and their listener."""
 
 import errno
 import json

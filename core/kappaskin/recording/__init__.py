@@ -1,6 +1,5 @@
 """Recordings: MCAP files written, read, replayed, verified, repaired and exported."""
 
-from kappaskin.recording.cdr import decode as decode
 from kappaskin.recording.disk import ReservedFile as ReservedFile
 from kappaskin.recording.disk import is_written as is_written
 from kappaskin.recording.export.request import ExportRequest as ExportRequest
@@ -8,16 +7,13 @@ from kappaskin.recording.export.writing import Exported as Exported
 from kappaskin.recording.export.writing import ExportTask as ExportTask
 from kappaskin.recording.reading import Recording as Recording
 from kappaskin.recording.recompute import RecordingSummary as RecordingSummary
+from kappaskin.recording.recompute import Verification as Verification
 from kappaskin.recording.recompute import recorded_setups as recorded_setups
 from kappaskin.recording.recompute import summary_of as summary_of
 from kappaskin.recording.recorder import Recorder as Recorder
 from kappaskin.recording.repair import Repaired as Repaired
 from kappaskin.recording.repair import RepairTask as RepairTask
-from kappaskin.recording.repair import repair_steps as repair_steps
-from kappaskin.recording.replay import REPLAY as REPLAY
 from kappaskin.recording.replay import Replay as Replay
 from kappaskin.recording.replay import ReplayedSource as ReplayedSource
-from kappaskin.recording.verify import Verification as Verification
-from kappaskin.recording.verify import verify_steps as verify_steps
 from kappaskin.recording.writing import RecordingStatus as RecordingStatus
 from kappaskin.recording.writing import unused as unused

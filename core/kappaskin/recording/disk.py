@@ -1,4 +1,4 @@
-"""Files on a disk that may fill up: a write succeeds whole, or changes nothing."""
+"""Files on a disk that may fill up."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""Message types of a recording: those of ROS 2 where there are, else our own, with units."""
+"""Message types of a recording: those of ROS 2, and our own with units."""
 
 import struct
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""MCAP files to the messages in them: whole files, and unfinished ones up to where they break off.
+"""MCAP reader, for whole files and for unfinished ones up to where they break off.
 
 Every size is checked against what is there: no file takes more memory than a few times `LARGEST`.
 """
@@ -7,6 +7,7 @@ import struct
 import zlib
 from collections import Counter
 from collections.abc import Iterator
+from functools import cached_property
 from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
@@ -31,8 +32,20 @@ from mcap.records import (
 )
 
 from kappaskin.errors import Damaged, Refusal
+from kappaskin.frames import Event
+from kappaskin.recording.cdr import decode
 from kappaskin.recording.disk import is_there
-from kappaskin.recording.messages import TOPICS, Topic
+from kappaskin.recording.messages import (
+    DEVICE,
+    EVENTS,
+    LINES,
+    LOG,
+    SETUP,
+    STRING,
+    TOPICS,
+    Topic,
+    unpack_line,
+)
 from kappaskin.recording.writing import FORMAT
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -338,13 +351,39 @@ class Recording:
 
     # What is in it.
 
-    @property
+    @cached_property
     def first(self) -> int:
         return min((chunk.first for chunk in self.chunks), default=0)
 
-    @property
+    @cached_property
     def last(self) -> int:
         return max((chunk.last for chunk in self.chunks), default=0)
+
+    def seconds(self, stamp: int) -> float:
+        """The time of a `stamp`, in s since the recording began."""
+        return (stamp - self.first) * 1e-9
+
+    def devices(self) -> Iterator[tuple[float, str]]:
+        """The information texts of devices, each with its time in s since the recording began."""
+        return self._texts(DEVICE)
+
+    def setups(self) -> Iterator[tuple[float, str]]:
+        """The setups as text, each with its time in s since the recording began."""
+        return self._texts(SETUP)
+
+    def _texts(self, topic: Topic) -> Iterator[tuple[float, str]]:
+        for message in self.messages_on(topic):
+            yield self.seconds(message.stamp), decode(STRING, message.data)["data"]
+
+    def events(self) -> Iterator[Event]:
+        """The events, their times in s since the recording began."""
+        for message in self.messages_on(EVENTS):
+            yield event_of(message, self.seconds(message.stamp))
+
+    def lines(self) -> Iterator[tuple[float, bool, bytes]]:
+        """Host time in s of bytes on the line, whether they were sent to the device, and those."""
+        for message in self.messages_on(LINES):
+            yield unpack_line(message.data)
 
     def messages(self, chunk: int = 0) -> Iterator[RecordedMessage]:
         """The messages from the chunk of that number on, in the order in which they were written.
@@ -428,6 +467,12 @@ class Recording:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def event_of(message: RecordedMessage, time: float) -> Event:
+    """The event that a message is, at a `time` in s."""
+    fields = decode(LOG, message.data)
+    return Event(time, fields["name"], fields["msg"])
 
 
 def _format(metadata: dict[str, str]) -> int:

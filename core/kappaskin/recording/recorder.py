@@ -129,7 +129,7 @@ class Recorder:
         self._file.put(m.SETUP, self._now, encode(m.STRING, {"data": text}))
         self._views = _Views(pipeline)
 
-    def remembered(self, memory: StateArrays) -> None:
+    def add_memory(self, memory: StateArrays) -> None:
         """The pipeline goes on from this."""
         for name, values in memory.items():
             fields = {"name": name, "shape": values.shape, "values": values.ravel()}
@@ -140,7 +140,7 @@ class Recorder:
         fields = {"kinds": kinds, "badness": badness}
         self._file.put(m.LEFT_OUTS, self._now, encode(m.LEFT_OUT, fields))
 
-    def happened(self, event: Event) -> None:
+    def add_event(self, event: Event) -> None:
         stamp = self._file.stamp(event.time)
         fields = {
             "stamp.sec": stamp // 10**9,
@@ -215,7 +215,7 @@ class _Views:
         self._cloud = MessageLayout(m.POINT_CLOUD, cloud)
         self._cloud_size = {"height": 1, "width": P, "point_step": step, "row_step": P * step}
         fit = pipeline.fit
-        self.every = isinstance(fit, Stateful) and not fit.remembers
+        self.every = isinstance(fit, Stateful) and not fit.has_memory
         """Whether estimates depend on which others were made, and so all have to be recorded."""
         bytes_each = 4 * C + 4 * C + 8 * 3 * P + 8 * math.prod(N) + P * step
         self.affordable = _RateLimit(min(_HEAVY, _BYTES / bytes_each))

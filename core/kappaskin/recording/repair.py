@@ -1,4 +1,4 @@
-"""A damaged MCAP file, whoever wrote it, to a whole one with all that can be trusted of it."""
+"""Repair of damaged MCAP files."""
 
 import mmap
 import struct
@@ -66,24 +66,24 @@ class Repaired:
             return f"no message could be saved; {lost}"
         return f"{self.total:,} messages and {self.attachments} attachments; {lost}"
 
+    @staticmethod
+    def steps(path: Path, out: Path) -> "Generator[float | Repaired]":
+        """Save every whole message of `path` to `out`, with summary and index.
 
-def repair_steps(path: Path, out: Path) -> Generator[float | Repaired]:
-    """Save every whole message of `path` to `out`, with summary and index.
-
-    Now and then the share that is done, and what was saved at the end. Nothing is written where
-    nothing is saved. A `Refusal` where `path` cannot be read or is no MCAP file, or `out` cannot be
-    written.
-    """
-    check_new(out)
-    check_file(path)
-    try:
-        with path.open("rb") as file:
-            if not path.stat().st_size:
-                raise Refusal(f"{path}: is empty")
-            with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-                yield (yield from _Repair(path, data, out).run())
-    except OSError as error:
-        raise Refusal(f"{path}: cannot be read ({error.strerror or error})") from error
+        Yields the share that is done now and then, and what was saved at the end. Nothing is
+        written where nothing is saved. A `Refusal` where `path` cannot be read or is no MCAP file,
+        or `out` cannot be written.
+        """
+        check_new(out)
+        check_file(path)
+        try:
+            with path.open("rb") as file:
+                if not path.stat().st_size:
+                    raise Refusal(f"{path}: is empty")
+                with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+                    yield (yield from _Repair(path, data, out).run())
+        except OSError as error:
+            raise Refusal(f"{path}: cannot be read ({error.strerror or error})") from error
 
 
 def check_new(out: Path) -> None:
@@ -289,7 +289,7 @@ class RepairTask:
         check_new(out)
         self._part = part_of(out)
         self._task = BackgroundProcess[float | Repaired](
-            "kappaskin-repair", repair_steps, path, out
+            "kappaskin-repair", Repaired.steps, path, out
         )
 
     @property

@@ -12,13 +12,11 @@ from typing import NamedTuple
 from kappaskin.errors import Refusal
 from kappaskin.frames import Event, Frame
 from kappaskin.recording import messages as m
-from kappaskin.recording.cdr import decode
-from kappaskin.recording.reading import RecordedMessage, Recording
+from kappaskin.recording.reading import RecordedMessage, Recording, event_of
 from kappaskin.recording.recompute import RecordedFrames
 from kappaskin.sensing import Sensor
 from kappaskin.sources import Accounting, InputRecorder, register_scheme
 
-REPLAY = "replay:"
 FASTEST = 10.0
 """How many times as fast as it was a recording is played at most."""
 
@@ -64,6 +62,9 @@ class ReplayedSource:
     Opening raises a `Refusal` where it is none.
     """
 
+    SCHEME = "replay:"
+    """Begins the names of such sources."""
+
     def __init__(
         self,
         path: Path,
@@ -85,8 +86,8 @@ class ReplayedSource:
                 f"{recording.path}: expected bytes of a device, got a recording without any"
             )
         self._first = recording.first
-        self.length = (recording.last - recording.first) * 1e-9
-        self._gaps, self._happened = self._landmarks()
+        self.length = recording.seconds(recording.last)
+        self._gaps, self._all_events = self._landmarks()
         self._speed, self._looped = 1.0, False
         self._sensor: Sensor | None = None
         self._made: dict[str, Sensor] = {}
@@ -99,31 +100,23 @@ class ReplayedSource:
     def _landmarks(self) -> tuple[tuple[tuple[float, float], ...], tuple[Event, ...]]:
         gaps: list[tuple[float, float]] = []
         for a, b in pairwise(self._recording.chunks):
-            begin, end = self._place(a.last), self._place(b.first)
+            begin, end = self._recording.seconds(a.last), self._recording.seconds(b.first)
             if end - begin > _GAP:
                 # An answer about the device's clock alone is no end of a gap.
                 brief = gaps and begin - gaps[-1][1] < _BRIEF
                 gaps.append((gaps.pop()[0] if brief else begin, end))
         events: list[Event] = []
         with suppress(Refusal):  # damage is told of where it is played
-            for message in islice(self._recording.messages_on(m.EVENTS), _MOST_LISTED):
-                events.append(self._event(message, self._place(message.stamp)))
+            for event in islice(self._recording.events(), _MOST_LISTED):
+                events.append(_brief(event))
         return tuple(gaps[:_MOST_LISTED]), tuple(events)
-
-    def _event(self, message: RecordedMessage, when: float) -> Event:
-        fields = decode(m.LOG, message.data)
-        return Event(when, fields["name"][:_LONGEST], fields["msg"][:_LONGEST])
-
-    def _place(self, stamp: int) -> float:
-        """Where a stamp is, in s from the beginning."""
-        return (stamp - self._first) * 1e-9
 
     # Where it is played.
 
     @property
     def replay(self) -> Replay:
         where = min(max(self._at(), 0.0), self.length)
-        rest = self._speed, self._looped, self._gaps, self._happened
+        rest = self._speed, self._looped, self._gaps, self._all_events
         return Replay(where, self.length, *rest, self._first * 1e-9, self._recording.whole)
 
     def _at(self) -> float:
@@ -167,14 +160,14 @@ class ReplayedSource:
 
         Those that were asked for the same way before, and were not given yet, are added.
         """
-        ahead, back = (self._steps, self._back) if self._moves and self._steps else (0, 0)
+        forward, back = (self._steps, self._back) if self._moves and self._steps else (0, 0)
         self.seek(None, 0.0)
         if self._ready and self._ready[0] is self._last:  # asked for again, and not given yet
             self._ready.popleft()
         self._back = back - frames if frames < 0 else 0
         if self._back:
             self._go_back(self._back)
-        self._steps, self._moves = 1 if self._back else ahead + max(frames, 1), True
+        self._steps, self._moves = 1 if self._back else forward + max(frames, 1), True
 
     @property
     def stands(self) -> bool:
@@ -192,11 +185,11 @@ class ReplayedSource:
         here, back = self._last.mark if self._last else (self._first, 0), _BACK
         marks, start = deque[tuple[int, int]](), 1.0
         while len(marks) < frames and start > 0:
-            start, back = max(self._place(here[0]) - back, 0.0), 4 * back
+            start, back = max(self._recording.seconds(here[0]) - back, 0.0), 4 * back
             self._go_to(start)
             marks = deque((ready.mark for ready in self._until(here)), frames)
         if marks:
-            self._go_to(self._place(marks[0][0]))
+            self._go_to(self._recording.seconds(marks[0][0]))
             deque(self._until(marks[0]), 0)
         self._events.clear()
 
@@ -216,15 +209,15 @@ class ReplayedSource:
     def _fill(self, until: float = float("inf")) -> bool:
         """Make a frame ready that is due at `until` s; whether there is one."""
         while not self._ready and self._next is not None:
-            if self._place(self._next.stamp) > until:
+            if self._recording.seconds(self._next.stamp) > until:
                 break
             self._add_event(self._next)
             self._take(self._next)
-        return bool(self._ready) and self._place(self._ready[0].mark[0]) <= until
+        return bool(self._ready) and self._recording.seconds(self._ready[0].mark[0]) <= until
 
     def _add_event(self, message: RecordedMessage) -> None:
         if message.topic == m.EVENTS.name:
-            self._events.append(self._event(message, self._clock()))
+            self._events.append(_brief(event_of(message, self._clock())))
 
     def read(self, timeout: float) -> list[Frame]:
         """The frames that are due, after at most `timeout` s."""
@@ -240,7 +233,7 @@ class ReplayedSource:
         """s until the next message is due."""
         if self._next is None or not self._speed:
             return _NAP
-        return max(self._place(self._next.stamp) - self._at(), 0.0) / self._speed
+        return max(self._recording.seconds(self._next.stamp) - self._at(), 0.0) / self._speed
 
     def _over(self) -> bool:
         return self._looped and self._speed > 0 and self._at() >= self.length
@@ -257,7 +250,7 @@ class ReplayedSource:
             over = self._next is None and not self._ready
             self._steps = 0 if over else self._steps - len(frames)
             if self._moves:
-                self._from, self._since = self._place(self._last.mark[0]), self._clock()
+                self._from, self._since = self._recording.seconds(self._last.mark[0]), self._clock()
         return frames
 
     def _give(self, ready: _Ready) -> Frame:
@@ -266,7 +259,7 @@ class ReplayedSource:
         self._last = ready
         came = self._clock()
         if self._speed:
-            came = self._since + (self._place(ready.mark[0]) - self._from) / self._speed
+            came = self._since + (self._recording.seconds(ready.mark[0]) - self._from) / self._speed
         return replace(frame, host_time=came, taken=came - (frame.host_time - frame.taken))
 
     @property
@@ -297,4 +290,8 @@ class ReplayedSource:
         self._recording.close()
 
 
-register_scheme(REPLAY, lambda name: ReplayedSource(Path(name)))
+def _brief(event: Event) -> Event:
+    return Event(event.time, event.kind[:_LONGEST], event.text[:_LONGEST])
+
+
+register_scheme(ReplayedSource.SCHEME, lambda name: ReplayedSource(Path(name)))

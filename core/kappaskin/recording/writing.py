@@ -1,4 +1,4 @@
-"""MCAP writer in a thread of its own: nothing live waits for the disk."""
+"""MCAP writer in a thread of its own."""
 
 import itertools
 import threading
@@ -93,9 +93,9 @@ class RecordingFile:
             if kind.name not in schemas:
                 schema = self._writer.register_schema(kind.name, "ros2msg", kind.definition)
                 schemas[kind.name] = schema
-            said = {"offered_qos_profiles": ""}
+            channel_metadata = {"offered_qos_profiles": ""}
             self._channels[name] = self._writer.register_channel(
-                name, "cdr", schemas[kind.name], said
+                name, "cdr", schemas[kind.name], channel_metadata
             )
         self._writer.add_metadata("kappaskin", {"format": str(FORMAT), "version": version})
 

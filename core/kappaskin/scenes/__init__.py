@@ -1,9 +1,9 @@
 """Scenes: a skin, what touches it, and which effects its readings call for; scene to frames."""
 
-from kappaskin.scenes.plan import Plan as Plan
-from kappaskin.scenes.plan import kept_effects as kept_effects
-from kappaskin.scenes.plan import plan as plan
-from kappaskin.scenes.plan import planned as planned
+from kappaskin.scenes.effect_plan import Plan as Plan
+from kappaskin.scenes.effect_plan import kept_effects as kept_effects
+from kappaskin.scenes.effect_plan import plan as plan
+from kappaskin.scenes.effect_plan import planned as planned
 from kappaskin.scenes.read import SCENES as SCENES
 from kappaskin.scenes.read import TABLE_1_NOISE as TABLE_1_NOISE
 from kappaskin.scenes.read import check_elements as check_elements

@@ -16,6 +16,7 @@ from kappaskin.bases import basis_for
 from kappaskin.errors import Refusal
 from kappaskin.mechanics import HeightMap, Load, Mesh, Plate, RigidObject
 from kappaskin.scenes.cylinders import Presentation, schedule
+from kappaskin.scenes.effect_plan import effects_of
 from kappaskin.scenes.effects import (
     EFFECTS,
     FIRST_GENERATION_LOOPS,
@@ -25,7 +26,6 @@ from kappaskin.scenes.effects import (
     StrainLimit,
     StuckElements,
 )
-from kappaskin.scenes.plan import effects_of
 from kappaskin.scenes.scene import LINEAR, EffectSelection, Scene, scaled_to
 from kappaskin.scenes.schema import (
     CYLINDERS,

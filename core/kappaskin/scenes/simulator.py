@@ -9,6 +9,7 @@ import numpy as np
 
 from kappaskin.frames import Array, Frame, Truth
 from kappaskin.mechanics import Load
+from kappaskin.scenes.effect_plan import effects_of, kept_effects
 from kappaskin.scenes.effects import (
     CorruptedFrames,
     DroppedFrames,
@@ -20,7 +21,6 @@ from kappaskin.scenes.effects import (
     SkinEffect,
     Temperature,
 )
-from kappaskin.scenes.plan import effects_of, kept_effects
 from kappaskin.scenes.scene import AppliedLoads, LoadingHistory, Playback, Scene
 from kappaskin.sensing import Scan
 

@@ -14,8 +14,8 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics import Load, RigidObject
 from kappaskin.scenes.cylinders import RADII, Presentation, schedule
+from kappaskin.scenes.effect_plan import effects_of
 from kappaskin.scenes.effects import EFFECTS, Effect, StrainLimit
-from kappaskin.scenes.plan import effects_of
 from kappaskin.scenes.read import CHAINS, LOOPS, read_scene, usual_reference
 from kappaskin.scenes.scene import Scene
 from kappaskin.scenes.schema import (

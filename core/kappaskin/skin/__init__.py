@@ -1,10 +1,10 @@
 """The skin: its own coordinates, its outline, and surfaces on it."""
 
-from kappaskin.skin.outline import Outline as Outline
-from kappaskin.skin.outline import doubled_area as doubled_area
 from kappaskin.skin.patch import Disk as Disk
+from kappaskin.skin.patch import Outline as Outline
 from kappaskin.skin.patch import Patch as Patch
 from kappaskin.skin.patch import Polygon as Polygon
+from kappaskin.skin.patch import doubled_area as doubled_area
 from kappaskin.skin.surface import Distances as Distances
 from kappaskin.skin.surface import distances as distances
 from kappaskin.skin.surface import interpolated as interpolated

@@ -24,10 +24,10 @@ def snapped_to_rim(patch: Patch, grid: Array, on: Mask) -> tuple[Array, Indices]
     least = np.full(on.shape, np.inf)
     for dy, dx in ((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j):
         q, p = np.nonzero(~on)
-        beside = (q + dy >= 0) & (q + dy < ny) & (p + dx >= 0) & (p + dx < nx)
-        q, p = q[beside], p[beside]
-        beside = on[q + dy, p + dx]
-        q, p = q[beside], p[beside]
+        neighbour = (q + dy >= 0) & (q + dy < ny) & (p + dx >= 0) & (p + dx < nx)
+        q, p = q[neighbour], p[neighbour]
+        neighbour = on[q + dy, p + dx]
+        q, p = q[neighbour], p[neighbour]
         inside, outside = grid[q + dy, p + dx], grid[q, p]
         for _ in range(_HALVINGS):
             middle = (inside + outside) / 2

@@ -164,7 +164,7 @@ class ClockMap:
             self._start_over()
         self._unanswered = 0
         self._latest = max(self._latest, answered) if not first else answered
-        self._keep(answered, low, high)
+        self._add_exchange(answered, low, high)
         self._fit()
 
     def _contradicted(self, device_time: float, host_time: float) -> None:
@@ -184,17 +184,17 @@ class ClockMap:
         self._latest = -math.inf
         self._forget()
 
-    def _keep(self, time: float, low: float, high: float) -> None:
+    def _add_exchange(self, time: float, low: float, high: float) -> None:
         """Keep an exchange among those of the window, the quickest in each bucket."""
-        kept = self._exchanges
+        exchanges = self._exchanges
         # Not the first, or a drift would be known no sooner than a bucket is over.
-        if len(kept) > 1 and time - kept[-1][0] < _BUCKET:
-            if high - low > kept[-1][2] - kept[-1][1]:
+        if len(exchanges) > 1 and time - exchanges[-1][0] < _BUCKET:
+            if high - low > exchanges[-1][2] - exchanges[-1][1]:
                 return
-            kept.pop()
-        kept.append((time, low, high))
-        while kept[0][0] < time - _WINDOW:
-            kept.popleft()
+            exchanges.pop()
+        exchanges.append((time, low, high))
+        while exchanges[0][0] < time - _WINDOW:
+            exchanges.popleft()
 
     def _take_in(self) -> None:
         """Take in the quickest message since the last time."""

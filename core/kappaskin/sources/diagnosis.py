@@ -1,4 +1,4 @@
-"""Diagnosis of a port: what is on it and how well it works, and a monitor of its messages."""
+"""Diagnosis of a port, and a monitor of its messages."""
 
 import math
 import time
@@ -14,7 +14,7 @@ from kappaskin.sources import information
 from kappaskin.sources.clock import ClockMap
 from kappaskin.sources.commands import DeviceCommands, operation_name
 from kappaskin.sources.decoder import SEQUENCES, Accounting, Decoder
-from kappaskin.sources.ports import BaudRateSearch, SerialConnection, port_called
+from kappaskin.sources.ports import BaudRateSearch, Port, SerialConnection
 from kappaskin.sources.serial_source import SerialSource
 from kappaskin.sources.wire import VERSION, Command, FromDevice, Information, Reply, Samples
 
@@ -50,6 +50,19 @@ class Diagnosis:
     accounting: Accounting = field(default_factory=Accounting)
     events: tuple[Event, ...] = ()
 
+    @staticmethod
+    def of(url: str, clock: Callable[[], float] = time.monotonic) -> "Diagnosis":
+        """The diagnosis of the port or URL, after reading it for a few seconds."""
+        plug = Port.named(url).words
+        try:
+            source = SerialSource(url, clock)
+        except SourceError as error:
+            return Diagnosis(url, plug, str(error))
+        try:
+            return _diagnosed(source, plug, clock)
+        finally:
+            source.close()
+
     def to_json(self) -> dict[str, Any]:
         """Everything as JSON values; null for what is not known."""
         found = asdict(self) | {"well": not self.why}
@@ -57,19 +70,6 @@ class Diagnosis:
             key: None if isinstance(value, float) and not math.isfinite(value) else value
             for key, value in found.items()
         }
-
-
-def diagnose(url: str, clock: Callable[[], float] = time.monotonic) -> Diagnosis:
-    """What is on the port or URL, after reading it for a few seconds."""
-    plug = port_called(url).words
-    try:
-        source = SerialSource(url, clock)
-    except SourceError as error:
-        return Diagnosis(url, plug, str(error))
-    try:
-        return _diagnosed(source, plug, clock)
-    finally:
-        source.close()
 
 
 def _diagnosed(source: SerialSource, plug: str, clock: Callable[[], float]) -> Diagnosis:
@@ -100,9 +100,9 @@ def _diagnosed(source: SerialSource, plug: str, clock: Callable[[], float]) -> D
 
 def _settled(source: SerialSource) -> bool:
     """Whether the trouble is one that no other baud rate can solve."""
-    seen = source.accounting()
-    understood = seen.good > 0 or seen.other_version is not None
-    return bool(source.trouble) and (understood or not seen.bytes_in)
+    counts = source.accounting()
+    understood = counts.good > 0 or counts.other_version is not None
+    return bool(source.trouble) and (understood or not counts.bytes_in)
 
 
 def _frame_rate(frames: list[Frame]) -> tuple[float, float]:
@@ -224,13 +224,13 @@ class WireMonitor:
 
     def summary(self) -> str:
         """Totals in one line: messages, bytes, and the rate."""
-        seen, lasted = self.accounting(), max(self._clock() - self._began, 1e-9)
-        reasons = ", ".join(f"{count} {reason}" for reason, count in seen.discarded) or "none"
+        counts, lasted = self.accounting(), max(self._clock() - self._began, 1e-9)
+        reasons = ", ".join(f"{count} {reason}" for reason, count in counts.discarded) or "none"
         return (
-            f"{lasted:.1f} s at {self._connection.baud_rate} baud: {seen.bytes_in} bytes in, "
-            f"{seen.bytes_good} good, {seen.buffered} waiting, discarded: {reasons}; "
-            f"{seen.accepted} messages accepted, {seen.lost} lost, {seen.duplicate} twice, "
-            f"{seen.restarts} restarts; {self._samples / lasted:.1f} scans/s"
+            f"{lasted:.1f} s at {self._connection.baud_rate} baud: {counts.bytes_in} bytes in, "
+            f"{counts.bytes_good} good, {counts.buffered} waiting, discarded: {reasons}; "
+            f"{counts.accepted} messages accepted, {counts.lost} lost, {counts.duplicate} twice, "
+            f"{counts.restarts} restarts; {self._samples / lasted:.1f} scans/s"
         )
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Device information: the schema of a sensor's description, which is JSON on the wire, and back."""
+"""Device information: a sensor's description, its schema, and its JSON on the wire."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Serial ports: which there are, opening one, its baud rates, and a thread that reads it."""
+"""Serial ports: discovery, connection, baud rates and reader thread."""
 
 import errno
 import os
@@ -64,25 +64,31 @@ class Port:
             return (self.usb, self.serial_number) == (other.usb, other.serial_number)
         return self.port == other.port
 
+    @property
+    def permission_help(self) -> str:
+        """How to get the permission to open it."""
+        group = _group(self.port)
+        return f"Join the port's group with `sudo usermod -aG {group} $USER`, then log in again"
 
-def serial_ports() -> list[Port]:
-    """The ports found, in the order of their names."""
-    return [
-        Port(
-            found.device,
-            "" if found.description == "n/a" else found.description or "",
-            found.manufacturer or "",
-            found.serial_number or "",
-            None if found.vid is None or found.pid is None else (found.vid, found.pid),
-            sys.platform == "win32" or os.access(found.device, os.R_OK | os.W_OK),
-        )
-        for found in sorted(list_ports.comports())
-    ]
+    @staticmethod
+    def found() -> "list[Port]":
+        """The ports of this machine, in the order of their names."""
+        return [
+            Port(
+                found.device,
+                "" if found.description == "n/a" else found.description or "",
+                found.manufacturer or "",
+                found.serial_number or "",
+                None if found.vid is None or found.pid is None else (found.vid, found.pid),
+                sys.platform == "win32" or os.access(found.device, os.R_OK | os.W_OK),
+            )
+            for found in sorted(list_ports.comports())
+        ]
 
-
-def port_called(url: str) -> Port:
-    """The port with this name, with its name alone if it is not among those found."""
-    return next((port for port in serial_ports() if port.port == url), Port(url))
+    @staticmethod
+    def named(url: str) -> "Port":
+        """The port with this name, with its name alone if it is not among those found."""
+        return next((port for port in Port.found() if port.port == url), Port(url))
 
 
 def open_port(url: str) -> serial.SerialBase:
@@ -97,11 +103,11 @@ def open_port(url: str) -> serial.SerialBase:
         )
     except (serial.SerialException, OSError, ValueError, LookupError, re.error) as error:
         raise SourceError(_why_not(url, error)) from error
-    _keep_lines(port)
+    _preserve_lines(port)
     return port
 
 
-def _keep_lines(port: serial.SerialBase) -> None:
+def _preserve_lines(port: serial.SerialBase) -> None:
     """Ask the system not to drop DTR when the port is closed."""
     if sys.platform == "win32" or not isinstance(port, serial.Serial):
         return
@@ -116,7 +122,7 @@ def _keep_lines(port: serial.SerialBase) -> None:
 def _why_not(url: str, error: Exception) -> str:
     code = getattr(error, "errno", None)
     if code in (errno.EACCES, errno.EPERM):
-        return f"{url}: no permission to open it. {permission_line(url)}"
+        return f"{url}: no permission to open it. {Port(url).permission_help}"
     if code in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in str(error):
         return f"{url}: busy, {_holders_text(url)} has it open; close that program"
     if code in (errno.ENOENT, errno.ENXIO, errno.ENODEV, errno.EIO):
@@ -130,11 +136,6 @@ def _why_not(url: str, error: Exception) -> str:
         f"{url}: cannot be opened ({error}); expected a port such as /dev/ttyACM0 or COM3, or a "
         "URL such as socket://host:port"
     )
-
-
-def permission_line(url: str) -> str:
-    """How to get the permission to open a port."""
-    return f"Join the port's group with `sudo usermod -aG {_group(url)} $USER`, then log in again"
 
 
 def _group(url: str) -> str:

@@ -11,14 +11,12 @@ from kappaskin.frames import Event, Frame
 from kappaskin.sensing import Sensor
 from kappaskin.sources.clock import ClockMap, ClockState
 from kappaskin.sources.commands import DeviceCommands, ScanControl
-from kappaskin.sources.decoder import Accounting, Decoder, SequenceCounter
-from kappaskin.sources.interpreter import Interpreter
+from kappaskin.sources.decoder import Accounting, Decoder, Interpreter, SequenceCounter
 from kappaskin.sources.ports import (
     BaudRateSearch,
+    Port,
     SerialConnection,
     holders,
-    port_called,
-    serial_ports,
 )
 from kappaskin.sources.source import InputRecorder, register_scheme
 from kappaskin.sources.wire import (
@@ -50,7 +48,7 @@ class SerialSource:
 
     def __init__(self, url: str, clock: Callable[[], float] = time.monotonic) -> None:
         self.url, self._clock = url, clock
-        self._plug = port_called(url)
+        self._plug = Port.named(url)
         self._decoder = Decoder()
         self._interpreter = Interpreter(url)
         self._events = _EventLog(self._decoder.sequence, clock)
@@ -120,7 +118,7 @@ class SerialSource:
 
     def _present_url(self) -> str:
         known = self._plug.serial_number
-        here = (port.port for port in serial_ports() if port.same_plug(self._plug)) if known else ()
+        here = (port.port for port in Port.found() if port.same_plug(self._plug)) if known else ()
         return next(iter(here), self.url)
 
     def reset(self) -> None:
@@ -181,11 +179,11 @@ class SerialSource:
     def _drop_beyond(self, most: int) -> None:
         """Keep the newest messages, of `most` counts together."""
         counts = 0
-        for kept, (_, message) in enumerate(reversed(self._pending)):
+        for newer, (_, message) in enumerate(reversed(self._pending)):
             counts += _MESSAGE_OVERHEAD
             counts += len(message.counts) if isinstance(message, Samples) else 0
             if counts > most:
-                self._drop(len(self._pending) - kept)
+                self._drop(len(self._pending) - newer)
                 return
 
     def _drop(self, count: int) -> None:
@@ -211,10 +209,10 @@ class SerialSource:
         same = before is not None and before.serial_number == now.serial_number
         sequence = self._decoder.sequence
         lost_before = sequence.lost
-        sequence.resume(same and self._kept_running())
+        sequence.resume(same and self._ran_on())
         self._events.reconnected(now, away, same, sequence.lost - lost_before)
 
-    def _kept_running(self) -> bool:
+    def _ran_on(self) -> bool:
         """Whether the device's clock went on while there was no connection.
 
         One that shows more than had passed here as the port was opened went on too: this machine
@@ -309,15 +307,15 @@ class SerialSource:
         return self._why_none(now)
 
     def _why_none(self, now: float) -> str:
-        seen, known = self._decoder.accounting(), self._interpreter.known
+        counts, known = self._decoder.accounting(), self._interpreter.known
         if self._commands.refusal and not known:
             return f"{self.url}: {self._commands.refusal}"
-        if seen.other_version is not None and not known:
+        if counts.other_version is not None and not known:
             return (
-                f"{self.url}: the device speaks wire version {seen.other_version}, this program "
+                f"{self.url}: the device speaks wire version {counts.other_version}, this program "
                 f"speaks {VERSION}; update the older of the two"
             )
-        arrived = seen.bytes_in - self._bytes_before
+        arrived = counts.bytes_in - self._bytes_before
         if not arrived or (known and now - self._received_at >= _PATIENCE):
             return (
                 f"{self.url}: silent for more than {_PATIENCE:g} s; is the device on, and is this "

@@ -17,7 +17,7 @@ from kappaskin.sources.clock import ClockState
 from kappaskin.sources.commands import in_few_runs
 from kappaskin.sources.decoder import Accounting
 from kappaskin.sources.information import sensor_from_json, sensor_to_json
-from kappaskin.sources.source import SIMULATION, InputRecorder, register_scheme
+from kappaskin.sources.source import InputRecorder, register_scheme
 from kappaskin.sources.wire import MOST_RUNS, encode_scan, pack_runs
 
 _BACKLOG = 0.25  # s behind its own clock after which frames are skipped, and counted as lost
@@ -31,6 +31,9 @@ class SimulatedSource:
     Another skin, other elements or electronics are another device on the same line: `sensor` is
     then another one.
     """
+
+    SCHEME = "sim:"
+    """Begins the names of such sources."""
 
     def __init__(
         self,
@@ -191,4 +194,4 @@ class SimulatedSource:
         """Nothing is held open."""
 
 
-register_scheme(SIMULATION, lambda name: SimulatedSource(load_scene(name)))
+register_scheme(SimulatedSource.SCHEME, lambda name: SimulatedSource(load_scene(name)))

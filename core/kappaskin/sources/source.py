@@ -1,4 +1,4 @@
-"""Sources of frames: what every source offers, who records it, and how one is opened by name."""
+"""Interface of sources, their recorders, and opening by name."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -8,8 +8,6 @@ from kappaskin.frames import Event, Frame
 from kappaskin.sensing import Sensor
 from kappaskin.sources.clock import ClockState
 from kappaskin.sources.decoder import Accounting
-
-SIMULATION = "sim:"
 
 
 class InputRecorder(Protocol):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from kappaskin.errors import Refusal
-from kappaskin.estimation import Region, scan_tradeoff
+from kappaskin.estimation import Region, ScanTradeoff
 from kappaskin.frames import Array, Estimate
 from kappaskin.live import track_region
 from kappaskin.mechanics import PointLoad
@@ -128,7 +128,7 @@ def measured(
     newest = _rms([error(a.estimate, (a.ended + b.ended) / 2) for a, b in pairwise(answers)])
     (load,) = scene.loads_at(0.0)
     x, y = (float(along) for along in load.centre())
-    bounds = scan_tradeoff(scene.sensor(), region, PointLoad(x, y, load.force), TABLE_1_NOISE)
+    bounds = ScanTradeoff.of(scene.sensor(), region, PointLoad(x, y, load.force), TABLE_1_NOISE)
     return {
         "speed_mm_s": 1e3 * 2 * math.pi * 0.022 / period,
         "method": method,

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kappaskin.bases.cache import cached
+from kappaskin.bases.argyris import cached
 
 
 @pytest.fixture(autouse=True)

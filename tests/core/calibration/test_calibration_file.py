@@ -12,8 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Calibration, Patch, Refusal, SensorLayout, load_calibration, load_scene
-from kappaskin.calibration import calibration_to_toml, save_calibration
-from kappaskin.calibration.calibration import fingerprint, read_calibration
+from kappaskin.calibration.calibration import fingerprint
 from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, Creep
 
 SENSOR = replace(
@@ -41,7 +40,7 @@ CALIBRATION = Calibration(
 
 @pytest.fixture
 def path(tmp_path) -> Path:
-    save_calibration(CALIBRATION, tmp_path / "skin.toml")
+    CALIBRATION.save(tmp_path / "skin.toml")
     return tmp_path / "skin.toml"
 
 
@@ -85,7 +84,7 @@ def test_what_was_written_comes_back_to_the_last_digit(path):
 
 def test_a_calibration_of_lines_alone_comes_back(tmp_path):
     alone = replace(CALIBRATION, hysteresis=None, creep=None)
-    save_calibration(alone, tmp_path / "a.toml")
+    alone.save(tmp_path / "a.toml")
     assert load_calibration(tmp_path / "a.toml", SENSOR, LATER) == alone
     assert "[hysteresis]" not in (tmp_path / "a.toml").read_text()
 
@@ -94,7 +93,7 @@ def test_a_calibration_of_lines_alone_comes_back(tmp_path):
 def test_any_name_and_any_time_zone_come_back(name, hours):
     date = DATE.astimezone(timezone(timedelta(hours=hours)))
     named = replace(CALIBRATION, name=name, serial_number=name, date=date)
-    said = tomllib.loads(calibration_to_toml(named))
+    said = tomllib.loads(named.to_toml())
     assert said["device"]["name"] == said["device"]["serial_number"] == name
     assert said["device"]["date"] == date
 
@@ -120,17 +119,17 @@ def test_a_file_is_replaced_whole_or_not_at_all(path, monkeypatch):
 
     monkeypatch.setattr("os.fsync", full)
     with pytest.raises(Refusal, match=r"cannot be written .*No space left.*another place"):
-        save_calibration(replace(CALIBRATION, name="other"), path)
+        replace(CALIBRATION, name="other").save(path)
     monkeypatch.setattr("os.fsync", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
-        save_calibration(replace(CALIBRATION, name="other"), path)
+        replace(CALIBRATION, name="other").save(path)
     assert path.read_bytes() == before
     assert list(path.parent.iterdir()) == [path]
 
 
 def test_a_name_that_no_file_can_hold_is_refused(tmp_path):
     with pytest.raises(Refusal, match=r"cannot be written .*surrogates"):
-        save_calibration(replace(CALIBRATION, name="\ud800"), tmp_path / "a.toml")
+        replace(CALIBRATION, name="\ud800").save(tmp_path / "a.toml")
 
     assert not list(tmp_path.iterdir())
 
@@ -147,7 +146,7 @@ def test_a_calibration_of_more_channels_than_the_sensor_has_is_refused():
 @pytest.mark.parametrize("place", ["no/such/folder/skin.toml", "."])
 def test_a_place_that_is_none_is_refused(tmp_path, place):
     with pytest.raises(Refusal, match="expected a file in a folder that exists"):
-        save_calibration(CALIBRATION, tmp_path / place)
+        CALIBRATION.save(tmp_path / place)
 
 
 # Refusals on loading
@@ -173,13 +172,13 @@ def test_bytes_that_are_no_text_are_refused(tmp_path):
 
 @given(st.data())
 def test_no_changed_character_goes_unnoticed(tmp_path_factory, data):
-    text = calibration_to_toml(CALIBRATION)
+    text = CALIBRATION.to_toml()
     at = data.draw(st.integers(0, len(text) - 1))
     new = data.draw(st.characters(exclude_categories=["Cs"]))
     path = tmp_path_factory.getbasetemp() / "changed.toml"
     path.write_text(text[:at] + new + text[at + 1 :], encoding="utf-8", newline="")
     try:
-        found = read_calibration(path)
+        found = Calibration.read(path)
     except Refusal:
         return
     assert found == CALIBRATION  # a space, a line end, another way to write the same number

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kappaskin import PointLoad, Refusal, SensorLayout, load_scene
-from kappaskin.calibration import PressPhase, PressTest, elements_to_press
+from kappaskin.calibration import PressPhase, PressTest
 from kappaskin.frames import COMPONENTS
 from kappaskin.sources import SimulatedSource
 
@@ -52,7 +52,7 @@ class Finger:
         return self.read(np.zeros(300), 0.3)
 
     def press_all(self):
-        while (asked := self.test.asked) is not None:
+        while (asked := self.test.target) is not None:
             assert self.press(asked) is not None
         return self.test.verdict()
 
@@ -70,7 +70,9 @@ def moved(elements=None, components=None, at=None):
 
 
 def pressed_through(order=None, quick=False):
-    return Finger(PressTest(SENSOR, elements_to_press(SCENE.layout, quick)), order).press_all()
+    return Finger(
+        PressTest(SENSOR, PressTest.choose_elements(SCENE.layout, quick)), order
+    ).press_all()
 
 
 @pytest.mark.parametrize("quick", [True, False])
@@ -142,7 +144,7 @@ def told_of(components):
 @pytest.mark.parametrize("quick", [True, False])
 def test_components_that_are_exchanged_are_told_and_set_right(components, quick):
     order = moved(components=components)
-    test = PressTest(SENSOR, elements_to_press(SCENE.layout, quick))
+    test = PressTest(SENSOR, PressTest.choose_elements(SCENE.layout, quick))
     finger = Finger(test, order)
 
     verdict = finger.press_all()
@@ -257,14 +259,14 @@ def test_back_asks_for_the_last_one_again():
 
     test.back()
 
-    assert test.asked == 5
+    assert test.target == 5
     assert finger.press(5).verdict == "ok"
-    assert test.asked == 6
+    assert test.target == 6
 
 
 def test_a_strip_has_elements_to_press_but_no_components_to_exchange():
     scene = replace(load_scene("fingertip"), reference=(15, 1))
-    test = PressTest(scene.sensor(), elements_to_press(scene.layout, quick=True))
+    test = PressTest(scene.sensor(), PressTest.choose_elements(scene.layout, quick=True))
     operator = scene.layout.curvature_operator(scene.basis)
     rng, time = np.random.default_rng(0), 0.0
     for element in (0, 1, 2, 4, 3, 5, 6, 7, 8, 9):
@@ -286,7 +288,7 @@ def test_what_cannot_be_pressed_is_refused():
     with pytest.raises(Refusal, match="from 0 to 99"):
         PressTest(SENSOR, ())
     with pytest.raises(Refusal, match="1 to 400 elements"):
-        elements_to_press(SensorLayout.regular(SCENE.plate.patch, 30, 30), quick=False)
+        PressTest.choose_elements(SensorLayout.regular(SCENE.plate.patch, 30, 30), quick=False)
     with pytest.raises(Refusal, match=r"readings \(300,\)"):
         PressTest(SENSOR, (1,)).take(0.0, np.zeros(3))
 
@@ -294,8 +296,8 @@ def test_what_cannot_be_pressed_is_refused():
 def test_dead_elements_are_not_asked_for():
     layout = SCENE.layout.without([0, 11, 45])
 
-    assert not {0, 11, 45} & set(elements_to_press(layout, quick=False))
-    assert not {0, 11, 45} & set(elements_to_press(layout, quick=True))
+    assert not {0, 11, 45} & set(PressTest.choose_elements(layout, quick=False))
+    assert not {0, 11, 45} & set(PressTest.choose_elements(layout, quick=True))
 
 
 def test_the_command_presses_a_simulation_by_itself_and_confirms_its_map(run):

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Refusal, Tare, load_scene
-from kappaskin.calibration import TareStore, tare_folder
+from kappaskin.calibration import TareStore
 from kappaskin.calibration.calibration import digest, fingerprint
 from kappaskin.calibration.tare_store import MOST_SAVED
 
@@ -120,7 +120,7 @@ def test_any_serial_number_is_a_file_in_the_folder(tares, serial_number):
 
 @given(st.text(), st.text())
 def test_sensors_share_no_file(one, other):
-    tares = TareStore(tare_folder())
+    tares = TareStore(TareStore.user_folder())
     assert (tares.path(one) == tares.path(other)) == (one == other)
 
 

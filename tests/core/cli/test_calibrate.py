@@ -19,8 +19,7 @@ import numpy as np
 import pytest
 
 from kappaskin import Frame, Refusal, SensorLayout, Simulator, load_scene
-from kappaskin.calibration import calibrate, take_sweep
-from kappaskin.calibration.calibration import read_calibration
+from kappaskin.calibration import Calibration, calibrate, take_sweep
 from kappaskin.errors import SourceError
 from kappaskin.scenes.cylinders import ADVICE, Presentation, schedule
 from kappaskin.scenes.effects import Creep, GaussianNoise, ReadingEffect, Size, Survey, Tolerance
@@ -56,7 +55,7 @@ def test_a_simulation_lays_itself_on_every_cylinder(run, tmp_path) -> None:
     assert told.count("\n    xx ") == len(STEPS) == 55
     assert "4/55  Cylinder of radius 100 mm, bent along x, inner face on it" in told
     gain, offset = TOLERANCE.errors((300,))
-    found = read_calibration(tmp_path / "s.toml")
+    found = Calibration.read(tmp_path / "s.toml")
     # Each mean is of 11 frames: 0.07 1/m, over curvatures of up to 67 1/m, half of it for twist.
     np.testing.assert_allclose(found.gain[:200], gain[:200], atol=0.01)
     np.testing.assert_allclose(found.offset, offset, atol=0.4)
@@ -69,7 +68,7 @@ def test_json_tells_every_channel_and_nothing_else(run, tmp_path) -> None:
     found = json.loads(printed)
     assert code == 0
     assert (found["passed"], found["failed"], len(found["channels"])) == (300, 0, 300)
-    assert found["channels"][0]["gain"] == read_calibration(out).gain[0]
+    assert found["channels"][0]["gain"] == Calibration.read(out).gain[0]
 
 
 def test_a_hold_tells_the_creep_that_a_scene_has(run, tmp_path, monkeypatch) -> None:
@@ -79,7 +78,7 @@ def test_a_hold_tells_the_creep_that_a_scene_has(run, tmp_path, monkeypatch) -> 
     _, printed, told = run("calibrate", "sim:creeping", "--out", out, "--hold", "10", *FAST)
     assert "held for 10 s" in told
     assert "creep      5.0 % in 2" in printed
-    assert read_calibration(out).creep.time_constant == pytest.approx(2.0, rel=0.03)
+    assert Calibration.read(out).creep.time_constant == pytest.approx(2.0, rel=0.03)
 
 
 def test_a_channel_that_fails_gives_1_and_a_file_without_it(run, tmp_path, monkeypatch) -> None:
@@ -102,7 +101,7 @@ def test_a_channel_that_fails_gives_1_and_a_file_without_it(run, tmp_path, monke
     assert code == 1
     assert "299 of 300 channels passed" in printed
     assert "failed     xy of element 17: gain" in printed
-    assert np.flatnonzero(np.isnan(read_calibration(out).gain)).tolist() == [217]
+    assert np.flatnonzero(np.isnan(Calibration.read(out).gain)).tolist() == [217]
 
 
 @pytest.mark.parametrize(
@@ -346,7 +345,7 @@ def test_a_device_on_the_line_is_calibrated_within_the_standard_errors(run, tmp_
         code, printed, told = run("calibrate", device.port, "--out", out, "--dwell", 0.05)
     assert code == 0, told
     assert "300 of 300 channels passed" in printed
-    found = read_calibration(out)
+    found = Calibration.read(out)
     gain, offset = TOLERANCE.errors((300,))
     for read, sd, true in (
         (found.gain, found.gain_sd, gain),

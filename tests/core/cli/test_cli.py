@@ -106,7 +106,7 @@ def refused(found: tuple[int, str, str], reason: str) -> None:
         ("0x8", "expected at least 1 x 1 functions, got 0 x 8"),
         ("-1x8", "expected at least 1 x 1 functions, got -1 x 8"),
         ("18x17", "expected at most 300 functions for 300 readings per frame, got 18 x 17 = 306"),
-        ("12x12", "do not tell these functions apart; use a smaller basis"),
+        ("12x12", "cannot distinguish these functions; use a smaller basis"),
         ("1000000x1000000", "expected at most 300 functions"),
     ],
 )

@@ -40,7 +40,7 @@ def device_of(scene) -> Iterator[str]:
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    monkeypatch.setattr("kappaskin.calibration.tare_folder", lambda: tmp_path / "tares")
+    monkeypatch.setattr("kappaskin.calibration.TareStore.user_folder", lambda: tmp_path / "tares")
     return tmp_path / "tares"
 
 

@@ -7,8 +7,7 @@ import pytest
 
 from kappaskin import LeastSquares, Patch, Plate, PointContact, PointLoad, SensorLayout, basis_for
 from kappaskin.contact.elastic_skin import EVEN, ROUND, ElasticSkin, Optimum, arcs, ends, ring
-from kappaskin.contact.hypotheses import fit_hypotheses
-from kappaskin.contact.interior import arc_widths
+from kappaskin.contact.hypotheses import arc_widths, fit_hypotheses
 
 SQUARE = Patch(0.1, 0.1)
 LAYOUT = SensorLayout.regular(SQUARE, 6, 6)

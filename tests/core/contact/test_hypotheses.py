@@ -11,12 +11,13 @@ from kappaskin.contact.elastic_skin import ElasticSkin, Optimum, ends
 from kappaskin.contact.hypotheses import (
     SHARE,
     Hypotheses,
+    Hypothesis,
+    Width,
     laplace_integral,
     length_prior,
     plane_prior,
     radius_prior,
 )
-from kappaskin.contact.interior import Hypothesis, Width
 
 SIDE = 0.1
 BENT, FLAT = (

@@ -100,5 +100,5 @@ def test_what_is_predicted_is_the_spread_of_many_draws():
 
 @pytest.mark.parametrize("apart", [0.03, 0.0005])
 def test_too_few_or_too_many_places_are_refused(apart):
-    with pytest.raises(Refusal, match="expected a distance apart that leaves more than 16 places"):
+    with pytest.raises(Refusal, match="expected a spacing that leaves more than 16 places"):
         place_elements(GRID, BASIS, "D", apart)

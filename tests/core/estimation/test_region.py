@@ -20,7 +20,7 @@ from kappaskin import (
     SineBasis,
     load_scene,
 )
-from kappaskin.estimation import Scanner, scan_tradeoff
+from kappaskin.estimation import Scanner, ScanTradeoff
 from kappaskin.estimation.region import contact_bound
 from kappaskin.sensing import SECOND_GENERATION
 
@@ -237,7 +237,7 @@ def test_the_bound_of_all_channels_is_the_known_one(place, position_mm, force_pe
 def test_a_region_never_tells_more_than_everything_does(centre, radius, share):
     contact = PointLoad(*(0.8 * centre + 0.01), 0.15)
 
-    told = scan_tradeoff(SENSOR, Region("skin", radius=radius, share=share), contact, NOISE)
+    told = ScanTradeoff.of(SENSOR, Region("skin", radius=radius, share=share), contact, NOISE)
 
     assert (told.bound >= told.full_bound * (1 - 1e-9)).all()
     assert told.gain == pytest.approx(300 / told.channels)
@@ -262,7 +262,7 @@ def test_the_bound_of_a_region_is_reached_by_a_fit_to_its_readings_alone():
 
     found = [find(frame, fit(frame)) for frame in K]
 
-    bound = scan_tradeoff(SENSOR, region, CENTRE, NOISE).bound
+    bound = ScanTradeoff.of(SENSOR, region, CENTRE, NOISE).bound
     error = [[*(t.position - CENTRE.centre()), t.force - CENTRE.force] for t in found]
     # The standard error of a variance over 800 draws is 5 %.
     efficiency = bound**2 / np.mean(np.square(error), axis=0)
@@ -271,7 +271,7 @@ def test_the_bound_of_a_region_is_reached_by_a_fit_to_its_readings_alone():
 
 
 def test_a_quarter_of_the_channels_lose_a_tenth_of_the_accuracy():
-    told = scan_tradeoff(SENSOR, Region("skin", radius=0.025, share=0.1), CENTRE, NOISE)
+    told = ScanTradeoff.of(SENSOR, Region("skin", radius=0.025, share=0.1), CENTRE, NOISE)
 
     assert told.channels == 75
     assert told.gain == pytest.approx(4.0)
@@ -312,14 +312,14 @@ def test_readings_that_do_not_decide_bound_nothing():
 
 
 def test_what_takes_turns_counts_by_its_share():
-    told = scan_tradeoff(SENSOR, Region("turns", share=0.25), CENTRE, NOISE)
+    told = ScanTradeoff.of(SENSOR, Region("turns", share=0.25), CENTRE, NOISE)
 
     assert (told.channels, told.gain) == (75, pytest.approx(4.0))
     np.testing.assert_allclose(told.bound, 2 * told.full_bound, rtol=1e-9)
 
 
 def test_a_bargain_that_is_off_is_none():
-    told = scan_tradeoff(SENSOR, Region(), CENTRE, NOISE)
+    told = ScanTradeoff.of(SENSOR, Region(), CENTRE, NOISE)
 
     assert (told.channels, told.gain) == (300, 1.0)
     np.testing.assert_array_equal(told.bound, told.full_bound)

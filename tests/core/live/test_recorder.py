@@ -15,7 +15,7 @@ from kappaskin import Calibration, Pipeline, Setup, load_scene
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.estimation import METHODS
 from kappaskin.live.recorder import LiveRecorder
-from kappaskin.recording import Recorder, Recording, verify_steps
+from kappaskin.recording import Recorder, Recording, Verification
 from kappaskin.scenes import SCENES
 from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, StuckElements
 from kappaskin.sources import SimulatedSource
@@ -90,7 +90,7 @@ def test_what_was_connected_twice_comes_to_the_same_again(tmp_path) -> None:
                     keeping.take(frame, pipeline(frame))
             keeping.source_ended()
 
-    *_, verdict = verify_steps(path)
+    *_, verdict = Verification.steps(path)
 
     assert verdict.same, verdict.words
 
@@ -110,7 +110,7 @@ def test_what_another_device_remembered_is_not_taken_for_that_of_the_next(tmp_pa
         for frame in source.read(0.0):
             keeping.take(frame, pipeline(frame))
 
-    *_, verdict = verify_steps(path)
+    *_, verdict = Verification.steps(path)
 
     assert verdict.same, verdict.words
 
@@ -158,6 +158,6 @@ def test_what_is_recorded_from_the_middle_comes_to_the_same_again(method, tmp_pa
         keeping.begin(path, source, SimpleNamespace(pipeline=pipeline, excluded=None))
         play(0.4)
 
-    *_, verdict = verify_steps(path)
+    *_, verdict = Verification.steps(path)
 
     assert verdict.same, verdict.words

@@ -10,7 +10,8 @@ import pytest
 
 from kappaskin import Engine, Recording, Refusal, Setup, Status
 from kappaskin.live import LONGEST_NOTE
-from kappaskin.recording import ReplayedSource, Verification, decode, recorded_setups, verify_steps
+from kappaskin.recording import ReplayedSource, Verification, recorded_setups
+from kappaskin.recording.cdr import decode
 from kappaskin.recording.messages import EVENTS, LOG
 
 pytestmark = pytest.mark.slow
@@ -205,7 +206,7 @@ def test_a_recording_goes_on_through_a_replay_which_is_not_recorded(
         time.sleep(0.5)
         engine.record(None)
         until(lambda: path.exists())
-    *_, verdict = verify_steps(path)
+    *_, verdict = Verification.steps(path)
     assert isinstance(verdict, Verification)
     assert verdict.same
     source = ReplayedSource(path)

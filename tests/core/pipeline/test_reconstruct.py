@@ -398,7 +398,7 @@ def test_a_basis_the_readings_cannot_decide_is_refused_before_it_costs(saved, ba
 
 def test_a_basis_that_only_few_elements_tell_apart_is_refused_with_a_way_out(saved) -> None:
     row = np.column_stack([np.linspace(0.01, 0.11, P), np.full(P, B / 2)])
-    with pytest.raises(RankDeficient, match="do not tell these functions apart; use a smaller"):
+    with pytest.raises(RankDeficient, match="cannot distinguish these functions; use a smaller"):
         reconstruct(saved(positions=row), (4, 8))
 
 

@@ -9,9 +9,8 @@ from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 
 from kappaskin import Refusal
-from kappaskin.recording import decode
 from kappaskin.recording import messages as m
-from kappaskin.recording.cdr import MessageLayout, MessageType, encode
+from kappaskin.recording.cdr import MessageLayout, MessageType, decode, encode
 
 INNER = MessageType("pkg/msg/Inner", "uint8 a\nfloat64 b")
 NESTED = MessageType(

@@ -42,7 +42,6 @@ from kappaskin.recording import (
     Recorder,
     Recording,
     Verification,
-    verify_steps,
 )
 from kappaskin.recording.export.surfaces import SkinMesh, SkinSurface
 from kappaskin.recording.export.writing import export_steps
@@ -214,7 +213,7 @@ def test_a_csv_has_the_same_numbers_as_an_npz(taps, tmp_path) -> None:
 
 
 def test_a_verdict_finds_the_recording_the_same(taps) -> None:
-    *_, verdict = verify_steps(taps[0])
+    *_, verdict = Verification.steps(taps[0])
     assert isinstance(verdict, Verification)
     assert verdict.same
     assert verdict.compared > len(taps[1])

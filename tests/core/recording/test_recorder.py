@@ -25,9 +25,9 @@ from kappaskin.calibration import Tare
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.live import STREAMING, Engine, Status
 from kappaskin.pipeline import setup_from_text
-from kappaskin.recording import Recording, Verification, decode, verify_steps
+from kappaskin.recording import Recording, Verification
 from kappaskin.recording import messages as m
-from kappaskin.recording.cdr import MessageLayout
+from kappaskin.recording.cdr import MessageLayout, decode
 from kappaskin.recording.writing import part_of
 from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, CorruptedFrames, Creep, DroppedFrames
 from kappaskin.sources import open_source
@@ -47,7 +47,7 @@ def wait_for(ask: Callable[[], Any], within: float = 30.0) -> Any:
 
 def verdict_of(path: Path) -> Verification:
     """As `kappaskin verify` finds it: in a process of one thread."""
-    with BackgroundProcess[float | Verification]("verify", verify_steps, path) as work:
+    with BackgroundProcess[float | Verification]("verify", Verification.steps, path) as work:
         *_, verdict = work.wait()
     assert isinstance(verdict, Verification)
     return verdict

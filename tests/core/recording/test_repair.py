@@ -11,7 +11,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
 from kappaskin import Refusal
-from kappaskin.recording import Recording, Repaired, RepairTask, repair_steps
+from kappaskin.recording import Recording, Repaired, RepairTask
 from kappaskin.recording import messages as m
 from kappaskin.recording.writing import part_of
 
@@ -57,7 +57,7 @@ def places(whole):
 
 
 def repair(path, out) -> Repaired:
-    *_, done = repair_steps(path, out)
+    *_, done = Repaired.steps(path, out)
     return done
 
 
@@ -210,7 +210,7 @@ def test_a_file_of_others_is_repaired_too(tmp_path) -> None:
 
 
 def test_the_share_that_is_done_is_told(whole, tmp_path) -> None:
-    *shares, _ = repair_steps(whole, tmp_path / "out.mcap")
+    *shares, _ = Repaired.steps(whole, tmp_path / "out.mcap")
     assert shares == sorted(shares)
     assert 0 <= shares[0] < 0.1
     assert shares[-1] > 0.9
@@ -223,7 +223,7 @@ def test_a_process_of_its_own_saves_as_much(whole, tmp_path) -> None:
     while not (told and isinstance(told[-1], Repaired)):
         told += work.poll()
     work.close()
-    *_, alone = repair_steps(whole, tmp_path / "alone.mcap")
+    *_, alone = Repaired.steps(whole, tmp_path / "alone.mcap")
     assert told[-1] == alone
     assert out.exists()
 

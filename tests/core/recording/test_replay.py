@@ -38,7 +38,7 @@ def recorded(tmp_path_factory, written_out):
     recorder = Recorder(path, clock())
     source.record(recorder)
     count, shift = 0, 0.0
-    recorder.happened(Event(clock(), "note", "before"))
+    recorder.add_event(Event(clock(), "note", "before"))
     put = recorder._file.put  # noqa: SLF001 - to let time pass for the file alone
     recorder._file.put = lambda topic, when, data: put(topic, when + shift, data)  # noqa: SLF001
     while count < FRAMES:
@@ -46,7 +46,7 @@ def recorded(tmp_path_factory, written_out):
         if count == FRAMES // 2 and not shift:
             written_out(recorder)
             shift = GAP
-            recorder.happened(Event(clock(), "note", "after"))
+            recorder.add_event(Event(clock(), "note", "after"))
         elif count % 100 == 0:
             written_out(recorder)
     recorder.close()

@@ -12,7 +12,7 @@ from mcap.writer import Writer
 
 from kappaskin import Refusal
 from kappaskin.errors import Damaged
-from kappaskin.recording import ExportRequest, Recording, repair_steps, writing
+from kappaskin.recording import ExportRequest, Recording, Repaired, writing
 from kappaskin.recording import messages as m
 from kappaskin.recording import reading as records
 from kappaskin.recording.writing import RecordingFile, part_of
@@ -112,7 +112,7 @@ def test_nothing_else_is_taken_for_a_recording(tmp_path) -> None:
         Recording(tmp_path)
     if hasattr(os, "mkfifo"):
         os.mkfifo(tmp_path / "pipe")
-        for read in (Recording, lambda pipe: list(repair_steps(pipe, path))):
+        for read in (Recording, lambda pipe: list(Repaired.steps(pipe, path))):
             with pytest.raises(Refusal, match="expected a file"):
                 read(tmp_path / "pipe")
     for data in (b"", b"\x89PNG\r\n\x1a\n" + bytes(100), records.MAGIC, records.MAGIC * 20):
@@ -213,7 +213,7 @@ def test_a_damaged_chunk_is_said_to_be_one(whole, tmp_path) -> None:
     [
         RecordingFile,
         Recording,
-        lambda path: list(repair_steps(path, path)),
+        lambda path: list(Repaired.steps(path, path)),
         lambda path: ExportRequest(path, path),
     ],
     ids=["record", "read", "repair", "export"],

@@ -20,8 +20,8 @@ from kappaskin import (
 )
 from kappaskin.scenes import SCENES, EffectSelection, Orbit, kept_effects, plan
 from kappaskin.scenes.cylinders import Presentation, schedule
+from kappaskin.scenes.effect_plan import effects_of
 from kappaskin.scenes.effects import EFFECTS, GaussianNoise
-from kappaskin.scenes.plan import effects_of
 from kappaskin.scenes.scene import survey
 from kappaskin.scenes.stimulus import (
     HoldStep,

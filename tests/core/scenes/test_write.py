@@ -39,6 +39,7 @@ from kappaskin.scenes import (
     scene_file,
 )
 from kappaskin.scenes.cylinders import Presentation, schedule
+from kappaskin.scenes.effect_plan import effects_of
 from kappaskin.scenes.effects import (
     EFFECTS,
     FIRST_GENERATION_LOOPS,
@@ -55,7 +56,6 @@ from kappaskin.scenes.effects import (
     Tolerance,
 )
 from kappaskin.scenes.effects.electronics import CrossTalk, FlickerNoise, MainsHum
-from kappaskin.scenes.plan import effects_of
 from kappaskin.scenes.scene import LINEAR
 from kappaskin.scenes.stimulus import (
     HoldStep,

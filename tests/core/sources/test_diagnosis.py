@@ -11,7 +11,7 @@ import pytest
 from kappaskin import load_scene
 from kappaskin.cli import main
 from kappaskin.cli.common import FAILED
-from kappaskin.sources import Accounting, diagnose, information
+from kappaskin.sources import Accounting, Diagnosis, information
 from kappaskin.sources.wire import encode_information
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
@@ -76,7 +76,7 @@ def saying():
 
 
 def test_a_device_that_is_well_is_told_of_whole(served):
-    found = diagnose(served)
+    found = Diagnosis.of(served)
     assert found.why == ""
     assert (found.port, found.plug) == (served, served)
     assert found.device == "Simulated skin SIM-0001, firmware kappaskin simulator"
@@ -89,7 +89,7 @@ def test_a_device_that_is_well_is_told_of_whole(served):
 
 
 def test_looking_twice_finds_the_same(served):
-    first, second = diagnose(served), diagnose(served)
+    first, second = Diagnosis.of(served), Diagnosis.of(served)
     assert (first.device, first.why) == (second.device, second.why)
     assert second.clock_sd < 0.1
 
@@ -107,7 +107,7 @@ def test_looking_twice_finds_the_same(served):
     ids=["silent", "another protocol", "a spoilt header"],
 )
 def test_what_is_no_device_is_told(saying, data, why, hasty):
-    found = diagnose(saying(data))
+    found = Diagnosis.of(saying(data))
     assert why in found.why
 
 
@@ -120,7 +120,7 @@ def test_what_is_no_device_is_told(saying, data, why, hasty):
     ids=["no readings", "half an information"],
 )
 def test_what_is_wrong_with_a_device_is_told(saying, text, why):
-    found = diagnose(saying(lambda n: encode_information(n, n / 20, text)))
+    found = Diagnosis.of(saying(lambda n: encode_information(n, n / 20, text)))
     assert why in found.why
 
 
@@ -135,7 +135,7 @@ def test_an_absent_port_is_told_and_the_command_fails(capsys):
 def test_a_busy_port_is_told(served):
     with open(served, "rb+", buffering=0) as held:
         fcntl.flock(held, fcntl.LOCK_EX)
-        assert "busy" in diagnose(served).why
+        assert "busy" in Diagnosis.of(served).why
 
 
 def test_the_command_says_in_words_and_in_json_that_a_port_is_well(served, capsys):

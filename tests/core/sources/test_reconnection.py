@@ -26,7 +26,6 @@ from kappaskin.sources import (
     Port,
     SerialSource,
     information,
-    ports,
     serial_source,
 )
 from kappaskin.sources.decoder import FROM_HOST
@@ -371,8 +370,7 @@ def test_half_a_message_at_the_end_of_the_line_is_cut_off_and_no_part_of_the_nex
 
 def test_a_plug_is_found_by_its_serial_number_under_another_name(plug, opened, monkeypatch):
     here = []
-    for module in (ports, serial_source):
-        monkeypatch.setattr(module, "serial_ports", lambda: list(here))
+    monkeypatch.setattr(Port, "found", lambda: list(here))
     device = plug()
     here.append(Port(str(device.link), "Fingertip", "Kappa", "A-7", (1, 2)))
     reader = Reader(opened(device))

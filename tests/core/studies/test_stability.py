@@ -94,7 +94,10 @@ def test_eq_6_as_printed_loses_twice_the_digits_of_the_condition(rows):
 @pytest.mark.parametrize(
     ("case", "cause"),
     [
-        ("Ni > m, Nj > n", "determine 140 of the 144 .* beyond the elements look like lower ones"),
+        (
+            "Ni > m, Nj > n",
+            "determine 140 of the 144 .* finer than the elements read as coarser ones",
+        ),
         ("Ni = 2m, Nj = 2n", "determine at most 300 of the 400 coefficients"),
         ("fingertip, free ends", "moves the skin as a whole and bends it nowhere"),
         ("all dead", "no readings are left"),

@@ -3,7 +3,7 @@
 from functools import partial
 from pathlib import Path
 
-from kappaskin.calibration import TareStore, tare_folder
+from kappaskin.calibration import TareStore
 from kappaskin.errors import Refusal
 from kappaskin_app.features.calibration.calibrating import Calibrating
 from kappaskin_app.features.calibration.panel import CalibratePanel, InUsePanel
@@ -24,7 +24,7 @@ class CalibrationFeature:
     def install(self, shell: MainWindow) -> None:
         self._shell, panels = shell, shell.panels
         self.calibrating = Calibrating(shell.history, shell.tasks, shell)
-        tares = TareStore(tare_folder())
+        tares = TareStore(TareStore.user_folder())
         self.taring = Taring(shell.history, shell.session.engine, tares, shell)
         self.tare = panels.add(LIVE, TarePanel())
         self.in_use = panels.add(CALIBRATE, InUsePanel())

@@ -17,7 +17,6 @@ from kappaskin.calibration import (
     Sweep,
     calibrate,
     load_calibration,
-    save_calibration,
 )
 from kappaskin.errors import Refusal
 from kappaskin.frames import OVERTAKEN, Estimate
@@ -189,7 +188,7 @@ class Calibrating(QObject):
     def save(self, path: Path) -> None:
         if self.result is not None:
             try:
-                save_calibration(self.result.report.calibration, path)
+                self.result.report.calibration.save(path)
                 self.used.emit(path)
                 self._tell("", f"saved as {path}")
             except Refusal as refusal:

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 from kappaskin.calibration import Calibration
 from kappaskin.live import Status
 from kappaskin.sensing import Sensor
-from kappaskin.sources import Port, serial_ports
+from kappaskin.sources import Port
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.form import well_behaved
@@ -48,7 +48,7 @@ class Plugs(QObject):
     def look(self) -> None:
         """Look now, unless that is being done."""
         if not self._looking.running:
-            self._looking.run(serial_ports)
+            self._looking.run(Port.found)
 
 
 _SIMULATED = ("sim:", "Simulated skin")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from PySide6.QtGui import QGuiApplication
 
-from kappaskin.calibration import tare_folder
+from kappaskin.calibration import TareStore
 from kappaskin.errors import Refusal
 from kappaskin.studies import FIGURES
 from kappaskin_app.features.export.exports import Exports
@@ -49,7 +49,7 @@ class ExportFeature:
 
     def _copy_python(self) -> None:
         """Put a script on the clipboard, and what it reads into a folder."""
-        shell, folder = self._shell, tare_folder().parent / "scripts"
+        shell, folder = self._shell, TareStore.user_folder().parent / "scripts"
         try:
             script = script_of(shell.session, shell.history.settings, folder)
             for name, content in script.files.items():

@@ -3,7 +3,7 @@
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QGridLayout, QProgressBar, QVBoxLayout, QWidget
 
-from kappaskin.calibration import MapVerdict, PressPhase, PressTest, elements_to_press
+from kappaskin.calibration import MapVerdict, PressPhase, PressTest
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
@@ -44,7 +44,7 @@ class MapTesting(QObject):
             sensor = self._status.sensor
             if sensor is None or self._status.state != "streaming":
                 raise Refusal("no sensor is connected; connect one, then begin")
-            self.test = PressTest(sensor, elements_to_press(sensor.layout, quick))
+            self.test = PressTest(sensor, PressTest.choose_elements(sensor.layout, quick))
         except Refusal as refusal:
             self._tell(str(refusal))
             return
@@ -97,7 +97,7 @@ class MapTesting(QObject):
         self._phase = None if test is None else test.phase
         if test is not None and test.over and self.verdict is None:
             self.verdict = test.verdict()
-        now = test.asked if test is not None and self.running else None
+        now = test.target if test is not None and self.running else None
         self.asked.emit(-1 if now is None else now)
         self.changed.emit()
 
@@ -220,7 +220,7 @@ class PressPage(QWidget):
             widget.setVisible(not running)
 
     def _asked(self, test: PressTest | None, running: bool) -> str:
-        if test is None or test.asked is None or not running:
+        if test is None or test.target is None or not running:
             return _WHAT + (_DRAG if self._inside else "")
-        x, y = test.sensor.layout.positions[test.asked] * 1e3
-        return f"<b>Element {test.asked}</b>, at ({x:.0f}, {y:.0f}) mm. {_WAIT[test.phase]}"
+        x, y = test.sensor.layout.positions[test.target] * 1e3
+        return f"<b>Element {test.target}</b>, at ({x:.0f}, {y:.0f}) mm. {_WAIT[test.phase]}"

@@ -1,4 +1,4 @@
-"""Recordings to files that other programs read: tables of every frame, and the skin as a mesh."""
+"""Export of recordings: tables of frames, and meshes of the skin."""
 
 from kappaskin.recording.export.request import ExportRequest as ExportRequest
 from kappaskin.recording.export.writing import Exported as Exported

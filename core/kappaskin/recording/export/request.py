@@ -1,8 +1,8 @@
-"""What is to be exported, and what every exported file says of its recording."""
+"""Export requests, and the facts that exported files state of their recording."""
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 from functools import cached_property
@@ -14,10 +14,7 @@ from kappaskin.calibration import Calibration, Tare
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate, Frame
 from kappaskin.pipeline import Pipeline, Reported, Setup, setup_from_text
-from kappaskin.recording import messages as m
-from kappaskin.recording.cdr import decode
 from kappaskin.recording.disk import is_there
-from kappaskin.recording.messages import Topic
 from kappaskin.recording.reading import Recording
 from kappaskin.sensing import Sensor
 from kappaskin.sources import sensor_from_json
@@ -148,7 +145,7 @@ class _StampedText(NamedTuple):
 def recording_info(recording: Recording, request: ExportRequest) -> RecordingInfo:
     """What files of the requested span say; a `Refusal` where there were two devices."""
     path = recording.path
-    devices = list(_in_force(recording, m.DEVICE, request))
+    devices = list(_in_force(recording.devices(), request))
     if not devices:
         raise Refusal(f"{path}: expected a device from {request.first:g} s on, got none")
     for device in devices[1:]:
@@ -157,7 +154,7 @@ def recording_info(recording: Recording, request: ExportRequest) -> RecordingInf
     sensor = sensor_from_json(devices[0].text)
     setups = [_setup_facts(request.setup, sensor)] if request.setup else []
     if request.setup is None:
-        for each in _in_force(recording, m.SETUP, request):
+        for each in _in_force(recording.setups(), request):
             setup = setup_from_text(each.text, recording.attachment)
             number = {"number": each.number, "since": max(each.at, 0.0)}
             setups.append(number | _setup_facts(setup, sensor))
@@ -179,16 +176,10 @@ def another(at: float) -> str:
     )
 
 
-def _in_force(recording: Recording, topic: Topic, request: ExportRequest) -> Iterator[_StampedText]:
-    """The texts on a topic that held at some time of the span."""
-    texts = [
-        _StampedText(
-            number, (message.stamp - recording.first) * 1e-9, decode(m.STRING, message.data)["data"]
-        )
-        for number, message in enumerate(recording.messages_on(topic))
-    ]
+def _in_force(texts: Iterable[tuple[float, str]], request: ExportRequest) -> Iterator[_StampedText]:
+    """The texts that held at some time of the span."""
     last = None
-    for one in texts:
+    for one in [_StampedText(number, at, text) for number, (at, text) in enumerate(texts)]:
         if one.at > request.end:
             break
         if last is not None and one.at > request.first:

@@ -1,4 +1,4 @@
-"""Export of a recording: frames recomputed and written, by a process of its own."""
+"""Export of a recording in a background process."""
 
 import math
 import shutil
@@ -117,13 +117,10 @@ class _Work:
         self._last = math.nan  # s, when the last frame that was looked at came
         self._written = self._unsettled = self._shapeless = 0
 
-    def _at(self, message: RecordedMessage) -> float:
-        return (message.stamp - self._recording.first) * 1e-9
-
     def take(self, message: RecordedMessage) -> bool:
         """Take one message; whether the next one is needed too."""
         for frame in self._recomputation(message):
-            self._last = at = self._at(message)
+            self._last = at = self._recording.seconds(message.stamp)
             if at > self._request.end:
                 return False
             if at >= self._due:
@@ -173,9 +170,10 @@ class _Work:
 
     def share(self, message: RecordedMessage) -> float:
         """The share of the requested time that has passed with a message."""
+        at = self._recording.seconds(message.stamp)
         end = self._request.end if self._request.at is None else self._request.at
-        until = min(end, (self._recording.last - self._recording.first) * 1e-9)
-        return min(max(self._at(message) / until, 0.0), 1.0) if until > 0 else 0.0
+        until = min(end, self._recording.seconds(self._recording.last))
+        return min(max(at / until, 0.0), 1.0) if until > 0 else 0.0
 
     def done(self) -> Exported:
         whole = self._recording.whole

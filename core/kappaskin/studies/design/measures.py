@@ -19,7 +19,6 @@ from kappaskin.estimation import (
     estimator_for,
     place_elements,
     predicted_sd,
-    stacked_fits,
 )
 from kappaskin.frames import Array, Contact, Mask, Truth
 from kappaskin.mechanics import Plate
@@ -65,7 +64,7 @@ class FrameBlock:
     def fit(self) -> Fit:
         """The fit of all frames, each of which is taken in once by what remembers."""
         return (
-            stacked_fits(self.fits) if self.estimator.remembers else self.estimator(self.curvature)
+            Fit.stacked(self.fits) if self.estimator.has_memory else self.estimator(self.curvature)
         )
 
     @cached_property

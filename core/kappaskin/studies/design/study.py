@@ -389,7 +389,7 @@ def setup_of(content: dict[str, Any]) -> PointSetup:
 
 def estimator_of(content: dict[str, Any], setup: PointSetup) -> Estimator:
     """The estimator of a point, cached for points with the same sensor and fit."""
-    if METHODS[setup.fit.method].remembers:
+    if METHODS[setup.fit.method].has_memory:
         return _estimator(setup)
     alike = {key: content.get(key) for key in ("skin", "elements", "fit", "place")}
     return _cached_estimator(_SameSensor(json.dumps(alike, sort_keys=True), setup))

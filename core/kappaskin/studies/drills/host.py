@@ -16,11 +16,10 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from kappaskin.calibration import Calibration, save_calibration
+from kappaskin.calibration import Calibration
 from kappaskin.errors import Refusal
 from kappaskin.live import LOST, STREAMING, Engine
 from kappaskin.recording import Recorder, Recording, RecordingStatus, ReservedFile
-from kappaskin.recording import messages as m
 from kappaskin.sources import Accounting
 from kappaskin.studies.drills.stand import Drill, DrillOutcome, Stand
 
@@ -55,11 +54,11 @@ def _spoilt(fault: Callable[[Path], AbstractContextManager[None]], _: Stand) -> 
     """Replace a file on a full disk: the old one stays intact, and the error is reported."""
     with TemporaryDirectory(prefix="kappaskin-drill-") as folder:
         path = Path(folder) / "skin.toml"
-        save_calibration(_calibration("before"), path)
+        _calibration("before").save(path)
         before, refusal = path.read_bytes(), ""
         with fault(path.with_name(f".{path.name}.part")):
             try:
-                save_calibration(_calibration("after"), path)
+                _calibration("after").save(path)
             except Refusal as reason:
                 refusal = str(reason)
         claims = [
@@ -142,7 +141,7 @@ def _claims(
     try:
         with Recording(path) as recording:
             whole = recording.whole
-            lines = [m.unpack_line(got.data) for got in recording.messages_on(m.LINES)]
+            lines = list(recording.lines())
     except Refusal as refusal:
         return [(False, str(refusal))]
     kept = sum(len(data) for _, sent, data in lines if not sent)

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from kappaskin._processes import process_context
 from kappaskin.errors import Refusal
-from kappaskin.estimation import METHODS, Estimator, Fit, merged_fits
+from kappaskin.estimation import METHODS, Estimator, Fit
 from kappaskin.frames import Array
 from kappaskin.studies.stability.gallery import CaseKind, HardCase, gallery
 from kappaskin.studies.stability.reference import Reference, reference_of
@@ -122,7 +122,7 @@ def _in_blocks(case: HardCase, estimator: Estimator) -> Iterator[MethodAnswer]:
     for start in range(0, len(case.curvature), _BLOCK):
         fit = estimator(case.curvature[start : start + _BLOCK])
         chosen = np.arange(0, len(fit.curvature), every)
-        kept = fit if every == 1 else merged_fits([fit], chosen)
+        kept = fit if every == 1 else Fit.merged([fit], chosen)
         yield MethodAnswer.of(case, kept, start + chosen)
 
 
@@ -132,7 +132,7 @@ def _after_another(
     for t in range(len(case.curvature)):
         restart()
         fit = estimator(case.curvature[[t - 1, t]])
-        yield MethodAnswer.of(case, merged_fits([fit], np.array([1])), np.array([t]))
+        yield MethodAnswer.of(case, Fit.merged([fit], np.array([1])), np.array([t]))
 
 
 def _joined(parts: list[MethodAnswer]) -> MethodAnswer:

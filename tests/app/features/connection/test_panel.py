@@ -118,7 +118,7 @@ def found(monkeypatch):
     """What the finder of ports was called for: the threads that it was called in."""
     calls = []
     monkeypatch.setattr(
-        plugs, "serial_ports", lambda: calls.append(threading.current_thread()) or [SKIN]
+        plugs.Port, "found", lambda: calls.append(threading.current_thread()) or [SKIN]
     )
     monkeypatch.setattr(plugs, "_EVERY", 50)
     return calls

@@ -17,7 +17,7 @@ from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import DARK
 
 STUCK = Finding(157, 57, "yy", "stuck", 100.0, "reads -1.70 1/m")
-KEPT = Finding(12, 12, "xx", "dead", 20.0, "the device says so", kept=True)
+KEPT = Finding(12, 12, "xx", "dead", 20.0, "the device says so", retained=True)
 
 
 def told(panel: HealthPanel) -> list[list[str]]:
@@ -124,7 +124,7 @@ def test_a_simulated_skin_is_pressed_by_dragging_its_load(window: MainWindow, un
     until(lambda: window.membrane.asked.actor.visibility)
     until(lambda: window.testing.test.phase is PressPhase.PRESS)
     assert "Press it now" in page.words.text()
-    asked = window.testing.test.asked
+    asked = window.testing.test.target
     x, y = window.session.scene.layout.positions[asked]
     wishes, at = window.editing, window.session.estimate.contact.position
 
@@ -136,7 +136,7 @@ def test_a_simulated_skin_is_pressed_by_dragging_its_load(window: MainWindow, un
     assert str(window.testing.test.done[0]) == f"element {asked} answers"
     assert page.last.text() == f"Element {asked} answers."
     page.back.click()
-    assert window.testing.test.asked == asked
+    assert window.testing.test.target == asked
     page.skip.click()
     page.nothing.click()
     assert [p.verdict for p in window.testing.test.done] == ["skipped", "nothing"]

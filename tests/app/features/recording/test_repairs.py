@@ -83,7 +83,7 @@ def test_a_file_of_another_kind_is_not_offered(window: MainWindow, tmp_path: Pat
 def test_one_without_readings_is_not_offered(window: MainWindow, tmp_path: Path, until) -> None:
     path, panel = tmp_path / "empty.mcap", window.recording
     with closing(Recorder(path, 0.0)) as recorder:
-        recorder.happened(Event(0.0, "note", "nothing else"))
+        recorder.add_event(Event(0.0, "note", "nothing else"))
     window.replaying.open_file(path)
     until(lambda: "expected bytes of a device" in panel.message.text())
     assert not panel.offer.isVisibleTo(panel)

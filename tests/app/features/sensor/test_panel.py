@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kappaskin import PointLoad, Region, Status
-from kappaskin.estimation import scan_tradeoff
+from kappaskin.estimation import ScanTradeoff
 from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, Creep, Tolerance, UniformNoise
 from kappaskin.sensing import SECOND_GENERATION
 from kappaskin_app.features.sensor.panel import RegionPanel
@@ -92,7 +92,7 @@ def test_a_bargain_is_of_the_frames_that_really_come(qapp, electronics, buys):
     panel = RegionPanel()
     panel.show_settings(settings)
     panel.show_status(Status(sensor=sensor, region=region), simulating=True)
-    panel.show_bargain(scan_tradeoff(sensor, region, PointLoad(0.05, 0.05, 0.15), 0.231))
+    panel.show_bargain(ScanTradeoff.of(sensor, region, PointLoad(0.05, 0.05, 0.15), 0.231))
     panel.show_status(Status(sensor=sensor, region=region), simulating=True)
 
     assert buys in panel.message.text()
@@ -123,7 +123,7 @@ def test_a_strip_tells_where_the_contact_is_along_it_alone(qapp) -> None:
     region = Region(around="adaptive", share=0.2)
     panel = RegionPanel()
     panel.show_settings(Settings(region="adaptive"))
-    panel.show_bargain(scan_tradeoff(sensor, region, PointLoad(0.02, 0.02, 0.5), 0.2))
+    panel.show_bargain(ScanTradeoff.of(sensor, region, PointLoad(0.02, 0.02, 0.5), 0.2))
     panel.show_status(Status(state="streaming", sensor=sensor, region=region), True)
     assert "costs accuracy" in panel.message.text()
     assert "0.04 mm at best, all channels to \N{PLUS-MINUS SIGN}0.02 mm" in panel.message.text()
