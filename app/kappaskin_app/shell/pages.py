@@ -1,4 +1,4 @@
-"""The pages of settings: features add panels to them; all show settings, status and theme."""
+"""The pages of settings: features add panels to them; all show settings and status."""
 
 from typing import TypeVar
 
@@ -9,7 +9,6 @@ from kappaskin.live import Status
 from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.theme import Theme
 from kappaskin_app.widgets.layout import scrolled
 
 _Some = TypeVar("_Some", bound=Panel)
@@ -78,7 +77,3 @@ class Pages(QTabWidget):
     def show_status(self, status: Status, simulating: bool) -> None:
         for panel in self.all():
             panel.show_status(status, simulating)
-
-    def show_theme(self, theme: Theme) -> None:
-        for panel in self.all():
-            panel.show_theme(theme)

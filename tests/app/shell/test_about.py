@@ -16,7 +16,7 @@ from kappaskin_app.shell.layouts.layout import DOCKS
 from kappaskin_app.shell.requests import Requests
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.simulation import scene_of
-from kappaskin_app.theme import THEMES
+from kappaskin_app.theme import THEMES, apply_look
 
 
 def test_every_panel_and_every_dock_says_what_it_is_for(panels) -> None:
@@ -48,7 +48,7 @@ def test_it_leads_on_to_a_page_of_the_guide(panels) -> None:
 
 def test_its_buttons_stand_beside_the_title_and_inside(panels, until) -> None:
     for theme in THEMES.values():
-        panels.show_theme(theme)
+        apply_look(theme)
         panels.show_settings(replace(Settings(), functions_x=5))
         basis = panels.basis
         until(lambda: panels.basis.corner.geometry().right() == panels.basis.rect().right())

@@ -17,7 +17,6 @@ class AccuracyFeature:
         session.reported.connect(guarded(self.costing.follow))
         session.estimated.connect(guarded(self.costing.receive))
         self.cost.attend(self.costing)
-        shell.theme_changed.connect(guarded(self.cost.show_theme))
         shell.tasks.add(
             "Measuring what accuracy costs", lambda: self.costing.running, self.costing.cancel
         )

@@ -14,7 +14,6 @@ from kappaskin_app.features.calibration.pages import Outcome, Start, Steps
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.theme import Theme
 from kappaskin_app.widgets.parts import (
     ELLIPSIS,
     EQUATION_8,
@@ -142,12 +141,6 @@ class CalibratePanel(Panel):
                 self.start.radii.setText(radii)
                 self.start.radii.setCursorPosition(0)
             self._plan()
-
-    def show_theme(self, theme: Theme) -> None:
-        super().show_theme(theme)
-        for view in (self.steps.drawing, self.outcome.map, self.outcome.plot):
-            view.show_theme(theme)
-        self.outcome.show_colour(theme.accent)
 
     def _plan(self, *_: object) -> None:
         sensor = self._status.sensor

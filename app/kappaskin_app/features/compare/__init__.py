@@ -22,4 +22,3 @@ class CompareFeature:
         shell.panels.join(self.compare.form)
         self.compare.attend(self.comparing)
         shell.settings_shown.connect(guarded(self.compare.show_settings))
-        shell.theme_changed.connect(guarded(self.compare.show_theme))

@@ -37,7 +37,6 @@ class ContactFeature:
         display.status_shown.connect(guarded(self._follow))
         self.naming.named.connect(guarded(display.foot.object.show_text))
         self.naming.found.connect(display.object_found)
-        shell.theme_changed.connect(guarded(self.readouts.show_theme))
         shell.tasks.add("Learning what objects read like", lambda: self.naming.learning)
         shell.closed.connect(guarded(self.naming.close))
 

@@ -20,7 +20,6 @@ class DesignFeature:
         )
         self.design.attend(self.designing)
         shell.settings_shown.connect(guarded(self.design.show_settings))
-        shell.theme_changed.connect(guarded(self.design.show_theme))
         cancel = self.designing.cancel
         shell.tasks.add("Placing the design's elements", lambda: self.designing.predicting, cancel)
         shell.tasks.add("Simulating the design", lambda: self.designing.checking, cancel)

@@ -19,7 +19,7 @@ from kappaskin_app.shell.settings import Settings, ask_of
 from kappaskin_app.shell.settings.asks import Range
 from kappaskin_app.shell.settings.designed import Designed
 from kappaskin_app.shell.settings.skin import SHAPES
-from kappaskin_app.theme import SEQUENTIAL, Theme
+from kappaskin_app.theme import SEQUENTIAL
 from kappaskin_app.widgets.layout import row, scrolled
 from kappaskin_app.widgets.parts import ELLIPSIS, button, sentence, text_label
 from kappaskin_app.widgets.plots import Curve, CurvePlot
@@ -150,11 +150,6 @@ class DesignPanel(QWidget):
 
     def show_settings(self, settings: Settings) -> None:
         self.form.show_settings(settings)
-
-    def show_theme(self, theme: Theme) -> None:
-        self.form.show_theme(theme)
-        for view in (self.predicted, self.simulated, self.along):
-            view.show_theme(theme)
 
     def _show(self) -> None:
         designing = self._designing

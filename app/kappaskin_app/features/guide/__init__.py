@@ -17,7 +17,6 @@ class GuideFeature:
         self._shell, self.guide = shell, GuidePanel()
         shell.docks.put_below("guide", "Guide", self.guide, "Ctrl+F1", HELP)
         shell.read_wanted.connect(guarded(lambda name: self.read(page_called(name))))
-        shell.theme_changed.connect(guarded(self.guide.show_theme))
         shell.menus.things.append(self._things)
 
     def read(self, page: Page, heading: str = "") -> None:

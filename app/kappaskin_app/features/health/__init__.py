@@ -25,4 +25,3 @@ class HealthFeature:
         self.testing.asked.connect(guarded(selection.ask_for))
         self.health.pointed.connect(guarded(selection.point))
         self.health.attend(self.testing)
-        shell.theme_changed.connect(guarded(self.health.show_theme))

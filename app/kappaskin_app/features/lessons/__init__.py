@@ -31,8 +31,6 @@ class LessonsFeature:
         self.teaching.pointed.connect(guarded(self.pointing.point))
         self.teaching.taken_up.connect(guarded(partial(docks.reveal, "lesson")))
         self.teaching.told.connect(guarded(shell.tell))
-        for part in (self.lesson, self.pointing):
-            shell.theme_changed.connect(guarded(part.show_theme))
         shell.menus.welcome.add(
             3,
             "&Begin a lesson",

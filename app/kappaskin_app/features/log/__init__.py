@@ -22,8 +22,6 @@ class LogFeature:
         session.reported.connect(guarded(lambda *_: self.log.look()))
         display.badge.clicked.connect(guarded(self.event_log.open_list))
         self.event_log.told.connect(guarded(shell.tell))
-        for part in (self.log, self.errors):
-            shell.theme_changed.connect(guarded(part.show_theme))
         show = self.event_log.open_list
         shell.actions_by_name.add("event_log", SOURCE, "E&vent log", show, "F4")
         self.errors.add_actions(shell.actions_by_name, HELP)

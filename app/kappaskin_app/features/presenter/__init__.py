@@ -23,7 +23,6 @@ class PresenterFeature:
         shell.display.status_shown.connect(guarded(self.presenting.follow))
         shell.display.object_found.connect(guarded(self.presenting.find))
         self.stage.fitted.connect(shell.display.unit_changed)
-        shell.theme_changed.connect(guarded(self.presenting.show_theme))
         self._add_actions(shell)
         shell.closing.connect(guarded(self.presenting.close))
 

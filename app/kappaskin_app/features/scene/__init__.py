@@ -51,8 +51,6 @@ class SceneFeature:
         session.pausing.connect(guarded(self._pause))
         self.staging.told.connect(guarded(shell.tell))
         shell.settings_shown.connect(guarded(self.staging.show_settings))
-        for part in (self.scene, self.timeline):
-            shell.theme_changed.connect(guarded(part.show_theme))
         shell.display.unit_changed.connect(guarded(self.timeline.clock.show_unit))
         shell.opening.add(Kind("scene", (".toml",), self.staging.play))
         shell.opening.add(Kind("mesh", (".stl", ".ply", ".obj"), self._touch_with))

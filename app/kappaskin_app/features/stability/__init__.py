@@ -26,7 +26,6 @@ class StabilityFeature:
             guarded(lambda status: self.stability.show_status(status, session.inside))
         )
         shell.settings_shown.connect(guarded(self.stability.show_settings))
-        shell.theme_changed.connect(guarded(self.stability.show_theme))
         self.stability.attend(self.seeing)
         self.stability.demonstrated.connect(guarded(self.demonstrating.demonstrate))
         self.stability.back.connect(guarded(stack.undo))

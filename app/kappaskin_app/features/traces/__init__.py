@@ -12,7 +12,6 @@ class TracesFeature:
         self.picking = Picking(shell.history, shell.session, shell.display, shell.selection)
         shell.docks.put_below("element", "Element", self.picking.card, "Ctrl+Alt+E")
         shell.docks.put_below("traces", "Traces", self.picking.traces, "Ctrl+Alt+T")
-        shell.theme_changed.connect(guarded(self.picking.show_theme))
         self.picking.picked.connect(guarded(lambda *_: self._show_element(shell)))
 
     def _show_element(self, shell: MainWindow) -> None:

@@ -20,7 +20,6 @@ from kappaskin_app.shell.history import History
 from kappaskin_app.shell.selection import Selection
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.theme import Theme
 
 Array = NDArray[np.float64]
 
@@ -290,7 +289,3 @@ class Picking(QObject):
 
     def _show_tracing(self) -> None:
         self.card.show_tracing(self.element in self._history.settings.traced)
-
-    def show_theme(self, theme: Theme) -> None:
-        self.card.show_theme(theme)
-        self.traces.show_theme(theme)
