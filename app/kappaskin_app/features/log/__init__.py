@@ -7,6 +7,8 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.parts import HELP, SOURCE
 from kappaskin_app.shell.window import MainWindow
 
+_EVENTS = "When a device came, went, lost messages or began anew, newest first"
+
 
 class LogFeature:
     name = "log"
@@ -23,7 +25,7 @@ class LogFeature:
         display.badge.clicked.connect(guarded(self.event_log.open_list))
         self.event_log.told.connect(guarded(shell.tell))
         show = self.event_log.open_list
-        shell.actions_by_name.add("event_log", SOURCE, "E&vent log", show, "F4")
+        shell.actions_by_name.add("event_log", SOURCE, "E&vent log", show, "F4", _EVENTS)
         self.errors.add_actions(shell.actions_by_name, HELP)
         shell.closing.connect(guarded(self.errors.close))
         shell.closed.connect(guarded(self.logged.close))

@@ -23,6 +23,8 @@ from kappaskin_app.shell.parts import FILE
 from kappaskin_app.shell.window import MainWindow
 
 _MILLIMETRE = 1e-3  # m, the unit of what is drawn for a printer
+_OPEN = "Simulate what a scene file (.toml) says; it may also be dropped on the window"
+_SAVE = "Write the scene that plays, as text that can be edited and opened again"
 
 
 class SceneFeature:
@@ -64,8 +66,8 @@ class SceneFeature:
 
     def _add_actions(self, shell: MainWindow) -> None:
         add, staging = shell.actions_by_name.add, self.staging
-        add("open-scene", FILE, f"&Open scene{DOTS}", staging.open, "Ctrl+O")
-        add("save-scene", FILE, f"Save scene &as{DOTS}", staging.save, "Ctrl+Shift+S")
+        add("open-scene", FILE, f"&Open scene{DOTS}", staging.open, "Ctrl+O", _OPEN)
+        add("save-scene", FILE, f"Save scene &as{DOTS}", staging.save, "Ctrl+Shift+S", _SAVE)
         shell.menus.welcome.add(
             1,
             f"&Open a scene{DOTS}",
