@@ -61,11 +61,14 @@ class Pages(QTabWidget):
         self.setCurrentIndex((self.currentIndex() + pages) % self.count())
         self.tabBar().setFocus(Qt.FocusReason.TabFocusReason)
 
+    def place(self, title: str) -> int:
+        """The place of the page of this title, counted from 0."""
+        return [there for there in _PAGES if there in self._pages].index(title)
+
     def reveal(self, panel: Panel) -> None:
         """Show the page of a panel, scrolled to it."""
-        titles = [title for title in _PAGES if title in self._pages]
-        [of] = [title for title in titles if panel in self._pages[title]]
-        self.setCurrentIndex(titles.index(of))
+        [of] = [title for title, panels in self._pages.items() if panel in panels]
+        self.setCurrentIndex(self.place(of))
         page = self.currentWidget()
         if isinstance(page, QScrollArea):
             page.ensureWidgetVisible(panel)

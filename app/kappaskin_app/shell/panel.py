@@ -14,7 +14,6 @@ from PySide6.QtWidgets import (
 
 from kappaskin.live import Status
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.about import PAGES, PANELS
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.theme import ALERT, FAINT, current, follow_look
 from kappaskin_app.widgets.layout import scroll_to
@@ -29,6 +28,11 @@ class Panel(QGroupBox):
     guide a person wants to read on.
     """
 
+    purpose = ""
+    """What it is for, with the equation where there is one."""
+    guide_page = ""
+    """The page of the guide that says more."""
+
     wished = Signal(str, object)
     read_wanted = Signal(str)
 
@@ -42,16 +46,15 @@ class Panel(QGroupBox):
         self._hint = False
         self._grown = QTimer(self, singleShot=True, interval=_GROWN)  # pyright: ignore[reportCallIssue]
         self._grown.timeout.connect(guarded(self._answer))
-        what = PANELS.get(title, "")
         self.about = QLabel(wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
         self.about.setForegroundRole(FAINT)
         self.about.setTextInteractionFlags(how.TextBrowserInteraction)
         self.about.linkActivated.connect(self.read_wanted)
         self.help = QToolButton(text="?", checkable=True)  # pyright: ignore[reportCallIssue]
         self.help.setAccessibleName(f"What {title} is for")
-        self.help.setToolTip(f"What this panel is for: {what}")
+        self.help.setToolTip(f"What this panel is for: {self.purpose}")
         self.help.toggled.connect(self.about.setVisible)
-        self.help.setVisible(bool(what))
+        self.help.setVisible(bool(self.purpose))
         self.corner = QWidget(self)
         self._corner = QHBoxLayout(self.corner)
         self._corner.setContentsMargins(0, 0, 0, 0)
@@ -79,7 +82,10 @@ class Panel(QGroupBox):
         self.message.setVisible(bool(text))
 
     def _dress(self) -> None:
-        self.about.setText(_leading_on(self.title(), PANELS.get(self.title(), "")))
+        style = f'style="color: {current().accent}"'
+        self.about.setText(
+            f'{self.purpose} <a href="{self.guide_page}" {style}>More in the guide</a>'
+        )
         self.corner.setStyleSheet(_corner_style())
 
     def place_corner(self) -> None:
@@ -99,12 +105,6 @@ class Panel(QGroupBox):
         if asked is not None and self.isAncestorOf(asked):
             scroll_to(self)
             scroll_to(asked)
-
-
-def _leading_on(title: str, what: str) -> str:
-    """What a panel is for, with a link to the page of the guide that tells more."""
-    link = f'<a href="{PAGES.get(title)}" style="color: {current().accent}">More in the guide</a>'
-    return f"{what} {link}" if title in PAGES else what
 
 
 def _corner_style() -> str:

@@ -18,6 +18,7 @@ _CHECKSUM = "sha256"  # the line that a calibration has and a scene has not
 _HEAD = 4096  # characters, among which it is
 _STOPPED = "Cancelled while it was computed; what was taken is forgotten."
 
+_LAYOUT = "The page Calibrate, and the health of the elements below the skin"
 _TARE = "Let what every element reads now be its zero: \u03ba = reading \u2212 zero"
 _CALIBRATE = "The page that guides through cylinders of known radius R, where \u03ba = 1 / R"
 _TAKE = "Take the mean of what comes in now for the cylinder that is asked for"
@@ -34,6 +35,7 @@ class CalibrationFeature:
         self.tare = panels.add(LIVE, TarePanel())
         self.in_use = panels.add(CALIBRATE, InUsePanel())
         self.calibrate = panels.add(CALIBRATE, CalibratePanel())
+        shell.layouts.add("Calibrate", _LAYOUT, CALIBRATE)
         self._wire_calibration(shell)
         self._wire_tare(shell)
         self._add_actions(shell)

@@ -29,6 +29,12 @@ from kappaskin_app.widgets.parts import (
 class InUsePanel(Panel):
     """Says which calibration the readings are corrected by."""
 
+    purpose = (
+        "The calibration that turns readings into curvatures now, if there is one, and how well it "
+        "fits this sensor."
+    )
+    guide_page = "calibrate"
+
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("In use", parent)
         self.what = text_label()
@@ -98,6 +104,12 @@ def _unfit(calibration: Calibration, status: Status) -> str:
 
 class CalibratePanel(Panel):
     """Guides through a calibration on cylinders, and shows what came of it."""
+
+    purpose = (
+        "Lays the skin on cylinders one after the other: there \u03ba = 1 / R, so that each "
+        "channel's gain and offset follow."
+    )
+    guide_page = "calibrate"
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Cylinders of known radius", parent)

@@ -50,6 +50,9 @@ _TABLE = (
 class OtherForm(Form):
     """Asks for the settings of B, and says why they were not taken."""
 
+    purpose = "Other settings for the same readings, to hold against those in use (A)."
+    guide_page = "accuracy"
+
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("B", _ASKS, parent)
         self.swap = button("Swap A and B", "swap", "Let what is in use and B change places.")

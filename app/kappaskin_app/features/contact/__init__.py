@@ -18,6 +18,8 @@ _OBJECT = (
     "probability; and the principal curvatures of the skin at the contact."
 )
 
+_ABOUT = "What the picture shows as tables: contact, object, every element; copied as CSV"
+
 
 class ContactFeature:
     name = "contact"
@@ -28,7 +30,7 @@ class ContactFeature:
         self.readouts, self.numbers = Readouts(), NumbersPanel()
         self.naming = Naming(shell)
         display.header.add(self.readouts)
-        shell.docks.put_below("numbers", "Numbers", self.numbers, "Ctrl+Shift+T")
+        shell.docks.put_below("numbers", "Numbers", self.numbers, "Ctrl+Shift+T", _ABOUT)
         display.foot.object.setToolTip(_OBJECT)
         for name, parts in self.readouts.parts.items():
             display.places[f"readout-{name}"] = parts

@@ -44,6 +44,12 @@ _ALONG = "Along x through the middle of the skin, on the scale of both maps."
 class DesignForm(Form):
     """Asks for what is designed, each number with a slider."""
 
+    purpose = (
+        "A sensor that is not built yet. How sure it would be follows at once from the covariance "
+        "s\u00b2 (M\u1d40M)\u207b\u00b9 of noise s and the fit's matrix M; nothing is simulated."
+    )
+    guide_page = "build"
+
     def __init__(self, parent: QWidget | None = None) -> None:
         self.sliders: dict[str, QSlider] = {}
         super().__init__("To be built", _NAMES, parent)

@@ -16,6 +16,8 @@ from kappaskin_app.shell.window import MainWindow
 
 _EACH = 0.06  # s between two drawings
 
+_ABOUT = "What each element reads, map by map: curvature xx, yy, xy or what View says"
+
 
 class HeatmapsFeature:
     name = "heatmaps"
@@ -26,7 +28,7 @@ class HeatmapsFeature:
         self._next = 0.0
         self.maps = Maps()
         self.heatmaps = self.maps.heatmaps
-        shell.docks.put_right("curvature", "By element", self.maps)
+        shell.docks.put_right("curvature", "By element", self.maps, _ABOUT, share=0.22)
         words = {name: words[0].lower() + words[1:] for name, words in COLOURS}
         shell.display.views["Picture of a &map"] = {
             f"the map of {words[name]}": heatmap for name, heatmap in self.heatmaps.items()

@@ -9,6 +9,8 @@ from kappaskin_app.shell.window import MainWindow
 
 _EVENTS = "When a device came, went, lost messages or began anew, newest first"
 
+_ABOUT = "What was logged or said in passing since the window opened, newest first"
+
 
 class LogFeature:
     name = "log"
@@ -18,7 +20,7 @@ class LogFeature:
         self.logged = Logged()
         self.log, self.event_log = LogPanel(self.logged), EventLog(shell)
         self.errors = Errors(shell, self.event_log)
-        shell.docks.put_below("log", "Log", self.log, "Ctrl+Alt+G")
+        shell.docks.put_below("log", "Log", self.log, "Ctrl+Alt+G", _ABOUT)
         display.foot.add(self.errors.count)
         session.reported.connect(guarded(self.event_log.follow))
         session.reported.connect(guarded(lambda *_: self.log.look()))

@@ -22,6 +22,9 @@ from kappaskin_app.shell.settings.shown import COLOURS
 class ViewPanel(Form):
     """Asks for colours, height and what is drawn beside the skin."""
 
+    purpose = "How the skin is drawn: its colours, its height and what is drawn over it."
+    guide_page = "numbers"
+
     def __init__(self, parent: QWidget | None = None) -> None:
         names = (
             *("colour_by", "colour_from", "maps", "one_range"),

@@ -26,6 +26,8 @@ _MILLIMETRE = 1e-3  # m, the unit of what is drawn for a printer
 _OPEN = "Simulate what a scene file (.toml) says; it may also be dropped on the window"
 _SAVE = "Write the scene that plays, as text that can be edited and opened again"
 
+_ABOUT = "Ready scenes, the text of the one that plays, and which effects it calls for"
+
 
 class SceneFeature:
     name = "scene"
@@ -41,7 +43,7 @@ class SceneFeature:
             *(shell.history, session, self.editing, self.planning),
             *(self.scene, self.timeline, shell.opening, shell),
         )
-        shell.docks.put_below("scene", "Scene", self.scene, "F2")
+        shell.docks.put_below("scene", "Scene", self.scene, "F2", _ABOUT, height=0.38)
         shell.display.centre.add_below(self.timeline)
         shell.layouts.pages.append(self.scene)
         self._wire(shell)
