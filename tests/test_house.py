@@ -24,8 +24,8 @@ _FACES = (
 # What the house may come to at most; who brings a count down brings its limit down. The house is
 # to have 340 modules and 32,000 statements. A feature that raises a count says why beside it.
 LIMITS = {
-    "modules": 349,
-    "statements": 35_388,
+    "modules": 347,
+    "statements": 35_319,
     "loose modules of core": 8,
     "loose modules of the app": 8,
     "names of the library": 55,
