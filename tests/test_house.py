@@ -167,3 +167,42 @@ def test_no_package_of_the_app_is_in_a_circle_nor_any_within_the_shell() -> None
 
     for module in sorted(shell):
         visit(module, ())
+
+
+_PUT = ("put_left", "put_right", "put_below", "put_above")
+_OTHER_MEANINGS = {"health", "scene", "element"}  # a colouring, what is simulated, a plain word
+
+
+def texts_of(node: ast.AST) -> set[str]:
+    """The strings that stand in a part of a module."""
+    return {
+        part.value
+        for part in ast.walk(node)
+        if isinstance(part, ast.Constant) and isinstance(part.value, str)
+    }
+
+
+def test_the_shell_names_no_dock_of_a_feature() -> None:
+    docks = {
+        text
+        for module, tree in modules().items()
+        if module.startswith("kappaskin_app.features.")
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call) and getattr(node.func, "attr", "") in _PUT
+        for text in texts_of(ast.Tuple(node.args[:2]))  # its name and its title
+    }
+    assert len(docks) > 20
+    shell = {m: tree for m, tree in modules().items() if m.startswith("kappaskin_app.shell.")}
+    knows_docks = {
+        m
+        for m, tree in shell.items()
+        if any(name == "QDockWidget" or "docks" in source for source, name in imports(tree))
+        or ".layouts." in m
+    } | {"kappaskin_app.shell.docks", "kappaskin_app.shell.window"}
+    named = {
+        (module, text)
+        for module, tree in shell.items()
+        for text in texts_of(tree) & docks
+        if module in knows_docks or text.lower() not in _OTHER_MEANINGS
+    }
+    assert named == set()

@@ -45,7 +45,7 @@ def run(
     source
         `sim:`, `sim:SCENE`, `replay:FILE`, or a port or URL for pyserial.
     seconds
-        Close by itself after so long.
+        Close by itself after so long; the window begins in its first theme and layout.
     screenshot
         Save a picture of the window just before it closes by itself.
     """
@@ -68,7 +68,7 @@ def present(*, seconds: float | None = None, screenshot: Path | None = None) -> 
     Parameters
     ----------
     seconds
-        Close by itself after so long.
+        Close by itself after so long; the window begins in its first theme and layout.
     screenshot
         Save a picture of the window just before it closes by itself.
     """
@@ -105,7 +105,7 @@ def replay(file: Path, *, seconds: float | None = None, screenshot: Path | None 
     file
         The recording.
     seconds
-        Close by itself after so long.
+        Close by itself after so long; the window begins in its first theme and layout.
     screenshot
         Save a picture of the window just before it closes by itself.
     """

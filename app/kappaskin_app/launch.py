@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from kappaskin_app.shell.recovery import Recovering
     from kappaskin_app.shell.splash import Splash
     from kappaskin_app.shell.window import MainWindow
+    from kappaskin_app.theme import Theme
 
 log = logging.getLogger("kappaskin")
 
@@ -113,9 +114,10 @@ def _application() -> "QApplication":
 
 def _splash(kept: Path) -> "Splash":
     from kappaskin_app.shell.splash import Splash
-    from kappaskin_app.theme import LIGHT, THEMES
+    from kappaskin_app.theme import apply_look
 
-    splash = Splash(THEMES.get(_theme_in(kept), LIGHT))
+    apply_look(_theme_in(kept))
+    splash = Splash()
     splash.show()
     splash.say("Loading the library")
     return splash
@@ -195,16 +197,18 @@ def _kept_file() -> Path:
     return platformdirs.user_config_path("kappaskin", appauthor=False) / "window.toml"
 
 
-def _theme_in(path: Path) -> str:
-    """The name of the theme that is kept at `path`; empty where none can be read.
+def _theme_in(path: Path) -> "Theme":
+    """The theme that is kept at `path`; that of a first start where none can be read.
 
     What is wrong with the file is told by who reads all of it.
     """
+    from kappaskin_app.theme import DARK, THEMES
+
     try:
         with path.open("rb") as file:
-            return str(tomllib.load(file)["window"]["theme"])
+            return THEMES[tomllib.load(file)["window"]["theme"]]
     except (OSError, ValueError, LookupError, TypeError, RecursionError):
-        return ""
+        return DARK
 
 
 def _logbook() -> "Logbook | None":

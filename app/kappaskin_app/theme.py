@@ -1,10 +1,18 @@
-"""Colours: two palettes for the window, and the colour maps of what is measured."""
+"""Colours: two themes for the window, and the colour maps of what is measured.
 
+The palette of the application says which theme is in use. Qt repaints every widget when it
+changes: what is painted with the colours of `current` follows by itself, and so do labels whose
+foreground role is `FAINT` or `ALERT`. What holds colours otherwise asks `follow_look`.
+"""
+
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from PySide6.QtCore import QEvent, QObject
 from PySide6.QtGui import QColor, QFont, QFontDatabase, QGuiApplication, QPalette
+from PySide6.QtWidgets import QApplication, QWidget
 
 Colours = NDArray[np.uint8]
 
@@ -71,6 +79,8 @@ DARK = Theme(
     disabled="#8a939e",
 )
 THEMES = {"light": LIGHT, "dark": DARK}
+FAINT, ALERT = QPalette.ColorRole.PlaceholderText, QPalette.ColorRole.BrightText
+"""The roles of a theme's colours `faint` and `alert` in its palette."""
 
 
 def palette(theme: Theme) -> QPalette:
@@ -83,10 +93,10 @@ def palette(theme: Theme) -> QPalette:
         roles.Base: theme.base,
         roles.AlternateBase: theme.window,
         roles.Text: theme.text,
-        roles.PlaceholderText: theme.faint,
         roles.Button: theme.window,
         roles.ButtonText: theme.text,
-        roles.BrightText: theme.bad,
+        FAINT: theme.faint,
+        ALERT: theme.alert,
         roles.ToolTipBase: theme.base,
         roles.ToolTipText: theme.text,
         roles.Highlight: theme.accent,
@@ -109,6 +119,43 @@ def bar_palette(theme: Theme) -> QPalette:
     return made
 
 
+def current() -> Theme:
+    """The theme of the application's palette; light where it is another's."""
+    window = QGuiApplication.palette().window().color().name()
+    return next((theme for theme in THEMES.values() if theme.window == window), LIGHT)
+
+
+def apply_look(theme: Theme, percent: float = 100.0) -> None:
+    """Show every window in `theme`, with letters of so many percent of the system's size."""
+    QApplication.setPalette(palette(theme))
+    QApplication.setPalette(bar_palette(theme), "QScrollBar")  # pyright: ignore[reportArgumentType]
+    if (font := letters(percent)) != QApplication.font():
+        QApplication.setFont(font)
+
+
+class _LookFollower(QObject):
+    """Calls `show` when Qt tells a widget of another palette or font."""
+
+    def __init__(self, widget: QWidget, show: Callable[[], object]) -> None:
+        super().__init__(widget)
+        self._show = show
+        widget.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() in (QEvent.Type.PaletteChange, QEvent.Type.FontChange):
+            self._show()
+        return False
+
+
+def follow_look(widget: QWidget, show: Callable[[], object]) -> None:
+    """Call `show` now, and again whenever the theme or the letters are others.
+
+    `widget` has no style sheet: Qt tells one with a style sheet nothing.
+    """
+    _LookFollower(widget, show)
+    show()
+
+
 def letters(percent: float) -> QFont:
     """The system's font, at so many percent of its size."""
     font = QFontDatabase.systemFont(QFontDatabase.SystemFont.GeneralFont)
@@ -121,8 +168,9 @@ def grown(px: float) -> int:
     return round(px * QGuiApplication.font().pointSizeF() / letters(100).pointSizeF())
 
 
-def slider_style(theme: Theme) -> str:
+def slider_style() -> str:
     """A slider whose groove is seen on a dark ground too, where Fusion's is lost."""
+    theme = current()
     off, on = theme.off, theme.accent
     handle = "QSlider::handle:horizontal"
     return (
@@ -180,3 +228,8 @@ SERIES = (
     ("#1a7a8a", "#7fe0e8"),
     ("#6a3fb5", "#b79bf0"),
 )
+
+
+def series(number: int) -> QColor:
+    """The colour of the curve with this `number`, in the theme of now."""
+    return QColor(SERIES[number % len(SERIES)][current() is DARK])

@@ -20,6 +20,7 @@ from kappaskin import Engine
 from kappaskin_app import features, guard
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.window import Feature, MainWindow
+from kappaskin_app.theme import LIGHT, apply_look, current
 
 if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
     pytest.exit("the app's tests need a display: run `python3 packaging/start.py test`", 2)
@@ -46,6 +47,8 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 def no_window_and_no_failure_left(
     qapp: QApplication, request: pytest.FixtureRequest
 ) -> Iterator[None]:
+    if current() is not LIGHT:
+        apply_look(LIGHT)
     failures: list[str] = []
     guard.on_failure(failures.append)
     yield

@@ -11,6 +11,7 @@ import pytest
 from PySide6.QtGui import QImage
 
 from kappaskin_app.shell.badge import SIM, STALE, WAITING, colour_of
+from kappaskin_app.shell.layouts.kept import Kept, KeptFile
 from kappaskin_app.theme import DARK
 
 
@@ -20,10 +21,14 @@ def run(*arguments: str, **more: object) -> subprocess.CompletedProcess[str]:
 
 
 def test_the_app_opens_takes_its_picture_and_closes(tmp_path: Path) -> None:
-    picture = tmp_path / "window.png"
-    done = run("--source", "sim:line", "--seconds", "4", "--screenshot", str(picture))
+    picture, config = tmp_path / "window.png", {"XDG_CONFIG_HOME": str(tmp_path)}
+    KeptFile(tmp_path / "kappaskin" / "window.toml").write(Kept(theme="light"))
+    asked = ("--source", "sim:line", "--seconds", "4", "--screenshot", str(picture))
+    done = run(*asked, env=os.environ | config)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert QImage(str(picture)).size().toTuple() == (1280, 800)
+    # The same for everybody, whatever theme is kept: beside the menus is the first theme's ground.
+    assert QImage(str(picture)).pixelColor(800, 10).name() == DARK.window
 
 
 def _forks(process: psutil.Process) -> bool:

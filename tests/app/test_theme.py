@@ -1,21 +1,33 @@
+import time
 from dataclasses import asdict
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from PySide6.QtWidgets import QApplication, QScrollBar
+from PySide6.QtGui import QImage
+from PySide6.QtWidgets import QApplication, QLabel, QScrollBar, QWidget
 
+from kappaskin import Engine, Estimate
+from kappaskin.live import Status
+from kappaskin_app.shell import window as shell
 from kappaskin_app.shell.badge import GAP, LIVE, LOST, OFF, REPLAY, SIM, STALE, WAITING, colour_of
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import (
+    ALERT,
     DARK_INK,
     DIVERGING,
+    FAINT,
     LIGHT_INK,
     PULLED,
     SEQUENTIAL,
     SERIES,
     THEMES,
     Theme,
+    apply_look,
     bar_palette,
+    current,
+    follow_look,
 )
 
 Array = NDArray[np.float64]
@@ -144,3 +156,100 @@ def test_the_handle_of_a_scroll_bar_is_lighter_than_its_groove(
     bar.setPalette(bar_palette(theme))
     seen = bar.grab().toImage()
     assert seen.pixelColor(8, 60).lightness() > seen.pixelColor(8, 250).lightness() + 10
+
+
+def test_the_palette_tells_which_theme_is_in_use(qapp: QApplication) -> None:
+    for theme in THEMES.values():
+        apply_look(theme)
+        assert current() is theme
+
+
+@pytest.mark.parametrize("role", [FAINT, ALERT])
+def test_a_label_of_a_role_has_its_colour_in_each_theme(qapp: QApplication, role: object) -> None:
+    label = QLabel("Some words")
+    label.setForegroundRole(role)
+    for theme in THEMES.values():
+        apply_look(theme)
+        qapp.processEvents()
+        wanted = theme.faint if role is FAINT else theme.alert
+        assert label.palette().color(label.foregroundRole()).name() == wanted
+
+
+def test_what_follows_the_look_is_called_at_once_and_at_each_change(qapp: QApplication) -> None:
+    seen: list[Theme] = []
+    widget = QWidget()
+    follow_look(widget, lambda: seen.append(current()))
+    assert seen == [current()]
+    for theme in THEMES.values():
+        apply_look(theme)
+        qapp.processEvents()
+        assert seen[-1] is theme
+    apply_look(seen[-1], 150)
+    count = len(seen)
+    qapp.processEvents()
+    assert len(seen) == count + 1
+    apply_look(seen[-1])
+
+
+@pytest.fixture(scope="module")
+def felt() -> tuple[Status, Estimate]:
+    """What a window is told of a simulated skin."""
+    engine = Engine()
+    engine.connect("sim:centre")
+    while (estimate := engine.latest(engine.status())) is None:
+        time.sleep(0.01)
+    status = engine.status()
+    engine.close()
+    return status, estimate
+
+
+def parts_of(window: MainWindow) -> dict[str, QWidget]:
+    """All that a window shows, by name."""
+    docks = {name: window.docks.widget(name) for name in window.docks.by_name()}
+    panels = {panel.title(): panel for panel in window.panels.all()}
+    frame = {"header": window.display.header, "foot": window.display.foot}
+    centre = {"skin": window.membrane, "scale": window.scale, "timeline": window.timeline}
+    stage = {"transport": window.transport, "operator": window.stage.operator}
+    stage |= {f"board {number}": board for number, board in enumerate(window.stage.boards)}
+    return {**docks, **panels, **frame, **centre, **stage}
+
+
+def show_much(window: MainWindow, status: Status, estimate: Estimate) -> None:
+    """Show what is felt, and nothing that comes later."""
+    window.session.status, window.session.estimate = status, estimate
+    window.session.reported.emit(status)
+    window.display.show_estimate(estimate)
+    window.session.blockSignals(True)  # so that nothing else is shown
+    window.timeline.show_time(1.0, True)
+    say_much(window)
+
+
+def say_much(window: MainWindow) -> None:
+    """Say in each panel what it is for, and a warning or a hint."""
+    window.display.notice.show_warning("Too near the rim")
+    for number, panel in enumerate(window.panels.all()):
+        panel.help.setChecked(True)
+        panel.show_message("A message", hint=number % 2 == 0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("theme", THEMES)
+def test_a_window_that_is_switched_is_as_one_that_began_so(
+    opened, felt, qtbot, monkeypatch: pytest.MonkeyPatch, theme: str
+) -> None:
+    def pictures() -> dict[str, QImage]:
+        return {name: part.grab().toImage() for name, part in parts_of(window).items()}
+
+    found = list[dict[str, QImage]]()
+    for begun in THEMES:
+        monkeypatch.setattr(shell, "settings_for", lambda _, begun=begun: Settings(theme=begun))
+        window = opened("sim:")
+        show_much(window, *felt)
+        qtbot.wait(100)
+        window.history.change("Theme", -1, theme=theme)
+        say_much(window)  # as one or the other panel says something else with other settings
+        qtbot.wait(100)
+        found.append(pictures())
+        window.close()
+    one, other = found
+    assert [name for name in one if one[name] != other[name]] == []

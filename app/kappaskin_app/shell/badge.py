@@ -2,14 +2,14 @@
 
 import math
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QFontInfo, QMouseEvent
-from PySide6.QtWidgets import QApplication, QLabel, QWidget
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QColor, QFontInfo, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
 from kappaskin.live import Status
 from kappaskin.recording import Replay
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
-from kappaskin_app.theme import Theme
+from kappaskin_app.theme import Theme, current
 from kappaskin_app.widgets.parts import sentence
 
 LIVE, SIM, WAITING = "LIVE", "SIM", "WAITING"
@@ -35,7 +35,8 @@ _TIPS = {
     _RECORDING: "What comes in is being recorded.",
 }
 
-_WIDTH, _LARGE = 8.6, 1.54  # of the size of letters elsewhere
+_WIDTH, _HEIGHT, _LARGE = 8.6, 2.5, 1.54  # of the size of letters elsewhere
+_ROUND = 6  # px: radius of its corners
 _MORE = "Click it, or F4, to read what happened."
 
 
@@ -61,8 +62,7 @@ class Badge(QLabel):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self._theme: Theme | None = None
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Preferred)
         self.state, self._recording = "", False
 
     def show_state(self, state: str, recording: bool = False) -> None:
@@ -74,26 +74,32 @@ class Badge(QLabel):
             self.setText("\n".join(parts[:2]))
             self.setAccessibleName(", ".join(parts))
             self.setToolTip("\n".join([*(_TIPS[part] for part in parts), _MORE]))
-            self._paint()
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         self.clicked.emit()
         super().mouseReleaseEvent(event)
 
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
-        self._paint()
+    def sizeHint(self) -> QSize:
+        one = QFontInfo(self.font()).pixelSize()
+        return QSize(round(_WIDTH * one), round(_HEIGHT * one))
 
-    def _paint(self) -> None:
-        if self._theme is None or not self.state:
+    def minimumSizeHint(self) -> QSize:
+        return self.sizeHint()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        if not self.state:
             return
-        one = QFontInfo(QApplication.font()).pixelSize()  # not its own: that is what is set
-        self.setFixedWidth(round(_WIDTH * one))
-        size, padding = (one, 0) if "\n" in self.text() else (round(_LARGE * one), 4)
-        self.setStyleSheet(
-            f"background: {colour_of(self.state, self._theme)}; color: white; font-weight: 700;"
-            f"font-size: {size}px; border-radius: 6px; padding: {padding}px;"
-        )
+        painter, font = QPainter(self), self.font()
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(colour_of(self.state, current())))
+        painter.drawRoundedRect(self.rect(), _ROUND, _ROUND)
+        one = QFontInfo(font).pixelSize()
+        font.setPixelSize(one if "\n" in self.text() else round(_LARGE * one))
+        font.setBold(True)
+        painter.setFont(font)
+        painter.setPen(QColor("white"))
+        painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self.text())
 
 
 def colour_of(state: str, theme: Theme) -> str:

@@ -24,7 +24,6 @@ from kappaskin_app.shell.header import Header
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.status_bar import Notice, StatusBar, warnings
-from kappaskin_app.theme import LIGHT, Theme
 from kappaskin_app.widgets.tint import Tint
 
 _OLD = (LOST, OFF, STALE, WAITING, GAP)  # what is shown is not so now
@@ -81,7 +80,6 @@ class Display(QObject):
         self.settings = Settings()
         self.old = True
         """Whether what is shown is not coming in any more."""
-        self.missing = LIGHT.missing
         self.ages: Callable[[], list[float]] = list
         """How old in s what was drawn within the last second was, as the main view tells."""
         self.age_sd = math.nan
@@ -95,11 +93,6 @@ class Display(QObject):
 
     def show_settings(self, settings: Settings) -> None:
         self.settings = settings
-
-    def show_theme(self, theme: Theme) -> None:
-        self.missing = theme.missing
-        for view in (self.badge, self.notice):
-            view.show_theme(theme)
 
     def limits_shown(self) -> dict[str, float]:
         """How far the colours of each view that is seen reach, in SI units, by its setting."""

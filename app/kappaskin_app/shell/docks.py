@@ -1,6 +1,6 @@
 """Docks around the skin of a window: beside it, and below it one in the place of another."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 
@@ -17,7 +17,6 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.about import DOCKS
 from kappaskin_app.shell.actions import Actions
 from kappaskin_app.widgets.layout import heighten
 from kappaskin_app.widgets.line import Line
@@ -69,7 +68,7 @@ class Title(QWidget):
 
 
 _HEIGHT = 0.28  # of the window's, of a dock below the skin that is shown
-_HEIGHTS = {"scene": 0.38, "compare": 0.36, "design": 0.4, "guide": 0.5}
+_NONE: Mapping[str, float] = {}
 _UPPER = (0.58, 0.28)  # of it, of a dock above another in a column and of that one
 _LEAST = 40  # px of a dock that is scrolled, without its title
 _BELOW = Qt.DockWidgetArea.BottomDockWidgetArea
@@ -96,6 +95,9 @@ class Docks:
         self._above: dict[str, str] = {}
         self._right: list[str] = []
         self._also: dict[str, str] = {}
+        self._heights: dict[str, float] = {}
+        self._areas: dict[str, Qt.DockWidgetArea] = {}
+        self._layouts: dict[str, Mapping[str, float]] = {}
 
     def __getitem__(self, name: str) -> Dock:
         return self._docks[name]
@@ -117,30 +119,57 @@ class Docks:
         """Those that stood right of the skin at first."""
         return [self._docks[name] for name in self._right]
 
-    def put_left(self, name: str, title: str, widget: QWidget) -> None:
-        """Show a widget in a column left of the skin."""
-        self.put_beside(name, title, widget, Qt.DockWidgetArea.LeftDockWidgetArea)
+    def at_first(self, layout: str) -> Iterator[tuple[str, Qt.DockWidgetArea, float]]:
+        """Each dock, where it began, and its share of the window in a ready layout; 0: hidden."""
+        for name in (*self._above, *(name for name in self._docks if name not in self._above)):
+            shares = self._layouts[name]
+            yield name, self._areas[name], shares.get(layout, shares.get("", 0.0))
 
-    def put_right(self, name: str, title: str, widget: QWidget) -> None:
-        """Show a widget in a column right of the skin."""
-        self.put_beside(name, title, widget, Qt.DockWidgetArea.RightDockWidgetArea)
+    def put_left(self, name: str, title: str, widget: QWidget, tip: str, share: float) -> None:
+        """Show a widget in a column left of the skin, in each ready layout so wide."""
+        self._put(name, title, widget, Qt.DockWidgetArea.LeftDockWidgetArea, tip, {"": share})
+
+    def put_right(self, name: str, title: str, widget: QWidget, tip: str, share: float) -> None:
+        """Show a widget in a column right of the skin, in each ready layout so wide."""
+        self._put(name, title, widget, Qt.DockWidgetArea.RightDockWidgetArea, tip, {"": share})
         self._right.append(name)
 
-    def put_beside(self, name: str, title: str, widget: QWidget, area: Qt.DockWidgetArea) -> None:
-        """Show a widget in a column beside the skin."""
+    def _put(
+        self,
+        name: str,
+        title: str,
+        widget: QWidget,
+        area: Qt.DockWidgetArea,
+        tip: str,
+        layouts: Mapping[str, float],
+    ) -> None:
+        self._areas[name], self._layouts[name] = area, layouts
         dock = self._docks[name] = Dock(title, self._window)
         self._shown[name] = widget
         dock.setObjectName(name)
-        dock.setToolTip(DOCKS.get(name, ""))  # also of what in it explains nothing itself
+        dock.setToolTip(tip)  # also of what in it explains nothing itself
         dock.setTitleBarWidget(Title(dock))
         dock.setWidget(widget)
         self._window.addDockWidget(area, dock)
 
-    def put_below(self, name: str, title: str, widget: QWidget, key: str, menu: str = "") -> None:
+    def put_below(
+        self,
+        name: str,
+        title: str,
+        widget: QWidget,
+        key: str,
+        tip: str,
+        *,
+        menu: str = "",
+        height: float = _HEIGHT,
+        layouts: Mapping[str, float] = _NONE,
+    ) -> None:
         """Have a widget below the skin, hidden until it is asked for with `key`.
 
-        It is also asked for in a `menu`, besides that of all docks.
+        It is also asked for in a `menu`, besides that of all docks; then it has the `height`, a
+        share of the window's. The ready `layouts` that show it have their own.
         """
+        self._heights[name] = height
         if menu:
             self._also[name] = menu
         before = self.below
@@ -149,7 +178,7 @@ class Docks:
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # a stop on the way of Tab that nobody sees
         area.setMinimumHeight(_LEAST)
         area.setWidget(widget)
-        self.put_beside(name, title, area, _BELOW)
+        self._put(name, title, area, _BELOW, tip, layouts)
         self._shown[name] = widget
         self._keys[name] = key
         dock = self[name]
@@ -159,9 +188,22 @@ class Docks:
         dock.setAllowedAreas(Qt.DockWidgetArea.TopDockWidgetArea | _BELOW)
         dock.hide()  # so that a small window is left to the skin
 
-    def put_above(self, name: str, title: str, widget: QWidget, other: str, key: str) -> None:
-        """Have a widget above the `other` in its column, hidden until asked for with `key`."""
-        self.put_beside(name, title, widget, self._window.dockWidgetArea(self[other]))
+    def put_above(
+        self,
+        name: str,
+        title: str,
+        widget: QWidget,
+        other: str,
+        key: str,
+        tip: str,
+        layouts: Mapping[str, float],
+    ) -> None:
+        """Have a widget above the `other` in its column, hidden until asked for with `key`.
+
+        In the ready `layouts` that show it the column is a share of the window's width.
+        """
+        area = self._window.dockWidgetArea(self[other])
+        self._put(name, title, widget, area, tip, layouts)
         self._keys[name], self._above[name] = key, other
         self._window.splitDockWidget(self[name], self[other], Qt.Orientation.Vertical)
         self[name].hide()
@@ -200,7 +242,7 @@ class Docks:
         dock.show()
         if dock in self.below and not dock.isFloating():
             least = self._needed(name) + dock.height() - dock.widget().height()
-            heighten(self._window, dock, _HEIGHTS.get(name, _HEIGHT), least)
+            heighten(self._window, dock, self._heights[name], least)
         self._share_columns()
         dock.raise_()
 

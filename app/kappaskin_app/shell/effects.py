@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
 
 from kappaskin.scenes.effects import EFFECTS
 from kappaskin.studies import EffectCost
-from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.theme import current, follow_look
 from kappaskin_app.widgets.layout import fit_rows
 from kappaskin_app.widgets.text import NONE, duration, length
 
@@ -48,7 +48,6 @@ class EffectsTable(QTableWidget):
     def __init__(self) -> None:
         super().__init__(0, len(_COLUMNS))
         self._shown: tuple[EffectCost, ...] = ()
-        self._theme = LIGHT
         for column, (name, tip) in enumerate(_COLUMNS.items()):
             item = _cell(name, column)
             item.setToolTip(tip)
@@ -66,16 +65,13 @@ class EffectsTable(QTableWidget):
         self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setAccessibleName("What each effect costs")
+        follow_look(self, self._fill)
 
     def show_effects(self, effects: tuple[EffectCost, ...]) -> None:
         """Show what was measured of `effects`."""
         if effects == self._shown:
             return
         self._shown = effects
-        self._fill()
-
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
         self._fill()
 
     def _fill(self) -> None:
@@ -89,7 +85,7 @@ class EffectsTable(QTableWidget):
                 item = _cell(text, column)
                 item.setToolTip(_tip(cost))
                 if not cost.kept:
-                    item.setForeground(QColor(self._theme.faint))
+                    item.setForeground(QColor(current().faint))
                 if column >= len(texts) - len(errors) and errors[column - len(texts)][1]:
                     font = item.font()
                     font.setBold(True)

@@ -12,10 +12,13 @@ from kappaskin_app.shell.finder.finder import Finder
 from kappaskin_app.shell.finder.sheet import CheatSheet
 from kappaskin_app.shell.finder.things import Things, things_in
 from kappaskin_app.shell.parts import EDIT, FILE, HELP, VIEW, Parts
-from kappaskin_app.shell.tips import tip_of
 from kappaskin_app.shell.welcome import Welcome
 
 _LONGEST = 60  # characters of a step in a menu
+_TIPS = {
+    "undo": "Take back the last change of a setting, scene or layout; what comes in goes on",
+    "redo": "Make the change again that was taken back last",
+}
 
 
 class Undoing(QObject):
@@ -26,8 +29,8 @@ class Undoing(QObject):
     ) -> None:
         super().__init__(stack)
         self._stack, self._settle, self._actions = stack, settle, actions
-        actions.add("undo", menu, "&Undo", self._undo, "Ctrl+Z")
-        actions.add("redo", menu, "&Redo", self._redo, "Ctrl+Shift+Z")
+        actions.add("undo", menu, "&Undo", self._undo, "Ctrl+Z", _TIPS["undo"])
+        actions.add("redo", menu, "&Redo", self._redo, "Ctrl+Shift+Z", _TIPS["redo"])
         stack.indexChanged.connect(guarded(self._show))
         self._show()
 
@@ -46,12 +49,18 @@ class Undoing(QObject):
                 text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}\N{HORIZONTAL ELLIPSIS}"
             )
             action.setText(f"&{word}: {cut.replace('&', '&&')}" if text else f"&{word}")
-            action.setToolTip(f"{word}: {text}" if text else tip_of(name, word))
+            action.setToolTip(f"{word}: {text}" if text else _TIPS[name])
             self._actions.allow(name, "" if text else f"there is nothing to {name}")
 
 
 DOTS = "\N{HORIZONTAL ELLIPSIS}"
 _FIND = "Whatever this window can do, found by a few letters: commands, settings, scenes, files"
+_RESET = "Every setting as at first, but for calibration, tare and what is published"
+_PAUSE = "Let a scene or a recording stand; what a sensor sends goes on"
+_THEME = "Dark letters on a light ground, or light ones on a dark ground"
+_QUIT = "End the program; a recording that goes on is asked about first"
+_NEXT = "Turn to the next page of Settings: Live, Skin, Sensor, Calibrate"
+_PREVIOUS = "Turn to the page of Settings before"
 _SHEET = "Every shortcut, to look up and to change"
 _WELCOME = "Offer above the skin what one may begin with: a scene, a sensor, a lesson, a recording"
 _RECENT = "Scenes, recordings, calibrations and meshes opened last; each may also be dropped here"
@@ -83,20 +92,21 @@ class Menus(QObject):
         self.undoing = Undoing(
             window.history.stack, window.layouts.note, window.actions_by_name, EDIT
         )
-        add("reset", EDIT, "&Reset settings", window.requests.reset)
+        add("reset", EDIT, "&Reset settings", window.requests.reset, "", _RESET)
         find = self.finder.open_empty
         add("find", EDIT, f"&Find a command{DOTS}", find, "Ctrl+K", _FIND)
-        add("pause", VIEW, "&Pause or go on", window.session.pause, "Ctrl+P")
-        add("theme", VIEW, "Light or &dark", window.requests.switch_theme, "Ctrl+T")
+        add("pause", VIEW, "&Pause or go on", window.session.pause, "Ctrl+P", _PAUSE)
+        add("theme", VIEW, "Light or &dark", window.requests.switch_theme, "Ctrl+T", _THEME)
 
     def finish(self) -> None:
         """Register what stands after all that features do."""
         window, add = self._window, self._window.actions_by_name.add
         recent = add("recent", FILE, "Open r&ecent", lambda: None, "", _RECENT)
         recent.setMenu(window.opening.menu)
-        add("quit", FILE, "&Quit", self.quit_wanted.emit, "Ctrl+Q")
-        add("next-panels", VIEW, "&Next panels", partial(window.panels.turn, 1), "Ctrl+PgDown")
-        add("last-panels", VIEW, "&Previous panels", partial(window.panels.turn, -1), "Ctrl+PgUp")
+        add("quit", FILE, "&Quit", self.quit_wanted.emit, "Ctrl+Q", _QUIT)
+        after, before = (partial(window.panels.turn, pages) for pages in (1, -1))
+        add("next-panels", VIEW, "&Next panels", after, "Ctrl+PgDown", _NEXT)
+        add("last-panels", VIEW, "&Previous panels", before, "Ctrl+PgUp", _PREVIOUS)
         window.docks.add_actions(window.actions_by_name, VIEW)
         window.layouts.add_actions(window.actions_by_name)
         self.sheet = CheatSheet(window.actions_by_name, window.history, window)

@@ -1,4 +1,4 @@
-"""The pages of settings: features add panels to them; all show settings, status and theme."""
+"""The pages of settings: features add panels to them; all show settings and status."""
 
 from typing import TypeVar
 
@@ -9,7 +9,6 @@ from kappaskin.live import Status
 from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.theme import Theme
 from kappaskin_app.widgets.layout import scrolled
 
 _Some = TypeVar("_Some", bound=Panel)
@@ -62,11 +61,14 @@ class Pages(QTabWidget):
         self.setCurrentIndex((self.currentIndex() + pages) % self.count())
         self.tabBar().setFocus(Qt.FocusReason.TabFocusReason)
 
+    def place(self, title: str) -> int:
+        """The place of the page of this title, counted from 0."""
+        return [there for there in _PAGES if there in self._pages].index(title)
+
     def reveal(self, panel: Panel) -> None:
         """Show the page of a panel, scrolled to it."""
-        titles = [title for title in _PAGES if title in self._pages]
-        [of] = [title for title in titles if panel in self._pages[title]]
-        self.setCurrentIndex(titles.index(of))
+        [of] = [title for title, panels in self._pages.items() if panel in panels]
+        self.setCurrentIndex(self.place(of))
         page = self.currentWidget()
         if isinstance(page, QScrollArea):
             page.ensureWidgetVisible(panel)
@@ -78,7 +80,3 @@ class Pages(QTabWidget):
     def show_status(self, status: Status, simulating: bool) -> None:
         for panel in self.all():
             panel.show_status(status, simulating)
-
-    def show_theme(self, theme: Theme) -> None:
-        for panel in self.all():
-            panel.show_theme(theme)

@@ -14,9 +14,8 @@ from PySide6.QtWidgets import (
 
 from kappaskin.live import Status
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.about import PAGES, PANELS
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.theme import ALERT, FAINT, current, follow_look
 from kappaskin_app.widgets.layout import scroll_to
 
 _GROWN = 20  # ms after which the page of a panel that grew has grown too
@@ -29,6 +28,11 @@ class Panel(QGroupBox):
     guide a person wants to read on.
     """
 
+    purpose = ""
+    """What it is for, with the equation where there is one."""
+    guide_page = ""
+    """The page of the guide that says more."""
+
     wished = Signal(str, object)
     read_wanted = Signal(str)
 
@@ -39,18 +43,18 @@ class Panel(QGroupBox):
         self.message.setTextInteractionFlags(
             how.TextSelectableByMouse | how.TextSelectableByKeyboard
         )
-        self._theme, self._hint = LIGHT, False
+        self._hint = False
         self._grown = QTimer(self, singleShot=True, interval=_GROWN)  # pyright: ignore[reportCallIssue]
         self._grown.timeout.connect(guarded(self._answer))
-        what = PANELS.get(title, "")
-        self.about = QLabel(_leading_on(title, what), wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
+        self.about = QLabel(wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
+        self.about.setForegroundRole(FAINT)
         self.about.setTextInteractionFlags(how.TextBrowserInteraction)
         self.about.linkActivated.connect(self.read_wanted)
         self.help = QToolButton(text="?", checkable=True)  # pyright: ignore[reportCallIssue]
         self.help.setAccessibleName(f"What {title} is for")
-        self.help.setToolTip(f"What this panel is for: {what}")
+        self.help.setToolTip(f"What this panel is for: {self.purpose}")
         self.help.toggled.connect(self.about.setVisible)
-        self.help.setVisible(bool(what))
+        self.help.setVisible(bool(self.purpose))
         self.corner = QWidget(self)
         self._corner = QHBoxLayout(self.corner)
         self._corner.setContentsMargins(0, 0, 0, 0)
@@ -61,6 +65,7 @@ class Panel(QGroupBox):
         self._around.addWidget(self.about)
         self._around.addLayout(self.body)
         self._around.addWidget(self.message)
+        follow_look(self, self._dress)
 
     def show_settings(self, settings: Settings) -> None:
         """Show what is chosen."""
@@ -68,24 +73,20 @@ class Panel(QGroupBox):
     def show_status(self, status: Status, simulating: bool) -> None:
         """Show how the engine is doing, and whether the app's own simulation is playing."""
 
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
-        self._paint()
-
     def show_message(self, text: str, hint: bool = False) -> None:
         """Say something at the foot, or nothing: an alarm, or only a hint."""
         if (text, hint) != (self.message.text(), self._hint):
             self._hint = hint
             self.message.setText(text)
-            self._paint()
+            self.message.setForegroundRole(FAINT if hint else ALERT)
         self.message.setVisible(bool(text))
 
-    def _paint(self) -> None:
-        colour = self._theme.faint if self._hint else self._theme.alert
-        self.message.setStyleSheet(f"color: {colour};")
-        self.about.setStyleSheet(f"color: {self._theme.faint};")
-        for button in self.corner.findChildren(QToolButton):
-            button.setStyleSheet(_corner_style(self._theme))
+    def _dress(self) -> None:
+        style = f'style="color: {current().accent}"'
+        self.about.setText(
+            f'{self.purpose} <a href="{self.guide_page}" {style}>More in the guide</a>'
+        )
+        self.corner.setStyleSheet(_corner_style())
 
     def place_corner(self) -> None:
         """Put the corner's buttons beside the title."""
@@ -106,13 +107,9 @@ class Panel(QGroupBox):
             scroll_to(asked)
 
 
-def _leading_on(title: str, what: str) -> str:
-    """What a panel is for, with a link to the page of the guide that tells more."""
-    return f'{what} <a href="{PAGES[title]}">More in the guide</a>' if title in PAGES else what
-
-
-def _corner_style(theme: Theme) -> str:
+def _corner_style() -> str:
     """Words without a frame, until they are pointed at or reached by Tab."""
+    theme = current()
     seen = f"color: {theme.text}; border-color: {theme.accent};"
     return (
         f"QToolButton {{ color: {theme.faint}; border: 1px solid transparent; border-radius: 3px;"

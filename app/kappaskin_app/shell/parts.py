@@ -27,14 +27,13 @@ MENUS = (FILE, EDIT, SOURCE, RECORDING, SKIN, VIEW, LAYOUT, FIGURES, EXPORT, HEL
 class Parts(QMainWindow):
     """A window with settings and their history, a session, a display, docks and actions.
 
-    `settings_shown` and `theme_changed` bring what all views follow. `begun` tells, once all is
+    `settings_shown` brings what all views follow. `begun` tells, once all is
     there, what an engine was left with by another window (or None) and which source is read;
     `read_wanted` which page of the guide a person wants to read. `closing` lets go of what runs
     before the session ends, `closed` of what draws after it.
     """
 
     settings_shown = Signal(Settings)
-    theme_changed = Signal(object)
     begun = Signal(object, str)
     read_wanted = Signal(str)
     closing = Signal()

@@ -3,10 +3,10 @@
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QMetaObject, Qt, QTimer
-from PySide6.QtGui import QGuiApplication, QMouseEvent
+from PySide6.QtGui import QColor, QGuiApplication, QMouseEvent, QPainter, QPaintEvent, QPalette
 from PySide6.QtWidgets import QApplication, QLabel, QVBoxLayout, QWidget
 
-from kappaskin_app.theme import Theme
+from kappaskin_app.theme import FAINT, current
 
 if TYPE_CHECKING:
     from kappaskin_app.shell.parts import Parts
@@ -20,24 +20,19 @@ _DOTS = "\N{HORIZONTAL ELLIPSIS}"
 class Splash(QWidget):
     """Says what is loaded; goes when the first estimate is drawn, at a click, or after a while."""
 
-    def __init__(self, theme: Theme) -> None:
+    def __init__(self) -> None:
         super().__init__(None, Qt.WindowType.SplashScreen | Qt.WindowType.FramelessWindowHint)
         self.setObjectName("splash")
         self.setAccessibleName("Kappaskin is starting")
         # Put away before there is a window, it would be the last one and end the program.
         self.setAttribute(Qt.WidgetAttribute.WA_QuitOnClose, False)
-        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self._watching: QMetaObject.Connection | None = None
-        self.setStyleSheet(
-            f"#splash {{ background: {theme.window}; border: 1px solid {theme.line}; }}"
-            f"QLabel {{ color: {theme.text}; }}"
-        )
         self.words = QLabel()
-        self.words.setStyleSheet(f"color: {theme.faint};")
+        self.words.setForegroundRole(FAINT)
         layout = QVBoxLayout(self)
         margin = self.fontMetrics().height()
         layout.setContentsMargins(2 * margin, margin, 2 * margin, margin)
-        for label in (_name(theme), QLabel("The shape of a skin from its curvature"), self.words):
+        for label in (_name(), QLabel("The shape of a skin from its curvature"), self.words):
             layout.addWidget(label)
         self.setFixedSize(_WIDTH * self.fontMetrics().averageCharWidth(), self.sizeHint().height())
         self.move(QGuiApplication.primaryScreen().geometry().center() - self.rect().center())
@@ -63,15 +58,20 @@ class Splash(QWidget):
             self._watching = None
             self.close()
 
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setPen(QColor(current().line))
+        painter.drawRect(self.rect().adjusted(0, 0, -1, -1))
+
     def mousePressEvent(self, event: QMouseEvent) -> None:
         self.close()
 
 
-def _name(theme: Theme) -> QLabel:
+def _name() -> QLabel:
     name = QLabel("Kappaskin")
     font = name.font()
     font.setPointSizeF(2 * font.pointSizeF())
     font.setBold(True)
     name.setFont(font)
-    name.setStyleSheet(f"color: {theme.accent};")
+    name.setForegroundRole(QPalette.ColorRole.Link)
     return name

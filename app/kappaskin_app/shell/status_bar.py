@@ -2,11 +2,12 @@
 
 import numpy as np
 from PySide6.QtCore import Signal
+from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QStatusBar, QToolButton, QWidget
 
 from kappaskin.estimation import FAULTS
 from kappaskin.frames import Estimate
-from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.theme import ALERT
 from kappaskin_app.widgets.layout import row
 from kappaskin_app.widgets.line import Line
 
@@ -81,7 +82,7 @@ class Notice(QLabel):
 
     def __init__(self, hint: str, parent: QWidget | None = None) -> None:
         super().__init__(hint, parent)
-        self._hint, self._theme, self.warning = hint, LIGHT, ""
+        self._hint, self.warning = hint, ""
         self.setContentsMargins(4, 0, 12, 0)
         self.setMinimumWidth(self.sizeHint().width())  # or what stands beside it would jump
 
@@ -97,15 +98,7 @@ class Notice(QLabel):
             self.warning = text
             self.setText(text or self._hint)
             self.setToolTip(_TIP if text else "")
-            self._paint()
-
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
-        self._paint()
-
-    def _paint(self) -> None:
-        colour = self._theme.alert if self.warning else self._theme.text
-        self.setStyleSheet(f"color: {colour};")
+            self.setForegroundRole(ALERT if text else QPalette.ColorRole.WindowText)
 
 
 class StatusBar(QStatusBar):

@@ -6,7 +6,6 @@ from typing import Protocol
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent
-from PySide6.QtWidgets import QApplication
 
 from kappaskin.live import Engine, ResumeInfo, Status
 from kappaskin_app.guard import guarded
@@ -16,9 +15,10 @@ from kappaskin_app.shell.parts import Parts
 from kappaskin_app.shell.recovery import settings_left
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.simulation import settings_for
-from kappaskin_app.theme import THEMES, Theme, bar_palette, letters, palette
+from kappaskin_app.theme import THEMES, apply_look
 from kappaskin_app.widgets.layout import widen
 
+_SETTINGS = "What a person chooses: connection, load, basis, view, skin, sensor, calibration"
 _PACKED = 80  # of a picture: packs a fifth less well than Qt does, in half the time
 
 
@@ -62,7 +62,7 @@ class MainWindow(Parts):
         self.setCentralWidget(self.display.centre)
         self.setStatusBar(self.display.foot)
         self.addToolBar(self.display.header)
-        self.docks.put_left("settings", "Settings", self.panels)
+        self.docks.put_left("settings", "Settings", self.panels, _SETTINGS, share=0.25)
 
     def _wire(self) -> None:
         session, tasks, activity = self.session, self.tasks, self.display.foot.activity
@@ -100,22 +100,7 @@ class MainWindow(Parts):
         self.settings_shown.emit(settings)
         look = settings.theme, settings.letters
         if before is None or look != (before.theme, before.letters):
-            self._show_look(settings)
-
-    def _show_look(self, settings: Settings) -> None:
-        theme: Theme = THEMES[settings.theme]
-        application = QApplication.instance()
-        if isinstance(application, QApplication):
-            application.setPalette(palette(theme))
-            application.setPalette(
-                bar_palette(theme),
-                "QScrollBar",  # pyright: ignore[reportArgumentType]
-            )
-            if (font := letters(settings.letters)) != application.font():
-                application.setFont(font)
-        self.panels.show_theme(theme)
-        self.display.show_theme(theme)
-        self.theme_changed.emit(theme)
+            apply_look(THEMES[settings.theme], settings.letters)
 
     def _show_status(self, status: Status) -> None:
         self.panels.show_status(status, self.session.simulating and status.state == "streaming")

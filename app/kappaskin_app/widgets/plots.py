@@ -10,7 +10,7 @@ from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from kappaskin_app.theme import DARK, LIGHT, SERIES, Theme
+from kappaskin_app.theme import current, series
 from kappaskin_app.widgets.text import in_digits, round_up
 
 _ROUND = (1.0, 2.0, 5.0)
@@ -91,7 +91,7 @@ class CurvePlot(QWidget):
     ) -> None:
         super().__init__(parent)
         self._title, self._unit, self._signed = title, unit, signed
-        self._theme, self._empty = LIGHT, ""
+        self._empty = ""
         self._x: Array = np.empty(0)
         self._span, self._x_unit = (0.0, 1.0), "s"
         self.curves: tuple[Curve, ...] = ()
@@ -129,10 +129,6 @@ class CurvePlot(QWidget):
         if element != self._marked:
             self._marked = element
             self.update()
-
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
-        self.update()
 
     @property
     def _left(self) -> float:
@@ -180,7 +176,7 @@ class CurvePlot(QWidget):
     # How it is drawn.
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        painter, area, theme = QPainter(self), self._area, self._theme
+        painter, area, theme = QPainter(self), self._area, current()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.fillRect(area, QColor(theme.base))
         self._paint_words(painter, area)
@@ -192,15 +188,12 @@ class CurvePlot(QWidget):
         painter.setClipRect(area)
         for curve in sorted(self.curves, key=lambda curve: curve.element == self._marked >= 0):
             bold = curve.element == self._marked >= 0
-            painter.setPen(QPen(self._ink(curve), 3.0 if bold else _THIN))
+            painter.setPen(QPen(series(curve.number), 3.0 if bold else _THIN))
             for piece in self._places(curve):
                 painter.drawPolyline(QPolygonF(piece))
 
-    def _ink(self, curve: Curve) -> QColor:
-        return QColor(SERIES[curve.number % len(SERIES)][self._theme is DARK])
-
     def _paint_words(self, painter: QPainter, area: QRectF) -> None:
-        theme, flags, line = self._theme, Qt.AlignmentFlag, painter.fontMetrics().height()
+        theme, flags, line = current(), Qt.AlignmentFlag, painter.fontMetrics().height()
         painter.setPen(QPen(QColor(theme.line), 1))
         painter.drawRect(area)
         middle = area.center().y()
@@ -220,7 +213,7 @@ class CurvePlot(QWidget):
         painter.drawText(QPointF(4, painter.fontMetrics().ascent() + 1), head)
         x = 4.0 + painter.fontMetrics().horizontalAdvance(head) + 12
         for curve in self.curves:
-            painter.setPen(self._ink(curve))
+            painter.setPen(series(curve.number))
             painter.drawText(QPointF(x, painter.fontMetrics().ascent() + 1), curve.name)
             x += painter.fontMetrics().horizontalAdvance(curve.name) + 8
 

@@ -6,7 +6,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
-from kappaskin_app.theme import DARK_INK, LIGHT, LIGHT_INK, SEQUENTIAL, Colours, Theme
+from kappaskin_app.theme import DARK_INK, LIGHT_INK, SEQUENTIAL, Colours, current, follow_look
 from kappaskin_app.widgets.colour_bar import ColourBar
 from kappaskin_app.widgets.line import Line
 from kappaskin_app.widgets.tint import Tint
@@ -26,7 +26,6 @@ class _Map(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self._image: QImage | None = None
         self._contact, self._sides, self._faded = np.full(2, np.nan), (1.0, 1.0), False
-        self.line = QColor("#888888")
         self._points: Array | None = None
 
     def sizeHint(self) -> QSize:
@@ -71,7 +70,7 @@ class _Map(QWidget):
             painter.setOpacity(0.3 if self._faded else 1.0)
             painter.drawImage(area, self._image)
             painter.setOpacity(1.0)
-        painter.setPen(QPen(self.line, 1))
+        painter.setPen(QPen(QColor(current().line), 1))
         painter.drawRect(area)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if self._points is not None:
@@ -103,7 +102,7 @@ class SurfaceMap(QWidget):
         bold = self.title.font()
         bold.setBold(True)
         self.title.setFont(bold)
-        self.map, self.bar, self._unit, self._theme = _Map(), ColourBar(), unit, LIGHT
+        self.map, self.bar, self._unit = _Map(), ColourBar(), unit
         self._tint = Tint(SEQUENTIAL, (0.0, 1.0), unit)
         self.bar.show_tint(self._tint)
         self._values: Array | None = None
@@ -120,6 +119,7 @@ class SurfaceMap(QWidget):
         around.addWidget(self.title, 0, Qt.AlignmentFlag.AlignLeft)
         around.addLayout(beside, 1)
         around.addWidget(self.words)
+        follow_look(self, self._show)
 
     def show_surface(
         self,
@@ -138,10 +138,5 @@ class SurfaceMap(QWidget):
     def _show(self) -> None:
         rgb = None
         if self._values is not None:
-            rgb = self._tint.rgb(self._values, self._theme.window)
+            rgb = self._tint.rgb(self._values, current().window)
         self.map.show_map(rgb, self._contact, self._sides)
-
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
-        self.map.line = QColor(theme.line)
-        self._show()

@@ -18,7 +18,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QAbstractSlider, QSizePolicy, QToolButton, QWidget
 
 from kappaskin_app.guard import guarded
-from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.theme import current
 from kappaskin_app.widgets.lettering import read_from_afar
 
 HEIGHT = 30  # px of the row
@@ -50,7 +50,6 @@ class Course(QAbstractSlider):
         self.setAccessibleName(name)
         self.setToolTip(tip)
         self.time, self.last, self.duration = 0.0, 0.0, 1.0
-        self.theme = LIGHT
         self.valueChanged.connect(guarded(lambda ms: self.seek(ms / _MS)))
 
     def sizeHint(self) -> QSize:
@@ -64,10 +63,6 @@ class Course(QAbstractSlider):
             self.setSingleStep(max(_whole_ms(step), 1))
             self.setPageStep(max(_whole_ms(duration / 10), 1))
         self.show_time(0.0)
-
-    def show_theme(self, theme: Theme) -> None:
-        self.theme = theme
-        self.update()
 
     def show_time(self, seconds: float) -> None:
         self.time = seconds
@@ -119,7 +114,7 @@ class Course(QAbstractSlider):
         return (x - area.left()) / max(area.width(), 1.0) * self.duration
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        painter, theme, area = QPainter(self), self.theme, self.area
+        painter, theme, area = QPainter(self), current(), self.area
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(QPen(QColor(theme.text if self.hasFocus() else theme.line), 1))
         painter.setBrush(QColor(theme.base))
@@ -133,7 +128,7 @@ class Course(QAbstractSlider):
 
     def halves(self, area: QRectF, handle: float) -> tuple[tuple[QRectF, QColor], ...]:
         """What is before the handle and what behind it, each with the ink that it is drawn in."""
-        passed, coming = QColor(self.theme.accent), QColor(self.theme.faint)
+        passed, coming = QColor(current().accent), QColor(current().faint)
         passed.setAlphaF(0.55)
         coming.setAlphaF(0.45)
         height = float(self.height())
@@ -142,7 +137,7 @@ class Course(QAbstractSlider):
         return (before, passed), (behind, coming)
 
     def _paint_handle(self, painter: QPainter, area: QRectF, x: float) -> None:
-        theme = self.theme
+        theme = current()
         painter.setPen(QPen(QColor(theme.text), 1.5))
         painter.drawLine(QPointF(x, area.top() - 2), QPointF(x, area.bottom() + 2))
         painter.setPen(QPen(QColor(theme.base), 1.5))
@@ -216,9 +211,9 @@ GLYPHS: dict[str, Callable[[QPainter], None]] = {
 }
 
 
-def icon(name: str, theme: Theme) -> QIcon:
-    """The sign called `name`, paler where it cannot be pressed."""
-    made = QIcon()
+def icon(name: str) -> QIcon:
+    """The sign called `name` in the theme of now, paler where it cannot be pressed."""
+    made, theme = QIcon(), current()
     modes = (QIcon.Mode.Normal, theme.text), (QIcon.Mode.Disabled, theme.missing)
     for mode, colour in modes:
         picture = QPixmap(_SIDE, _SIDE)

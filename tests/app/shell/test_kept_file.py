@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from kappaskin import Refusal
 from kappaskin_app.shell.layouts.kept import Kept, KeptFile, from_text, to_text
-from kappaskin_app.shell.layouts.layout import READY
+from kappaskin_app.shell.layouts.layout import Layout, Place
 
 HOSTILE = (
     "",
@@ -35,6 +35,18 @@ HOSTILE = (
     "\x00",
     "format = 1\n" + "\n".join(f"[layouts.a{n}]" for n in range(200)),
 )
+
+STUDY = Layout(
+    0,
+    (
+        ("lesson", Place("left", shown=False)),
+        ("settings", Place("left", share=0.25)),
+        ("curvature", Place("right", share=0.22)),
+        ("cost", Place("bottom", share=0.36)),
+        ("scene", Place("bottom", shown=False)),
+    ),
+)
+TEACH = Layout(0, (("lesson", Place("left", share=0.25)), *STUDY.docks[1:]))
 
 
 @pytest.mark.parametrize("text", HOSTILE, ids=range(len(HOSTILE)))
@@ -89,7 +101,7 @@ def test_two_windows_that_write_at_once_leave_one_whole_file_and_no_other(tmp_pa
 
 
 def test_a_file_that_was_cut_anywhere_is_read_or_told(tmp_path: Path) -> None:
-    text, path = to_text(Kept(theme="dark", now=READY["Study"])), tmp_path / "window.toml"
+    text, path = to_text(Kept(theme="dark", now=STUDY)), tmp_path / "window.toml"
     for end in range(0, len(text), 97):
         path.write_text(text[:end])
         kept, told = KeptFile(path).read()
@@ -97,25 +109,25 @@ def test_a_file_that_was_cut_anywhere_is_read_or_told(tmp_path: Path) -> None:
 
 
 def test_the_text_is_read_by_a_person() -> None:
-    text = to_text(Kept(theme="dark", keys={"picture": "F12"}))
+    text = to_text(Kept(theme="dark", keys={"picture": "F12"}, now=STUDY))
     assert 'theme = "dark"' in text
     assert 'picture = "F12"' in text
     assert 'settings = {area = "left", shown = true, share = 0.25}' in text
 
 
 def test_of_two_windows_each_keeps_what_it_changed_and_what_it_forgot(tmp_path: Path) -> None:
-    file, mine = KeptFile(tmp_path / "window.toml"), READY["Study"]
+    file, mine = KeptFile(tmp_path / "window.toml"), STUDY
     begun = Kept(theme="light", keys={"picture": "F12", "tare": "F9"}, own={"A": mine, "B": mine})
     assert file.merge(begun, Kept()) == ""
     one = replace(begun, theme="dark", own={"A": mine, "B": mine, "One": mine})
-    other = replace(begun, letters=150.0, keys={"picture": "F8"}, own={"B": READY["Teach"]})
+    other = replace(begun, letters=150.0, keys={"picture": "F8"}, own={"B": TEACH})
     for window in (one, other):
         assert file.merge(window, begun) == ""
     assert file.read()[0] == Kept(
         theme="dark",
         letters=150.0,
         keys={"picture": "F8"},
-        own={"B": READY["Teach"], "One": mine},
+        own={"B": TEACH, "One": mine},
     )
     assert [path.name for path in tmp_path.iterdir()] == ["window.toml"]
 

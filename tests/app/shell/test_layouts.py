@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from PySide6.QtCore import QRect, Qt
+from PySide6.QtCore import QRect
 from PySide6.QtWidgets import QLabel, QMainWindow, QTabWidget
 
 from kappaskin import Refusal
@@ -14,17 +14,20 @@ from kappaskin_app.shell.layouts.keeping import clamped
 from kappaskin_app.shell.layouts.kept import Kept, from_text, to_text
 from kappaskin_app.shell.layouts.layout import (
     AREAS,
-    BELOW,
-    DOCKS,
     FLOATING,
-    READY,
     Layout,
     Place,
     arrange,
     layout_of,
+    ready_layout,
 )
 from kappaskin_app.shell.window import MainWindow
 
+BELOW = (
+    *("cost", "stability", "scene", "health", "compare", "design"),
+    *("element", "traces", "numbers", "log", "guide"),
+)
+DOCKS = ("lesson", "settings", "curvature", *BELOW)
 SHARES = st.integers(50, 600).map(lambda share: share / 1000)
 RECTANGLES = st.tuples(*[st.integers(0, 400)] * 2, *[st.integers(120, 500)] * 2)
 
@@ -78,11 +81,11 @@ def bare() -> Iterator[tuple[QMainWindow, Docks, QTabWidget]]:
     for page in range(4):
         pages.addTab(QLabel(), str(page))
     docks = Docks(window)
-    docks.put_beside("settings", "Settings", pages, Qt.DockWidgetArea.LeftDockWidgetArea)
-    docks.put_beside("lesson", "Lessons", QLabel(), Qt.DockWidgetArea.LeftDockWidgetArea)
-    docks.put_beside("curvature", "Maps", QLabel(), Qt.DockWidgetArea.RightDockWidgetArea)
+    docks.put_left("settings", "Settings", pages, "", 0.25)
+    docks.put_above("lesson", "Lessons", QLabel(), "settings", "", "", {"Teach": 0.25})
+    docks.put_right("curvature", "Maps", QLabel(), "", 0.22)
     for name in BELOW:
-        docks.put_below(name, name, QLabel(), "")
+        docks.put_below(name, name, QLabel(), "", "", layouts={"Study": 0.36 * (name == "cost")})
     window.resize(1400, 900)
     yield window, docks, pages
     window.close()
@@ -105,13 +108,15 @@ def test_any_layout_goes_through_text_and_window_and_back(bare, qapp, layout: La
     wished = {name: (p.area if p.shown else "", p.shown) for name, p in layout.docks}
     assert {n: (p.area if p.shown else "", p.shown) for n, p in once.docks} == wished
     assert once.page == layout.page
-    arrange(window, docks.by_name(), pages, READY["Live"])
+    arrange(window, docks.by_name(), pages, ready_layout(docks, "Live", 0))
     qapp.processEvents()
     again = from_text(to_text(Kept(now=once))).now
     arrange(window, docks.by_name(), pages, again)
     qapp.processEvents()
     twice = layout_of(window, docks.by_name(), pages)
-    arrange(window, docks.by_name(), pages, READY["Live"])  # or what floats would stay
+    arrange(
+        window, docks.by_name(), pages, ready_layout(docks, "Live", 0)
+    )  # or what floats would stay
     window.hide()
     assert list(_words(twice).items()) == list(_words(once).items())  # in their order too
     shares = dict(once.docks)
@@ -136,7 +141,7 @@ def test_tabs_keep_their_order_and_docks_that_share_a_column_their_sizes(bare, q
         arrange(window, docks.by_name(), pages, wanted)
         qapp.processEvents()
         wanted = layout_of(window, docks.by_name(), pages)
-        arrange(window, docks.by_name(), pages, READY["Live"])
+        arrange(window, docks.by_name(), pages, ready_layout(docks, "Live", 0))
         qapp.processEvents()
         found.append([(n, p.beside, round(p.share, 2)) for n, p in wanted.docks if p.shown])
     window.hide()
@@ -148,12 +153,14 @@ def test_tabs_keep_their_order_and_docks_that_share_a_column_their_sizes(bare, q
 def test_docks_that_there_are_not_are_passed_over(bare, qapp) -> None:
     window, docks, pages = bare
     window.show()
-    text = to_text(Kept(now=READY["Study"])).replace("curvature = ", "holograms = ")
+    text = to_text(Kept(now=ready_layout(docks, "Study", 0))).replace(
+        "curvature = ", "holograms = "
+    )
     arrange(window, docks.by_name(), pages, from_text(text).now)
     qapp.processEvents()
     assert docks["curvature"].isHidden()
     assert not docks["cost"].isHidden()
-    arrange(window, docks.by_name(), pages, READY["Live"])
+    arrange(window, docks.by_name(), pages, ready_layout(docks, "Live", 0))
     window.hide()
 
 
@@ -256,7 +263,7 @@ def test_the_skin_is_not_drawn_while_the_window_is_arranged(window: MainWindow) 
     drawn = []
     window.membrane.drawn.connect(lambda: drawn.append(None))
 
-    for name in [*READY, "Live"]:
+    for name in ("Live", "Teach", "Calibrate", "Study", "Presenter", "Live"):
         window.layouts.choose(name)
 
     assert not drawn

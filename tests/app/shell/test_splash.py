@@ -10,8 +10,9 @@ from PySide6.QtWidgets import QApplication
 
 from kappaskin_app.launch import _all_stays, _theme_in
 from kappaskin_app.shell.layouts.kept import Kept, KeptFile
+from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.splash import Splash
-from kappaskin_app.theme import DARK, LIGHT, Theme
+from kappaskin_app.theme import DARK, LIGHT, THEMES, Theme, apply_look
 
 
 class Window(QObject):
@@ -29,7 +30,7 @@ class Window(QObject):
 
 @pytest.fixture
 def splash(qapp: QApplication) -> Iterator[Splash]:
-    made = Splash(LIGHT)
+    made = Splash()
     made.show()
     yield made
     made.close()
@@ -70,7 +71,8 @@ def test_a_click_puts_it_away_and_does_not_end_the_program(splash: Splash) -> No
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 def test_it_is_in_the_colours_of_its_theme(qapp: QApplication, theme: Theme) -> None:
-    splash = Splash(theme)
+    apply_look(theme)
+    splash = Splash()
     picture = splash.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
     assert f"#{picture.pixel(5, 5) & 0xFFFFFF:06x}" == theme.window
     splash.close()
@@ -78,11 +80,12 @@ def test_it_is_in_the_colours_of_its_theme(qapp: QApplication, theme: Theme) -> 
 
 def test_the_theme_that_is_kept_is_told_and_the_file_left_alone(tmp_path: Path) -> None:
     path = tmp_path / "window.toml"
-    assert _theme_in(path) == ""
-    KeptFile(path).write(Kept(theme="dark"))
-    assert _theme_in(path) == "dark"
+    first = THEMES[Settings().theme]
+    assert _theme_in(path) is first
+    KeptFile(path).write(Kept(theme="light"))
+    assert _theme_in(path) is LIGHT
     path.write_text("no TOML")
-    assert _theme_in(path) == ""
+    assert _theme_in(path) is first
     assert [file.name for file in tmp_path.iterdir()] == ["window.toml"]
 
 

@@ -9,7 +9,7 @@ from kappaskin import Pipeline, Setup, Simulator, load_scene
 from kappaskin.estimation import FAULTS
 from kappaskin.frames import Contact
 from kappaskin_app.shell.status_bar import Notice, warnings
-from kappaskin_app.theme import DARK, LIGHT
+from kappaskin_app.theme import DARK, LIGHT, apply_look
 
 INSIDE = Contact(np.full(2, 0.05), np.full(2, 1e-4), 0.1, 1e-3, 4e-3, 1e-5, 297, True, False)
 NEAR = replace(INSIDE, near_rim=True)
@@ -57,14 +57,15 @@ def test_a_warning_takes_the_hints_place_in_the_colour_of_alarms_and_gives_it_ba
     notice = Notice("Drag the arrow")
     width = notice.minimumWidth()
     for theme in (LIGHT, DARK):
-        notice.show_theme(theme)
+        apply_look(theme)
+        qapp.processEvents()
         notice.show_warning("Too near")
         assert (notice.text(), notice.minimumWidth()) == ("Too near", width)
-        assert theme.alert in notice.styleSheet()
+        assert notice.palette().color(notice.foregroundRole()).name() == theme.alert
         assert "near" in notice.toolTip().lower()
         notice.show_warning("")
         assert (notice.text(), notice.toolTip()) == ("Drag the arrow", "")
-        assert theme.alert not in notice.styleSheet()
+        assert notice.palette().color(notice.foregroundRole()).name() == theme.text
 
 
 def test_another_hint_waits_for_the_warning_to_go(qapp) -> None:

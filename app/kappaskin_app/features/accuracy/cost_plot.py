@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 from kappaskin.studies import Cost
 from kappaskin_app.features.accuracy.costing import Frontier, in_words
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
-from kappaskin_app.theme import LIGHT, SERIES, Theme
+from kappaskin_app.theme import current, series
 from kappaskin_app.widgets.plots import LogAxis
 from kappaskin_app.widgets.text import duration, length
 
@@ -37,7 +37,7 @@ class CostPlot(QWidget):
         self._live: Point = (math.nan, math.nan)
         self._x, self._y = LogAxis(1e-5, 1e-2), LogAxis(1e-5, 1e-4)
         self._under: Cost | None = None
-        self._theme, self._empty = LIGHT, ""
+        self._empty = ""
         self.setMouseTracking(True)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("Error against time")
@@ -63,10 +63,6 @@ class CostPlot(QWidget):
             self._x = LogAxis.around([c.time_per_frame for c in frontier.costs] + [live[1]])
             self._y = LogAxis.around([c.rms for c in frontier.costs] + [live[0]])
             self.update()
-
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
-        self.update()
 
     # Where things are.
 
@@ -129,7 +125,7 @@ class CostPlot(QWidget):
     # How it is drawn.
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        painter, area, theme = QPainter(self), self._area, self._theme
+        painter, area, theme = QPainter(self), self._area, current()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.fillRect(area, QColor(theme.base))
         if not self.frontier.costs:
@@ -145,7 +141,7 @@ class CostPlot(QWidget):
         self._paint_legend(painter, area)
 
     def _paint_axes(self, painter: QPainter, area: QRectF) -> None:
-        theme, flags = self._theme, Qt.AlignmentFlag
+        theme, flags = current(), Qt.AlignmentFlag
         line = painter.fontMetrics().height()
         free = area.left()
         for value, written in self._x.ticks():
@@ -188,7 +184,7 @@ class CostPlot(QWidget):
         for place in best:
             corners += [QPointF(place.x(), corners[-1].y()), place]
         corners.append(QPointF(area.right(), corners[-1].y()))
-        painter.setPen(QPen(QColor(self._theme.text), 1.4, Qt.PenStyle.DashLine))
+        painter.setPen(QPen(QColor(current().text), 1.4, Qt.PenStyle.DashLine))
         painter.drawPolyline(QPolygonF(corners))
 
     def _paint_point(self, painter: QPainter, place: QPointF, cost: Cost) -> None:
@@ -200,14 +196,13 @@ class CostPlot(QWidget):
         self, painter: QPainter, place: QPointF, method: str, filled: bool, size: float
     ) -> None:
         number = _METHODS.index(method) if method in _METHODS else len(_METHODS)
-        light, dark = SERIES[number % len(SERIES)]
-        colour = QColor(light if self._theme is LIGHT else dark)
+        colour = series(number)
         painter.setPen(QPen(colour, 1.5))
-        painter.setBrush(colour if filled else QColor(self._theme.base))
+        painter.setBrush(colour if filled else QColor(current().base))
         _SHAPES[number % len(_SHAPES)](painter, place, size)
 
     def _paint_present(self, painter: QPainter) -> None:
-        theme = self._theme
+        theme = current()
         painter.setBrush(Qt.BrushStyle.NoBrush)
         if self._present is not None:
             painter.setPen(QPen(QColor(theme.text), 2))
@@ -217,7 +212,7 @@ class CostPlot(QWidget):
             _cross(painter, self.at(error, time), QColor(theme.alert))
 
     def _paint_legend(self, painter: QPainter, area: QRectF) -> None:
-        theme, flags = self._theme, Qt.AlignmentFlag
+        theme, flags = current(), Qt.AlignmentFlag
         left, width = area.right() + 10, self._legend - _BESIDE
         used = [m for m in _METHODS if any(c.setting.method == m for c in self.frontier.costs)]
         rows = [*used, "own", "other", "present", "live", "best"]

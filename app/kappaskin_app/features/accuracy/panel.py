@@ -18,7 +18,7 @@ from kappaskin_app.features.accuracy.cost_plot import CostPlot
 from kappaskin_app.features.accuracy.costing import Costing, Frontier, gives, in_words
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.effects import EffectsTable
-from kappaskin_app.theme import LIGHT, Theme, grown, slider_style
+from kappaskin_app.theme import ALERT, FAINT, follow_look, grown, slider_style
 from kappaskin_app.widgets.line import Line
 from kappaskin_app.widgets.parts import ELLIPSIS, button, sentence, text_label
 from kappaskin_app.widgets.plots import LogAxis
@@ -61,15 +61,17 @@ class CostPanel(QWidget):
         self.count, self.message = QLabel(), text_label()
         self.effects, self.no_effects = EffectsTable(), text_label()
         self.no_effects.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.no_effects.setForegroundRole(FAINT)
         self.no_effects.hide()
         self._lay_out()
         self._costing: Costing | None = None
         self._accuracy = math.nan
         self._axis, self._frontier = LogAxis(1e-5, 1e-4), Frontier()
-        self._theme, self._hint = LIGHT, None
+        self._hint = None
         self.wanted.valueChanged.connect(guarded(self._slid))
         self.wanted.sliderReleased.connect(guarded(self._take))
         self.again.clicked.connect(guarded(self._measure))
+        follow_look(self, self._dress)
 
     def _make_figures(self) -> None:
         self.setting = Line(NONE)
@@ -156,17 +158,12 @@ class CostPanel(QWidget):
         costing.changed.connect(guarded(self._show))
         self.plot.chosen.connect(guarded(costing.choose))
 
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
+    def _dress(self) -> None:
         self._words.setFixedWidth(grown(_WORDS))
         self._side.setFixedWidth(grown(_EFFECTS))
         wide = self.wanted_words.fontMetrics().horizontalAdvance("0.000 mm")
         self.wanted_words.setMinimumWidth(wide)
-        self.plot.show_theme(theme)
-        self.effects.show_theme(theme)
-        self.no_effects.setStyleSheet(f"color: {theme.faint};")
-        self.wanted.setStyleSheet(slider_style(theme))
-        self._hint = None
+        self.wanted.setStyleSheet(slider_style())
 
     # What a person asks.
 
@@ -229,8 +226,7 @@ class CostPanel(QWidget):
         if (text, hint) != (self.message.text(), self._hint):
             self._hint = hint
             self.message.setText(text)
-            colour = self._theme.faint if hint else self._theme.alert
-            self.message.setStyleSheet(f"color: {colour};")
+            self.message.setForegroundRole(FAINT if hint else ALERT)
         self.message.setVisible(bool(text))
 
     def _show_figures(

@@ -17,6 +17,11 @@ from kappaskin_app.shell.window import MainWindow
 _CHECKSUM = "sha256"  # the line that a calibration has and a scene has not
 _HEAD = 4096  # characters, among which it is
 
+_LAYOUT = "The page Calibrate, and the health of the elements below the skin"
+_TARE = "Let what every element reads now be its zero: \u03ba = reading \u2212 zero"
+_CALIBRATE = "The page that guides through cylinders of known radius R, where \u03ba = 1 / R"
+_TAKE = "Take the mean of what comes in now for the cylinder that is asked for"
+
 
 class CalibrationFeature:
     name = "calibration"
@@ -29,6 +34,7 @@ class CalibrationFeature:
         self.tare = panels.add(LIVE, TarePanel())
         self.in_use = panels.add(CALIBRATE, InUsePanel())
         self.calibrate = panels.add(CALIBRATE, CalibratePanel())
+        shell.layouts.add("Calibrate", _LAYOUT, CALIBRATE)
         self._wire_calibration(shell)
         self._wire_tare(shell)
         self._add_actions(shell)
@@ -58,10 +64,11 @@ class CalibrationFeature:
 
     def _add_actions(self, shell: MainWindow) -> None:
         add, take = shell.actions_by_name.add, self.calibrating.take
-        add("tare", SOURCE, "Ta&re", self.taring.tare, "Ctrl+0")
+        add("tare", SOURCE, "Ta&re", self.taring.tare, "Ctrl+0", _TARE)
         show = partial(shell.panels.reveal, self.calibrate)
-        add("calibrate", SOURCE, "C&alibrate", show, "Ctrl+L")
-        add("take-step", SOURCE, "Cap&ture a step of the calibration", take, "Ctrl+Shift+K")
+        add("calibrate", SOURCE, "C&alibrate", show, "Ctrl+L", _CALIBRATE)
+        words = "Cap&ture a step of the calibration"
+        add("take-step", SOURCE, words, take, "Ctrl+Shift+K", _TAKE)
 
     def _use(self, file: Path) -> None:
         self.calibrating.load(file)

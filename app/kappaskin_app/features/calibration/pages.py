@@ -19,6 +19,7 @@ from kappaskin.scenes.cylinders import ADVICE, CylinderStep, schedule
 from kappaskin_app.features.calibration.calibrating import Calibrating, Result, parsed_radii
 from kappaskin_app.features.calibration.plots import CylinderView, Loop, LoopPlot, PassMap
 from kappaskin_app.guard import guarded
+from kappaskin_app.theme import current, follow_look
 from kappaskin_app.widgets.parts import (
     ELLIPSIS,
     EQUATION_8,
@@ -252,7 +253,8 @@ class Outcome(QWidget):
         self.map.chosen.connect(guarded(self.show_channel))
         self.worst.linkActivated.connect(guarded(lambda link: self.show_channel(int(link))))
         self._result: Result | None = None
-        self._link, self._worst = "", []
+        self._worst = list[int]()
+        follow_look(self, self._show_worst)
 
     def show_result(self, result: Result) -> None:
         if result is self._result:
@@ -289,16 +291,11 @@ class Outcome(QWidget):
         report = self._result.report
         elements, failures = len(report.passed) // 3, dict(report.calibration.failures)
         lines = [
-            f'<a href="{c}" style="color: {self._link}">{named(c, elements)}</a>: '
+            f'<a href="{c}" style="color: {current().accent}">{named(c, elements)}</a>: '
             + failures.get(c, f"error {report.fitted.left_out[c]:.2f} 1/m")
             for c in self._worst
         ]
         self.worst.setText("<br>".join(["Worst:", *lines]))
-
-    def show_colour(self, link: str) -> None:
-        """The colour of what can be clicked."""
-        self._link = link
-        self._show_worst()
 
     def _told(self, channel: int) -> str:
         """A channel in words."""

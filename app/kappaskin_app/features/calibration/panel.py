@@ -14,7 +14,6 @@ from kappaskin_app.features.calibration.pages import Outcome, Start, Steps
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.theme import Theme
 from kappaskin_app.widgets.parts import (
     ELLIPSIS,
     EQUATION_8,
@@ -29,6 +28,12 @@ from kappaskin_app.widgets.parts import (
 
 class InUsePanel(Panel):
     """Says which calibration the readings are corrected by."""
+
+    purpose = (
+        "The calibration that turns readings into curvatures now, if there is one, and how well it "
+        "fits this sensor."
+    )
+    guide_page = "calibrate"
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("In use", parent)
@@ -100,6 +105,12 @@ def _unfit(calibration: Calibration, status: Status) -> str:
 class CalibratePanel(Panel):
     """Guides through a calibration on cylinders, and shows what came of it."""
 
+    purpose = (
+        "Lays the skin on cylinders one after the other: there \u03ba = 1 / R, so that each "
+        "channel's gain and offset follow."
+    )
+    guide_page = "calibrate"
+
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Cylinders of known radius", parent)
         self.start, self.steps, self.outcome = Start(), Steps(), Outcome()
@@ -142,12 +153,6 @@ class CalibratePanel(Panel):
                 self.start.radii.setText(radii)
                 self.start.radii.setCursorPosition(0)
             self._plan()
-
-    def show_theme(self, theme: Theme) -> None:
-        super().show_theme(theme)
-        for view in (self.steps.drawing, self.outcome.map, self.outcome.plot):
-            view.show_theme(theme)
-        self.outcome.show_colour(theme.accent)
 
     def _plan(self, *_: object) -> None:
         sensor = self._status.sensor

@@ -23,7 +23,7 @@ from kappaskin.frames import COMPONENTS
 from kappaskin.scenes.cylinders import CylinderStep
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
-from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.theme import current
 
 _POINTS = 61  # of the skin's line
 _MOST_WRAPPED = math.pi  # rad: the rest of a long skin hangs down straight
@@ -39,7 +39,7 @@ class CylinderView(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._step: CylinderStep | None = None
-        self._patch, self._theme = Patch(0.1, 0.1), LIGHT
+        self._patch = Patch(0.1, 0.1)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setToolTip(
             "Left: the skin on its cylinder, seen along the axis and to scale; the thick line is "
@@ -58,10 +58,6 @@ class CylinderView(QWidget):
             self._step, self._patch = step, patch
             self.update()
 
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
-        self.update()
-
     def paintEvent(self, event: QPaintEvent) -> None:
         if self._step is None:
             return
@@ -77,7 +73,7 @@ class CylinderView(QWidget):
     # From the side.
 
     def _paint_side(self, painter: QPainter, area: QRectF, step: CylinderStep) -> None:
-        theme = self._theme
+        theme = current()
         high = painter.fontMetrics().height()
         painter.save()
         painter.setClipRect(area)
@@ -117,7 +113,7 @@ class CylinderView(QWidget):
     # From above.
 
     def _paint_above(self, painter: QPainter, area: QRectF, step: CylinderStep) -> None:
-        theme = self._theme
+        theme = current()
         per_m = min(area.width() / self._patch.a, area.height() / self._patch.b)
         width, height = self._patch.a * per_m, self._patch.b * per_m
         skin = QRectF(0, 0, width, height)
@@ -147,13 +143,13 @@ class CylinderView(QWidget):
         painter.translate(skin.center())
         painter.rotate(-math.degrees(math.atan2(dy, dx)))
         far = skin.width() + skin.height()
-        cylinder = QColor(self._theme.line)
+        cylinder = QColor(current().line)
         painter.fillRect(QRectF(-radius, -far, 2 * radius, 2 * far), cylinder)
-        painter.setPen(QPen(QColor(self._theme.faint), 1.5, Qt.PenStyle.DashLine))
+        painter.setPen(QPen(QColor(current().faint), 1.5, Qt.PenStyle.DashLine))
         painter.drawLine(QPointF(0, -far), QPointF(0, far))
         painter.restore()
         painter.setBrush(Qt.BrushStyle.NoBrush)
-        painter.setPen(QPen(QColor(self._theme.text), 1))
+        painter.setPen(QPen(QColor(current().text), 1))
         painter.drawRect(skin)
 
 
@@ -227,7 +223,6 @@ class LoopPlot(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._loop: Loop | None = None
-        self._theme = LIGHT
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setToolTip(
             "Nominal curvature as Eq. 8 reads it, 4 V / (V_in GF (t_s + t_g) G), over that of the "
@@ -246,12 +241,8 @@ class LoopPlot(QWidget):
         self._loop = loop
         self.update()
 
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
-        self.update()
-
     def paintEvent(self, event: QPaintEvent) -> None:
-        loop, theme = self._loop, self._theme
+        loop, theme = self._loop, current()
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if loop is None or not np.isfinite(loop.read).any():
@@ -299,7 +290,7 @@ class LoopPlot(QWidget):
     def _paint_axes(
         self, painter: QPainter, area: QRectF, most: float, ticks: dict[float, str], widest: float
     ) -> None:
-        theme, flags = self._theme, Qt.AlignmentFlag
+        theme, flags = current(), Qt.AlignmentFlag
         line = painter.fontMetrics().height()
         painter.setPen(QPen(QColor(theme.line), 1))
         painter.drawRect(area)
@@ -360,7 +351,7 @@ class PassMap(QWidget):
         self._layout: SensorLayout | None = None
         self._failures: dict[int, str] = {}
         self._tips: list[str] = []
-        self._channel, self._spacing, self._theme = 0, 0.0, LIGHT
+        self._channel, self._spacing = 0, 0.0
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Channels that passed")
@@ -382,10 +373,6 @@ class PassMap(QWidget):
 
     def show_channel(self, channel: int) -> None:
         self._channel = channel
-        self.update()
-
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
         self.update()
 
     @property
@@ -411,7 +398,7 @@ class PassMap(QWidget):
         ]
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        layout, theme = self._layout, self._theme
+        layout, theme = self._layout, current()
         if layout is None:
             return
         painter = QPainter(self)
@@ -432,7 +419,7 @@ class PassMap(QWidget):
 
     def _paint_channel(self, painter: QPainter, square: QRectF, channel: int) -> None:
         """A full square where it passed, a crossed one where not: not told by colour alone."""
-        theme = self._theme
+        theme = current()
         if channel not in self._failures:
             painter.fillRect(square, QColor(theme.good))
             return

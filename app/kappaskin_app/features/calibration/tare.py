@@ -172,6 +172,12 @@ _DRIFT = (
 class TarePanel(Panel):
     """Says which tare is in use and how it does."""
 
+    purpose = (
+        "Takes the mean of what every element reads now for its zero: \u03ba = reading \u2212 "
+        "zero. The skin must be at rest and free, or a contact that is held would vanish."
+    )
+    guide_page = "connect"
+
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Tare", parent)
         self.what = text_label()

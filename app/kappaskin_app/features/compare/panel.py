@@ -22,7 +22,7 @@ from kappaskin_app.shell.colouring import SteadyRange
 from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
-from kappaskin_app.theme import DIVERGING, SEQUENTIAL, Theme, grown
+from kappaskin_app.theme import DIVERGING, SEQUENTIAL, follow_look, grown
 from kappaskin_app.widgets.layout import fit_rows, scrolled
 from kappaskin_app.widgets.parts import button, number, sentence
 from kappaskin_app.widgets.surface_map import SurfaceMap
@@ -49,6 +49,9 @@ _TABLE = (
 
 class OtherForm(Form):
     """Asks for the settings of B, and says why they were not taken."""
+
+    purpose = "Other settings for the same readings, to hold against those in use (A)."
+    guide_page = "accuracy"
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("B", _ASKS, parent)
@@ -87,6 +90,7 @@ class ComparePanel(QWidget):
             around.addWidget(view, 3)
         around.addWidget(self.table, 3)
         self._empty()
+        follow_look(self, lambda: self.table.setMinimumWidth(grown(_FIGURES)))
 
     def _made_table(self) -> QTableWidget:
         table = QTableWidget(0, len(_COLUMNS))
@@ -192,12 +196,6 @@ class ComparePanel(QWidget):
                 item = self.table.item(row, column)
                 if item is not None and item.text() != text:
                     item.setText(text)
-
-    def show_theme(self, theme: Theme) -> None:
-        self.table.setMinimumWidth(grown(_FIGURES))
-        self.form.show_theme(theme)
-        for view in self.maps.values():
-            view.show_theme(theme)
 
 
 def _told(value: float, sd: float, digits: int, sign: str = "") -> str:

@@ -7,6 +7,11 @@ from kappaskin_app.shell.pages import LIVE
 from kappaskin_app.shell.parts import SOURCE
 from kappaskin_app.shell.window import MainWindow
 
+_SIMULATE = "Read the skin that the panels describe, in place of a sensor or a recording"
+_CONNECT = "Take readings from the source that is named under Connection"
+_DISCONNECT = "Take no more readings; the last ones stay, marked as old"
+_PORTS = "Look again which serial ports there are; they come and go by themselves too"
+
 
 class ConnectionFeature:
     name = "connection"
@@ -21,10 +26,10 @@ class ConnectionFeature:
         self.connection.ports_wanted.connect(guarded(self.plugs.look))
         self.plugs.found.connect(guarded(self.connection.show_ports))
         session.source_changed.connect(guarded(self.connection.show_source))
-        add("simulate", SOURCE, "&Simulated skin", session.simulate, "Ctrl+M")
-        add("connect", SOURCE, "&Connect", self._connect, "Ctrl+Return")
-        add("disconnect", SOURCE, "&Disconnect", session.disconnect_from, "Ctrl+D")
-        add("ports", SOURCE, "Re&fresh ports", self.plugs.look, "F5")
+        add("simulate", SOURCE, "&Simulated skin", session.simulate, "Ctrl+M", _SIMULATE)
+        add("connect", SOURCE, "&Connect", self._connect, "Ctrl+Return", _CONNECT)
+        add("disconnect", SOURCE, "&Disconnect", session.disconnect_from, "Ctrl+D", _DISCONNECT)
+        add("ports", SOURCE, "Re&fresh ports", self.plugs.look, "F5", _PORTS)
         shell.menus.welcome.add(
             2,
             "Connec&t a sensor",

@@ -64,6 +64,13 @@ _LOSSES = 1.0  # s between two looks at what was lost
 class ConnectionPanel(Panel):
     """Asks for a source: the simulation, a serial port found, or a typed port or URL."""
 
+    purpose = (
+        "Where readings come from: the simulated skin, a serial port, any address that pyserial "
+        "opens, or a recording. A line that breaks is taken up again by itself; what was missed "
+        "meanwhile is counted."
+    )
+    guide_page = "connect"
+
     connect_wanted = Signal(str)
     disconnect_wanted = Signal()
     ports_wanted = Signal()

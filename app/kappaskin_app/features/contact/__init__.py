@@ -18,6 +18,8 @@ _OBJECT = (
     "probability; and the principal curvatures of the skin at the contact."
 )
 
+_ABOUT = "What the picture shows as tables: contact, object, every element; copied as CSV"
+
 
 class ContactFeature:
     name = "contact"
@@ -28,7 +30,7 @@ class ContactFeature:
         self.readouts, self.numbers = Readouts(), NumbersPanel()
         self.naming = Naming(shell.tasks, shell)
         display.header.add(self.readouts)
-        shell.docks.put_below("numbers", "Numbers", self.numbers, "Ctrl+Shift+T")
+        shell.docks.put_below("numbers", "Numbers", self.numbers, "Ctrl+Shift+T", _ABOUT)
         display.foot.object.setToolTip(_OBJECT)
         for name, parts in self.readouts.parts.items():
             display.places[f"readout-{name}"] = parts
@@ -37,7 +39,6 @@ class ContactFeature:
         display.status_shown.connect(guarded(self._follow))
         self.naming.named.connect(guarded(display.foot.object.show_text))
         self.naming.found.connect(display.object_found)
-        shell.theme_changed.connect(guarded(self.readouts.show_theme))
 
     def _follow(self, status: Status) -> None:
         shell, now = self._shell, time.monotonic()

@@ -4,13 +4,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from PySide6.QtCore import QEvent
 from PySide6.QtGui import QFont, QFontInfo, QResizeEvent
-from PySide6.QtWidgets import QApplication, QGridLayout, QLabel, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from kappaskin.frames import Contact, Estimate
 from kappaskin.pipeline import REPORTED, Readout, Reported, readouts_of
-from kappaskin_app.theme import Theme
+from kappaskin_app.theme import FAINT, follow_look
 from kappaskin_app.widgets.line import Line
 
 _FINE = 0.02  # mm of error bar, below which a hundredth is too coarse
@@ -135,10 +134,12 @@ class Readouts(QWidget):
             below.setFont(bold)
             for widget in (above, below):
                 widget.setToolTip(tip)
+            above.setForegroundRole(FAINT)
             self._names.append(above)
             self._numbers[key] = below
         self._columns = 0
         self._lay_out(len(FIELDS))
+        follow_look(self, self._shrink)
 
     def _lay_out(self, columns: int) -> None:
         """Put so many fields beside each other."""
@@ -164,10 +165,13 @@ class Readouts(QWidget):
         super().resizeEvent(event)
         self._fit()
 
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.FontChange:
-            self._fit()
+    def _shrink(self) -> None:
+        """Have the names in smaller letters than the numbers."""
+        font = self.font()
+        font.setPixelSize(round(_SMALL * QFontInfo(font).pixelSize()))
+        for label in self._names:
+            label.setFont(font)
+        self._fit()
 
     def text(self, key: str) -> str:
         return self._numbers[key].text()
@@ -200,8 +204,3 @@ class Readouts(QWidget):
 
     def _write(self, key: str, text: str) -> None:
         self._numbers[key].show_text(text)
-
-    def show_theme(self, theme: Theme) -> None:
-        size = round(_SMALL * QFontInfo(QApplication.font()).pixelSize())
-        for label in self._names:
-            label.setStyleSheet(f"color: {theme.faint}; font-size: {size}px;")

@@ -19,7 +19,7 @@ from kappaskin_app.shell.settings import Settings, ask_of
 from kappaskin_app.shell.settings.asks import Range
 from kappaskin_app.shell.settings.designed import Designed
 from kappaskin_app.shell.settings.scene import SHAPES
-from kappaskin_app.theme import SEQUENTIAL, Theme
+from kappaskin_app.theme import SEQUENTIAL
 from kappaskin_app.widgets.layout import row, scrolled
 from kappaskin_app.widgets.parts import ELLIPSIS, button, sentence, text_label
 from kappaskin_app.widgets.plots import Curve, CurvePlot
@@ -43,6 +43,12 @@ _ALONG = "Along x through the middle of the skin, on the scale of both maps."
 
 class DesignForm(Form):
     """Asks for what is designed, each number with a slider."""
+
+    purpose = (
+        "A sensor that is not built yet. How sure it would be follows at once from the covariance "
+        "s\u00b2 (M\u1d40M)\u207b\u00b9 of noise s and the fit's matrix M; nothing is simulated."
+    )
+    guide_page = "build"
 
     def __init__(self, parent: QWidget | None = None) -> None:
         self.sliders: dict[str, QSlider] = {}
@@ -150,11 +156,6 @@ class DesignPanel(QWidget):
 
     def show_settings(self, settings: Settings) -> None:
         self.form.show_settings(settings)
-
-    def show_theme(self, theme: Theme) -> None:
-        self.form.show_theme(theme)
-        for view in (self.predicted, self.simulated, self.along):
-            view.show_theme(theme)
 
     def _show(self) -> None:
         designing = self._designing

@@ -20,6 +20,12 @@ class EstimatorFeature:
 class BasisPanel(Form):
     """Asks for Ni x Nj and the edge, and says why a choice was not taken."""
 
+    purpose = (
+        "The functions that the shape is made of, w(x, y) = \u03a3 c\u1d62\u2c7c "
+        "\u03c6\u1d62\u2c7c(x, y), and how their coefficients c are found from the curvatures read."
+    )
+    guide_page = "accuracy"
+
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Basis", ("functions_x", "functions_y", "method", "fit_edge"), parent)
 

@@ -18,6 +18,10 @@ from kappaskin_app.shell.window import MainWindow
 
 _PYTHON = "A script that does what the window does now: source, scene, setup; it prints the contact"
 
+_WINDOW = "Save the whole window as a PNG in the folder the program was started in"
+_FIGURE = "This figure of the paper from a run of our own, in a window beside; to be saved there"
+_INITIAL = "Section 6.2 of the paper from a run of our own, in a window beside"
+
 
 class ExportFeature:
     name = "export"
@@ -25,11 +29,12 @@ class ExportFeature:
     def install(self, shell: MainWindow) -> None:
         self._shell, add = shell, shell.actions_by_name.add
         self.exports = Exports(shell.session, shell.display.centre, shell.tasks, shell)
-        add("picture", menus.FILE, "Save &picture", self._save_picture, "Ctrl+S")
+        add("picture", menus.FILE, "Save &picture", self._save_picture, "Ctrl+S", _WINDOW)
         copy = self._copy_python
         add("copy-python", menus.EDIT, "Copy as P&ython", copy, "Ctrl+Shift+C", _PYTHON)
         for name in FIGURES:
-            add(name, menus.FIGURES, TITLES.get(name, name), partial(self._draw, name))
+            tip = _INITIAL if name == "initial-curvature" else _FIGURE
+            add(name, menus.FIGURES, TITLES.get(name, name), partial(self._draw, name), "", tip)
         self._register(shell)
         self.exports.told.connect(guarded(shell.tell))
         shell.closing.connect(guarded(self.exports.close))

@@ -160,6 +160,9 @@ def _seconds(nothing: str) -> QDoubleSpinBox:
 
 
 _MENU = "E&xport"
+_EXPORT = "Write readings, estimates or surfaces of a recording as files for other programs"
+_FILMING = "Write what the skin looks like to an MP4 from now on, until this is chosen again"
+_PICTURE = "Write {what} as it is shown now, with time and settings below it; it must be visible"
 _FILM = "Film (*.mp4)"
 
 
@@ -188,15 +191,16 @@ class Exports(QObject):
         Those that are `solid` are in three dimensions, the others `flat`, a menu of its own each.
         """
         more = "\N{HORIZONTAL ELLIPSIS}"
-        actions.add("export", _MENU, f"&Recording{more}", self.ask, "Ctrl+Shift+E")
+        actions.add("export", _MENU, f"&Recording{more}", self.ask, "Ctrl+Shift+E", _EXPORT)
         if self.filming is not None:
-            film = self.film
-            actions.add("film", _MENU, "&Film of the skin, begin or end", film, "Ctrl+Shift+F")
+            words = "&Film of the skin, begin or end"
+            actions.add("film", _MENU, words, self.film, "Ctrl+Shift+F", _FILMING)
         menus = {_MENU: solid} | {f"{_MENU}{WITHIN}{title}": flat[title] for title in flat}
         for menu, views in menus.items():
             for name, view in views.items():
                 act = partial(self.picture, view, name, menu != _MENU)
-                actions.add(f"picture-of-{name.lower()}", menu, f"Picture of {name}{more}", act)
+                words, tip = f"Picture of {name}{more}", _PICTURE.format(what=name.lower())
+                actions.add(f"picture-of-{name.lower()}", menu, words, act, "", tip)
 
     def ask(self) -> None:
         """Ask what of a recording is to be written where."""

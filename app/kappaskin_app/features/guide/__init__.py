@@ -9,15 +9,18 @@ from kappaskin_app.shell.finder.things import FinderEntry
 from kappaskin_app.shell.parts import HELP
 from kappaskin_app.shell.window import MainWindow
 
+_ABOUT = "How to begin, connect, calibrate and record, what every number means, what to mend"
+
 
 class GuideFeature:
     name = "guide"
 
     def install(self, shell: MainWindow) -> None:
         self._shell, self.guide = shell, GuidePanel()
-        shell.docks.put_below("guide", "Guide", self.guide, "Ctrl+F1", HELP)
+        shell.docks.put_below(
+            "guide", "Guide", self.guide, "Ctrl+F1", _ABOUT, menu=HELP, height=0.5
+        )
         shell.read_wanted.connect(guarded(lambda name: self.read(page_called(name))))
-        shell.theme_changed.connect(guarded(self.guide.show_theme))
         shell.menus.things.append(self._things)
 
     def read(self, page: Page, heading: str = "") -> None:

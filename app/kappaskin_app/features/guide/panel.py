@@ -26,7 +26,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QHBoxLayout, QListWidget, QTextBrowser, QVBoxLayout, QWidget
 
 from kappaskin_app.guard import guarded
-from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.theme import Theme, current, follow_look
 from kappaskin_app.widgets.parts import button, in_a_row
 
 FOLDER = Path(str(files("kappaskin_resources"))) / "guide"
@@ -128,19 +128,16 @@ class GuidePanel(QWidget):
         if self.text.source().isEmpty():
             self.read(pages()[0])
 
-    def show_theme(self, theme: Theme) -> None:
-        self.text.show_theme(theme)
-
 
 class _Text(QTextBrowser):
     """A page of Markdown, in lines that are not too long."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._theme = LIGHT
         self.setAccessibleName("The page of the guide")
         self.setOpenExternalLinks(True)
         self.setLineWrapMode(QTextBrowser.LineWrapMode.FixedPixelWidth)
+        follow_look(self, self._dress_anew)
 
     def loadResource(self, kind: int, name: QUrl) -> object:
         """What a page names; pictures no wider than its lines."""
@@ -159,17 +156,16 @@ class _Text(QTextBrowser):
                 top = self.document().documentLayout().blockBoundingRect(block).top()
                 self.verticalScrollBar().setValue(round(top))
 
-    def show_theme(self, theme: Theme) -> None:
-        if theme != self._theme:
-            self._theme = theme
-            at = self.verticalScrollBar().value()
-            self.reload()  # links have the colour of the palette with which they were read
-            self.dress()
-            self.verticalScrollBar().setValue(at)
+    def _dress_anew(self) -> None:
+        at = self.verticalScrollBar().value()
+        self._fit()
+        self.reload()  # links have the colour of the palette with which they were read
+        self.dress()
+        self.verticalScrollBar().setValue(at)
 
     def dress(self) -> None:
         """Give code a ground and letters as large as others, and tables thin lines."""
-        document, theme = self.document(), self._theme
+        document, theme = self.document(), current()
         document.setDocumentMargin(_MARGIN)
         for frame in document.rootFrame().childFrames():
             if isinstance(frame, QTextTable):
@@ -184,12 +180,6 @@ class _Text(QTextBrowser):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._fit()
-
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.FontChange:
-            self._fit()
-            self.dress()
 
     def _fit(self) -> None:
         widest = _WIDEST * self.fontMetrics().horizontalAdvance("M")

@@ -5,6 +5,8 @@ from kappaskin_app.features.health.press import MapTesting, Resting
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.window import MainWindow
 
+_ABOUT = "Which channels are dead, stuck, noisy, swapped or drifting, and what that costs"
+
 
 class HealthFeature:
     name = "health"
@@ -13,7 +15,9 @@ class HealthFeature:
         session, selection = shell.session, shell.selection
         self.health, self.testing = HealthPanel(), MapTesting(shell)
         self.resting = Resting(session, self.testing)
-        shell.docks.put_below("health", "Health", self.health, "F3")
+        shell.docks.put_below(
+            "health", "Health", self.health, "F3", _ABOUT, layouts={"Calibrate": 0.3}
+        )
         session.reported.connect(guarded(self.testing.follow))
         session.reported.connect(
             guarded(lambda status: self.health.show_status(status, session.inside))
@@ -25,4 +29,3 @@ class HealthFeature:
         self.testing.asked.connect(guarded(selection.ask_for))
         self.health.pointed.connect(guarded(selection.point))
         self.health.attend(self.testing)
-        shell.theme_changed.connect(guarded(self.health.show_theme))

@@ -16,7 +16,6 @@ from kappaskin.health import Health
 from kappaskin.live import Status
 from kappaskin_app.features.health.press import MapTesting, PressPage
 from kappaskin_app.guard import guarded
-from kappaskin_app.theme import Theme
 from kappaskin_app.widgets.layout import fit_rows
 from kappaskin_app.widgets.parts import sentence, text_label
 
@@ -114,6 +113,3 @@ class HealthPanel(QWidget):
         findings = self._shown.findings
         there = [index.row() for index in rows if index.row() < len(findings)]
         self.pointed.emit(findings[there[0]].element if there else -1)
-
-    def show_theme(self, theme: Theme) -> None:
-        self.press.show_theme(theme)

@@ -1,6 +1,7 @@
 """The press test: elements pressed one after the other to verify the channel map."""
 
 from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QFont
 from PySide6.QtWidgets import QGridLayout, QProgressBar, QVBoxLayout, QWidget
 
 from kappaskin.calibration import MapVerdict, PressPhase, PressTest
@@ -9,7 +10,7 @@ from kappaskin.frames import Estimate
 from kappaskin.live import Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.session import Session
-from kappaskin_app.theme import Theme
+from kappaskin_app.theme import FAINT
 from kappaskin_app.widgets.parts import button, sentence, text_label
 
 _ENDED = "The test ended: the line was lost, or another skin answered. Begin anew."
@@ -139,6 +140,10 @@ class PressPage(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.words, self.last, self.verdict = (text_label() for _ in range(3))
+        self.last.setForegroundRole(FAINT)
+        bold = self.verdict.font()
+        bold.setWeight(QFont.Weight.DemiBold)
+        self.verdict.setFont(bold)
         self.progress = QProgressBar()
         self.progress.setFormat("%v of %m")
         self.progress.setToolTip("Elements that were asked for.")
@@ -192,10 +197,6 @@ class PressPage(QWidget):
         if inside != self._inside:
             self._inside = inside
             self._show()
-
-    def show_theme(self, theme: Theme) -> None:
-        self.verdict.setStyleSheet(f"color: {theme.text}; font-weight: 600;")
-        self.last.setStyleSheet(f"color: {theme.faint};")
 
     def _show(self) -> None:
         testing = self._testing

@@ -13,9 +13,10 @@ from kappaskin_app.shell.display import Display, Shown, of_row
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.shown import COLOURS
 from kappaskin_app.shell.window import MainWindow
-from kappaskin_app.theme import Theme
 
 _EACH = 0.06  # s between two drawings
+
+_ABOUT = "What each element reads, map by map: curvature xx, yy, xy or what View says"
 
 
 class HeatmapsFeature:
@@ -27,7 +28,7 @@ class HeatmapsFeature:
         self._next = 0.0
         self.maps = Maps()
         self.heatmaps = self.maps.heatmaps
-        shell.docks.put_right("curvature", "By element", self.maps)
+        shell.docks.put_right("curvature", "By element", self.maps, _ABOUT, share=0.22)
         words = {name: words[0].lower() + words[1:] for name, words in COLOURS}
         shell.display.views["Picture of a &map"] = {
             f"the map of {words[name]}": heatmap for name, heatmap in self.heatmaps.items()
@@ -39,7 +40,6 @@ class HeatmapsFeature:
         display.numbers.connect(guarded(self._show_readings))
         display.shown.connect(guarded(self._show))
         shell.settings_shown.connect(guarded(self._show_settings))
-        shell.theme_changed.connect(guarded(self._show_theme))
         for name, heatmap in self.heatmaps.items():
             heatmap.pointed.connect(guarded(selection.point))
             heatmap.pointed.connect(guarded(lambda *_: display.show_numbers_soon()))
@@ -53,10 +53,6 @@ class HeatmapsFeature:
         self.maps.show_those(settings.maps)
         for name, heatmap in self.heatmaps.items():
             heatmap.show_lock(locked_at(name, settings) > 0)
-
-    def _show_theme(self, theme: Theme) -> None:
-        for heatmap in self.heatmaps.values():
-            heatmap.show_theme(theme)
 
     def _limits(self) -> dict[str, float]:
         """How far the colours of those that are seen reach, in SI units."""

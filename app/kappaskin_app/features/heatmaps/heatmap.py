@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWi
 from kappaskin.estimation import FAULTS
 from kappaskin.sensing import SensorLayout
 from kappaskin_app.shell.colouring import SHADES
-from kappaskin_app.theme import DARK_INK, WANTED, Colours, Theme
+from kappaskin_app.theme import DARK_INK, WANTED, Colours, current, follow_look
 from kappaskin_app.widgets.colour_bar import ColourBar, LockButton
 from kappaskin_app.widgets.line import Line
 from kappaskin_app.widgets.tint import Tint
@@ -40,7 +40,6 @@ class FlatCells(QWidget):
         super().__init__(parent)
         self._layout: SensorLayout | None = None
         self._colours: Colours = np.empty((0, 3), np.uint8)
-        self._line = QColor("#888888")
         self._under, self._faded = -1, False
         self._marks: tuple[list[int], ...] = ([], [])
         self._kinds: dict[int, str] = {}
@@ -87,10 +86,6 @@ class FlatCells(QWidget):
             self._faded = faded
             self.update()
 
-    def show_line(self, colour: str) -> None:
-        self._line = QColor(colour)
-        self.update()
-
     def area_of_patch(self) -> QRectF:
         """The patch on the widget: as large as fits, in its own proportions."""
         patch = self._layout.patch if self._layout else None
@@ -116,7 +111,7 @@ class FlatCells(QWidget):
         return QPointF(area.left() + x / a * area.width(), area.bottom() - y / b * area.height())
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
+        painter, line = QPainter(self), QPen(QColor(current().line), 1)
         area = self.area_of_patch()
         layout = self._layout
         if layout is None or len(self._colours) != len(layout):
@@ -128,13 +123,13 @@ class FlatCells(QWidget):
             rgb = np.ascontiguousarray(self._colours.reshape(n, m, 3)[::-1])
             painter.drawImage(area, QImage(rgb.tobytes(), m, n, 3 * m, QImage.Format.Format_RGB888))
         else:
-            painter.setPen(QPen(self._line, 1))  # or those near zero are lost on a light ground
+            painter.setPen(line)  # or those near zero are lost on a light ground
             for square, rgb in zip(self._squares(area), self._colours, strict=True):
                 painter.setBrush(QColor(*(int(v) for v in rgb)))
                 painter.drawRect(square)
             painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.setOpacity(1.0)
-        painter.setPen(QPen(self._line, 1))
+        painter.setPen(line)
         painter.drawRect(area)
         self._paint_marks(painter, area)
         self._paint_kinds(painter, area)
@@ -259,7 +254,7 @@ class Heatmap(QWidget):
         self.cells.pointed.connect(self.pointed)
         self.cells.chosen.connect(self.chosen)
         self._tint, self._layout, self._element = self._shade.tint(1.0), None, -1
-        self._missing = "#888888"
+        self._values, self._railed = np.empty(0), None
         self._kinds: dict[int, str] = {}
         top = QHBoxLayout()
         top.addWidget(self._title)
@@ -273,6 +268,7 @@ class Heatmap(QWidget):
         around.setSpacing(3)
         around.addLayout(top)
         around.addLayout(middle, 1)
+        follow_look(self, self._colour)
 
     def show_lock(self, locked: bool) -> None:
         self.lock.show_locked(locked)
@@ -297,9 +293,13 @@ class Heatmap(QWidget):
 
     def show_values(self, values: Array, tint: Tint, railed: Mask | None = None) -> None:
         """Colour `values` (P,) on the screen's scale by `tint`, but those that are `railed`."""
-        self._tint = tint
-        self.cells.show_cells(tint.rgb(values, self._missing, railed))
-        self.bar.show_tint(tint, tint.legend(values, self._missing, railed))
+        self._values, self._tint, self._railed = values, tint, railed
+        self._colour()
+
+    def _colour(self) -> None:
+        tint, shown = self._tint, (self._values, current().missing, self._railed)
+        self.cells.show_cells(tint.rgb(*shown))
+        self.bar.show_tint(tint, tint.legend(*shown))
 
     def show_marks(self, crossed: Mask, dotted: Mask, kinds: NDArray[np.uint8]) -> None:
         """Cross out elements (P,) bent too far, dot those chosen to scan, ring those left out.
@@ -341,7 +341,3 @@ class Heatmap(QWidget):
         missing = len(values) - len(finite)
         told = [f"peak {self._shade.written(peak)}"] if len(finite) else []
         return ", ".join(told + [f"{missing} missing"] * bool(missing))
-
-    def show_theme(self, theme: Theme) -> None:
-        self._missing = theme.missing
-        self.cells.show_line(theme.line)

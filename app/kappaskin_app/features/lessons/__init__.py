@@ -13,6 +13,8 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.window import MainWindow
 
+_ABOUT = "Lessons of ten to fifteen minutes, from what a gage feels to mending a sensor"
+
 
 class LessonsFeature:
     name = "lessons"
@@ -20,7 +22,16 @@ class LessonsFeature:
     def install(self, shell: MainWindow) -> None:
         self._shell, self.lesson = shell, LessonPanel()
         session, docks = shell.session, shell.docks
-        docks.put_above("lesson", "Lessons", self.lesson, "settings", "Shift+F1")
+        shell.layouts.add("Teach", "The lessons above the settings")
+        docks.put_above(
+            "lesson",
+            "Lessons",
+            self.lesson,
+            "settings",
+            "Shift+F1",
+            _ABOUT,
+            layouts={"Teach": 0.25},
+        )
         self.teaching = Teaching(
             *(shell.history, session, shell.display, shell),
             *(session.request_source, self._seen),
@@ -31,8 +42,6 @@ class LessonsFeature:
         self.teaching.pointed.connect(guarded(self.pointing.point))
         self.teaching.taken_up.connect(guarded(partial(docks.reveal, "lesson")))
         self.teaching.told.connect(guarded(shell.tell))
-        for part in (self.lesson, self.pointing):
-            shell.theme_changed.connect(guarded(part.show_theme))
         shell.menus.welcome.add(
             3,
             "&Begin a lesson",

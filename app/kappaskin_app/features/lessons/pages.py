@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from html import escape
 
 from PySide6.QtCore import Qt, QTimer, Signal
-from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent
+from PySide6.QtGui import QKeyEvent, QMouseEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
     QHBoxLayout,
@@ -22,7 +22,7 @@ from kappaskin_app.features.lessons.lesson import ChoiceAnswer, LessonTask, Numb
 from kappaskin_app.features.lessons.progress import DONE, Answer, Progress
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import well_behaved
-from kappaskin_app.theme import LIGHT, SERIES, Theme
+from kappaskin_app.theme import ALERT, current, follow_look, series
 from kappaskin_app.widgets.layout import scrolled
 from kappaskin_app.widgets.parts import ELLIPSIS, button, in_a_row, text_label
 
@@ -49,7 +49,7 @@ class Asking(QWidget):
 
     def __init__(self, question: Question, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._question, self._theme = question, LIGHT
+        self._question = question
         self._answer, self._message = Answer(), ""
         self.text, self.feedback = text_label(question.text), text_label()
         bold = self.text.font()
@@ -81,6 +81,7 @@ class Asking(QWidget):
         self.number.returnPressed.connect(guarded(self._give))
         self.show_how.clicked.connect(guarded(lambda *_: self.show_wanted.emit()))
         self.show_answer(self._answer, "")
+        follow_look(self, self._dress)
 
     def _add_options(self, options: tuple[str, ...]) -> None:
         for index, words in enumerate(options):
@@ -122,7 +123,7 @@ class Asking(QWidget):
         self.show_how.setVisible(task and answer.told and not answer.right)
         self.feedback.setText(self._said())
         self.feedback.setVisible(bool(self.feedback.text()))
-        self._paint()
+        self._dress()
 
     def _said(self) -> str:
         answer, question = self._answer, self._question
@@ -134,21 +135,17 @@ class Asking(QWidget):
             return f"Right. {question.explain}"
         return f"Not so. {question.explain if answer.told else question.hint}"
 
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
-        self._paint()
-
-    def _paint(self) -> None:
-        dark = QColor(self._theme.window).lightness() < 128
+    def _dress(self) -> None:
         right = self._answer.right and not self._message
-        colour = SERIES[_RIGHT][dark] if right else self._theme.alert
+        colour = series(_RIGHT).name() if right else current().alert
         self.feedback.setStyleSheet(f"color: {colour};")
         for option in self.options.buttons():
-            option.setStyleSheet(_radio_style(self._theme))
+            option.setStyleSheet(_radio_style())
 
 
-def _radio_style(theme: Theme) -> str:
+def _radio_style() -> str:
     """A ring that is seen on a dark ground too, where Fusion's is lost."""
+    theme = current()
     return (
         f"QRadioButton::indicator {{ width: 11px; height: 11px; border-radius: 6px;"
         f" border: 1px solid {theme.faint}; background: {theme.base}; }}"
@@ -183,7 +180,6 @@ class StepPage(QWidget):
         whole.addWidget(self.area)
         self.asking: Asking | None = None
         self._shown: tuple[str, int] | None = None
-        self._theme = LIGHT
 
     def show_progress(self, progress: Progress, message: str) -> None:
         """Show the step that a person is at, and what came of the answer."""
@@ -213,7 +209,6 @@ class StepPage(QWidget):
             self._below.addWidget(made)
         if step.question is not None:
             self.asking = Asking(step.question)
-            self.asking.show_theme(self._theme)
             self.asking.answered.connect(self.answered)
             self.asking.show_wanted.connect(self.show_wanted)
             self._below.addWidget(self.asking)
@@ -222,11 +217,6 @@ class StepPage(QWidget):
     def forget(self) -> None:
         """Make the step anew the next time, for a lesson that was read anew."""
         self._shown = None
-
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
-        if self.asking is not None:
-            self.asking.show_theme(theme)
 
 
 def _empty(layout: QLayout) -> None:
@@ -267,6 +257,7 @@ class ListPage(QWidget):
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.about, self.message = text_label(), text_label()
         self.message.setTextFormat(Qt.TextFormat.PlainText)
+        self.message.setForegroundRole(ALERT)
         self.about.setTextFormat(Qt.TextFormat.PlainText)
         self.about.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.about.setMinimumHeight(5 * self.about.fontMetrics().lineSpacing())
@@ -312,9 +303,6 @@ class ListPage(QWidget):
     def selected(self) -> str:
         item = self.list.currentItem()
         return "" if item is None else item.data(_NAME)
-
-    def show_theme(self, theme: Theme) -> None:
-        self.message.setStyleSheet(f"color: {theme.alert};")
 
     def _describe(self, *_: object) -> None:
         one = self._progress.get(self.selected)

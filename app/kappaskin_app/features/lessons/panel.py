@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
 from kappaskin_app.features.lessons.pages import EndPage, ListPage, StepPage
 from kappaskin_app.features.lessons.teaching import Teaching
 from kappaskin_app.guard import guarded
-from kappaskin_app.theme import Theme
+from kappaskin_app.theme import FAINT, current, follow_look
 from kappaskin_app.widgets.parts import button
 
 
@@ -31,6 +31,7 @@ class LessonPanel(QWidget):
             self.pages.addWidget(page)
         self.where, self.bar = QLabel(), QProgressBar()
         self.where.setTextFormat(Qt.TextFormat.PlainText)
+        self.where.setForegroundRole(FAINT)
         self.bar.setTextVisible(False)
         self.bar.setFixedHeight(4)
         self.back = button("\N{LEFTWARDS ARROW} &Back", "lesson-back", "The step before.")
@@ -58,6 +59,7 @@ class LessonPanel(QWidget):
         for widget in (self.list, self._taking):
             whole.addWidget(widget)
         self._taking.hide()
+        follow_look(self, self._dress)
 
     def attend(self, teaching: Teaching) -> None:
         """Show how `teaching` goes, and pass on what the user requests."""
@@ -107,10 +109,8 @@ class LessonPanel(QWidget):
         super().showEvent(event)
         self.seen.emit()
 
-    def show_theme(self, theme: Theme) -> None:
-        for page in (self.list, self.step):
-            page.show_theme(theme)
-        self.where.setStyleSheet(f"color: {theme.faint};")
+    def _dress(self) -> None:
+        theme = current()
         self.bar.setStyleSheet(
             f"QProgressBar {{ background: {theme.line}; border: none; border-radius: 2px; }}"
             f"QProgressBar::chunk {{ background: {theme.accent}; border-radius: 2px; }}"

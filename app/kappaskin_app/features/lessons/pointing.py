@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QDockWidget, QScrollArea, QTabWidget, QWidget
 
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import Form
-from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.theme import current
 
 _AROUND, _THICK, _ABOUT = 3, 2, 60  # px: of a ring, and of what is seen around it
 
@@ -16,10 +16,9 @@ _AROUND, _THICK, _ABOUT = 3, 2, 60  # px: of a ring, and of what is seen around 
 class _Ring(QWidget):
     """A ring around `targets`, which have one parent, wherever they go."""
 
-    def __init__(self, targets: list[QWidget], colour: str) -> None:
+    def __init__(self, targets: list[QWidget]) -> None:
         super().__init__(targets[0].parentWidget())
         self._targets = targets
-        self.colour = colour
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         for target in targets:
             target.installEventFilter(self)
@@ -45,7 +44,7 @@ class _Ring(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(QPen(QColor(self.colour), _THICK))
+        painter.setPen(QPen(QColor(current().accent), _THICK))
         inner = QRectF(self.rect()).adjusted(1, 1, -1, -1)
         painter.drawRoundedRect(inner, 2 * _AROUND, 2 * _AROUND)
 
@@ -67,7 +66,6 @@ class ControlPointer(QObject):
         self._forms, self._others, self._show_dock = forms, others, show_dock
         self.rings: list[_Ring] = []
         self._shown: list[QDockWidget] = []
-        self._theme = LIGHT
 
     def targets(self, name: str) -> list[QWidget]:
         """The widgets that `name` means: a control with its label, a dock or a number."""
@@ -90,7 +88,7 @@ class ControlPointer(QObject):
         self._put_away([one for targets in pointed for one in _around(targets[0])])
         for targets in pointed:
             self._reveal(targets[0])
-            self.rings.append(_Ring(targets, self._theme.accent))
+            self.rings.append(_Ring(targets))
         # Once more when what was shown has its place.
         QTimer.singleShot(0, self, guarded(self._scroll))
 
@@ -116,12 +114,6 @@ class ControlPointer(QObject):
                 if area.isHidden():
                     self._shown.append(area)
                 self._show_dock(area.objectName())
-
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
-        for ring in self.rings:
-            ring.colour = theme.accent
-            ring.update()
 
 
 def _around(widget: QWidget) -> Iterator[QWidget]:

@@ -7,6 +7,10 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.parts import HELP, SOURCE
 from kappaskin_app.shell.window import MainWindow
 
+_EVENTS = "When a device came, went, lost messages or began anew, newest first"
+
+_ABOUT = "What was logged or said in passing since the window opened, newest first"
+
 
 class LogFeature:
     name = "log"
@@ -16,16 +20,14 @@ class LogFeature:
         self.logged = Logged()
         self.log, self.event_log = LogPanel(self.logged), EventLog(shell)
         self.errors = Errors(shell, self.event_log)
-        shell.docks.put_below("log", "Log", self.log, "Ctrl+Alt+G")
+        shell.docks.put_below("log", "Log", self.log, "Ctrl+Alt+G", _ABOUT)
         display.foot.add(self.errors.count)
         session.reported.connect(guarded(self.event_log.follow))
         session.reported.connect(guarded(lambda *_: self.log.look()))
         display.badge.clicked.connect(guarded(self.event_log.open_list))
         self.event_log.told.connect(guarded(shell.tell))
-        for part in (self.log, self.errors):
-            shell.theme_changed.connect(guarded(part.show_theme))
         show = self.event_log.open_list
-        shell.actions_by_name.add("event_log", SOURCE, "E&vent log", show, "F4")
+        shell.actions_by_name.add("event_log", SOURCE, "E&vent log", show, "F4", _EVENTS)
         self.errors.add_actions(shell.actions_by_name, HELP)
         shell.closing.connect(guarded(self.errors.close))
         shell.closed.connect(guarded(self.logged.close))

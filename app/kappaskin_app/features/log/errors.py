@@ -25,7 +25,7 @@ from kappaskin_app.shell.folders import recordings_folder
 from kappaskin_app.shell.logbook import CRASHES, LOG, log_folder
 from kappaskin_app.shell.recovery import settings_text
 from kappaskin_app.shell.work_dialog import WorkDialog, beside, choosing, ended, named, path_in
-from kappaskin_app.theme import Theme
+from kappaskin_app.theme import current, follow_look
 
 if TYPE_CHECKING:
     from kappaskin_app.shell.window import MainWindow
@@ -177,6 +177,7 @@ class Errors(QObject):
         self.count.hide()
         self.report = ReportDialog(self._tell, log_folder(), window.tasks, window)
         guard.on_failure(self._take)
+        follow_look(window, self._dress)
 
     def add_actions(self, actions: Actions, menu: str) -> None:
         """Register what a person can do."""
@@ -191,6 +192,9 @@ class Errors(QObject):
         self.count.show()
         self.events.note("failure", words)
         self._window.tell(words)
+
+    def _dress(self) -> None:
+        self.count.setStyleSheet(f"color: {current().alert};")
 
     def _tell(self, with_readings: bool) -> Told:
         window, session = self._window, self._window.session
@@ -208,9 +212,6 @@ class Errors(QObject):
             "state.txt": "".join(f"{name}: {value}\n" for name, value in state.items()),
         }
         return Told(texts, session.estimate if with_readings else None)
-
-    def show_theme(self, theme: Theme) -> None:
-        self.count.setStyleSheet(f"color: {theme.alert};")
 
     def close(self) -> None:
         guard.forget(self._take)

@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin_app.guard import guarded, log
-from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.theme import current, follow_look
 
 _KEPT = 1000
 
@@ -93,7 +93,7 @@ class LogPanel(QWidget):
 
     def __init__(self, logged: Logged, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._logged, self._seen, self._theme = logged, -1, LIGHT
+        self._logged, self._seen = logged, -1
         self._lines: list[LogLine] = []
         self.level, self.nothing = QComboBox(), QLabel(_NOTHING)
         for words, level in _LEVELS:
@@ -114,6 +114,7 @@ class LogPanel(QWidget):
         column.addLayout(row)
         column.addWidget(self.nothing)
         column.addWidget(self.table, 1)
+        follow_look(self, self._fill)
 
     def look(self) -> None:
         """List what is new, while somebody looks."""
@@ -138,7 +139,7 @@ class LogPanel(QWidget):
         item = QTableWidgetItem(text)
         item.setToolTip(line.whole)
         if line.level >= logging.WARNING:
-            item.setForeground(QColor(self._theme.alert))
+            item.setForeground(QColor(current().alert))
         return item
 
     def _copy(self) -> None:
@@ -148,10 +149,6 @@ class LogPanel(QWidget):
     def _clear(self) -> None:
         self._logged.clear()
         self._fill()
-
-    def show_theme(self, theme: Theme) -> None:
-        if theme != self._theme:
-            self._theme, self._seen = theme, -1
 
 
 def _table() -> QTableWidget:

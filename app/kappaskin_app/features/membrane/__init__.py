@@ -26,7 +26,6 @@ class MembraneFeature:
     def _follow(self, shell: MainWindow) -> None:
         view, selection = self.view, shell.selection
         shell.settings_shown.connect(guarded(view.show_settings))
-        shell.theme_changed.connect(guarded(view.show_theme))
         shell.display.unit_changed.connect(guarded(self.scale.show_unit))
         shell.display.unit_changed.connect(guarded(self._alarm))
         # Queued: the next look comes after the picture is out, and need not wait for the timer.

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from kappaskin.skin import Distances
 from kappaskin_app.shell.drawn_skin import MM, Direction, DrawnSkin, Indices
-from kappaskin_app.theme import WANTED, Theme, grown
+from kappaskin_app.theme import WANTED, current, follow_look, grown
 
 UNLIT = {"lighting": False, "pickable": False, "reset_camera": False, "render": False}
 """For `add_mesh`: the same colour from every side, nothing drawn and the camera left alone."""
@@ -41,6 +41,7 @@ class Caption:
         self.text.position = _BESIDE, height
         self.text.prop.justification_vertical = vertical
         plotter.add_actor(self.text, reset_camera=False, render=False)
+        follow_look(plotter, self.fit)
 
     def say(self, words: str) -> None:
         """Say `words`; a number and its unit stay together."""
@@ -51,12 +52,8 @@ class Caption:
         """Say them in the letters of now, in lines for which the picture of now has room."""
         whole = self.words.replace(" mm", "\N{NO-BREAK SPACE}mm")
         lines = textwrap.wrap(whole, room_for(self._plotter, self._px))
-        self.text.prop.font_size = grown(self._px)
+        self.text.prop.font_size, self.text.prop.color = grown(self._px), current().text
         self.text.input = "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")
-
-    def show_colour(self, colour: str) -> None:
-        self.text.prop.color = colour
-        self.fit()
 
 
 _SIDE_LETTERS = 15  # px
@@ -77,6 +74,7 @@ class Sides:
         self.labels: list[Any] = [pv.Label() for _ in range(3)]
         for label in self.labels:
             plotter.add_actor(label, reset_camera=False, render=False)
+        follow_look(plotter, self._dress)
 
     def show_skin(self, skin: DrawnSkin) -> None:
         a, b = skin.patch.a, skin.patch.b
@@ -104,10 +102,9 @@ class Sides:
             label.size = size
         return _LONG * size / wide
 
-    def show_colour(self, colour: str) -> None:
-        self.actor.prop.color = colour
-        for label in self.labels:
-            label.prop.color = colour
+    def _dress(self) -> None:
+        for part in (self.actor, *self.labels):
+            part.prop.color = current().text
 
 
 Array = NDArray[np.float64]
@@ -156,9 +153,6 @@ class Ruler:
         self.actor.visibility = found is not None
         if found is not None:
             self._words.say(told(found))
-
-    def show_theme(self, theme: Theme) -> None:
-        self._words.show_colour(theme.text)
 
 
 def told(found: Distances) -> str:
@@ -224,6 +218,7 @@ class Alarm:
         style.color, style.background_opacity = "white", 0.9
         style.bold, style.justification_vertical = True, "top"
         plotter.add_actor(self.actor, reset_camera=False, render=False)
+        follow_look(plotter, self.fit)
 
     def show(self, text: str) -> None:
         """Say `text`, its first line apart; or nothing."""
@@ -240,7 +235,5 @@ class Alarm:
         most = _LINES * _WIDTH // wide
         lines = textwrap.wrap(rest, wide, max_lines=most, placeholder=" ...")
         self.actor.prop.font_size = grown(_ALARM_LETTERS)
+        self.actor.prop.background_color = current().bad
         self.actor.input = "\n".join([head, *lines]) if self.text else ""
-
-    def show_theme(self, theme: Theme) -> None:
-        self.actor.prop.background_color = theme.bad

@@ -10,15 +10,20 @@ from kappaskin_app.features.membrane.camera import DIRECTIONS
 from kappaskin_app.features.membrane.skin_view import SkinView
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import WITHIN, Actions
+from kappaskin_app.shell.colouring import SHADES
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.requests import Requests
+from kappaskin_app.shell.settings import ask_of
 from kappaskin_app.shell.settings.shown import COLOURS
 
 
 class ViewPanel(Form):
     """Asks for colours, height and what is drawn beside the skin."""
+
+    purpose = "How the skin is drawn: its colours, its height and what is drawn over it."
+    guide_page = "numbers"
 
     def __init__(self, parent: QWidget | None = None) -> None:
         names = (
@@ -33,8 +38,11 @@ class ViewPanel(Form):
 _MENU = "Sk&in"
 _COLOURS = f"{_MENU}{WITHIN}&Colour"
 _LOOKS = (
-    *(("F6", "above"), ("F7", "front"), ("F8", "side")),
-    *(("Shift+F6", "below"), ("Shift+F7", "corner")),
+    ("F6", "above", "The skin as a map: x to the right, y upward"),
+    ("F7", "front", "The skin from its front edge: x to the right, displacement up and down"),
+    ("F8", "side", "The skin from its side: y to the right, displacement up and down"),
+    ("Shift+F6", "below", "The skin from the side that is not touched"),
+    ("Shift+F7", "corner", "Lengths along x, y and the displacement drawn alike"),
 )
 _TOGGLES = (
     ("elements", "&elements", "Ctrl+E"),
@@ -45,7 +53,11 @@ _TOGGLES = (
     ("object", "object f&ound", "Ctrl+Alt+O"),
     ("pressed", "object &pressed", "Ctrl+Alt+P"),
 )
-_TIP = "Measure between two places of the skin that you click; Escape ends"
+_LOCK = "Keep what every colour means as it is now, or let it follow what is shown"
+_HIGHER = "Draw the displacement one more time larger; the colours stay as they are"
+_LOWER = "Draw the displacement one time less large; the colours stay as they are"
+_CAMERA = "Look at the whole skin from where it is seen at first"
+_MEASURE = "Measure between two places of the skin that you click; Escape ends"
 _DIGITS = 9  # actions that may have a digit for a shortcut
 
 
@@ -63,21 +75,24 @@ class Looking:
         for number, (value, words) in enumerate(COLOURS, 1):
             colour = partial(requests.set, "colour_by", value)
             key = f"Ctrl+{number}" if number <= _DIGITS else ""
-            add(f"colour-{value}", _COLOURS, f"Colour by {words.lower()}", colour, key)
-        add("lock-ranges", _MENU, "&Lock or free all ranges", self.lock_all, "Ctrl+Alt+L")
-        add("higher", _MENU, "Draw &higher", partial(self.exaggerate, 1), "Ctrl++")
-        add("lower", _MENU, "Draw &lower", partial(self.exaggerate, -1), "Ctrl+-")
+            words, tip = f"Colour by {words.lower()}", SHADES[value].tip
+            add(f"colour-{value}", _COLOURS, words, colour, key, tip)
+        add("lock-ranges", _MENU, "&Lock or free all ranges", self.lock_all, "Ctrl+Alt+L", _LOCK)
+        add("higher", _MENU, "Draw &higher", partial(self.exaggerate, 1), "Ctrl++", _HIGHER)
+        add("lower", _MENU, "Draw &lower", partial(self.exaggerate, -1), "Ctrl+-", _LOWER)
         for name, words, key in _TOGGLES:
             toggle = partial(requests.toggle, f"show_{name}")
-            add(name, _MENU, f"Show or hide {words}", toggle, key)
-        add("camera", _MENU, "Reset &camera", self._look("Reset camera", "left"), "Ctrl+R")
-        for key, look in _LOOKS:
+            tip = ask_of(f"show_{name}").tip
+            add(name, _MENU, f"Show or hide {words}", toggle, key, tip)
+        camera = self._look("Reset camera", "left")
+        add("camera", _MENU, "Reset &camera", camera, "Ctrl+R", _CAMERA)
+        for key, look, tip in _LOOKS:
             words = f"Look {DIRECTIONS[look].words}"
-            add(words.lower().replace(" ", "-"), _MENU, words, self._look(words, look), key)
+            add(words.lower().replace(" ", "-"), _MENU, words, self._look(words, look), key, tip)
         self._view.membrane.gaze.turned.connect(guarded(self._turned))
 
         measuring = self._view.measuring
-        self._measure = add("measure", _MENU, "&Measure", measuring.turn, "Ctrl+Alt+M", _TIP)
+        self._measure = add("measure", _MENU, "&Measure", measuring.turn, "Ctrl+Alt+M", _MEASURE)
         self._measure.setCheckable(True)
         self._escape = QShortcut(QKeySequence("Esc"), self._view.membrane.window())
         self._escape.setEnabled(False)

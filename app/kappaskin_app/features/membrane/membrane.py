@@ -24,7 +24,7 @@ from kappaskin_app.features.membrane.mouse import LoadDrag, SurfacePointer
 from kappaskin_app.features.membrane.surface import WHOLE, Box, Shares, Surface
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.drawn_skin import MM, DrawnSkin, Indices
-from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, Theme
+from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, current, follow_look
 
 Array = NDArray[np.float64]
 
@@ -83,8 +83,8 @@ class MembraneView(QWidget):
         self._elements_at_rest = (np.empty((0, 3)), np.empty((0, 3)))
         self._positions, self._marked = np.empty((0, 2)), (b"", -1)
         self._arrays: dict[str, Any] = {}
-        self._theme: Theme | None = None
         self._ink = "#ffffff"
+        follow_look(self, self._dress)
 
     def _make_actors(self) -> None:
         plotter = self.plotter
@@ -144,8 +144,7 @@ class MembraneView(QWidget):
         self.show_box(self._box.shares)
         if another:
             self.gaze.place()
-        if self._theme:
-            self.show_theme(self._theme)
+        self._dress()
 
     def _show_wire(self) -> None:
         if self._wire_actor is not None:
@@ -310,13 +309,8 @@ class MembraneView(QWidget):
         self._contact.visibility = not lost
         self.plotter.update()
 
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
-        self.plotter.set_background(theme.scene, top=theme.scene_top)
-        self.sides.show_colour(theme.text)
-        self._caption.show_colour(theme.text)
-        self.alarm.show_theme(theme)
-        self.surface.show_theme(theme)
+    def _dress(self) -> None:
+        self.plotter.set_background(current().scene, top=current().scene_top)
         self._fit()
         self.plotter.update()
 

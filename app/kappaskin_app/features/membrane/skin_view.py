@@ -19,7 +19,7 @@ from kappaskin_app.shell.loads import touches_at
 from kappaskin_app.shell.selection import Selection
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.theme import DIVERGING, Theme
+from kappaskin_app.theme import DIVERGING, current, follow_look
 from kappaskin_app.widgets.colour_bar import SkinScale
 from kappaskin_app.widgets.tint import Tint
 
@@ -44,7 +44,9 @@ class SkinView(QObject):
         self._settings = Settings()
         self._colours: object = None
         self._out = np.empty(0, np.intp)  # elements that are left out
+        self._shown: Shown | None = None
         self._next_marks = 0.0
+        follow_look(self.membrane, lambda: self._shown and self._colour(self._shown))
         display.ages, display.limits = self._ages, [*display.limits, self._limits]
         display.restarted.connect(guarded(self._restart))
         display.status_shown.connect(guarded(self._show_status))
@@ -65,10 +67,6 @@ class SkinView(QObject):
         self.membrane.show_box((s.from_x, s.to_x, s.from_y, s.to_y, s.from_z, s.to_z))
         self.membrane.show_options(settings.show_elements, settings.show_truth)
         self.membrane.gaze.show(settings.look, settings.camera)
-
-    def show_theme(self, theme: Theme) -> None:
-        self.measuring.ruler.show_theme(theme)
-        self.membrane.show_theme(theme)
 
     def limit_shown(self) -> float:
         """How far the colours of the skin reach, in SI units."""
@@ -112,6 +110,7 @@ class SkinView(QObject):
             return  # a picture is due; the next tick brings a newer estimate
         estimate, settings, now = shown.estimate, self._settings, shown.now
         self._display.ranges.limit("displacement", 1e3 * estimate.surface, settings, now)
+        self._shown = shown
         self._colour(shown)
         self._show_loads(estimate)
         self.overlays.show(estimate, settings, self._times())
@@ -136,8 +135,9 @@ class SkinView(QObject):
             of_elements = display.of_elements(name, estimate, shown.kinds)
             tint = display.tint(name, estimate, of_elements, shown.now)
             on_rail = of_row(name, shown.railed)
-            values = tint.rgb(of_elements, display.missing, on_rail)
-            beside = tint.legend(of_elements, display.missing, on_rail)
+            missing = current().missing
+            values = tint.rgb(of_elements, missing, on_rail)
+            beside = tint.legend(of_elements, missing, on_rail)
         if tint.colours is not self._colours:
             self._colours = tint.colours
             self.membrane.show_colours(tint.colours, tint.ink)

@@ -10,7 +10,7 @@ from vtkmodules.vtkCommonDataModel import vtkPlane, vtkPlaneCollection
 
 from kappaskin.sensing import SensorLayout
 from kappaskin_app.shell.drawn_skin import DrawnSkin
-from kappaskin_app.theme import Colours, Theme
+from kappaskin_app.theme import Colours, current, follow_look
 
 _PIXELS = 384  # along each side, of cells that are no rectangles of a regular grid
 
@@ -96,7 +96,7 @@ class Surface:
         self.actor: Any = None
         self._arrays: dict[str, Any] = {}
         self._lost = self._by_element = False
-        self._missing = "#808080"
+        follow_look(plotter, self._dress)
 
     def show_skin(self, skin: DrawnSkin, layout: SensorLayout) -> None:
         """Draw another skin, at rest."""
@@ -161,16 +161,12 @@ class Surface:
         self._lost = lost
         self._dress()
 
-    def show_theme(self, theme: Theme) -> None:
-        self._missing = theme.missing
-        self._colours.nan_color = theme.missing
-        self._dress()
-
     def _dress(self) -> None:
         """Show the values, a picture of the elements, or neither when lost."""
+        self._colours.nan_color = current().missing
         if self.actor is None:
             return
         pictured = self._by_element and not self._lost
         self.actor.SetTexture(self._cells.texture if pictured else None)
         self.actor.mapper.scalar_visibility = not (self._lost or pictured)
-        self.actor.prop.color = "#ffffff" if pictured else self._missing
+        self.actor.prop.color = "#ffffff" if pictured else current().missing

@@ -6,6 +6,8 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.parts import VIEW
 from kappaskin_app.shell.window import MainWindow
 
+_LAYOUT = "The skin and what is felt fill the screen; Esc leaves"
+
 
 class PresenterFeature:
     name = "presenter"
@@ -18,12 +20,11 @@ class PresenterFeature:
         self.presenting = Presenting(
             shell, self.stage, shell.session, shell.display, shell.selection.load
         )
-        shell.layouts.full_screen = self.presenting
+        shell.layouts.add("Presenter", _LAYOUT, full=self.presenting)
         shell.session.estimated.connect(guarded(self.presenting.receive))
         shell.display.status_shown.connect(guarded(self.presenting.follow))
         shell.display.object_found.connect(guarded(self.presenting.find))
         self.stage.fitted.connect(shell.display.unit_changed)
-        shell.theme_changed.connect(guarded(self.presenting.show_theme))
         self._add_actions(shell)
         shell.closing.connect(guarded(self.presenting.close))
 

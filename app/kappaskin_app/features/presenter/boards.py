@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from kappaskin_app.features.presenter.cue import Roundness
 from kappaskin_app.shell.badge import GAP, LOST, OFF, STALE, WAITING, colour_of
 from kappaskin_app.shell.colouring import SteadyRange
-from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.theme import current
 from kappaskin_app.widgets.lettering import (
     CAPTION,
     CENTRE,
@@ -34,7 +34,7 @@ class Board(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.unit, self.theme = 1.0, LIGHT
+        self.unit = 1.0
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
 
     def words(self) -> list[Words]:
@@ -53,10 +53,6 @@ class Board(QWidget):
         # Ignored, a layout would give it no height beside what stretches.
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.setFixedHeight(round(units * self.unit))
-
-    def show_theme(self, theme: Theme) -> None:
-        self.theme = theme
-        self.update()
 
     def letters(self, capital: float, bold: bool = False) -> QFont:
         """Letters whose capitals are so many units high."""
@@ -79,7 +75,7 @@ class Board(QWidget):
 
     def ink(self, words: Words) -> str:
         """The colour that the words have."""
-        return self.theme.faint if words.faint else self.theme.text
+        return current().faint if words.faint else current().text
 
     def fill(self, painter: QPainter, place: QRectF, colour: str, radius: float = 0.0) -> None:
         painter.setPen(Qt.PenStyle.NoPen)
@@ -127,7 +123,7 @@ class Strip(Board):
         return QRectF(self.edge, gap, wide + 2 * _PAD * self.unit, self.height() - 2 * gap)
 
     def draw(self, painter: QPainter) -> None:
-        self.fill(painter, self.badge, colour_of(self.state, self.theme), 10 * self.unit)
+        self.fill(painter, self.badge, colour_of(self.state, current()), 10 * self.unit)
 
     def ink(self, words: Words) -> str:
         return "#ffffff" if words.text == self.state else super().ink(words)
@@ -192,7 +188,7 @@ class Banner(Board):
         return REMEDIES.get(self.state, "")
 
     def draw(self, painter: QPainter) -> None:
-        self.fill(painter, QRectF(self.rect()), colour_of(self.state, self.theme), 10 * self.unit)
+        self.fill(painter, QRectF(self.rect()), colour_of(self.state, current()), 10 * self.unit)
 
     def ink(self, words: Words) -> str:
         return "#ffffff"
@@ -301,7 +297,7 @@ class ForceBar(Board):
         return low - short, high + short
 
     def draw(self, painter: QPainter) -> None:
-        scale, theme = self.scale, self.theme
+        scale, theme = self.scale, current()
         self.fill(painter, scale, theme.base, 4)
         if math.isfinite(self.force):
             self.fill(painter, QRectF(0, 0, self.at(self.force), scale.height()), theme.accent)
@@ -375,7 +371,7 @@ class RoundView(Board):
         return QRectF(foot.x() - r, foot.y() - 2 * r, 2 * r, 2 * r)
 
     def draw(self, painter: QPainter) -> None:
-        theme, foot = self.theme, self.foot
+        theme, foot = current(), self.foot
         painter.setClipRect(self.rect())
         if self.roundness is not None:
             self._draw_round(painter, self.roundness)
@@ -392,7 +388,7 @@ class RoundView(Board):
             painter.drawLine(QPointF(x, bar.bottom() - 8 * self.unit), QPointF(x, bar.bottom()))
 
     def _draw_round(self, painter: QPainter, round_: Roundness) -> None:
-        theme, (low, high) = self.theme, round_.between
+        theme, (low, high) = current(), round_.between
         band = QPainterPath()
         band.addRect(QRectF(0, 0, self.width(), self.foot.y())) if high == math.inf else (
             band.addEllipse(self.circle(high))
@@ -411,7 +407,7 @@ class RoundView(Board):
 
     def _draw_edge(self, painter: QPainter) -> None:
         foot, high = self.foot, _SHARP * self.height()
-        painter.setPen(QPen(QColor(self.theme.accent), max(2.0, 4 * self.unit)))
+        painter.setPen(QPen(QColor(current().accent), max(2.0, 4 * self.unit)))
         for side in (-1, 1):
             painter.drawLine(foot, QPointF(foot.x() + side * high, foot.y() - high))
 

@@ -32,7 +32,7 @@ from kappaskin.skin import Disk, Patch, Polygon
 from kappaskin_app.features.presenter.boards import Board
 from kappaskin_app.features.presenter.cue import Cue
 from kappaskin_app.guard import guarded
-from kappaskin_app.theme import SERIES, Theme
+from kappaskin_app.theme import current, follow_look, series
 from kappaskin_app.widgets.lettering import CAPTION, Words, letters, shrunk
 
 
@@ -182,7 +182,7 @@ class Pad(Board):
         return min(max(x, 0.0), patch.a), min(max(y, 0.0), patch.b)
 
     def draw(self, painter: QPainter) -> None:
-        theme, place = self.theme, self.skin
+        theme, place = current(), self.skin
         focus = theme.accent if self.hasFocus() else theme.line
         painter.setPen(QPen(QColor(focus), 2 if self.hasFocus() else 1))
         painter.setBrush(QColor(theme.base))
@@ -209,9 +209,8 @@ class Pad(Board):
 
     def _draw_cue(self, painter: QPainter, cue: Cue) -> None:
         """A dot where the contact is estimated to be."""
-        dark = QColor(self.theme.window).lightness() < 128
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(SERIES[3][dark]))
+        painter.setBrush(series(3))
         r = 7 * self.unit + 2
         painter.drawEllipse(self.seen_at(*cue.position), r, r)
 
@@ -376,6 +375,7 @@ class Operator(QWidget):
         row.addWidget(self.pad)
         row.addLayout(beside, 1)
         self._row, self._unit = row, 0.0
+        follow_look(self, self._dress)
 
     def show_unit(self, unit: float) -> None:
         self._unit = unit
@@ -404,9 +404,8 @@ class Operator(QWidget):
                 button.setChecked(self.things.id(button) == number)
             self.things.setExclusive(True)
 
-    def show_theme(self, theme: Theme) -> None:
-        for board in (self.pad, self.told):
-            board.show_theme(theme)
+    def _dress(self) -> None:
+        theme = current()
         self._choice.setStyleSheet(
             f"QPushButton:checked {{ background: {theme.accent}; color: {theme.base};"
             f" border: 1px solid {theme.accent}; border-radius: 3px; padding: 4px; }}"

@@ -23,7 +23,6 @@ from kappaskin_app.shell.docks import drawn_once
 from kappaskin_app.shell.loads import may_choose, touches_at
 from kappaskin_app.shell.selection import LoadHandle
 from kappaskin_app.shell.session import Session
-from kappaskin_app.theme import Theme
 
 TIP = "Fill the screen with what is felt, to be read from three metres; Escape leaves"
 SOUND_TIP = "A tone that rises and swells with the force, while the presenter is shown"
@@ -182,9 +181,6 @@ class Presenting(QObject):
         hand = self.stage.operator.pad.hand
         if hand is not None:
             self._load.replaced.emit(THINGS[number].said, *hand)
-
-    def show_theme(self, theme: Theme) -> None:
-        self.stage.show_theme(theme)
 
 
 def _called(status: Status) -> str:

@@ -17,7 +17,6 @@ from kappaskin_app.features.presenter.boards import (
 )
 from kappaskin_app.features.presenter.cue import Cue, Roundness
 from kappaskin_app.features.presenter.pad import Operator
-from kappaskin_app.theme import LIGHT, Theme
 
 _HEIGHT, _WIDTH = 1080.0, 1920.0  # of the picture that a unit is a pixel of
 _SKIN, _FIGURES = 51, 49  # how they share the width
@@ -46,7 +45,6 @@ class Stage(QWidget):
             *(self.displacement, self.place, self.radius, self.round),
         ]
         self.presenting = False
-        self._theme = LIGHT
         self._arrange(skin)
         self._show_parts()
 
@@ -138,10 +136,6 @@ class Stage(QWidget):
         if state:
             self.banner.show_trouble(state, since, why)
         self.pages.setCurrentWidget(self.banner if state else self._figures)
-
-    def show_theme(self, theme: Theme) -> None:
-        for part in (*self.boards, self.operator):
-            part.show_theme(theme)
 
 
 def radius_in_words(cue: Cue, recorded: bool = False) -> tuple[str, str, str]:

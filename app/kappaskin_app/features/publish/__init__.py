@@ -33,6 +33,12 @@ class PublishFeature:
 class PublishPanel(Form):
     """Asks for receivers; says what each of them gets, and why one gets nothing."""
 
+    purpose = (
+        "Sends the contact with its error bars to other programs, as JSON by UDP or to Foxglove; "
+        "receivers of twenty lines come with the library."
+    )
+    guide_page = "record"
+
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Publish", _NAMES, parent)
         self.counts, self.late = text_label(tip=_TIP), text_label(tip=_LATE)

@@ -35,8 +35,6 @@ class RecordingFeature:
         self._wire_taping(shell)
         self._wire_replaying(shell)
         self.recording.attend(self.taping, self.replaying)
-        for part in (self.transport, self.mark):
-            shell.theme_changed.connect(guarded(part.show_theme))
         shell.begun.connect(guarded(self._begin))
         shell.closing.connect(guarded(self.replaying.close))
         shell.closing.connect(guarded(self.taping.close))

@@ -23,6 +23,12 @@ _DOTS = "\N{HORIZONTAL ELLIPSIS}"
 class RecordingPanel(Panel):
     """Says how the recording does, and asks for another one."""
 
+    purpose = (
+        "Writes all that comes in, before anything is made of it, to a file that outlives a crash; "
+        "plays such a file again, with other settings if you like."
+    )
+    guide_page = "record"
+
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Recording", parent)
         self.record = button(f"Record{_DOTS}", "record-button", _RECORD)

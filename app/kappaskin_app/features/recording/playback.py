@@ -25,6 +25,16 @@ from kappaskin_app.widgets.text import day
 
 FILES = "Recording (*.mcap *.mcap.part)"
 _MENU = "&Recording"
+_TIPS = {
+    "forward": "Pause, and show the next frame of the recording",
+    "back": "Pause, and show the frame before in the recording",
+    "next": "Go to the next note, gap or change of settings in the recording",
+    "previous": "Go to the note, gap or change of settings before in the recording",
+    "faster": "Play the recording at the next higher speed",
+    "slower": "Play the recording at the next lower speed",
+    "loop": "Play the recording again and again, or once",
+    "settings": "Fit with the settings that were in use when this frame was recorded",
+}
 _ARRIVES = 0.4  # s after which what was asked of the engine shows in its status
 _HERE = 1e-4  # s: an event so near is where the replay is
 _DOTS = "\N{HORIZONTAL ELLIPSIS}"
@@ -96,16 +106,16 @@ class Replaying(QObject):
         add = partial(actions.add, menu=_MENU)
         add("open-recording", text=f"&Open{_DOTS}", act=self.open, shortcut="Ctrl+Shift+O", tip=tip)
         for name, text, act, shortcut in (
-            ("replay-forward", "One frame &forward", partial(self.step, 1), "Ctrl+."),
-            ("replay-back", "One frame &back", partial(self.step, -1), "Ctrl+,"),
-            ("replay-next", "Ne&xt event", partial(self.jump, 1), "Ctrl+]"),
-            ("replay-previous", "&Previous event", partial(self.jump, -1), "Ctrl+["),
-            ("replay-faster", "F&aster", partial(self._faster, 1), "Ctrl+Shift+Up"),
-            ("replay-slower", "S&lower", partial(self._faster, -1), "Ctrl+Shift+Down"),
-            ("replay-loop", "Begin ane&w at the end", self._turn_loop, "Ctrl+Shift+L"),
-            ("replay-settings", "Settings as recorded &here", self.use_recorded, ""),
+            ("forward", "One frame &forward", partial(self.step, 1), "Ctrl+."),
+            ("back", "One frame &back", partial(self.step, -1), "Ctrl+,"),
+            ("next", "Ne&xt event", partial(self.jump, 1), "Ctrl+]"),
+            ("previous", "&Previous event", partial(self.jump, -1), "Ctrl+["),
+            ("faster", "F&aster", partial(self._faster, 1), "Ctrl+Shift+Up"),
+            ("slower", "S&lower", partial(self._faster, -1), "Ctrl+Shift+Down"),
+            ("loop", "Begin ane&w at the end", self._turn_loop, "Ctrl+Shift+L"),
+            ("settings", "Settings as recorded &here", self.use_recorded, ""),
         ):
-            add(name, text=text, act=act, shortcut=shortcut)
+            add(f"replay-{name}", text=text, act=act, shortcut=shortcut, tip=_TIPS[name])
         self._show_actions()
 
     # Opening.

@@ -22,7 +22,7 @@ from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.folders import proposed, recordings_folder, repaired, repairing, unfinished
 from kappaskin_app.shell.recovery import words
 from kappaskin_app.shell.work_dialog import WorkDialog, beside, choosing, ended, named, path_in
-from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.theme import current
 
 _WIDTH, _TEXT = 92, 22  # px: of all, and to where the words begin
 _HOUR = 3600.0  # s, from which there is room for the time alone
@@ -54,7 +54,6 @@ class RecordingMark(QWidget):
         super().__init__(parent)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Preferred)
         self.head, self.below, self._bad = "", "", False
-        self._theme = LIGHT
 
     def sizeHint(self) -> QSize:
         return QSize(_WIDTH, 2 * self.fontMetrics().height())
@@ -81,16 +80,12 @@ class RecordingMark(QWidget):
             self.head, self.below, self._bad = head, below, bad
             self.update()
 
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
-        self.update()
-
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         self.clicked.emit()
         super().mouseReleaseEvent(event)
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        painter, theme = QPainter(self), self._theme
+        painter, theme = QPainter(self), current()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         line = float(self.fontMetrics().height())
         top = (self.height() - 2 * line) / 2

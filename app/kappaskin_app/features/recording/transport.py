@@ -13,7 +13,7 @@ from kappaskin.frames import Event
 from kappaskin.recording import Replay
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import ChoiceBox, well_behaved
-from kappaskin_app.theme import LIGHT, SERIES, Theme
+from kappaskin_app.theme import current, follow_look, series
 from kappaskin_app.widgets.timeline import Clock, Course, glyph_button, icon
 
 _NEAR = 6.0  # px from a flag within which it is meant
@@ -92,8 +92,8 @@ class Landmarks(Course):
         box = QRectF(left, area.top(), max(right - left, 2.0), area.height())
         painter.save()
         painter.setClipRect(box)
-        painter.fillRect(box, QColor(self.theme.base))
-        painter.setPen(QPen(QColor(self.theme.faint), 1.2))
+        painter.fillRect(box, QColor(current().base))
+        painter.setPen(QPen(QColor(current().faint), 1.2))
         for k in range(math.ceil((box.width() + box.height()) / _HATCH) + 1):
             x = box.left() + k * _HATCH
             painter.drawLine(QPointF(x, box.top()), QPointF(x - box.height(), box.bottom()))
@@ -101,8 +101,7 @@ class Landmarks(Course):
         painter.setPen(Qt.PenStyle.NoPen)
 
     def _paint_flag(self, painter: QPainter, area: QRectF, x: float) -> None:
-        dark = QColor(self.theme.window).lightness() < 128
-        ink = QColor(SERIES[5][dark])
+        ink = series(5)
         painter.setPen(QPen(ink, 1.5))
         painter.drawLine(QPointF(x, area.top() + 2), QPointF(x, area.bottom()))
         painter.setPen(Qt.PenStyle.NoPen)
@@ -157,9 +156,9 @@ class Transport(QWidget):
             row.addWidget(widget, int(widget is self.course))
         row.insertSpacing(row.indexOf(self.speed), 6)
         self._shown: tuple[object, ...] = ()
-        self._playing, self._theme, self.there = True, LIGHT, False
+        self._playing, self.there = True, False
         self._wire()
-        self.show_theme(LIGHT)
+        follow_look(self, self._show_signs)
         self.hide()
 
     def _made_speed(self) -> ChoiceBox:
@@ -235,18 +234,16 @@ class Transport(QWidget):
         whole = minutes(self.course.last)
         self.clock.show_text(f"{minutes(seconds)} of {whole}", f"{whole} of {whole}")
 
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
-        self.course.show_theme(theme)
+    def _show_signs(self) -> None:
         for name, button in self.buttons.items():
-            button.setIcon(icon(name, theme))
+            button.setIcon(icon(name))
             button.setToolTip(_TIPS[name])
             button.setAccessibleName(_TIPS[name].partition(" (")[0])
         self._show_playing()
 
     def _show_playing(self) -> None:
         name = "pause" if self._playing else "play"
-        self.play.setIcon(icon(name, self._theme))
+        self.play.setIcon(icon(name))
         self.play.setToolTip(_TIPS[name])
         self.play.setAccessibleName(name.capitalize())
 

@@ -23,6 +23,10 @@ from kappaskin_app.shell.parts import FILE
 from kappaskin_app.shell.window import MainWindow
 
 _MILLIMETRE = 1e-3  # m, the unit of what is drawn for a printer
+_OPEN = "Simulate what a scene file (.toml) says; it may also be dropped on the window"
+_SAVE = "Write the scene that plays, as text that can be edited and opened again"
+
+_ABOUT = "Ready scenes, the text of the one that plays, and which effects it calls for"
 
 
 class SceneFeature:
@@ -39,7 +43,7 @@ class SceneFeature:
             *(shell.history, session, self.editing, self.planning),
             *(self.scene, self.timeline, shell.opening, shell),
         )
-        shell.docks.put_below("scene", "Scene", self.scene, "F2")
+        shell.docks.put_below("scene", "Scene", self.scene, "F2", _ABOUT, height=0.38)
         shell.display.centre.add_below(self.timeline)
         shell.layouts.pages.append(self.scene)
         self._wire(shell)
@@ -51,8 +55,6 @@ class SceneFeature:
         session.pausing.connect(guarded(self._pause))
         self.staging.told.connect(guarded(shell.tell))
         shell.settings_shown.connect(guarded(self.staging.show_settings))
-        for part in (self.scene, self.timeline):
-            shell.theme_changed.connect(guarded(part.show_theme))
         shell.display.unit_changed.connect(guarded(self.timeline.clock.show_unit))
         shell.opening.add(Kind("scene", (".toml",), self.staging.play))
         shell.opening.add(Kind("mesh", (".stl", ".ply", ".obj"), self._touch_with))
@@ -60,8 +62,8 @@ class SceneFeature:
 
     def _add_actions(self, shell: MainWindow) -> None:
         add, staging = shell.actions_by_name.add, self.staging
-        add("open-scene", FILE, f"&Open scene{DOTS}", staging.open, "Ctrl+O")
-        add("save-scene", FILE, f"Save scene &as{DOTS}", staging.save, "Ctrl+Shift+S")
+        add("open-scene", FILE, f"&Open scene{DOTS}", staging.open, "Ctrl+O", _OPEN)
+        add("save-scene", FILE, f"Save scene &as{DOTS}", staging.save, "Ctrl+Shift+S", _SAVE)
         shell.menus.welcome.add(
             1,
             f"&Open a scene{DOTS}",

@@ -39,7 +39,7 @@ from kappaskin.scenes import SCENES, Scene
 from kappaskin_app.features.scene.scene_picture import Look, Picturing
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import Tasks
-from kappaskin_app.theme import LIGHT, Theme, grown
+from kappaskin_app.theme import FAINT, current, follow_look, grown
 from kappaskin_app.widgets.layout import scrolled
 from kappaskin_app.widgets.parts import ELLIPSIS, button, in_a_row, text_label
 
@@ -64,7 +64,7 @@ class CardPainter(QStyledItemDelegate):
 
     def __init__(self) -> None:
         super().__init__()
-        self.cell, self.theme = 160, LIGHT
+        self.cell = 160
 
     def sizeHint(self, option: QStyleOptionViewItem, index: _Index) -> QSize:
         return self.size(option.fontMetrics.height())
@@ -90,7 +90,7 @@ class CardPainter(QStyledItemDelegate):
         painter.restore()
 
     def _paint_ground(self, painter: QPainter, card: QRectF, state: QStyle.StateFlag) -> None:
-        theme, flags = self.theme, QStyle.StateFlag
+        theme, flags = current(), QStyle.StateFlag
         width, colour = 1.0, theme.line
         if state & flags.State_Selected:
             width, colour = 2.0, theme.accent if state & flags.State_Active else theme.faint
@@ -106,13 +106,13 @@ class CardPainter(QStyledItemDelegate):
             painter.drawPixmap(place, picture, QRectF(picture.rect()))
             return
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(self.theme.scene))
+        painter.setBrush(QColor(current().scene))
         painter.drawRoundedRect(place, 5, 5)
-        painter.setPen(QColor(self.theme.faint))
+        painter.setPen(QColor(current().faint))
         painter.drawText(place, Qt.AlignmentFlag.AlignCenter, "\N{HORIZONTAL ELLIPSIS}")
 
     def _paint_playing(self, painter: QPainter, place: QRectF) -> None:
-        theme, words = self.theme, "Playing"
+        theme, words = current(), "Playing"
         metrics = QFontMetricsF(painter.font())
         height = metrics.height() + 2
         width = metrics.horizontalAdvance(words) + 1.5 * height + 4
@@ -138,7 +138,7 @@ class CardPainter(QStyledItemDelegate):
         how = int(flags.AlignCenter) | int(Qt.TextFlag.TextWordWrap)
         if metrics.boundingRect(place, how, title).height() > _LINES * metrics.height() + 1:
             title = metrics.elidedText(title, Qt.TextElideMode.ElideRight, 1.7 * place.width())
-        painter.setPen(QColor(self.theme.text))
+        painter.setPen(QColor(current().text))
         painter.drawText(place, how, title)
 
 
@@ -236,7 +236,7 @@ class GalleryPanel(QWidget):
         )
         self._lay_out()
         self._scenes: dict[str, Scene | str] = {}
-        self._theme, self._playing = LIGHT, ""
+        self._playing = ""
         self._picturing = Picturing(list(self.items), tasks, self)
         self._picturing.read.connect(guarded(self._take_scene))
         self._picturing.painted.connect(guarded(self._take_picture))
@@ -246,10 +246,12 @@ class GalleryPanel(QWidget):
         self.play.clicked.connect(guarded(self._play))
         self.open.clicked.connect(guarded(lambda *_: self.open_wanted.emit()))
         self.cards.setCurrentRow(0)
+        follow_look(self, self._fit)
 
     def _lay_out(self) -> None:
         for label in (self.title, self.text, self.file):
             label.setTextFormat(Qt.TextFormat.PlainText)
+        self.file.setForegroundRole(FAINT)
         bold = self.title.font()
         bold.setBold(True)
         self.title.setFont(bold)
@@ -288,12 +290,9 @@ class GalleryPanel(QWidget):
                 item.setData(PLAYING, other == name)
             self._show_words()
 
-    def show_theme(self, theme: Theme) -> None:
+    def _fit(self) -> None:
         self._beside.setMinimumWidth(grown(_WORDS[0]))
         self._beside.setMaximumWidth(grown(_WORDS[1]))
-        self._theme = self.cards.painter.theme = theme
-        self.file.setStyleSheet(f"color: {theme.faint};")
-        self.cards.viewport().update()
         self._begin()
 
     def _show_words(self, *_: object) -> None:
@@ -326,7 +325,7 @@ class GalleryPanel(QWidget):
         """Have what is missing made where it is seen, beginning `after` so many ms."""
         if self.isVisible():
             size, ratio = picture_size(self.cards.painter.cell), self.devicePixelRatioF()
-            look = Look(self._theme, size.width(), size.height(), ratio)
+            look = Look(current(), size.width(), size.height(), ratio)
             self._picturing.paint(look, after)
 
     def _take_scene(self, name: str, scene: Scene | str) -> None:

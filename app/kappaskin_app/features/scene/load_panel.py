@@ -19,6 +19,12 @@ from kappaskin_app.shell.simulation import is_table_1
 class LoadPanel(SimulationForm):
     """Asks for the load case; a free one has its place and its force, a spread one its size."""
 
+    purpose = (
+        "What presses on the simulated skin, where and how hard. Drag the red arrow on the skin, "
+        "or type numbers here."
+    )
+    guide_page = "scenes"
+
     def __init__(self, parent: QWidget | None = None) -> None:
         names = ("load_case", "force", "x", "y", "x_end", "y_end", "size", "size_y")
         super().__init__("Load", names, parent)
@@ -61,6 +67,12 @@ class LoadPanel(SimulationForm):
 
 class NoisePanel(SimulationForm):
     """Asks for the noise of the simulated readings."""
+
+    purpose = (
+        "What is added to every simulated reading: independent, of mean zero and of this RMS. "
+        "With a seed the same noise comes back."
+    )
+    guide_page = "scenes"
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Noise", ("noise_kind", "noise_rms", "noise_seed"), parent)

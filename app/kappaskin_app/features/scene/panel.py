@@ -32,7 +32,7 @@ from kappaskin_app.features.scene.scene_form import SceneForm
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.form import for_the_window
-from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.theme import ALERT, current, follow_look
 from kappaskin_app.widgets.parts import button, text_label
 
 _PAUSE = 300  # ms without a key before what is typed counts
@@ -66,7 +66,7 @@ class SceneText(QPlainTextEdit):
         self.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
         self.setUndoRedoEnabled(False)
         self.setTabChangesFocus(True)
-        self._numbers, self._theme, self._wrong = _Numbers(self), LIGHT, 0
+        self._numbers, self._wrong = _Numbers(self), 0
         self._showing, self._known = False, ""
         self._pause = QTimer(self, singleShot=True, interval=_PAUSE)  # pyright: ignore[reportCallIssue]
         self._pause.timeout.connect(guarded(self.tell))
@@ -74,6 +74,7 @@ class SceneText(QPlainTextEdit):
         self.blockCountChanged.connect(self._make_room)
         self.updateRequest.connect(self._scroll_numbers)
         self._make_room()
+        follow_look(self, self._mark)
 
     def show_text(self, text: str) -> None:
         """Show a text that came from elsewhere; the place that is worked at stays in sight.
@@ -112,10 +113,6 @@ class SceneText(QPlainTextEdit):
             self._wrong = line
             self._mark()
 
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
-        self._mark()
-
     def _typed(self) -> None:
         if not self._showing:
             self._pause.start()
@@ -124,7 +121,7 @@ class SceneText(QPlainTextEdit):
         marks: list[QTextEdit.ExtraSelection] = []
         block = self.document().findBlockByNumber(self._wrong - 1)
         if self._wrong and block.isValid():
-            mark, colour = QTextEdit.ExtraSelection(), QColor(self._theme.bad)
+            mark, colour = QTextEdit.ExtraSelection(), QColor(current().bad)
             colour.setAlphaF(0.25)
             how = QTextCharFormat()
             how.setBackground(colour)
@@ -172,8 +169,8 @@ class SceneText(QPlainTextEdit):
 
     def paint_numbers(self, where: QWidget, event: QPaintEvent) -> None:
         """For the strip of numbers only: paint those of the lines in sight."""
-        painter = QPainter(where)
-        painter.fillRect(event.rect(), QColor(self._theme.window))
+        painter, theme = QPainter(where), current()
+        painter.fillRect(event.rect(), QColor(theme.window))
         painter.setFont(self.font())
         block, offset = self.firstVisibleBlock(), self.contentOffset()
         height = self.fontMetrics().height()
@@ -182,9 +179,7 @@ class SceneText(QPlainTextEdit):
             if top > event.rect().bottom():
                 break
             number = block.blockNumber() + 1
-            painter.setPen(
-                QColor(self._theme.alert if number == self._wrong else self._theme.faint)
-            )
+            painter.setPen(QColor(theme.alert if number == self._wrong else theme.faint))
             area = QRect(0, top, where.width() - _ROOM, height)
             painter.drawText(area, Qt.AlignmentFlag.AlignRight, str(number))
             block = block.next()
@@ -212,7 +207,7 @@ class SceneEditor(QWidget):
             "save-scene",
             "Write the scene into a file (Ctrl+Shift+S); `kappaskin plan` and `simulate` take it.",
         )
-        self._theme = LIGHT
+        self.message.setForegroundRole(ALERT)
         above = QHBoxLayout()
         above.addWidget(self.name, 1)
         above.addWidget(self.save)
@@ -247,10 +242,6 @@ class SceneEditor(QWidget):
         self.text.show_wrong(int(line[1]) if line else 0)
         self.message.setText(f"The last scene stays: {why}" if why else "")
         self.message.setVisible(bool(why))
-
-    def show_theme(self, theme: Theme) -> None:
-        self.message.setStyleSheet(f"color: {theme.alert};")
-        self.text.show_theme(theme)
 
 
 class ScenePanel(QTabWidget):
@@ -296,8 +287,3 @@ class ScenePanel(QTabWidget):
         for page in (_EDIT, _EFFECTS):
             self.setTabEnabled(page, simulated)
             self.setTabToolTip(page, why)
-
-    def show_theme(self, theme: Theme) -> None:
-        self.gallery.show_theme(theme)
-        self.editor.show_theme(theme)
-        self.effects.show_theme(theme)

@@ -23,7 +23,7 @@ from kappaskin_app.features.scene.scene_text import OFF, ON, PLANNED
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.effects import called, explained
 from kappaskin_app.shell.session import Session
-from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.theme import current, follow_look
 from kappaskin_app.widgets.text import duration
 
 
@@ -127,10 +127,11 @@ class EffectsPanel(QWidget):
         self.forces: dict[str, QComboBox] = {}
         self._cells: list[list[QTableWidgetItem]] = []
         self._rows: list[dict[str, Any]] = []
-        self._choice, self._theme = EffectSelection(), LIGHT
+        self._choice = EffectSelection()
         stack = QVBoxLayout(self)
         stack.addWidget(self.summary)
         stack.addWidget(self.table, 1)
+        follow_look(self, self._fill)
 
     def show_plan(self, rows: list[dict[str, Any]], choice: EffectSelection) -> None:
         """Show what `plan_rows` tells of a scene of which `choice` says what is simulated."""
@@ -140,18 +141,16 @@ class EffectsPanel(QWidget):
         if names != list(self.forces):
             self._lay_out(names)
         self._rows, self._choice = [*there, *absent], choice
-        for number, row in enumerate(self._rows):
-            self._fill(number, row)
+        self._fill()
         self._summarise(there)
 
     def show_waiting(self, words: str) -> None:
         """Say why the table is not that of the scene that is played."""
         self.summary.setText(words)
 
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
+    def _fill(self) -> None:
         for number, row in enumerate(self._rows):
-            self._fill(number, row)
+            self._fill_row(number, row)
 
     def _lay_out(self, names: list[str]) -> None:
         """A row for each effect, in this order."""
@@ -177,7 +176,7 @@ class EffectsPanel(QWidget):
     def _force(self, name: str) -> None:
         self.forced.emit(name, self.forces[name].currentData())
 
-    def _fill(self, number: int, row: dict[str, Any]) -> None:
+    def _fill_row(self, number: int, row: dict[str, Any]) -> None:
         name, there = row["effect"], row["microseconds"] is not None
         self._show_force(name, there)
         size = f"Size: {row['formula']}."
@@ -189,7 +188,7 @@ class EffectsPanel(QWidget):
             _TIME: (duration(row["microseconds"] * 1e-6) if there else "", _TIPS[_TIME]),
             _WHY: (row["why"], row["why"]),
         }
-        colour = QColor(self._theme.text if row["kept"] else self._theme.faint)
+        colour = QColor(current().text if row["kept"] else current().faint)
         for column, (text, tip) in cells.items():
             item = self._cells[number][column]
             item.setText(text)

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from kappaskin.scenes import Scene
 from kappaskin_app.guard import guarded
-from kappaskin_app.theme import LIGHT, Theme
+from kappaskin_app.theme import current, follow_look
 from kappaskin_app.widgets.timeline import Clock, Course, glyph_button, icon
 
 Array = NDArray[np.float64]
@@ -70,7 +70,7 @@ class Track(Course):
         return QPolygonF([area.bottomLeft(), *top, area.bottomRight()])
 
     def _paint_ticks(self, painter: QPainter, area: QRectF) -> None:
-        painter.setPen(QPen(QColor(self.theme.text), 1))
+        painter.setPen(QPen(QColor(current().text), 1))
         drawn = -math.inf
         for moment in self._moments:
             x = round(self.at(moment)) + 0.5  # or it would be blurred over two px
@@ -103,8 +103,8 @@ class Timeline(QWidget):
         for widget in (self.play, self.track, self.clock):
             row.addWidget(widget, int(widget is self.track))
         self._scene: Scene | None = None
-        self._playing, self._theme = True, LIGHT
-        self._show_playing()
+        self._playing = True
+        follow_look(self, self._show_playing)
         self.play.clicked.connect(guarded(lambda *_: self.play_wanted.emit(not self._playing)))
         self.track.sought.connect(guarded(self._seek))
         self.hide()
@@ -135,17 +135,12 @@ class Timeline(QWidget):
         whole = f"{duration:.2f}"
         self.clock.show_text(f"{seconds:.2f} s of {whole} s", f"{whole} s of {whole} s")
 
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
-        self.track.show_theme(theme)
-        self._show_playing()
-
     def _show_playing(self) -> None:
         verb = "Pause" if self._playing else "Play"
         self.play.setAccessibleName(verb)
         what = "Hold the scene as it is now" if self._playing else "Let the scene go on from here"
         self.play.setToolTip(f"{what} (Space)")
-        self.play.setIcon(icon("pause" if self._playing else "play", self._theme))
+        self.play.setIcon(icon("pause" if self._playing else "play"))
 
     def _seek(self, seconds: float) -> None:
         if self._scene is not None:

@@ -23,6 +23,13 @@ _NUMBERS = ("side_x", "side_y", "base_radius", "rim_radius")
 class ShapePanel(SimulationForm):
     """Asks for the shape, its sizes and its edge; says why there can be no such skin."""
 
+    purpose = (
+        "The simulated skin at rest, flat or bent, and how its edge is held. What a flat one does "
+        "under a load follows from "
+        "D \u2207\u2074w = p, D = E h\u00b3 / (12 (1 \u2212 \u03bd\u00b2))."
+    )
+    guide_page = "scenes"
+
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Shape", ("shape", *_NUMBERS, "edge"), parent)
         self.opening = QLabel()
@@ -61,6 +68,13 @@ class ShapePanel(SimulationForm):
 class ElementsPanel(SimulationForm):
     """Asks for m x n elements, and says when they are too few for the functions of the fit."""
 
+    purpose = (
+        "How many sense, on a regular grid. Each reads three curvatures where it is: xx = "
+        "\u2202\u00b2w/\u2202x\u00b2, yy = \u2202\u00b2w/\u2202y\u00b2, "
+        "xy = \u2202\u00b2w/\u2202x\u2202y of a flat skin's displacement w."
+    )
+    guide_page = "scenes"
+
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Elements", ("elements_x", "elements_y"), parent)
 
@@ -70,6 +84,12 @@ class ElementsPanel(SimulationForm):
 
 class SupportPanel(SimulationForm):
     """Asks for what holds the skin besides its own stiffness."""
+
+    purpose = (
+        "What carries the simulated skin beside its stiffness: tension T, foam k, a fluid that "
+        "keeps its volume. D \u2207\u2074w \u2212 T \u2207\u00b2w + k w = p."
+    )
+    guide_page = "scenes"
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Below and around", ("tension", "foam", "fluid"), parent)
@@ -91,6 +111,12 @@ def _facts(sensor: Sensor) -> tuple[str, str, str]:
 
 class ElectronicsPanel(SimulationForm):
     """Asks for the electronics; says how fast, how fine and how far they read."""
+
+    purpose = (
+        "What turns the change of resistance of a gage into counts, with how many bits and how "
+        "fast: a step of the converter and its noise are the least that can be told apart."
+    )
+    guide_page = "scenes"
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Electronics", ("electronics", "bits", "conversion_time"), parent)
@@ -118,12 +144,24 @@ class ElectronicsPanel(SimulationForm):
 class SpoilsPanel(SimulationForm):
     """Asks for hysteresis, creep and tolerance."""
 
+    purpose = (
+        "What spoils the reading of a real gage: loops (it comes back another way), creep, and "
+        "gages that are not alike."
+    )
+    guide_page = "scenes"
+
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Gages", ("loops", "creep", "tolerance"), parent)
 
 
 class RegionPanel(Form):
     """Asks for a region of interest; says what it buys and costs, or why there can be none."""
+
+    purpose = (
+        "Scans only part of the channels in each frame, around the contact or those chosen: "
+        "frames/s = 1 / (channels \u00d7 conversion time)."
+    )
+    guide_page = "accuracy"
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Region of interest", ("region", "region_radius", "region_share"), parent)

@@ -9,6 +9,8 @@ from kappaskin_app.features.stability.panel import StabilityPanel
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.window import MainWindow
 
+_ABOUT = "Which shapes the elements see well, by singular values, and the hard cases"
+
 
 class StabilityFeature:
     name = "stability"
@@ -18,7 +20,7 @@ class StabilityFeature:
         session, stack = shell.session, shell.history.stack
         self.seeing, self.stability = Seeing(shell.history, shell.tasks, shell), StabilityPanel()
         self.demonstrating = Demonstrating(shell.history)
-        shell.docks.put_below("stability", "Stability", self.stability, "F10")
+        shell.docks.put_below("stability", "Stability", self.stability, "F10", _ABOUT)
         shell.docks["stability"].visibilityChanged.connect(guarded(self.seeing.watch))
         session.reported.connect(guarded(self.seeing.follow))
         session.reported.connect(guarded(self.demonstrating.follow))
@@ -26,7 +28,6 @@ class StabilityFeature:
             guarded(lambda status: self.stability.show_status(status, session.inside))
         )
         shell.settings_shown.connect(guarded(self.stability.show_settings))
-        shell.theme_changed.connect(guarded(self.stability.show_theme))
         self.stability.attend(self.seeing)
         self.stability.demonstrated.connect(guarded(self.demonstrating.demonstrate))
         self.stability.back.connect(guarded(stack.undo))

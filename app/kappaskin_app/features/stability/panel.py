@@ -18,7 +18,7 @@ from kappaskin_app.features.stability.plots import ModeMap, SpectrumPlot
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.badge import in_use
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.theme import Theme, grown
+from kappaskin_app.theme import ALERT, FAINT, follow_look, grown
 from kappaskin_app.widgets.parts import ELLIPSIS, button, sentence, text_label
 
 _COLUMNS = 3
@@ -63,6 +63,9 @@ class StabilityPanel(QWidget):
         self._told, self._simulating = _TRY, True
         self._lay_out()
         self._wire()
+        self.refused.setForegroundRole(ALERT)
+        self.told.setForegroundRole(FAINT)
+        follow_look(self, lambda: self._shape.setFixedWidth(grown(_SHAPE)))
 
     def _lay_out(self) -> None:
         pick = QHBoxLayout()
@@ -135,13 +138,6 @@ class StabilityPanel(QWidget):
         if text != self.refused.text():
             self.refused.setText(text)
             self.refused.setVisible(bool(text))
-
-    def show_theme(self, theme: Theme) -> None:
-        self._shape.setFixedWidth(grown(_SHAPE))
-        self.plot.show_theme(theme)
-        self.map.show_theme(theme)
-        self.refused.setStyleSheet(f"color: {theme.alert};")
-        self.told.setStyleSheet(f"color: {theme.faint};")
 
     def _show_told(self) -> None:
         self.told.setText(self._told if self._simulating else _REAL)

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from kappaskin.sensing import SensorLayout
 from kappaskin_app.features.stability.observability import Spectrum
-from kappaskin_app.theme import DIVERGING, LIGHT, Theme
+from kappaskin_app.theme import DIVERGING, current
 from kappaskin_app.widgets.plots import LogAxis
 from kappaskin_app.widgets.tint import Tint
 
@@ -26,7 +26,6 @@ class ModeMap(QWidget):
         super().__init__(parent)
         self._surface: Array | None = None
         self._layout: SensorLayout | None = None
-        self._theme = LIGHT
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(120, 70)
         self.setToolTip(
@@ -41,10 +40,6 @@ class ModeMap(QWidget):
         self._surface, self._layout = surface, layout
         self.update()
 
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
-        self.update()
-
     def paintEvent(self, event: QPaintEvent) -> None:
         if self._surface is None or self._layout is None:
             return
@@ -53,13 +48,13 @@ class ModeMap(QWidget):
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         area = self._area(self._layout)
         # y points up on the skin, down in an image.
-        rgb = Tint(DIVERGING, (-1.0, 1.0), "").rgb(self._surface[::-1], self._theme.window)
+        rgb = Tint(DIVERGING, (-1.0, 1.0), "").rgb(self._surface[::-1], current().window)
         ny, nx = self._surface.shape
         image = QImage(
             np.ascontiguousarray(rgb).tobytes(), nx, ny, 3 * nx, QImage.Format.Format_RGB888
         )
         painter.drawImage(area, image)
-        painter.setPen(QPen(QColor(self._theme.line), 1))
+        painter.setPen(QPen(QColor(current().line), 1))
         painter.drawRect(area)
         self._paint_elements(painter, area, self._layout)
 
@@ -99,7 +94,7 @@ class SpectrumPlot(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.spectrum: Spectrum | None = None
-        self._number, self._theme, self._empty = 0, LIGHT, ""
+        self._number, self._empty = 0, ""
         self._axis = LogAxis(0.1, 1.0)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
@@ -126,10 +121,6 @@ class SpectrumPlot(QWidget):
             seen = [v / 1.3 for v in spectrum.values.tolist() if v > floor]
             seen += [float(spectrum.values[0]), *([floor / 30] if spectrum.silent else [])]
             self._axis = LogAxis.around(seen)  # with room for the ring around the last one
-        self.update()
-
-    def show_theme(self, theme: Theme) -> None:
-        self._theme = theme
         self.update()
 
     @property
@@ -163,7 +154,7 @@ class SpectrumPlot(QWidget):
             self.chosen.emit(self._number + step)
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        painter, area, theme = QPainter(self), self._area, self._theme
+        painter, area, theme = QPainter(self), self._area, current()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.fillRect(area, QColor(theme.base))
         spectrum = self.spectrum
@@ -185,7 +176,7 @@ class SpectrumPlot(QWidget):
             painter.drawEllipse(self.place_of(self._number), 7, 7)
 
     def _paint_axes(self, painter: QPainter, area: QRectF, count: int) -> None:
-        theme, flags = self._theme, Qt.AlignmentFlag
+        theme, flags = current(), Qt.AlignmentFlag
         line = painter.fontMetrics().height()
         free = -math.inf
         # From the top, where values of 1 are: what is not written for want of room lies below.

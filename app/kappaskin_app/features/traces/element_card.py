@@ -9,7 +9,6 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWi
 
 from kappaskin.frames import COMPONENTS
 from kappaskin.pipeline import REPORTED
-from kappaskin_app.theme import Theme
 from kappaskin_app.widgets.plots import Curve, CurvePlot
 
 Array = NDArray[np.float64]
@@ -82,10 +81,6 @@ class ElementCard(QWidget):
         span = (0.0, float(frequencies[-1]))
         self.spectrum.show_curves(frequencies, curves, span, "Hz")
 
-    def show_theme(self, theme: Theme) -> None:
-        for plot in (*self.pasts, self.spectrum):
-            plot.show_theme(theme)
-
 
 class Traces(QWidget):
     """One plot for each component, with a curve for each element; `pointed` tells at which."""
@@ -116,7 +111,3 @@ class Traces(QWidget):
     def mark(self, element: int) -> None:
         for plot in self.plots:
             plot.mark(element)
-
-    def show_theme(self, theme: Theme) -> None:
-        for plot in self.plots:
-            plot.show_theme(theme)

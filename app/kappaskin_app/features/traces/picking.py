@@ -19,7 +19,6 @@ from kappaskin_app.shell.history import History
 from kappaskin_app.shell.selection import Selection
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.theme import Theme
 
 Array = NDArray[np.float64]
 
@@ -289,10 +288,6 @@ class Picking(QObject):
 
     def _show_tracing(self) -> None:
         self.card.show_tracing(self.element in self._history.settings.traced)
-
-    def show_theme(self, theme: Theme) -> None:
-        self.card.show_theme(theme)
-        self.traces.show_theme(theme)
 
 
 _VANISHING = 1e-9  # of a wave's mean square: a sine of half the rate is zero at even steps

@@ -20,15 +20,13 @@ from kappaskin_app.shell.actions import Actions, plain
 from kappaskin_app.shell.docks import Docks
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.layouts.layout import (
-    LIVE,
-    PRESENTER,
-    READY,
     Layout,
     arrange,
     layout_of,
+    ready_layout,
     words_of,
 )
-from kappaskin_app.shell.pages import Pages
+from kappaskin_app.shell.pages import LIVE, Pages
 
 _HELD = 50  # ms between two looks whether the mouse has let go
 
@@ -162,13 +160,8 @@ def _in_words(seen: Seen) -> object:
 _MENU = "Layo&ut"
 _DOTS = "\N{HORIZONTAL ELLIPSIS}"
 _LONGEST = 60  # characters of a name
-_TIPS = {
-    LIVE: "Settings and curvature beside the skin: how the window begins",
-    "Teach": "The lessons above the settings",
-    "Calibrate": "The page Calibrate, and the health of the elements below the skin",
-    "Study": "What accuracy costs below the skin",
-    PRESENTER: "The skin and what is felt fill the screen; Esc leaves",
-}
+_LIVE = "Live"
+_LIVE_TIP = "Settings and curvature beside the skin: how the window begins"
 
 
 class FullScreen(Protocol):
@@ -194,12 +187,29 @@ class Layouts(QObject):
         self._history = history
         self.full_screen: FullScreen | None = None
         """A view that may fill the screen, once a feature has one."""
+        self._full = ""
         self.pages: list[QTabWidget] = []
         """Pages elsewhere in the window, whose turning can be undone too."""
         self._noting: Noting | None = None
+        self._ready: dict[str, tuple[str, str]] = {}  # of each the tip and the page
+        self.add(_LIVE, _LIVE_TIP)
         self.own: dict[str, Layout] = {}
         self._menu = QMenu(window)
         self._menu.aboutToShow.connect(guarded(self._list))
+
+    def add(self, name: str, tip: str, page: str = LIVE, full: FullScreen | None = None) -> None:
+        """Have a ready layout of this name, on a `page` of settings; a view may fill the screen.
+
+        Which docks are shown in it, they say themselves.
+        """
+        self._ready[name] = tip, page
+        if full is not None:
+            self.full_screen, self._full = full, name
+
+    def ready(self, name: str = _LIVE) -> Layout:
+        """The ready layout of this name."""
+        _, page = self._ready[name]
+        return ready_layout(self._all, name, self._panels.place(page))
 
     def begin(self) -> None:
         """Watch the docks and pages, once all are there."""
@@ -221,11 +231,9 @@ class Layouts(QObject):
     def add_actions(self, actions: Actions) -> None:
         """Register what a person can do."""
         add = partial(actions.add, menu=_MENU)
-        for name in READY:
-            if name == PRESENTER and self.full_screen is None:
-                continue
+        for name, (tip, _) in self._ready.items():
             act = partial(self.choose, name)
-            add(f"layout-{name.lower()}", text=f"&{name}", act=act, tip=_TIPS[name])
+            add(f"layout-{name.lower()}", text=f"&{name}", act=act, tip=tip)
         own = add("layout-own", text="Your &own", act=lambda: None, tip="Layouts you saved")
         own.setMenu(self._menu)
         for name, text, act, tip in (
@@ -264,21 +272,21 @@ class Layouts(QObject):
 
     def choose(self, name: str) -> None:
         """Arrange the window as the layout of this name, as a step that can be undone."""
-        layout = self.own[name] if name in self.own else READY[name]
+        layout = self.own[name] if name in self.own else self.ready(name)
         if (before := self.now) != layout:
             self._history.step(f"layout {name}", self.apply, before, layout)
-        if name == PRESENTER and self.full_screen is not None:
+        if name == self._full and self.full_screen is not None:
             self.full_screen.enter()
 
     def reset(self) -> None:
         """Arrange the window as it is at first."""
-        self.choose(LIVE)
+        self.choose(_LIVE)
 
     def save(self, name: str) -> None:
         """Keep this layout under a name, in the place of another of that name."""
         name = name.strip()
-        if not name or len(name) > _LONGEST or name in READY:
-            taken = ", ".join(READY)
+        if not name or len(name) > _LONGEST or name in self._ready:
+            taken = ", ".join(self._ready)
             self.told.emit(
                 f"Expected a name of at most {_LONGEST} characters other than {taken}, got "
                 f"{name!r:.80}: choose another"
@@ -290,7 +298,7 @@ class Layouts(QObject):
     def rename(self, old: str, new: str) -> None:
         """Call a layout otherwise."""
         new = new.strip()
-        if new in self.own or new in READY or not 0 < len(new) <= _LONGEST:
+        if new in self.own or new in self._ready or not 0 < len(new) <= _LONGEST:
             self.told.emit(f"{new!r:.80} cannot be its name or is another's: choose another")
             return
         renamed = {new if name == old else name: each for name, each in self.own.items()}

@@ -55,7 +55,7 @@ class Keeping(QObject):
         window.opening.recent = [Path(file) for file in kept.files]
         self._menus.finder.recent = list(kept.done)
         window.layouts.own = dict(kept.own)
-        window.layouts.apply(kept.now)
+        window.layouts.apply(kept.now or window.layouts.ready())
         return window.actions_by_name.take_keys(dict(kept.keys))
 
     def _now(self) -> Kept:

@@ -13,7 +13,7 @@ import tomlkit
 from PySide6.QtCore import QLockFile
 
 from kappaskin.errors import Refusal
-from kappaskin_app.shell.layouts.layout import AREAS, FLOATING, LIVE, READY, Layout, Place
+from kappaskin_app.shell.layouts.layout import AREAS, FLOATING, Layout, Place
 from kappaskin_app.shell.settings import ask_of
 from kappaskin_app.shell.settings.asks import Range
 from kappaskin_app.theme import THEMES
@@ -42,7 +42,7 @@ class Kept:
     keys: Mapping[str, str] = field(default_factory=dict)
     done: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
-    now: Layout = READY[LIVE]
+    now: Layout | None = None
     own: Mapping[str, Layout] = field(default_factory=dict)
     start: bool = True
     letters: float = 100.0
@@ -79,7 +79,8 @@ def to_text(kept: Kept) -> str:
     document["format"] = FORMAT
     document["window"] = _window(kept)
     document["shortcuts"] = dict(kept.keys)
-    document["layout"] = _said(kept.now)
+    if kept.now is not None:
+        document["layout"] = _said(kept.now)
     document["layouts"] = {name: _said(layout) for name, layout in kept.own.items()}
     return tomlkit.dumps(document)
 
@@ -127,7 +128,7 @@ def from_text(text: str) -> Kept:
         {_name(k): _name(v) for k, v in _few(_part(document, "shortcuts", dict, {})).items()},
         _names(window, "done"),
         _names(window, "files"),
-        _layout(_part(document, "layout", dict, {})) if "layout" in document else READY[LIVE],
+        _layout(_part(document, "layout", dict, {})) if "layout" in document else None,
         _layouts(document),
         _part(window, "start", bool, True),
         _letters(window),

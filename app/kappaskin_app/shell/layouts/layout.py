@@ -6,16 +6,10 @@ from dataclasses import dataclass, field
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QTabBar, QTabWidget
 
-from kappaskin_app.shell.docks import drawn_once
+from kappaskin_app.shell.docks import Docks, drawn_once
 
 LEFT, RIGHT, TOP, BOTTOM, FLOATING = "left", "right", "top", "bottom", "floating"
 AREAS = (LEFT, RIGHT, TOP, BOTTOM, FLOATING)
-BESIDE = ("lesson", "settings", "curvature")
-BELOW = (
-    *("cost", "stability", "scene", "health", "compare", "design"),
-    *("element", "traces", "numbers", "log", "guide"),
-)
-DOCKS = BESIDE + BELOW
 
 
 @dataclass(frozen=True)
@@ -46,25 +40,6 @@ class Layout:
     docks: tuple[tuple[str, Place], ...]
 
 
-def _ready(page: int, *below: str, share: float = 0.0, lesson: bool = False) -> Layout:
-    """Settings and curvature beside the skin, and below it at most one dock, so high."""
-    docks = [("lesson", Place(LEFT, shown=lesson, share=0.25 if lesson else 0.0))]
-    docks += [("settings", Place(LEFT, share=0.25)), ("curvature", Place(RIGHT, share=0.22))]
-    docks += [(name, Place(BOTTOM, share=share)) for name in below]
-    docks += [(name, Place(BOTTOM, shown=False)) for name in BELOW if name not in below]
-    return Layout(page, tuple(docks))
-
-
-LIVE, PRESENTER = "Live", "Presenter"
-READY: Mapping[str, Layout] = {
-    LIVE: _ready(0),
-    "Teach": _ready(0, lesson=True),
-    "Calibrate": _ready(3, "health", share=0.3),
-    "Study": _ready(0, "cost", share=0.36),
-    PRESENTER: _ready(0),
-}
-
-
 _SIDES = {
     LEFT: Qt.DockWidgetArea.LeftDockWidgetArea,
     RIGHT: Qt.DockWidgetArea.RightDockWidgetArea,
@@ -74,14 +49,27 @@ _SIDES = {
 _BESIDE = (LEFT, RIGHT)
 _ALIGNED = 4  # px between the edges of two docks that are in one line
 _ACROSS, _DOWN = Qt.Orientation.Horizontal, Qt.Orientation.Vertical
-Docks = Mapping[str, QDockWidget]
+Named = Mapping[str, QDockWidget]
 Placed = Sequence[tuple[QDockWidget, Place]]
 
 
 # From the window.
 
 
-def layout_of(window: QMainWindow, docks: Docks, panels: QTabWidget) -> Layout:
+def ready_layout(docks: Docks, name: str, page: int) -> Layout:
+    """The ready layout of this name: each dock where it began, shown if it was put there so."""
+    placed = [
+        (dock, Place(_called(area), shown=share > 0, share=share))
+        for dock, area, share in docks.at_first(name)
+    ]
+    # As `layout_of` lists them: in a column a hidden one before the others, else after them.
+    placed.sort(
+        key=lambda each: (AREAS.index(each[1].area), each[1].area == BOTTOM and not each[1].shown)
+    )
+    return Layout(page, tuple(placed))
+
+
+def layout_of(window: QMainWindow, docks: Named, panels: QTabWidget) -> Layout:
     """How the docks of a window are arranged now."""
     shown = [dock for dock in docks.values() if not dock.isHidden()]
     placed = [(d.objectName(), _floating(d)) for d in shown if d.isFloating()]
@@ -99,7 +87,10 @@ def layout_of(window: QMainWindow, docks: Docks, panels: QTabWidget) -> Layout:
 
 
 def _area(window: QMainWindow, dock: QDockWidget) -> str:
-    side = window.dockWidgetArea(dock)
+    return _called(window.dockWidgetArea(dock))
+
+
+def _called(side: Qt.DockWidgetArea) -> str:
     return next(area for area, known in _SIDES.items() if known == side)
 
 
@@ -164,7 +155,7 @@ def _bars(window: QMainWindow) -> list[QTabBar]:
 # Into the window.
 
 
-def arrange(window: QMainWindow, docks: Docks, panels: QTabWidget, layout: Layout) -> None:
+def arrange(window: QMainWindow, docks: Named, panels: QTabWidget, layout: Layout) -> None:
     """Arrange the docks of a window so; one that the layout does not name is hidden."""
     placed = [(docks[name], place) for name, place in layout.docks if name in docks]
     with drawn_once(window):
@@ -186,7 +177,7 @@ def words_of(layout: Layout) -> list[tuple[object, ...]]:
     ]
 
 
-def _only_show(window: QMainWindow, docks: Docks, panels: QTabWidget, layout: Layout) -> bool:
+def _only_show(window: QMainWindow, docks: Named, panels: QTabWidget, layout: Layout) -> bool:
     """Show and hide docks, which is seen at once; whether all are as the layout has them then."""
     for name, place in layout.docks:
         if name in docks and docks[name].isHidden() == place.shown:

@@ -30,13 +30,13 @@ def test_the_table_has_what_the_picture_shows_and_can_be_copied(window: MainWind
 
 
 def test_larger_letters_enlarge_the_window_and_are_taken_back(
-    window: MainWindow, qapp: QApplication
+    window: MainWindow, qapp: QApplication, until
 ) -> None:
     plain, badge = qapp.font().pointSizeF(), window.display.badge.width()
     window.history.change("Letters", -1, letters=200.0)
     assert qapp.font().pointSizeF() == pytest.approx(2 * plain)
-    assert window.basis.message.fontInfo().pixelSize() > 20
-    assert window.display.badge.width() > 1.8 * badge
+    until(lambda: window.basis.message.fontInfo().pixelSize() > 20)
+    until(lambda: window.display.badge.width() > 1.8 * badge)
     window.history.stack.undo()
     assert qapp.font().pointSizeF() == plain
-    assert window.display.badge.width() == badge
+    until(lambda: window.display.badge.width() == badge)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QFileDialog
+from PySide6.QtWidgets import QApplication, QFileDialog
 
 from kappaskin import load_scene, write_scene
 from kappaskin.scenes import read_scene
@@ -20,7 +20,7 @@ from kappaskin_app.shell.settings.designed import Designed
 from kappaskin_app.shell.settings.scene import SHAPES
 from kappaskin_app.shell.simulation import with_consequences
 from kappaskin_app.shell.window import MainWindow
-from kappaskin_app.theme import DARK, SEQUENTIAL
+from kappaskin_app.theme import DARK, SEQUENTIAL, apply_look
 from kappaskin_app.widgets.surface_map import SurfaceMap
 
 RANGES = [n for n in Designed.__dataclass_fields__ if isinstance(ask_of(n), Range)]
@@ -136,7 +136,8 @@ def test_what_lies_beside_a_round_skin_has_the_colour_of_the_window(qtbot) -> No
     values[-1, 0] = np.nan
     view.show_surface(values, (0.0, 2.0), SEQUENTIAL, np.full(2, np.nan), (1.0, 1.0))
 
-    view.show_theme(DARK)
+    apply_look(DARK)
+    QApplication.processEvents()
 
     image = view.map.grab().toImage()
     corner = view.map.area().topLeft().toPoint() + QPoint(2, 2)

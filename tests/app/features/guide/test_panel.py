@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication
 
 from kappaskin_app.features.guide.panel import FOLDER, GuidePanel, page_called, pages
 from kappaskin_app.shell.window import MainWindow
-from kappaskin_app.theme import DARK, LIGHT, palette
+from kappaskin_app.theme import DARK, LIGHT, apply_look
 
 
 @pytest.fixture(scope="module")
@@ -86,18 +86,13 @@ def test_code_is_as_large_as_the_letters_around_it(shown: GuidePanel, qapp: QApp
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 def test_a_page_has_the_colours_of_the_theme(shown: GuidePanel, qapp: QApplication, theme) -> None:
-    before = qapp.palette()
-    try:
-        qapp.setPalette(palette(theme))
-        shown.show_theme(theme)
-        shown.read(page_called("connect"))
-        qapp.processEvents()
-        picture = shown.text.viewport().grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
-        rows = range(0, picture.height(), 2)
-        colours = {picture.pixelColor(x, y).name() for x in range(0, 600, 2) for y in rows}
-        assert {theme.base, theme.window, QColor(theme.text).name()} <= colours
-    finally:
-        qapp.setPalette(before)
+    apply_look(theme)
+    shown.read(page_called("connect"))
+    qapp.processEvents()
+    picture = shown.text.viewport().grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
+    rows = range(0, picture.height(), 2)
+    colours = {picture.pixelColor(x, y).name() for x in range(0, 600, 2) for y in rows}
+    assert {theme.base, theme.window, QColor(theme.text).name()} <= colours
 
 
 def test_a_heading_is_found_and_read_in_the_window(window: MainWindow, until) -> None:

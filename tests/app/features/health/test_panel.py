@@ -14,7 +14,7 @@ from kappaskin_app.features.health.press import MapTesting
 from kappaskin_app.features.heatmaps.heatmap import Heatmap
 from kappaskin_app.shell.colouring import SHADES
 from kappaskin_app.shell.window import MainWindow
-from kappaskin_app.theme import DARK
+from kappaskin_app.theme import DARK, apply_look
 
 STUCK = Finding(157, 57, "yy", "stuck", 100.0, "reads -1.70 1/m")
 KEPT = Finding(12, 12, "xx", "dead", 20.0, "the device says so", retained=True)
@@ -59,7 +59,7 @@ def test_a_finding_that_is_chosen_is_pointed_at(qapp, qtbot) -> None:
 def test_a_letter_says_why_an_element_is_left_out_and_so_does_its_value(qapp) -> None:
     heatmap = Heatmap("xx")
     heatmap.resize(300, 260)
-    heatmap.show_theme(DARK)
+    apply_look(DARK)
     heatmap.show_layout(SensorLayout.regular(Patch(0.1, 0.1), 4, 4))
     heatmap.show_values(np.zeros(16), SHADES["xx"].tint(1.0))
     none, kinds = np.zeros(16, bool), np.zeros(16, np.uint8)

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QApplication
 from kappaskin import Patch, SensorLayout
 from kappaskin_app.features.heatmaps.heatmap import Heatmap
 from kappaskin_app.shell.colouring import SHADES
-from kappaskin_app.theme import DARK, DIVERGING
+from kappaskin_app.theme import DARK, DIVERGING, apply_look
 
 TINT = SHADES["xx"].tint(1.0)
 
@@ -15,7 +15,7 @@ TINT = SHADES["xx"].tint(1.0)
 def _heatmap(layout: SensorLayout) -> Heatmap:
     heatmap = Heatmap("xx")
     heatmap.resize(300, 260)
-    heatmap.show_theme(DARK)
+    apply_look(DARK)
     heatmap.show_layout(layout)
     return heatmap
 

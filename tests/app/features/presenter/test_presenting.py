@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QDockWidget
 
 from kappaskin_app.features.presenter.cue import Roundness
 from kappaskin_app.shell.badge import GAP, LOST, SIM
-from kappaskin_app.theme import THEMES
+from kappaskin_app.theme import THEMES, current
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -67,7 +67,7 @@ def test_shortcuts_work_while_presenting(demo, qtbot, until) -> None:
     theme = demo.history.settings.theme
     qtbot.keyClick(demo, Qt.Key.Key_T, Qt.KeyboardModifier.ControlModifier)
     assert demo.history.settings.theme != theme
-    assert demo.presenting.stage.force.theme is THEMES[demo.history.settings.theme]
+    assert current() is THEMES[demo.history.settings.theme]
     qtbot.keyClick(demo, Qt.Key.Key_F11)
     until(lambda: not demo.presenting.on)
 

@@ -13,7 +13,7 @@ from kappaskin_app.features.presenter.cue import Cue, Roundness
 from kappaskin_app.features.presenter.pad import Hand
 from kappaskin_app.features.presenter.stage import Stage
 from kappaskin_app.shell.badge import GAP, LIVE, LOST, OFF, SIM, STALE, WAITING
-from kappaskin_app.theme import THEMES
+from kappaskin_app.theme import THEMES, apply_look
 from kappaskin_app.widgets.colour_bar import SkinScale
 from kappaskin_app.widgets.lettering import CAPTION, PRIMARY
 from kappaskin_app.widgets.timeline import Clock
@@ -33,7 +33,7 @@ WHY = (
 def stage_of(size, qtbot, theme="light"):
     stage = Stage(_Skin())
     qtbot.addWidget(stage)
-    stage.show_theme(THEMES[theme])
+    apply_look(THEMES[theme])
     stage.resize(*size)
     stage.present(True)
     stage.show()

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication, QToolTip
 from kappaskin import Event
 from kappaskin.recording import Replay
 from kappaskin_app.features.recording.transport import SPEEDS, Transport, minutes
-from kappaskin_app.theme import DARK, LIGHT
+from kappaskin_app.theme import DARK, LIGHT, apply_look
 from kappaskin_app.widgets.timeline import GLYPHS, icon
 
 LEFT, KEYS = Qt.MouseButton.LeftButton, Qt.Key
@@ -143,7 +143,7 @@ def test_a_thousand_events_at_once_are_drawn_and_told_of_in_few_words(row: Trans
 def test_it_is_drawn_in_the_colours_of_the_theme(row: Transport) -> None:
     pictures = []
     for theme in (LIGHT, DARK, LIGHT):
-        row.show_theme(theme)
+        apply_look(theme)
         pictures.append(row.course.grab().toImage())
     assert pictures[0] == pictures[2] != pictures[1]
 
@@ -156,7 +156,7 @@ def test_a_recording_without_events_offers_no_way_to_them(row: Transport) -> Non
 
 @pytest.mark.parametrize("name", GLYPHS)
 def test_every_sign_is_drawn(qapp, name: str) -> None:
-    picture = icon(name, DARK).pixmap(64, 64).toImage()
+    picture = icon(name).pixmap(64, 64).toImage()
     alphas = {picture.pixelColor(x, y).alpha() > 0 for x in range(64) for y in range(0, 64, 4)}
     assert alphas == {False, True}
 

@@ -9,7 +9,7 @@ from kappaskin import load_scene
 from kappaskin.scenes import SCENES
 from kappaskin_app.features.scene.gallery import ORDER, PICTURE, PLAYING, GalleryPanel, in_order
 from kappaskin_app.shell.background import Tasks
-from kappaskin_app.theme import DARK, LIGHT
+from kappaskin_app.theme import DARK, apply_look
 
 
 @pytest.fixture
@@ -74,12 +74,11 @@ def test_the_scene_that_is_played_is_marked(gallery):
 
 
 def test_another_theme_makes_other_pictures(gallery, until):
-    gallery.show_theme(LIGHT)
     gallery.show()
     first = gallery.items["sphere"]
     until(lambda: first.data(PICTURE) is not None)
     light = first.data(PICTURE).toImage()
-    gallery.show_theme(DARK)
+    apply_look(DARK)
     until(lambda: first.data(PICTURE).toImage() != light)
 
 
@@ -104,6 +103,6 @@ def test_it_closes_while_it_works(gallery, until):
     assert time.monotonic() - began < 5
     assert not all(pictures(gallery))
     gallery.show()  # and does not begin again
-    gallery.show_theme(DARK)
+    apply_look(DARK)
     gallery.resize(700, 300)
     gallery.close()

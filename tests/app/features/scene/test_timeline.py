@@ -11,7 +11,7 @@ from kappaskin import load_scene
 from kappaskin.scenes.cylinders import Presentation
 from kappaskin.scenes.stimulus import MotionPath, PressStep, ReleaseStep
 from kappaskin_app.features.scene.timeline import Timeline, profile
-from kappaskin_app.theme import DARK, LIGHT
+from kappaskin_app.theme import DARK, LIGHT, apply_look
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -154,7 +154,7 @@ def test_the_profile_is_how_hard_the_scene_presses():
 
 def test_it_is_drawn_in_the_colours_of_the_theme(row):
     def picture(theme) -> QImage:
-        row.show_theme(theme)
+        apply_look(theme)
         return row.track.grab().toImage()
 
     light, dark = picture(LIGHT), picture(DARK)
