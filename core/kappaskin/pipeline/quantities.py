@@ -63,7 +63,8 @@ class Quantities:
         self._changes: dict[str, CurvatureMap] = {}
 
     @cached_property
-    def _form(self) -> CurvatureFormMap:
+    def form(self) -> CurvatureFormMap:
+        """The map from coefficients to the curvature form (3, ny, nx) in 1/m of the skin itself."""
         return CurvatureFormMap(self.basis, *self.grid)
 
     @cached_property
@@ -110,7 +111,7 @@ class Quantities:
 
         They are (3, ny, nx).
         """
-        xx, yy, xy = form = self.form(estimate)
+        xx, yy, xy = form = self.form(estimate.coefficients)
         angle = np.arctan2(xy, (xx - yy) / 2) / 2
         return np.stack(
             [curvature_invariant("first", form), curvature_invariant("second", form), angle]
@@ -130,12 +131,8 @@ class Quantities:
             self._changes[component] = CurvatureMap(self.basis, component, *self.grid)
         return self._changes[component](estimate.coefficients)
 
-    def form(self, estimate: Estimate) -> Array:
-        """The curvature form (3, ny, nx) in 1/m of the skin itself."""
-        return self._form(estimate.coefficients)
-
-    def form_at_elements(self, estimate: Estimate) -> Array:
+    def form_at_elements(self, curvature: Array) -> Array:
         """The curvature form (3, P) in 1/m as the elements read it, where slopes are small."""
         patch = self.layout.patch
-        form = estimate.curvature + np.array([[patch.base_curvature], [0.0], [0.0]])
+        form = curvature + np.array([[patch.base_curvature], [0.0], [0.0]])
         return np.where([[False], [True], [True]], 0.0, form) if patch.strip else form

@@ -8,6 +8,7 @@ from kappaskin.contact import NO_OBJECT, ContactObject, ObjectFinder
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
+from kappaskin_app.widgets.parts import with_error
 
 _LEARNING = "computing what objects read like on this skin\N{HORIZONTAL ELLIPSIS}"
 
@@ -18,11 +19,8 @@ def curved(estimate: Estimate) -> str:
     if not estimate.contact.present:
         return ""
     (one, other), (sd, other_sd) = geometry.principal, geometry.principal_sd
-    words = (
-        f"principal curvatures {one:+z.1f} \N{PLUS-MINUS SIGN} {sd:.1f} and "
-        f"{other:+z.1f} \N{PLUS-MINUS SIGN} {other_sd:.1f} 1/m"
-    )
-    return words.replace("-", "\N{MINUS SIGN}")
+    larger = with_error(one, sd, 1, sign="+")
+    return f"principal curvatures {larger} and {with_error(other, other_sd, 1, '1/m', '+')}"
 
 
 class Naming(QObject):

@@ -21,6 +21,7 @@ from kappaskin_app.shell.selection import Selection
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.theme import Theme
+from kappaskin_app.widgets.parts import with_error
 
 Array = NDArray[np.float64]
 
@@ -64,7 +65,6 @@ class Past:
         return self._times[order] - self._last, read.swapaxes(1, 2).astype(float)
 
 
-_PM, _DASH = "\N{PLUS-MINUS SIGN}", "\N{EN DASH}"
 _READ = tuple(quantity for quantity in REPORTED if quantity.element_head)
 _HEADS = (
     *("", *(f"{quantity.element_head} [{quantity.unit}]" for quantity in _READ)),
@@ -87,11 +87,8 @@ def facts(element: int, sensor: Sensor, status: Status, estimate: Estimate) -> s
 def title(element: int, sensor: Sensor, moved: float, moved_sd: float) -> str:
     """Which element it is, where, and how far in mm the skin `moved` there."""
     x, y = 1e3 * sensor.layout.positions[element]
-    sure = f" {_PM} {moved_sd:.3f}" if math.isfinite(moved_sd) else ""
-    return _signed(
-        f"<b>Element {element}</b> at ({x:.1f}, {y:.1f}) mm; the skin moved in by "
-        f"{moved:.3f}{sure} mm there"
-    )
+    inward = with_error(moved, moved_sd, 3, "mm")
+    return f"<b>Element {element}</b> at ({x:.1f}, {y:.1f}) mm; the skin moved in by {inward} there"
 
 
 def _row(
@@ -113,11 +110,9 @@ def _row(
 
 def _read(quantity: ReportedQuantity, reported: Reported, row: int, element: int) -> str:
     """A component of a quantity of an element, with its error bar if it has one."""
-    (_, _, value), *others = quantity.forms
-    found, digits = value(reported), quantity.shown[2]
-    bars = [np.broadcast_to(of(reported), found.shape) for _, _, of in others[:1]]
-    told = [_number(bar[row, element], f".{digits}f") for bar in bars]
-    return f" {_PM} ".join([_number(found[row, element], f"+z.{digits}f"), *told])
+    found = [of(reported) for suffix, _, of in quantity.forms if suffix != "_95"]
+    value, sd = np.broadcast_arrays(*found, math.nan)[:2]
+    return with_error(value[row, element], sd[row, element], quantity.shown[2], sign="+")
 
 
 def _calibrated(calibration: Calibration | None, channel: int) -> tuple[str, str]:
@@ -125,8 +120,8 @@ def _calibrated(calibration: Calibration | None, channel: int) -> tuple[str, str
         return "1 (nominal)", "0 (nominal)"
     c = calibration
     return (
-        f"{_number(c.gain[channel], '.3f')} {_PM} {_number(c.gain_sd[channel], '.3f')}",
-        f"{_number(c.offset[channel], '+z.2f')} {_PM} {_number(c.offset_sd[channel], '.2f')}",
+        with_error(c.gain[channel], c.gain_sd[channel], 3),
+        with_error(c.offset[channel], c.offset_sd[channel], 2, sign="+"),
     )
 
 
@@ -134,14 +129,6 @@ def _converted(sensor: Sensor, channel: int) -> int:
     """The number on the wire of what reads this channel."""
     wired = sensor.channel_map
     return channel if wired is None else int(np.flatnonzero(wired == channel)[0])
-
-
-def _number(value: float, digits: str) -> str:
-    return _signed(f"{value:{digits}}") if math.isfinite(value) else _DASH
-
-
-def _signed(text: str) -> str:
-    return text.replace("-", "\N{MINUS SIGN}")
 
 
 _PLOTS = 0.1  # s between two drawings of the plots

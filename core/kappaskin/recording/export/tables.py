@@ -7,6 +7,7 @@ import shutil
 import zipfile
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from operator import attrgetter
 from pathlib import Path
 from typing import IO, Any, NamedTuple, cast
 
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin.errors import lacking
-from kappaskin.pipeline import ACROSS, ALONG, ELEMENT, REPORTED, Getter
+from kappaskin.pipeline import ACROSS, ALONG, ELEMENT, REPORTED
 from kappaskin.recording.export.request import ExportedFrame, ExportRequest, RecordingInfo
 
 
@@ -60,7 +61,9 @@ def columns(info: RecordingInfo) -> tuple[Column, ...]:
     nominal = next(quantity for quantity in REPORTED if quantity.name == "nominal")
     made = {group: _columns(group, lengths) for group in ("frame", "fit", "contact")}
     return (
-        Column("time", "s", "<f8", (), (), "when it came, since the recording began", _time),
+        Column(
+            "time", "s", "<f8", (), (), "when it came, since the recording began", attrgetter("at")
+        ),
         *made["frame"],
         Column(
             "counts",
@@ -76,10 +79,6 @@ def columns(info: RecordingInfo) -> tuple[Column, ...]:
     )
 
 
-def _time(exported: ExportedFrame) -> float:
-    return exported.at
-
-
 def _columns(group: str, lengths: dict[str, int]) -> list[Column]:
     """The columns of the quantities of one group."""
     return [
@@ -90,16 +89,12 @@ def _columns(group: str, lengths: dict[str, int]) -> list[Column]:
             quantity.shape(lengths),
             quantity.labels(lengths) if quantity.parts else (),
             text,
-            _value(getter),
+            lambda exported, getter=getter: getter(exported.reported),
         )
         for quantity in REPORTED
         for suffix, text, getter in quantity.forms
         if quantity.group == group and suffix in quantity.columns
     ]
-
-
-def _value(getter: Getter) -> Callable[[ExportedFrame], Any]:
-    return lambda exported: getter(exported.reported)
 
 
 Block = dict[str, NDArray[Any]]
