@@ -25,7 +25,7 @@ _FACES = (
 # to have 340 modules and 32,000 statements. A feature that raises a count says why beside it.
 LIMITS = {
     "modules": 349,
-    "statements": 35_388,
+    "statements": 35_338,
     "loose modules of core": 8,
     "loose modules of the app": 8,
     "names of the library": 55,

@@ -121,9 +121,8 @@ class Quantities:
 
     def surface_sd(self, estimate: Estimate) -> Array:
         """Standard deviations (ny, nx) of the displacement in m; NaN where they are not known."""
-        if self.error_bars is None:
-            return np.full(estimate.surface.shape, np.nan)
-        return self.error_bars.on_surface(estimate.noise)
+        bars, unknown = self.error_bars, np.full(estimate.surface.shape, np.nan)
+        return unknown if bars is None else bars.on_surface(estimate.noise)
 
     def change(self, component: str, estimate: Estimate) -> Array:
         """The change (ny, nx) of a component of curvature in 1/m that the fit has."""

@@ -175,11 +175,6 @@ class SkinColour:
     unit: str = ""
     row: int = -1
 
-    @property
-    def surface(self) -> bool:
-        """Whether there is a value at every point of the skin, or only at the elements."""
-        return self.on_surface is not None
-
 
 class HeaderNumber(NamedTuple):
     """How a number stands in the window's header: its `key` in lessons, its width in characters."""
@@ -974,17 +969,18 @@ class Readout(NamedTuple):
     digits: int
 
     def less(self, other: "Readout") -> tuple[float, float]:
-        """This number less another, and its error as if those of both had nothing in common."""
+        """The difference to another number, and its error as if theirs had nothing in common."""
         return self.value - other.value, math.hypot(self.sd, other.sd)
 
 
 def readouts(estimate: Estimate) -> list[Readout]:
     """What the screen shows of an estimate: first of the contact, then of the fit."""
     reported = Reported(estimate)
-    found = (each for each in REPORTED if each.group in ("contact", "fit"))
     return [
         readout
-        for quantity in sorted(found, key=lambda each: each.group != "contact")
+        for group in ("contact", "fit")
+        for quantity in REPORTED
+        if quantity.group == group
         for readout in readouts_of(quantity, reported)
     ]
 

@@ -15,12 +15,11 @@ _LEARNING = "computing what objects read like on this skin\N{HORIZONTAL ELLIPSIS
 
 def curved(estimate: Estimate) -> str:
     """The principal curvatures of the skin at the contact, in words; empty without one."""
-    geometry = estimate.geometry
     if not estimate.contact.present:
         return ""
-    (one, other), (sd, other_sd) = geometry.principal, geometry.principal_sd
-    larger = with_error(one, sd, 1, sign="+")
-    return f"principal curvatures {larger} and {with_error(other, other_sd, 1, '1/m', '+')}"
+    found = zip(estimate.geometry.principal, estimate.geometry.principal_sd, strict=True)
+    one, other = (with_error(value, sd, 1, sign="+") for value, sd in found)
+    return f"principal curvatures {one} and {other} 1/m"
 
 
 class Naming(QObject):

@@ -44,17 +44,16 @@ _WIDTHS |= {header.key: header.width for _, header in _NUMBERS}
 
 _DIGITS = 1.14  # as wide as a character on average, the space between two fields with it
 _SMALL = 0.85  # of a number's letters are those of its name
-_LARGE = {"mN": "N"}
-"""The unit of what has a thousand or more of another."""
 
 
 def _told(found: Readout, sign: str) -> str:
     """A number of the table with its error bar."""
     _, value, sd, _, unit, digits = found
-    if unit in _LARGE and abs(value) >= 1e3:
-        return with_error(1e-3 * value, 1e-3 * sd, 3, _LARGE[unit], sign)
-    coarse = unit == "mm" and sd >= _FINE
-    return with_error(value, sd, digits - coarse, unit, sign)
+    if unit == "mN" and abs(value) >= 1e3:
+        return with_error(1e-3 * value, 1e-3 * sd, 3, "N", sign)
+    if unit == "mm" and sd >= _FINE:
+        digits -= 1
+    return with_error(value, sd, digits, unit, sign)
 
 
 def _short(count: int) -> str:

@@ -24,7 +24,6 @@ _HEIGHT, _WIDTH = 1080.0, 1920.0  # of the picture that a unit is a pixel of
 _SKIN, _FIGURES = 51, 49  # how they share the width
 _EDGE = 26.0  # units around the figures
 _RADIUS = "Radius of what touches"
-_PM = "\N{PLUS-MINUS SIGN}"
 _TOUCHES = {"sphere": "ball", "cylinder": "pipe", "plane": "flat face"}
 
 
@@ -176,4 +175,4 @@ def _digits(value: float) -> str:
 
 
 def _off(half: float, digits: int, unit: str) -> str:
-    return f"{_PM} {half:.{digits}f} {unit}" if math.isfinite(half) else ""
+    return f"\N{PLUS-MINUS SIGN} {half:.{digits}f} {unit}" if math.isfinite(half) else ""

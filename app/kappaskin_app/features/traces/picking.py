@@ -95,12 +95,11 @@ def _row(
     element: int, number: int, sensor: Sensor, status: Status, estimate: Estimate
 ) -> tuple[str, ...]:
     channel = number * len(sensor.layout) + element
-    name = COMPONENTS[number]
     found = [f for f in status.health.findings if f.channel == channel]
     health = "; ".join(f"{f.kind}: {f.figure}" for f in found) or "well"
     reported = Reported(estimate)
     return (
-        f"<b>{name}</b>",
+        f"<b>{COMPONENTS[number]}</b>",
         *(_read(quantity, reported, number, element) for quantity in _READ),
         *_calibrated(status.setup.calibration, channel),
         str(_converted(sensor, channel)),

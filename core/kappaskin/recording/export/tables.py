@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin.errors import lacking
-from kappaskin.pipeline import ACROSS, ALONG, ELEMENT, REPORTED
+from kappaskin.pipeline import ACROSS, ALONG, ELEMENT, REPORTED, Getter
 from kappaskin.recording.export.request import ExportedFrame, ExportRequest, RecordingInfo
 
 
@@ -89,12 +89,16 @@ def _columns(group: str, lengths: dict[str, int]) -> list[Column]:
             quantity.shape(lengths),
             quantity.labels(lengths) if quantity.parts else (),
             text,
-            lambda exported, getter=getter: getter(exported.reported),
+            _value(getter),
         )
         for quantity in REPORTED
         for suffix, text, getter in quantity.forms
         if quantity.group == group and suffix in quantity.columns
     ]
+
+
+def _value(getter: Getter) -> Callable[[ExportedFrame], Any]:
+    return lambda exported: getter(exported.reported)
 
 
 Block = dict[str, NDArray[Any]]
