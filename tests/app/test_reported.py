@@ -54,7 +54,7 @@ colouring = Colouring()
 colouring.follow(status)
 found["colours"] = np.array_equal(colouring.of_elements("twice_xy", estimate), twice[2])
 colouring.close()
-found["menu"] = dict(COLOURS)["twice_xy"] == "Twice xy" and not SHADES["twice_xy"].surface
+found["menu"] = dict(COLOURS)["twice_xy"] == "Twice xy" and SHADES["twice_xy"].on_surface is None
 found["range"] = Settings(range_twice_xy=3.0).range_twice_xy == 3.0
 found["heatmaps"] = "twice_xy" in Maps().heatmaps
 print(json.dumps({name: bool(whether) for name, whether in found.items()}))

@@ -197,5 +197,4 @@ def of_row(name: str, of_channels: NDArray[Any]) -> NDArray[Any]:
 
     Of that component which a quantity is made from, or of any of them.
     """
-    row = SHADES[name].row
-    return of_channels.max(axis=0) if row < 0 else of_channels[row]
+    return of_channels[row] if (row := SHADES[name].row) >= 0 else of_channels.max(axis=0)

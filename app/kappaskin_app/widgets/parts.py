@@ -40,6 +40,15 @@ def number(value: float, how: str) -> str:
     return f"{rounded:{how}}".replace("-", "\N{MINUS SIGN}")
 
 
+def with_error(value: float, sd: float, digits: int, unit: str = "", sign: str = "") -> str:
+    """A number with its error bar, as far as that is known; a dash for what is not known."""
+    told = number(value, f"{sign}.{digits}f")
+    if not np.isfinite(value):
+        return told
+    bar = f" \N{PLUS-MINUS SIGN} {sd:.{digits}f}" if np.isfinite(sd) else ""
+    return f"{told}{bar} {unit}".rstrip()
+
+
 def sentence(text: str) -> str:
     text = text[:1].upper() + text[1:]
     return text if not text or text.endswith((".", "?", "!")) else f"{text}."

@@ -63,7 +63,8 @@ class Quantities:
         self._changes: dict[str, CurvatureMap] = {}
 
     @cached_property
-    def _form(self) -> CurvatureFormMap:
+    def form(self) -> CurvatureFormMap:
+        """The map from coefficients to the curvature form (3, ny, nx) in 1/m of the skin itself."""
         return CurvatureFormMap(self.basis, *self.grid)
 
     @cached_property
@@ -110,7 +111,7 @@ class Quantities:
 
         They are (3, ny, nx).
         """
-        xx, yy, xy = form = self.form(estimate)
+        xx, yy, xy = form = self.form(estimate.coefficients)
         angle = np.arctan2(xy, (xx - yy) / 2) / 2
         return np.stack(
             [curvature_invariant("first", form), curvature_invariant("second", form), angle]
@@ -120,9 +121,8 @@ class Quantities:
 
     def surface_sd(self, estimate: Estimate) -> Array:
         """Standard deviations (ny, nx) of the displacement in m; NaN where they are not known."""
-        if self.error_bars is None:
-            return np.full(estimate.surface.shape, np.nan)
-        return self.error_bars.on_surface(estimate.noise)
+        bars, unknown = self.error_bars, np.full(estimate.surface.shape, np.nan)
+        return unknown if bars is None else bars.on_surface(estimate.noise)
 
     def change(self, component: str, estimate: Estimate) -> Array:
         """The change (ny, nx) of a component of curvature in 1/m that the fit has."""
@@ -130,12 +130,8 @@ class Quantities:
             self._changes[component] = CurvatureMap(self.basis, component, *self.grid)
         return self._changes[component](estimate.coefficients)
 
-    def form(self, estimate: Estimate) -> Array:
-        """The curvature form (3, ny, nx) in 1/m of the skin itself."""
-        return self._form(estimate.coefficients)
-
-    def form_at_elements(self, estimate: Estimate) -> Array:
+    def form_at_elements(self, curvature: Array) -> Array:
         """The curvature form (3, P) in 1/m as the elements read it, where slopes are small."""
         patch = self.layout.patch
-        form = estimate.curvature + np.array([[patch.base_curvature], [0.0], [0.0]])
+        form = curvature + np.array([[patch.base_curvature], [0.0], [0.0]])
         return np.where([[False], [True], [True]], 0.0, form) if patch.strip else form

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cache, partial
 from itertools import groupby, product
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -125,11 +125,16 @@ def _root(C: list[list[float]], xx: float, yy: float, xy: float) -> float:
 
 
 Getter = Callable[[Reported], Any]
+Step = tuple[bool, str | Getter]
+"""What gets numbers: whether several, as a list, and how."""
 
 
-def _got(of: str | Getter) -> Getter:
-    """What gets a quantity: itself, or what has its place among the fields of an estimate."""
-    return attrgetter(f"estimate.{of}") if isinstance(of, str) else of
+def _got(*of: str | Getter) -> Getter:
+    """What gets a quantity: itself, or what is at its path; of several paths, one after another."""
+    paths = [path for path in of if isinstance(path, str)]
+    # The contact and the geometry are at hand, which is the shorter way.
+    whole = [path if path.count(".") else f"estimate.{path}" for path in paths]
+    return attrgetter(*whole) if paths else cast("Getter", of[0])
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -169,11 +174,6 @@ class SkinColour:
     group: str = ""
     unit: str = ""
     row: int = -1
-
-    @property
-    def surface(self) -> bool:
-        """Whether there is a value at every point of the skin, or only at the elements."""
-        return self.on_surface is not None
 
 
 class HeaderNumber(NamedTuple):
@@ -288,22 +288,14 @@ class ReportedQuantity:
             for key, _ in self._keys
         )
 
-    def steps(self) -> "Iterator[tuple[bool, str | Getter]]":
-        """What gets the `published` numbers in order: whether several, as a list, and how."""
+    def steps(self) -> Iterator[Step]:
+        """What gets the `published` numbers in order."""
         if self.quick is not None:
             yield True, self.quick
-        else:
-            found = (self.value, len(self._keys)), (self.sd, len(self._sd_keys))
-            for of, count in found:
-                if of is not None and count:
-                    yield count > 1, (self._listed(of) if count > 1 else of)
-
-    def _listed(self, of: str | Getter) -> Getter:
-        """What gets an array as a flat list."""
-        get = _got(of)
-        if len(self.parts) == 1 and isinstance(of, str):
-            return lambda reported: get(reported).tolist()
-        return lambda reported: np.ravel(get(reported)).tolist()
+            return
+        for of, count in (self.value, len(self._keys)), (self.sd, len(self._sd_keys)):
+            if of is not None and count:
+                yield count > 1, (_listed(_got(of)) if count > 1 else of)
 
     def shaded(self) -> Iterator[SkinColour]:
         """Its `colours` with what they have from it."""
@@ -318,6 +310,10 @@ class ReportedQuantity:
             )
 
 
+def _listed(get: Getter) -> Getter:
+    return lambda reported: np.asarray(get(reported)).ravel().tolist()
+
+
 def _row(get: Getter, row: int, reported: Reported) -> Array:
     return np.atleast_2d(get(reported))[row].astype(float, copy=False)
 
@@ -326,12 +322,12 @@ def numbers_of(quantities: Iterable[ReportedQuantity]) -> Callable[[Reported], l
     """What gets all that is published of some quantities, in order."""
     found = (step for quantity in quantities for step in quantity.steps())
     steps: list[tuple[bool, Getter]] = []
-    for _, some in groupby(found, lambda step: isinstance(step[1], str)):
+    for is_one, some in groupby(found, lambda step: not step[0] and isinstance(step[1], str)):
         run = list(some)
-        # Fields one after the other are got at once.
-        if fields := [f"estimate.{of}" for _, of in run if isinstance(of, str)]:
-            steps.append((len(fields) > 1, attrgetter(*fields)))
-        steps += [(several, of) for several, of in run if not isinstance(of, str)]
+        if is_one:  # paths one after the other are got at once
+            steps.append((len(run) > 1, _got(*(of for _, of in run))))
+        else:
+            steps += [(several, _got(of)) for several, of in run]
 
     def numbers(reported: Reported) -> list[float]:
         found: list[float] = []
@@ -454,7 +450,7 @@ def _invariant(
         f"surface_{name}",
         unit,
         f"{label} of the skin, on the surface's points",
-        lambda r: of(_skin(r).form(r.estimate)),
+        lambda r: of(_skin(r).form(r.estimate.coefficients)),
         symbol=symbol,
         parts=(ROW, COLUMN),
         group="skin",
@@ -464,7 +460,7 @@ def _invariant(
                 label,
                 symbol,
                 tip,
-                of_elements=lambda r: of(_skin(r).form_at_elements(r.estimate)),
+                of_elements=lambda r: of(_skin(r).form_at_elements(r.estimate.curvature)),
                 at_rest=lambda H: float(of(np.array([H, 0.0, 0.0]))),
                 least=least,
                 group=group,
@@ -972,14 +968,19 @@ class Readout(NamedTuple):
     unit: str
     digits: int
 
+    def less(self, other: "Readout") -> tuple[float, float]:
+        """The difference to another number, and its error as if theirs had nothing in common."""
+        return self.value - other.value, math.hypot(self.sd, other.sd)
+
 
 def readouts(estimate: Estimate) -> list[Readout]:
     """What the screen shows of an estimate: first of the contact, then of the fit."""
     reported = Reported(estimate)
-    found = (each for each in REPORTED if each.group in ("contact", "fit"))
     return [
         readout
-        for quantity in sorted(found, key=lambda each: each.group != "contact")
+        for group in ("contact", "fit")
+        for quantity in REPORTED
+        if quantity.group == group
         for readout in readouts_of(quantity, reported)
     ]
 

@@ -62,9 +62,10 @@ SWITCHES = {number.key: number.text for number in _of(_FLAGS)} | {
 """What a message about the contact says with true or false."""
 
 # Made once of the table, since they are called for every frame.
-_frame_numbers, _fit_numbers, _contact_numbers = map(numbers_of, (_FRAME, _FIT, _AT_CONTACT))
+_frame_numbers, _fit_numbers, _contact_numbers, _flags = map(
+    numbers_of, (_FRAME, _FIT, _AT_CONTACT, _FLAGS)
+)
 _NOTHING = [math.nan] * len(_of(_AT_CONTACT))
-_flags = numbers_of(_FLAGS)
 _FLAGS_TEXT = ",".join(f'"{key}":%s' for key in SWITCHES)
 
 

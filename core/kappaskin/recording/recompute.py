@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
 from itertools import islice
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -295,11 +296,7 @@ _COMPARED = {
 _TOLD = 1000  # messages between two times that the share is told
 
 
-def _functions(reported: Reported) -> tuple[int, ...]:
-    return reported.estimate.coefficients.shape
-
-
-_GETTERS: dict[str, Getter] = {**getters(), "shape": _functions}
+_GETTERS: dict[str, Getter] = {**getters(), "shape": attrgetter("estimate.coefficients.shape")}
 
 
 @dataclass(frozen=True)
@@ -384,9 +381,7 @@ class _Worker:
 
     def _difference(self, name: str, value: Any, estimate: Estimate) -> str:
         """In which way one number, or list of numbers, is another now; nothing if it is not."""
-        again = (
-            estimate.coefficients.shape if name == "shape" else _GETTERS[name](Reported(estimate))
-        )
+        again = _GETTERS[name](Reported(estimate))
         was, now = np.asarray(value).ravel(), np.asarray(again).ravel()
         real = was.dtype.kind == now.dtype.kind == "f" and was.shape == now.shape
         if was.tobytes() == now.tobytes() if real else np.array_equal(was, now):

@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin.skin import Distances
-from kappaskin_app.features.contact.readouts import StreamFigures
 from kappaskin_app.shell.docks import Title
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import grown
@@ -74,7 +73,7 @@ def _cut_now(inside: QWidget) -> list[str]:
 
 
 def test_the_header_is_read_whole(large: MainWindow) -> None:
-    large.readouts.show_health(StreamFigures(501.0, 42.0, 0.0123, 0.0004, 1234, 0, 5678))
+    large.readouts.show_health(501.0, 42.0, 0.0123, 0.0004, lost=1234, skipped=5678)
     lines = [line for line in large.readouts.findChildren(Line) if not line.whole]
     assert [line.text() for line in lines] == []
 

@@ -1,6 +1,5 @@
 """What the engine computes of the same frames with other settings, held against what is in use."""
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,29 +8,13 @@ from PySide6.QtCore import QObject, Signal
 
 from kappaskin.frames import Estimate
 from kappaskin.live import PipelineStatus, Status
-from kappaskin.pipeline import REPORTED, Setup, readouts
+from kappaskin.pipeline import REPORTED, Readout, Setup, readouts
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Compared, EstimatorSettings, Settings
 from kappaskin_app.shell.settings.asks import settings_from, setup_values
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class ComparedFigure:
-    """One number of A and of B, each (value, standard deviation), in the unit that it is shown."""
-
-    label: str
-    unit: str
-    digits: int
-    a: tuple[float, float]
-    b: tuple[float, float]
-
-    @property
-    def difference(self) -> tuple[float, float]:
-        """B less A; the errors as if they had nothing in common."""
-        return self.b[0] - self.a[0], math.hypot(self.a[1], self.b[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,14 +31,10 @@ class Pair:
             return None
         return self.b.surface - self.a.surface
 
-    def figures(self) -> list[ComparedFigure]:
-        """What both say of the contact."""
+    def figures(self) -> list[tuple[Readout, Readout]]:
+        """What both say of the contact: A and B of each number that has an error bar."""
         pairs = zip(readouts(self.a), readouts(self.b), strict=True)
-        return [
-            ComparedFigure(a.label, a.unit, a.digits, (a.value, a.sd), (b.value, b.sd))
-            for a, b in pairs
-            if a.label in _COMPARED
-        ]
+        return [(a, b) for a, b in pairs if a.label in _COMPARED]
 
 
 _COMPARED = {label for each in REPORTED if each.sd is not None for label in each.labels_shown}

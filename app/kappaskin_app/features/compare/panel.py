@@ -24,7 +24,7 @@ from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
 from kappaskin_app.theme import DIVERGING, SEQUENTIAL, follow_look, grown
 from kappaskin_app.widgets.layout import fit_rows, scrolled
-from kappaskin_app.widgets.parts import button, number, sentence
+from kappaskin_app.widgets.parts import button, sentence, with_error
 from kappaskin_app.widgets.surface_map import SurfaceMap
 
 _ASKS = (
@@ -186,24 +186,16 @@ class ComparePanel(QWidget):
                             Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
                         )
                     self.table.setItem(row, column, item)
-        for row, figure in enumerate(figures):
+        for row, (a, b) in enumerate(figures):
             texts = (
-                f"{figure.label}, {figure.unit}",
-                *(_told(*pair, figure.digits) for pair in (figure.a, figure.b)),
-                _told(*figure.difference, figure.digits, "+"),
+                f"{a.label}, {a.unit}",
+                *(with_error(each.value, each.sd, each.digits) for each in (a, b)),
+                with_error(*b.less(a), a.digits, sign="+"),
             )
             for column, text in enumerate(texts):
                 item = self.table.item(row, column)
                 if item is not None and item.text() != text:
                     item.setText(text)
-
-
-def _told(value: float, sd: float, digits: int, sign: str = "") -> str:
-    """A number with its error bar."""
-    if not math.isfinite(value):
-        return "\N{EN DASH}"
-    bar = f" \N{PLUS-MINUS SIGN} {number(sd, f'.{digits}f')}" if math.isfinite(sd) else ""
-    return f"{number(value, f'{sign}.{digits}f')}{bar}"
 
 
 def _largest(values: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> float:

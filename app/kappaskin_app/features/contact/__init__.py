@@ -8,7 +8,7 @@ from kappaskin.frames import Estimate
 from kappaskin.live import Status
 from kappaskin_app.features.contact.naming import Naming
 from kappaskin_app.features.contact.numbers import NumbersPanel
-from kappaskin_app.features.contact.readouts import Readouts, StreamFigures
+from kappaskin_app.features.contact.readouts import Readouts
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.window import MainWindow
 
@@ -53,14 +53,12 @@ class ContactFeature:
         recent = [] if display.old else display.ages()
         counts = status.accounting
         self.readouts.show_health(
-            StreamFigures(
-                status.rate,
-                len(recent),
-                float(np.median(recent)) if recent else float("nan"),
-                display.age_sd,
-                counts.lost,
-                counts.bytes_discarded,
-                status.skipped,
-            )
+            status.rate,
+            len(recent),
+            float(np.median(recent)) if recent else float("nan"),
+            display.age_sd,
+            lost=counts.lost,
+            discarded=counts.bytes_discarded,
+            skipped=status.skipped,
         )
         self.readouts.show_estimate(estimate)

@@ -6,21 +6,18 @@ from kappaskin.contact import NO_OBJECT, ContactObject, ObjectFinder
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
 from kappaskin_app.shell.background import BackgroundTask, Tasks
+from kappaskin_app.widgets.parts import with_error
 
 _LEARNING = "computing what objects read like on this skin\N{HORIZONTAL ELLIPSIS}"
 
 
 def curved(estimate: Estimate) -> str:
     """The principal curvatures of the skin at the contact, in words; empty without one."""
-    geometry = estimate.geometry
     if not estimate.contact.present:
         return ""
-    (one, other), (sd, other_sd) = geometry.principal, geometry.principal_sd
-    words = (
-        f"principal curvatures {one:+z.1f} \N{PLUS-MINUS SIGN} {sd:.1f} and "
-        f"{other:+z.1f} \N{PLUS-MINUS SIGN} {other_sd:.1f} 1/m"
-    )
-    return words.replace("-", "\N{MINUS SIGN}")
+    found = zip(estimate.geometry.principal, estimate.geometry.principal_sd, strict=True)
+    one, other = (with_error(value, sd, 1, sign="+") for value, sd in found)
+    return f"principal curvatures {one} and {other} 1/m"
 
 
 class Naming(QObject):

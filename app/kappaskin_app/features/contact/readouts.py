@@ -1,7 +1,6 @@
 """The numbers in words: how live it is, where the contact is and how wrong the shape is."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from PySide6.QtGui import QFont, QFontInfo, QResizeEvent
@@ -11,26 +10,11 @@ from kappaskin.frames import Contact, Estimate
 from kappaskin.pipeline import REPORTED, Readout, Reported, readouts_of
 from kappaskin_app.theme import FAINT, follow_look
 from kappaskin_app.widgets.line import Line
+from kappaskin_app.widgets.parts import with_error
+from kappaskin_app.widgets.text import NONE
 
 _FINE = 0.02  # mm of error bar, below which a hundredth is too coarse
 _TINY = 0.05  # ms of error bar, below which it would be shown as none
-NONE = "\N{EN DASH}"
-
-
-@dataclass(frozen=True)
-class StreamFigures:
-    """How live the view is: `rate` in frames/s, `drawn` in pictures/s, `age` in s.
-
-    `age_sd` in s is the standard deviation of the age, infinite where it is only the least.
-    """
-
-    rate: float
-    drawn: float
-    age: float
-    age_sd: float
-    lost: int
-    discarded: int
-    skipped: int
 
 
 FIELDS = {
@@ -54,35 +38,21 @@ FIELDS = {
 _WIDTHS = {"contact": 22, "rate": 15, "lost": 19, "age": 10}
 """Characters of each, as many as it mostly has."""
 _NUMBERS = [(each, each.header) for each in REPORTED if each.header is not None]
-for _quantity, _header in _NUMBERS:
-    FIELDS[_header.key] = (_quantity.labels_shown[0], _header.tip)
-    _WIDTHS[_header.key] = _header.width
+FIELDS |= {header.key: (of.labels_shown[0], header.tip) for of, header in _NUMBERS}
+_WIDTHS |= {header.key: header.width for _, header in _NUMBERS}
 
 _DIGITS = 1.14  # as wide as a character on average, the space between two fields with it
 _SMALL = 0.85  # of a number's letters are those of its name
-_LARGE = {"mN": "N"}
-"""The unit of what has a thousand or more of another."""
-
-
-def _with_error(value: float, sd: float, digits: int, unit: str, sign: str = "") -> str:
-    if not math.isfinite(value):
-        return NONE
-    bar = f" \N{PLUS-MINUS SIGN} {sd:.{digits}f}" if math.isfinite(sd) else ""
-    return f"{_number(value, digits, sign)}{bar} {unit}"
 
 
 def _told(found: Readout, sign: str) -> str:
     """A number of the table with its error bar."""
     _, value, sd, _, unit, digits = found
-    if unit in _LARGE and abs(value) >= 1e3:
-        return _with_error(1e-3 * value, 1e-3 * sd, 3, _LARGE[unit], sign)
-    coarse = unit == "mm" and sd >= _FINE
-    return _with_error(value, sd, digits - coarse, unit, sign)
-
-
-def _number(value: float, digits: int, sign: str = "") -> str:
-    rounded = round(value, digits) + 0.0  # no minus before a zero
-    return f"{rounded:{sign}.{digits}f}".replace("-", "\N{MINUS SIGN}")
+    if unit == "mN" and abs(value) >= 1e3:
+        return with_error(1e-3 * value, 1e-3 * sd, 3, "N", sign)
+    if unit == "mm" and sd >= _FINE:
+        digits -= 1
+    return with_error(value, sd, digits, unit, sign)
 
 
 def _short(count: int) -> str:
@@ -110,7 +80,7 @@ def _age(age: float, sd: float) -> str:
         return NONE
     if not math.isfinite(sd):
         return f"\N{GREATER-THAN OR EQUAL TO} {age:.0f} ms"
-    return f"{age:.0f} ms" if sd < _TINY else _with_error(age, sd, 0 if sd >= 1 else 1, "ms")
+    return f"{age:.0f} ms" if sd < _TINY else with_error(age, sd, 0 if sd >= 1 else 1, "ms")
 
 
 class Readouts(QWidget):
@@ -184,12 +154,27 @@ class Readouts(QWidget):
             for (key, number), name in zip(self._numbers.items(), self._names, strict=True)
         }
 
-    def show_health(self, health: StreamFigures) -> None:
-        self._write("rate", f"{health.rate:.0f}/s, {health.drawn:.0f} drawn")
-        self._write("age", _age(1e3 * health.age, 1e3 * health.age_sd))
-        also = ((health.skipped, "skipped"), (health.discarded, "B"))
-        lost = [_short(health.lost), *(f"{_short(count)} {what}" for count, what in also if count)]
-        self._write("lost", ", ".join(lost))
+    def show_health(
+        self,
+        rate: float,
+        drawn: float,
+        age: float,
+        age_sd: float,
+        *,
+        lost: int = 0,
+        discarded: int = 0,
+        skipped: int = 0,
+    ) -> None:
+        """Show how live the view is: `rate` in frames/s, `drawn` in pictures/s, `age` in s.
+
+        `age_sd` in s is the standard deviation of the age, infinite where it is only the least;
+        the others count frames, and bytes discarded.
+        """
+        self._write("rate", f"{rate:.0f}/s, {drawn:.0f} drawn")
+        self._write("age", _age(1e3 * age, 1e3 * age_sd))
+        also = ((skipped, "skipped"), (discarded, "B"))
+        told = [_short(lost), *(f"{_short(count)} {what}" for count, what in also if count)]
+        self._write("lost", ", ".join(told))
 
     def show_estimate(self, estimate: Estimate | None) -> None:
         if estimate is None:

@@ -128,7 +128,7 @@ class SkinView(QObject):
         estimate, mode, shade, beside = shown.estimate, self._selection.mode, SHADES[name], ()
         if mode is not None and mode.shape == estimate.surface.shape:
             tint, values = Tint(DIVERGING, (-1.0, 1.0), "shape"), mode
-        elif shade.surface and self._settings.colour_from == "smooth":
+        elif shade.on_surface is not None and self._settings.colour_from == "smooth":
             values = display.colouring.on_surface(name, estimate)
             tint = display.tint(name, estimate, values, shown.now)
         else:

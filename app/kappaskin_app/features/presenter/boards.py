@@ -23,6 +23,7 @@ from kappaskin_app.widgets.lettering import (
     shrunk,
     width_of,
 )
+from kappaskin_app.widgets.text import NONE
 
 
 class Board(QWidget):
@@ -214,7 +215,6 @@ class Banner(Board):
         return shrunk(Words(text, font, place, align=_TOP, lines=True))
 
 
-NONE = "\N{EN DASH}"
 FIGURE_HEIGHT = 142.0  # units
 _GAP = 26.0
 

@@ -7,7 +7,6 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
 from kappaskin_app.features.presenter.boards import (
-    NONE,
     Banner,
     Board,
     Figure,
@@ -17,12 +16,13 @@ from kappaskin_app.features.presenter.boards import (
 )
 from kappaskin_app.features.presenter.cue import Cue, Roundness
 from kappaskin_app.features.presenter.pad import Operator
+from kappaskin_app.widgets.parts import number
+from kappaskin_app.widgets.text import NONE
 
 _HEIGHT, _WIDTH = 1080.0, 1920.0  # of the picture that a unit is a pixel of
 _SKIN, _FIGURES = 51, 49  # how they share the width
 _EDGE = 26.0  # units around the figures
 _RADIUS = "Radius of what touches"
-_PM = "\N{PLUS-MINUS SIGN}"
 _TOUCHES = {"sphere": "ball", "cylinder": "pipe", "plane": "flat face"}
 
 
@@ -117,10 +117,10 @@ class Stage(QWidget):
                 figure.show_figure(NONE, why_none if figure is self.force else "")
             self.radius.show_figure(NONE, name=_RADIUS)  # nothing is a ball now
             return
-        self.force.show_figure(f"{_number(cue.force, 3)} N", _off(cue.force_95, 3, "N"))
+        self.force.show_figure(f"{number(cue.force, '.3f')} N", _off(cue.force_95, 3, "N"))
         off = _off(1e3 * cue.displacement_95, 2, "mm") or "at its deepest"
-        self.displacement.show_figure(f"{_number(1e3 * cue.displacement, 2)} mm", off)
-        x, y = (_number(1e3 * value, 1) for value in cue.position)
+        self.displacement.show_figure(f"{number(1e3 * cue.displacement, '.2f')} mm", off)
+        x, y = (number(1e3 * value, ".1f") for value in cue.position)
         where = "near the rim: not sure" if cue.near_rim else _off(1e3 * cue.position_95, 1, "mm")
         self.place.show_figure(f"{x}, {y} mm", where)
         self.radius.show_figure(*radius_in_words(cue, recorded))
@@ -141,7 +141,7 @@ class Stage(QWidget):
 def radius_in_words(cue: Cue, recorded: bool = False) -> tuple[str, str, str]:
     """Value, note and name of the radius that is felt."""
     if cue.kind == "edge":
-        return "edge", f"{_number(1e3 * cue.length, 0)} mm long", "What touches"
+        return "edge", f"{number(1e3 * cue.length, '.0f')} mm long", "What touches"
     if cue.roundness is None:
         return _TOUCHES.get(cue.kind, cue.kind), "", "What touches"
     skin = cue.roundness.what == "skin"
@@ -168,10 +168,5 @@ def _digits(value: float) -> str:
     return f"{value:.{min(digits, 2)}f}"
 
 
-def _number(value: float, digits: int) -> str:
-    rounded = round(value, digits) + 0.0  # no minus before a zero
-    return f"{rounded:.{digits}f}".replace("-", "\N{MINUS SIGN}") if math.isfinite(value) else NONE
-
-
 def _off(half: float, digits: int, unit: str) -> str:
-    return f"{_PM} {half:.{digits}f} {unit}" if math.isfinite(half) else ""
+    return f"\N{PLUS-MINUS SIGN} {half:.{digits}f} {unit}" if math.isfinite(half) else ""

@@ -68,8 +68,9 @@ class ElementCard(QWidget):
     def show_past(self, times: Array, values: Array, seconds: float) -> None:
         """Draw `values` (T, 3 k) of k quantities at `times` (T,) in s up to now."""
         for number, plot in enumerate(self.pasts):
-            of = values[:, 3 * number :]
-            curves = [Curve(name, n, of[:, n]) for n, name in enumerate(COMPONENTS)]
+            curves = [
+                Curve(name, n, values[:, 3 * number + n]) for n, name in enumerate(COMPONENTS)
+            ]
             plot.show_curves(times, curves, (-seconds, 0.0), "s")
 
     def show_spectrum(self, frequencies: Array, amplitudes: Array) -> None:

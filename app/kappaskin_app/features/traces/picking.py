@@ -19,6 +19,7 @@ from kappaskin_app.shell.history import History
 from kappaskin_app.shell.selection import Selection
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
+from kappaskin_app.widgets.parts import with_error
 
 Array = NDArray[np.float64]
 
@@ -62,7 +63,6 @@ class Past:
         return self._times[order] - self._last, read.swapaxes(1, 2).astype(float)
 
 
-_PM, _DASH = "\N{PLUS-MINUS SIGN}", "\N{EN DASH}"
 _READ = tuple(quantity for quantity in REPORTED if quantity.element_head)
 _HEADS = (
     *("", *(f"{quantity.element_head} [{quantity.unit}]" for quantity in _READ)),
@@ -85,23 +85,19 @@ def facts(element: int, sensor: Sensor, status: Status, estimate: Estimate) -> s
 def title(element: int, sensor: Sensor, moved: float, moved_sd: float) -> str:
     """Which element it is, where, and how far in mm the skin `moved` there."""
     x, y = 1e3 * sensor.layout.positions[element]
-    sure = f" {_PM} {moved_sd:.3f}" if math.isfinite(moved_sd) else ""
-    return _signed(
-        f"<b>Element {element}</b> at ({x:.1f}, {y:.1f}) mm; the skin moved in by "
-        f"{moved:.3f}{sure} mm there"
-    )
+    inward = with_error(moved, moved_sd, 3, "mm")
+    return f"<b>Element {element}</b> at ({x:.1f}, {y:.1f}) mm; the skin moved in by {inward} there"
 
 
 def _row(
     element: int, number: int, sensor: Sensor, status: Status, estimate: Estimate
 ) -> tuple[str, ...]:
     channel = number * len(sensor.layout) + element
-    name = COMPONENTS[number]
     found = [f for f in status.health.findings if f.channel == channel]
     health = "; ".join(f"{f.kind}: {f.figure}" for f in found) or "well"
     reported = Reported(estimate)
     return (
-        f"<b>{name}</b>",
+        f"<b>{COMPONENTS[number]}</b>",
         *(_read(quantity, reported, number, element) for quantity in _READ),
         *_calibrated(status.setup.calibration, channel),
         str(_converted(sensor, channel)),
@@ -111,11 +107,9 @@ def _row(
 
 def _read(quantity: ReportedQuantity, reported: Reported, row: int, element: int) -> str:
     """A component of a quantity of an element, with its error bar if it has one."""
-    (_, _, value), *others = quantity.forms
-    found, digits = value(reported), quantity.shown[2]
-    bars = [np.broadcast_to(of(reported), found.shape) for _, _, of in others[:1]]
-    told = [_number(bar[row, element], f".{digits}f") for bar in bars]
-    return f" {_PM} ".join([_number(found[row, element], f"+z.{digits}f"), *told])
+    found = [of(reported) for suffix, _, of in quantity.forms if suffix != "_95"]
+    value, sd = np.broadcast_arrays(*found, math.nan)[:2]
+    return with_error(value[row, element], sd[row, element], quantity.shown[2], sign="+")
 
 
 def _calibrated(calibration: Calibration | None, channel: int) -> tuple[str, str]:
@@ -123,8 +117,8 @@ def _calibrated(calibration: Calibration | None, channel: int) -> tuple[str, str
         return "1 (nominal)", "0 (nominal)"
     c = calibration
     return (
-        f"{_number(c.gain[channel], '.3f')} {_PM} {_number(c.gain_sd[channel], '.3f')}",
-        f"{_number(c.offset[channel], '+z.2f')} {_PM} {_number(c.offset_sd[channel], '.2f')}",
+        with_error(c.gain[channel], c.gain_sd[channel], 3),
+        with_error(c.offset[channel], c.offset_sd[channel], 2, sign="+"),
     )
 
 
@@ -132,14 +126,6 @@ def _converted(sensor: Sensor, channel: int) -> int:
     """The number on the wire of what reads this channel."""
     wired = sensor.channel_map
     return channel if wired is None else int(np.flatnonzero(wired == channel)[0])
-
-
-def _number(value: float, digits: str) -> str:
-    return _signed(f"{value:{digits}}") if math.isfinite(value) else _DASH
-
-
-def _signed(text: str) -> str:
-    return text.replace("-", "\N{MINUS SIGN}")
 
 
 _PLOTS = 0.1  # s between two drawings of the plots

@@ -7,6 +7,7 @@ import shutil
 import zipfile
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from operator import attrgetter
 from pathlib import Path
 from typing import IO, Any, NamedTuple, cast
 
@@ -60,7 +61,9 @@ def columns(info: RecordingInfo) -> tuple[Column, ...]:
     nominal = next(quantity for quantity in REPORTED if quantity.name == "nominal")
     made = {group: _columns(group, lengths) for group in ("frame", "fit", "contact")}
     return (
-        Column("time", "s", "<f8", (), (), "when it came, since the recording began", _time),
+        Column(
+            "time", "s", "<f8", (), (), "when it came, since the recording began", attrgetter("at")
+        ),
         *made["frame"],
         Column(
             "counts",
@@ -74,10 +77,6 @@ def columns(info: RecordingInfo) -> tuple[Column, ...]:
         *made["fit"],
         *made["contact"],
     )
-
-
-def _time(exported: ExportedFrame) -> float:
-    return exported.at
 
 
 def _columns(group: str, lengths: dict[str, int]) -> list[Column]:

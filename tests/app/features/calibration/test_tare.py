@@ -284,10 +284,8 @@ def test_a_window_tares_a_skin_at_rest_and_refuses_a_loaded_one(window, until):
 
 
 def test_the_age_has_its_error_bar(window, until):
-    from kappaskin_app.features.contact.readouts import StreamFigures
-
     def told(age, sd):
-        window.readouts.show_health(StreamFigures(500, 60, age, sd, 0, 0, 0))
+        window.readouts.show_health(500, 60, age, sd)
         return window.readouts.text("age")
 
     assert told(0.0124, 0.0) == "12 ms"
@@ -298,10 +296,9 @@ def test_the_age_has_its_error_bar(window, until):
 
 
 def test_large_counts_are_told_in_few_digits(window):
-    from kappaskin_app.features.contact.readouts import StreamFigures
-
-    def told(*counts):
-        window.readouts.show_health(StreamFigures(500, 60, 0.01, 0.0, *counts))
+    def told(lost, discarded, skipped):
+        counts = {"lost": lost, "discarded": discarded, "skipped": skipped}
+        window.readouts.show_health(500, 60, 0.01, 0.0, **counts)
         return window.readouts.text("lost")
 
     assert told(0, 0, 0) == "0"

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from kappaskin import Setup
-from kappaskin_app.features.compare.comparing import ComparedFigure, Pair, other_setup
+from kappaskin.pipeline import Readout
+from kappaskin_app.features.compare.comparing import Pair, other_setup
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.window import MainWindow
 
@@ -48,16 +49,15 @@ def test_every_figure_has_its_error_bar(window: MainWindow, pairs: list[Pair], u
     for row in range(6):
         for column in (1, 2, 3):
             assert "\N{PLUS-MINUS SIGN}" in table.item(row, column).text()
-    assert [f.label for f in pairs[-1].figures()] == [
+    assert [a.label for a, _ in pairs[-1].figures()] == [
         table.item(row, 0).text().rpartition(",")[0] for row in range(6)
     ]
 
 
 def test_a_difference_has_the_errors_of_both() -> None:
-    figure = ComparedFigure("x", "mm", 1, (1.0, 0.3), (3.0, 0.4))
-    assert figure.difference == (2.0, pytest.approx(0.5))
-    unknown = ComparedFigure("x", "mm", 1, (math.nan, math.nan), (3.0, 0.4))
-    assert math.isnan(unknown.difference[0])
+    a, b = (Readout("x", value, sd, math.nan, "mm", 1) for value, sd in ((1.0, 0.3), (3.0, 0.4)))
+    assert b.less(a) == (2.0, pytest.approx(0.5))
+    assert math.isnan(b.less(a._replace(value=math.nan))[0])
 
 
 def test_b_is_undone_like_any_setting(window: MainWindow, pairs: list[Pair], until, qtbot) -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from kappaskin_app.features.contact.readouts import FIELDS, Readouts, StreamFigures
+from kappaskin_app.features.contact.readouts import FIELDS, Readouts
 
 
 @pytest.fixture
@@ -11,7 +11,7 @@ def readouts(qtbot) -> Readouts:
     qtbot.addWidget(made)
     made.resize(1180, 60)
     made.show()
-    made.show_health(StreamFigures(500.0, 42.0, 0.0123, 0.0004, 1234, 0, 5678))
+    made.show_health(500.0, 42.0, 0.0123, 0.0004, lost=1234, skipped=5678)
     return made
 
 
