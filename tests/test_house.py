@@ -15,8 +15,8 @@ ROOMS = (
 # What the house may come to at most; who brings a count down brings its limit down. The house is
 # to have 340 modules and 32,000 statements. A feature that raises a count says why beside it.
 LIMITS = {
-    "modules": 341,
-    "statements": 35_397,
+    "modules": 329,
+    "statements": 35_074,
     "loose modules of core": 8,
     "loose modules of the app": 8,
     "names of the library": 55,
