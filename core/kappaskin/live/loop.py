@@ -18,8 +18,12 @@ import numpy as np
 from kappaskin._processes import ProcessPriority
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.frames import Event, Frame
-from kappaskin.live.health_monitor import LiveHealthMonitor
-from kappaskin.live.pipelines import ComparedPipeline, PipelineHost, PipelineStatus
+from kappaskin.live.pipelines import (
+    ComparedPipeline,
+    LiveHealthMonitor,
+    PipelineHost,
+    PipelineStatus,
+)
 from kappaskin.live.recorder import LiveRecorder
 from kappaskin.live.region_tracking import SerialTracking, SimulatedTracking, track_region
 from kappaskin.live.requests import Action, Note, RestartEffects, Seek, StepFrames, TakeTare, Update
