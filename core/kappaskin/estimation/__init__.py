@@ -1,4 +1,4 @@
-"""Estimation: readings to coefficients with error bars; element placement; scanned regions."""
+"""Estimation: readings to coefficients with error bars; element placement; regions; spectra."""
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
@@ -26,6 +26,7 @@ from kappaskin.estimation.region import Scanner as Scanner
 from kappaskin.estimation.region import ScanTradeoff as ScanTradeoff
 from kappaskin.estimation.robust import FAULTS as FAULTS
 from kappaskin.estimation.robust import Robust as Robust
+from kappaskin.estimation.spectrum import amplitude_spectrum as amplitude_spectrum
 from kappaskin.estimation.tracking import Tracking as Tracking
 from kappaskin.sensing import SensorLayout
 

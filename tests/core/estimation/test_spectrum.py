@@ -1,9 +1,9 @@
-"""A spectrum tells the waves that readings were made of, at whatever times they came."""
+"""Amplitude spectrum: sines and noise at even and uneven times."""
 
 import numpy as np
 import pytest
 
-from kappaskin_app.features.traces.picking import amplitude_spectrum
+from kappaskin.estimation import amplitude_spectrum
 
 FREQUENCIES = np.arange(1, 200) * 0.25
 
