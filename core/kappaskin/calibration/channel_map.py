@@ -40,10 +40,10 @@ class PressResult:
 
     def __str__(self) -> str:
         if self.verdict == ELSEWHERE:
-            return f"element {self.element} answers in the place of element {self.target}"
+            return f"element {self.element} responds in place of element {self.target}"
         words = {
-            OK: "answers",
-            NOTHING: "does not answer, nor does any other",
+            OK: "responds",
+            NOTHING: "does not respond, nor does any other",
             SKIPPED: "was not pressed",
         }
         return f"element {self.target} {words.get(self.verdict, f'is not clear: {self.why}')}"
@@ -62,7 +62,7 @@ def judge_press(layout: SensorLayout, target: int, answer: Array) -> PressResult
     near = distance <= _BESIDE * _pitch(layout)
     also = np.where(near, 0.0, strength)
     if also.max() > _ALSO * strength[peak]:
-        why = f"elements {peak} and {int(also.argmax())} answer alike"
+        why = f"elements {peak} and {int(also.argmax())} respond alike"
         return PressResult(target, UNCLEAR, peak, answer, why)
     if near[target] and strength[target] >= _AS_GOOD * strength[peak]:
         peak = target
@@ -106,16 +106,18 @@ def map_verdict(sensor: Sensor, done: tuple[PressResult, ...]) -> MapVerdict:
     words = [*words, *more]
     order = np.concatenate([orders[c] * len(layout) + elements for c in range(3)])
     if not words and answered and not open_:
-        return MapVerdict(True, (f"the map is right: {_counted(answered)} where pressed",), order)
+        return MapVerdict(
+            True, (f"channel map confirmed: {_counted(answered)} where pressed",), order
+        )
     if not answered:
-        words = ["no press shows anything of the map"]
+        words = ["the presses do not determine the map"]
     elif not words:
-        words = [f"nothing wrong was found: {_counted(answered)} where pressed"]
+        words = [f"no error was found: {_counted(answered)} where pressed"]
     return MapVerdict(False, (*words, *_some(open_)), order if answered else None)
 
 
 def _counted(answered: list[PressResult]) -> str:
-    return "1 element answers" if len(answered) == 1 else f"{len(answered)} elements answer"
+    return "1 element responds" if len(answered) == 1 else f"{len(answered)} elements respond"
 
 
 def _some(words: list[str]) -> list[str]:
@@ -132,14 +134,14 @@ def _elements(layout: SensorLayout, found: dict[int, int]) -> tuple[Indices | No
     wrong = {target: element for target, element in found.items() if target != element}
     if not wrong:
         return every, []
-    words = [f"element {q} answers in the place of element {p}" for p, q in wrong.items()]
+    words = [f"element {q} responds in place of element {p}" for p, q in wrong.items()]
     closed = sorted(wrong) == sorted(wrong.values())
     by_lines = None if closed and len(wrong) <= _NAMED else _by_lines(layout, found)
     if by_lines is not None:
         return by_lines
     if closed:
         return _permuted(every, wrong), _some(_fewest_words(wrong))
-    return None, [*_some(words), "that does not determine a map: press every element"]
+    return None, [*_some(words), "these presses do not determine the map: press every element"]
 
 
 def _permuted(every: Indices, moved: dict[int, int]) -> Indices:

@@ -183,7 +183,8 @@ class CalibrationReport:
         lines = [
             f"{calibration.name} {calibration.serial_number}: {int(self.passed.sum())} of "
             f"{int(self.passed.sum()) + len(self.failed)} channels passed; curvature in 1/m",
-            f"{'':<11}{'gain':<18}{'offset':<18}{'widest loop (left)':<22}error (of a line alone)",
+            f"{'':<11}{'gain':<18}{'offset':<18}{'widest loop (remaining)':<25}"
+            "error (straight line)",
         ]
         for c, name in enumerate(COMPONENTS):
             here = np.flatnonzero(self.passed[c * P : (c + 1) * P]) + c * P
@@ -193,7 +194,7 @@ class CalibrationReport:
                 lines.append(
                     f"{name:<11}{spread(self.fitted.gain[here]):<18}"
                     f"{spread(self.fitted.offset[here]):<18}"
-                    f"{'{:.2f} ({:.2f})'.format(*loops):<22}{errors[0]:.3f} ({errors[1]:.2f})"
+                    f"{'{:.2f} ({:.2f})'.format(*loops):<25}{errors[0]:.3f} ({errors[1]:.2f})"
                 )
         if calibration.creep:
             share = float(np.median(calibration.creep.share[self.passed]))

@@ -264,8 +264,8 @@ def _check_unloaded(sensor: Sensor, seeker: LoadDetector, found: _Found, rest: R
             f"{rest.tare.date:%Y-%m-%d %H:%M}: undo that one first"
         )
     raise Refusal(
-        f"the skin is loaded: {_force(load.force)} near ({x:.0f}, {y:.0f}) mm explain "
-        f"{100 * load.share:.0f} % of what stands out; {then}"
+        f"the skin is loaded: {_force(load.force)} at ({x:.0f}, {y:.0f}) mm; this contact explains "
+        f"{100 * load.share:.0f} % of the signal; {then}"
     )
 
 

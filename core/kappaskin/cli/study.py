@@ -274,10 +274,10 @@ def study(
                 points = run_study(loaded, folder, pool, show_progress)
         except KeyboardInterrupt:
             raise Refusal(
-                f"stopped; what was computed is in {path}, and the same command goes on from there"
+                f"stopped; the results so far are in {path}; the same command resumes"
             ) from None
     print(table_text(loaded, points))
-    print(f"kappaskin report {path} makes a page of it", file=sys.stderr)
+    print(f"kappaskin report {path} writes the report", file=sys.stderr)
     return FAILED if any(point.failures for point in points) else 0
 
 

@@ -130,7 +130,7 @@ def _port_text(found: "Diagnosis") -> str:
     if found.device:
         lines.append(_line("device", found.device))
     if math.isfinite(found.rate):
-        rate = f"{found.rate:.1f} frames/s of the {found.said_rate:g} it says"
+        rate = f"{found.rate:.1f} frames/s of {found.said_rate:g} nominal"
         known = f"known to {1e3 * found.clock_sd:.2g} ms" if found.clock_sd < math.inf else _DEAF
         lines += [_line("rate", rate), _line("clock", known)]
     if math.isfinite(found.temperature):
@@ -138,10 +138,10 @@ def _port_text(found: "Diagnosis") -> str:
     if received := found.accounting.bytes_in:
         lines.append(_line("losses", f"{found.accounting.words}, in {received:,} bytes"))
     lines += [_line(event.kind, event.text) for event in found.events if event.kind != "met"]
-    return "\n".join([*lines, _line("verdict", found.why or "well")])
+    return "\n".join([*lines, _line("verdict", found.why or "OK")])
 
 
-_DEAF = "not known: the device does not answer pings"
+_DEAF = "unknown: no reply to pings"
 
 
 def _line(name: str, text: str) -> str:

@@ -70,10 +70,10 @@ class ContactObject:
             return "no contact"
         (likeliest, first), (second, chance) = self.ranked[:2]
         if not self.kind and first >= _SURE:
-            return f"cannot tell: fits none of these objects, {likeliest} the least badly"
+            return f"undetermined: fits none of these objects, {likeliest} best"
         if not self.kind:
             odds = f"{100 * first:.0f} % to {100 * chance:.0f} %"
-            return f"{likeliest} or {second}: cannot tell ({odds})"
+            return f"{likeliest} or {second}: undetermined ({odds})"
         parts = [self.kind]
         if self.kind in ("cylinder", "sphere"):
             parts.append(self._radius())

@@ -390,7 +390,7 @@ _FRAME = (
         sd="taken_sd",
         sd_text="standard deviation of taken",
         keys=(),
-        sd_keys=(("taken_sd_s", "standard deviation of timestamp; null where nothing tells"),),
+        sd_keys=(("taken_sd_s", "standard deviation of timestamp; null if unknown"),),
     ),
     ReportedQuantity(
         "ready_time",
@@ -691,9 +691,7 @@ _CONTACT = (
         "whether one point load explains the readings",
         "contact.single",
         kind="?",
-        keys=(
-            ("single", "whether one point load explains the readings as well as the shape does"),
-        ),
+        keys=(("single", "whether one point load fits the readings as well as the shape"),),
     ),
     ReportedQuantity(
         "near_rim",
@@ -704,7 +702,7 @@ _CONTACT = (
         keys=(
             (
                 "near_rim",
-                "whether it is too near a held edge for its place and force to be trusted",
+                "whether it is too near a held edge for a reliable position and force",
             ),
         ),
     ),

@@ -32,8 +32,7 @@ _HEAD = (
     Number(
         "timestamp",
         "%.6f",
-        "when the scan began, or where nothing tells that, when it was read; s since 1970 by the "
-        "sender's clock",
+        "when the scan began or, if unknown, when it was read; s since 1970 by the sender's clock",
     ),
     Number("number", "%d", "counts the messages about contacts; a gap was lost on the network"),
     Number("sequence", "%d", "of the scan, as the device counts; a gap was lost or not computed"),

@@ -178,14 +178,14 @@ class UdpListener:
             return []
         missing = self._number - last - 1
         if missing < 0:
-            return ["back      a late one, or the sender began anew"]
+            return ["back      out of order, or the sender restarted"]
         self.lost += missing
         return [f"gap       {missing} messages lost"]
 
     @property
     def summary(self) -> str:
-        foreign = f", {self.foreign} datagrams that are none of ours" if self.foreign else ""
-        return f"{self.contacts} contacts came, {self.lost} were lost{foreign}"
+        foreign = f", {self.foreign} foreign datagrams" if self.foreign else ""
+        return f"{self.contacts} contacts received, {self.lost} lost{foreign}"
 
     def close(self) -> None:
         self._socket.close()

@@ -110,11 +110,11 @@ def _reasons(
     for name in sorted(there, key=lambda name: sizes[name].error):
         error = sizes[name].error
         if there[name].authored:
-            found[name] = True, "a failure that the scene asks for"
+            found[name] = True, "a failure in the scene"
         elif name in choice.on | choice.off:
-            found[name] = name in choice.on, "as the scene says"
+            found[name] = name in choice.on, "as set in the scene"
         elif not choice.auto:
-            found[name] = True, "the scene asks for all there are"
+            found[name] = True, "the scene requests all effects"
         elif spent + error <= choice.accuracy:
             spent += error
             found[name] = (

@@ -190,7 +190,7 @@ class WireMonitor:
             if count > before.get(reason, 0)
         ]
         if now.duplicate > was.duplicate:
-            lines.append(f"duplicate    {now.duplicate - was.duplicate} messages came twice")
+            lines.append(f"duplicate    {now.duplicate - was.duplicate} duplicate messages")
         if now.restarts > was.restarts:
             lines.append("restart      the device counts from another number")
         if now.other_version is not None and was.other_version is None:
@@ -206,7 +206,7 @@ class WireMonitor:
         self._tuned_at = now
         self._commands.greet(now)
         return [
-            f"nothing came for {_SILENCE:g} s. Is the device powered, and its firmware started "
+            f"no bytes for {_SILENCE:g} s. Is the device powered, and its firmware started "
             "(--reset pulses DTR and RTS)? On a UART: are TX and RX crossed, and ground joined?"
         ]
 
@@ -229,8 +229,9 @@ class WireMonitor:
         return (
             f"{lasted:.1f} s at {self._connection.baud_rate} baud: {counts.bytes_in} bytes in, "
             f"{counts.bytes_good} good, {counts.buffered} waiting, discarded: {reasons}; "
-            f"{counts.accepted} messages accepted, {counts.lost} lost, {counts.duplicate} twice, "
-            f"{counts.restarts} restarts; {self._samples / lasted:.1f} scans/s"
+            f"{counts.accepted} messages accepted, {counts.lost} lost, "
+            f"{counts.duplicate} duplicate, {counts.restarts} restarts; "
+            f"{self._samples / lasted:.1f} scans/s"
         )
 
     def close(self) -> None:

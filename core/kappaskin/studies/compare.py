@@ -475,12 +475,12 @@ _HEAD = (
     f"{'':<26}{'':>5}{'mm':>8}{'mm':>8}{'mm':>15}{'mm':>8}{'':>5}{'ms':>7}{'us':>7}{'':>6}{'KiB':>6}"
 )
 _LEGEND = """\
-The same work by Kappaskin and by what one would use instead
+The same problems solved by Kappaskin and by alternatives
 N        unknowns that are solved for
 E        signed error at the load; with noise the mean +- standard deviation of 200 draws
 RMS      error over the skin; with noise the mean of the draws
-bars     whether the answer comes with error bars
-set-up   until the first answer; answer: median of the next ones, and over that of our first way
+bars     error bars available
+set-up   until the first answer; answer: median of the next ones, and its ratio to the first row
 held     most memory at once in both, with what SuperLU holds"""
 
 

@@ -80,7 +80,9 @@ def test_a_map_that_is_right_is_confirmed(quick):
     verdict = pressed_through(quick=quick)
 
     assert verdict.confirmed
-    assert str(verdict).startswith(f"the map is right: {20 if quick else 100} elements answer")
+    assert str(verdict).startswith(
+        f"channel map confirmed: {20 if quick else 100} elements respond"
+    )
     np.testing.assert_array_equal(verdict.order, np.arange(300))
 
 
@@ -185,7 +187,7 @@ def test_what_is_skipped_or_silent_confirms_no_map():
 
     assert not verdict.confirmed
     assert verdict.words == (
-        "nothing wrong was found: 1 element answers where pressed",
+        "no error was found: 1 element responds where pressed",
         "element 5 was not pressed",
         "element 6 does not answer, nor does any other",
     )
@@ -200,7 +202,7 @@ def test_two_fingers_are_not_clear():
     came = finger.read(np.zeros(300), 0.3)
 
     assert came.verdict == "unclear"
-    assert "22 and 77 answer alike" in str(came) or "77 and 22 answer alike" in str(came)
+    assert "22 and 77 respond alike" in str(came) or "77 and 22 respond alike" in str(came)
 
 
 def test_a_press_between_two_elements_counts_for_the_one_asked_for():
@@ -255,7 +257,7 @@ def test_back_asks_for_the_last_one_again():
     finger = Finger(test)
     finger.press(77)
     assert [p.verdict for p in test.done] == ["elsewhere"]
-    assert str(test.done[0]) == "element 77 answers in the place of element 5"
+    assert str(test.done[0]) == "element 77 responds in place of element 5"
 
     test.back()
 
@@ -303,7 +305,7 @@ def test_dead_elements_are_not_asked_for():
 def test_the_command_presses_a_simulation_by_itself_and_confirms_its_map(run):
     code, out, err = run("press", "sim:circle", "--quick")
 
-    assert (code, out) == (0, "the map is right: 20 elements answer where pressed\n")
+    assert (code, out) == (0, "channel map confirmed: 20 elements respond where pressed\n")
     assert err.startswith("1/20  press element 0, at (5.0, 5.0) mm, and let go\n    element 0")
 
 

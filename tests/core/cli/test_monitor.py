@@ -127,7 +127,7 @@ def test_a_refusal_is_told_in_the_devices_words_without_what_steers_a_terminal(d
 def test_after_silence_the_usual_causes_are_named(device) -> None:
     assert device.later(2.9) == ""
     for text in (device.later(0.2), device.later(3.0)):
-        assert text.count("nothing came for 3 s") == 1
+        assert text.count("no bytes for 3 s") == 1
         assert "--reset" in text
         assert device.later(0.1) == ""
 

@@ -239,7 +239,7 @@ def test_publish_sends_what_listen_tells(start) -> None:
     assert listening.returncode == 0
     assert "status    streaming  Simulated skin" in told
     assert re.search(r"contact +#\d+ +x 4?5?\d*\.\d+ \+- ", told)
-    assert re.search(r"\d+ contacts came, \d+ were lost", told.splitlines()[-1])
+    assert re.search(r"\d+ contacts received, \d+ lost", told.splitlines()[-1])
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals as POSIX has them")

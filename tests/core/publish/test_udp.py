@@ -313,14 +313,14 @@ def test_a_contact_is_told_with_its_error_bars_and_age(listener, message: Estima
     assert f"x {1e3 * touch.position[0]:.2f} +- {1e3 * touch.position_sd[0]:.2f} mm" in said
     assert f"force {touch.force:.4f} +- {touch.force_sd:.4f} N" in said
     assert "age" in said
-    assert listener.summary == "1 contacts came, 0 were lost"
+    assert listener.summary == "1 contacts received, 0 lost"
 
 
 def test_losses_are_told_by_gaps(listener) -> None:
     said = send(listener, *(numbered(n) for n in (5, 6, 9, 10, 0, 1)))
     assert said.count("2 messages lost") == 1
-    assert "began anew" in said
-    assert listener.summary == "6 contacts came, 2 were lost"
+    assert "the sender restarted" in said
+    assert listener.summary == "6 contacts received, 2 lost"
 
 
 def test_a_state_is_told_once_and_cannot_speak_to_the_terminal(listener) -> None:

@@ -142,10 +142,10 @@ def test_the_command_says_in_words_and_in_json_that_a_port_is_well(served, capsy
     assert main(["doctor", served]) == 0
     words = capsys.readouterr().out
     assert "device              Simulated skin SIM-0001, firmware kappaskin simulator\n" in words
-    assert "rate                100.0 frames/s of the 100 it says\n" in words
+    assert "rate                100.0 frames/s of 100 nominal\n" in words
     assert "clock               known to " in words
     assert "losses              0 of " in words
-    assert words.endswith("verdict             well\n")
+    assert words.endswith("verdict             OK\n")
     assert main(["doctor", served, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["well"], found["why"], found["said_rate"]) == (True, "", 100.0)

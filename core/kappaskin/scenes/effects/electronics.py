@@ -68,7 +68,7 @@ class CrossTalk(ReadingEffect):
 
     name: ClassVar = "cross-talk"
     example: ClassVar = {"share": 0.02}
-    formula: ClassVar = "share kept of the channel scanned before"
+    formula: ClassVar = "share of the previously scanned channel"
 
     share: Annotated[float, Within(0, 0.5)]
 

@@ -118,7 +118,7 @@ class Hysteresis(ReadingEffect):
 
     name: ClassVar = "hysteresis"
     example: ClassVar = {"like": "second"}
-    formula: ClassVar = "how far the plays lag behind, over peak curvature"
+    formula: ClassVar = "hysteresis lag over peak curvature"
 
     thresholds: tuple[float, ...]
     weights: tuple[float, ...]
@@ -179,7 +179,7 @@ class Creep(ReadingEffect):
 
     name: ClassVar = "creep"
     example: ClassVar = {"share": 0.1, "time_constant": 8.0}
-    formula: ClassVar = "share that relaxes away while the scene lasts"
+    formula: ClassVar = "share that relaxes during the scene"
 
     share: float
     time_constant: float

@@ -49,7 +49,7 @@ class Workers(Protocol):
 def scheduler_lost() -> Refusal:
     """The refusal once no scheduler answers any more."""
     return Refusal(
-        "the scheduler is gone; what was computed is kept, and the same command goes on from there"
+        "connection to the scheduler lost; the results so far are saved, the same command resumes"
     )
 
 

@@ -113,7 +113,7 @@ def block_of(setup: PointSetup, estimator: Estimator, seed: int) -> FrameBlock:
 
 
 def _compensated(scene: Scene, read: Array) -> Array:
-    """Readings (T, 3 P) in 1/m, one after the other, with the scene's loops undone."""
+    """Readings (T, 3 P) in 1/m, one after the other, with the scene's hysteresis compensated."""
     loops = [effect for effect in kept_effects(scene) if isinstance(effect, Hysteresis)]
     if not loops:
         raise Refusal("expected a scene with hysteresis to compensate, got none of it")
@@ -348,8 +348,8 @@ class StudyFolder:
             self._write(file, json.dumps(about | found, allow_nan=failed))
         except OSError as error:
             raise Refusal(
-                f"{file}: cannot be written ({error}); make room and run the study again, which "
-                "goes on from here"
+                f"{file}: cannot be written ({error}); free disk space, then run the "
+                "study again: it resumes"
             ) from error
 
     @staticmethod

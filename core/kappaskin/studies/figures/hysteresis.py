@@ -44,7 +44,7 @@ class _LoopRun:
 
     @property
     def errors(self) -> tuple[Array, Array]:
-        """Errors (S,) in 1/m of the later sweep by the line alone, and with the loops undone."""
+        """Errors (S,) in 1/m of the later sweep: straight line, and hysteresis compensated."""
         line, correct = self.report.line, self.report.calibration.start()
         by_line = (self.later.readings[:, PAIR] - line.offset[PAIR]) / line.gain[PAIR]
         steps = zip(self.later.readings, self.later.times, strict=True)
@@ -121,7 +121,7 @@ def _draw_loop(axes: style.Axes, first: _LoopRun, second: _LoopRun) -> None:
 
 def _draw_errors(axes: style.Axes, found: _LoopRun) -> None:
     applied = found.later.curvature[:, 0]
-    looks = (("line alone", style.BLUE), ("loops undone", style.ORANGE))
+    looks = (("straight line", style.BLUE), ("hysteresis compensated", style.ORANGE))
     axes.axhline(0, color=style.LINE, lw=0.6)
     for error, (name, colour) in zip(found.errors, looks, strict=True):
         rms = np.sqrt(np.mean(error**2))

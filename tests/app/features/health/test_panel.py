@@ -133,8 +133,8 @@ def test_a_simulated_skin_is_pressed_by_dragging_its_load(window: MainWindow, un
     until(lambda: window.testing.test.done)
     wishes.release()
 
-    assert str(window.testing.test.done[0]) == f"element {asked} answers"
-    assert page.last.text() == f"Element {asked} answers."
+    assert str(window.testing.test.done[0]) == f"element {asked} responds"
+    assert page.last.text() == f"Element {asked} responds."
     page.back.click()
     assert window.testing.test.target == asked
     page.skip.click()

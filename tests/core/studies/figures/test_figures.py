@@ -299,8 +299,8 @@ def test_fig8_tells_errors_on_cylinders_that_were_not_calibrated_on(drawn) -> No
         rms[drawn_line.get_label().split(":")[0]] = np.sqrt(np.mean(error**2))
 
     # Noise of 0.23 1/m, averaged over 50 frames.
-    assert 0.23 / math.sqrt(50) < rms["loops undone"] < 0.15
-    assert rms["line alone"] > 2
+    assert 0.23 / math.sqrt(50) < rms["hysteresis compensated"] < 0.15
+    assert rms["straight line"] > 2
 
 
 def test_fig9_draws_what_least_squares_makes_of_ten_readings(drawn) -> None:
