@@ -78,9 +78,9 @@ from pathlib import Path
 from kappaskin import Setup
 from kappaskin.live import Engine
 
-folder, file, patience, entrusted = sys.argv[1:]
+folder, file, patience, window_state = sys.argv[1:]
 engine = Engine(Setup(6, 7), Path(folder), float(patience))
-engine.entrust(bytes.fromhex(entrusted))
+engine.store_window_state(bytes.fromhex(window_state))
 if file:
     engine.record(Path(file))
 engine.connect("sim:centre")
@@ -123,9 +123,9 @@ def abandoned() -> Iterator[Callable[..., Abandoned]]:
     made: list[Abandoned] = []
 
     def begin(
-        orphans: Path, file: Path | None, patience: float = 20.0, entrusted: bytes = b""
+        orphans: Path, file: Path | None, patience: float = 20.0, window_state: bytes = b""
     ) -> Abandoned:
-        said = [str(orphans), str(file or ""), str(patience), entrusted.hex()]
+        said = [str(orphans), str(file or ""), str(patience), window_state.hex()]
         call = [sys.executable, "-c", _PARENT, *said]
         quiet = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
         with subprocess.Popen(call, text=True, **quiet) as parent:

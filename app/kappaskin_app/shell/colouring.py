@@ -173,7 +173,7 @@ class Colouring:
         if sensor is None or estimate.curvature.shape[1] != len(sensor.layout):
             return None
         shapes = estimate.coefficients.shape, estimate.surface.shape
-        key = (self._status.meetings, estimate.generation, *shapes)
+        key = (self._status.connections, estimate.generation, *shapes)
         if key != self._key:
             basis = basis_for(sensor.layout.patch, setup.edge or sensor.edge, *shapes[0])
             ny, nx = shapes[1]

@@ -87,7 +87,7 @@ class Display(QObject):
         self.views: dict[str, dict[str, QWidget]] = {}
         self.places: dict[str, list[QWidget]] = {}
         self.figures: dict[str, Callable[[], float]] = {}
-        self._met, self._next_numbers = 0, 0.0
+        self._connection, self._next_numbers = 0, 0.0
         session.estimated.connect(guarded(self.show_estimate))
         session.reported.connect(guarded(self._show_status))
 
@@ -105,8 +105,8 @@ class Display(QObject):
 
     def _show_status(self, status: Status) -> None:
         self.colouring.follow(status)
-        if status.sensor is not None and status.meetings != self._met:
-            self._met = status.meetings
+        if status.sensor is not None and status.connections != self._connection:
+            self._connection = status.connections
             self.ranges = Ranges(
                 1e3 * max(status.sensor.layout.patch.a, status.sensor.layout.patch.b)
             )

@@ -75,8 +75,8 @@ def _value(name: str, value: Any) -> Any:
     return value
 
 
-class Entrusting:
-    """Leaves the settings with the engine, which may outlive the window while it records."""
+class WindowStateStore:
+    """Stores the settings in the engine, which may outlive the window while it records."""
 
     def __init__(self, history: History, engine: Engine) -> None:
         self._history, self._engine = history, engine
@@ -86,14 +86,14 @@ class Entrusting:
         settings = self._history.settings
         if status.recording.active and settings is not self._left:
             self._left = settings
-            self._engine.entrust(settings_text(settings).encode())
+            self._engine.store_window_state(settings_text(settings).encode())
 
 
 def settings_left(left: ResumeInfo) -> Settings:
     """The settings of the window that is gone; those to begin with where they cannot be read."""
     setup = left.requested.setup
     try:
-        settings = settings_in(left.requested.entrusted.decode(errors="replace"))
+        settings = settings_in(left.requested.window_state.decode(errors="replace"))
     except Refusal:
         return settings_for(left.requested.source or "")
     return replace(settings, calibration=setup.calibration, tare=setup.tare)

@@ -398,7 +398,7 @@ class Session(QObject):
             self.engine.revive()
             was, self.status = self.status, self.engine.status()
             self._lost_since = min(self._lost_since, now) if self._lost else math.inf
-            if self.status.meetings != was.meetings:
+            if self.status.connections != was.connections:
                 self.estimate = None  # what the last sensor showed is not this one's
                 self._set_up()
             told = self.status.reported > self._sought_at + _ARRIVES

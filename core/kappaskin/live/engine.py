@@ -1,4 +1,4 @@
-"""The engine as the window sees it: started, requested of, followed and ended from here."""
+"""Engine: starts the engine process, sends requests, reads status and estimates."""
 
 import multiprocessing
 import time
@@ -38,7 +38,7 @@ LONGEST_NOTE = 500
 """Characters of a note."""
 
 _ORDERLY, _WRITTEN = 2.0, 10.0  # s for an end, and where a recording is to be ended first
-_PATIENCE = 600.0  # s that a recording goes on without a window
+_PATIENCE = 600.0  # s that a recording continues without a window
 _DEATHS, _WITHIN = 3, 10.0  # so many in so many s, and the process is not started again
 
 _AGAIN = "the engine process ended unexpectedly and was started again"
@@ -51,12 +51,12 @@ _GIVEN_UP = (
 
 
 class Engine:
-    """The engine process, seen from the window; no call here waits for it.
+    """The engine process, controlled from the window; no call here waits for it.
 
-    What is requested here is one value, `Requested`, which the engine gets and follows. It ends
-    when `close` is called, or within a second when this process is gone. With a folder to
-    `resume_from` one that records goes on for `patience` s instead, until another `Engine` with
-    that folder resumes it instead of beginning one: `resumed` tells what it goes on with.
+    All requests are one value, `Requested`, which is sent to the engine. The process ends when
+    `close` is called, or within a second after this process ended. With a folder to `resume_from`,
+    a process that records continues for `patience` s instead, and the next `Engine` with that
+    folder resumes it instead of starting one: `resumed` describes it.
     """
 
     def __init__(
@@ -104,18 +104,23 @@ class Engine:
         self._requests.connect(cast("Connection[Update, Any]", ours))
 
     def _start_again(self, *events: Event) -> None:
-        """Start another process; it goes on counting, so that no generation comes twice."""
+        """Start another process, which continues the counts: no generation is used twice."""
         self._reap()
         # One killed while it wrote left no status that can be read.
         was = self._ring.read_status() or self._seen
         if self.resumed is not None:
-            self._give_memory_back()
+            self._release_memory()
             self._ring, self._compared_ring, self.resumed = Ring.create(), Ring.create(), None
         setup, source = self._requested.setup, self._requested.source
-        fresh = Status(setup=setup, generation=was.generation, meetings=was.meetings, tare=was.tare)
+        fresh = Status(
+            setup=setup,
+            generation=was.generation,
+            connections=was.connections,
+            tare=was.tare,
+        )
         if events and source is not None:
             fresh = replace(fresh, state=LOST, source=source, message=events[-1].text)
-        self._start(replace(fresh, events=was.events, happened=was.happened).after(events))
+        self._start(replace(fresh, events=was.events, event_count=was.event_count).after(events))
 
     def revive(self) -> None:
         """Restart a process that died, with all that is requested; `status` says so.
@@ -179,22 +184,21 @@ class Engine:
         self._requests.change(compared=setup)
 
     def play(self, scene: Scene) -> None:
-        """Let the simulated source, if that is what there is, go on with `scene`."""
+        """Continue a simulated source with `scene`; no effect on any other source."""
         self._requests.change(scene=scene)
 
     def seek(self, at: float | None = None, speed: float = 1.0, looped: bool | None = None) -> None:
-        """Let a simulated scene or a recording go on from its time `at` in s, or from where it is.
+        """Continue a simulated scene or a recording from time `at` in s; by default from now.
 
-        It goes `speed` times as fast as the device's clock, at most ten times; at zero it is
-        paused, and a scene goes on being read. A recording that is `looped` begins again at its
-        end. Status tells where it is.
+        It plays at `speed` times real time, at most ten; at zero it is paused, while a scene is
+        still read. A recording that is `looped` restarts at its end. `status` has the position.
         """
         Playback(at or 0.0, 0.0, speed)  # or refused here
         after = self._requested.looped if looped is None else looped
         self._requests.act(Seek(at, speed, looped), speed=speed, looped=after)
 
     def restart_effects(self) -> None:
-        """Let what spoils the readings of a simulated sensor start anew, as from rest."""
+        """Restart the simulated sensor's effects, as from rest."""
         self._requests.act(RestartEffects())
 
     def step(self, frames: int) -> None:
@@ -202,28 +206,28 @@ class Engine:
         self._requests.act(StepFrames(frames), speed=0.0)
 
     def scan(self, region: Region) -> None:
-        """Let every frame scan `region`; where it cannot, `status` says why."""
+        """Scan only `region` in every frame; where this is impossible, `status` says why."""
         self._requests.change(region=region)
 
     def publish(self, targets: Sequence[str]) -> None:
         """Send estimates to `targets` from now on, such as udp://127.0.0.1:9870 or foxglove://.
 
-        Those requested before get no more; `status` tells how each is doing. Raises a `Refusal`
-        where one is no target.
+        Earlier targets receive no more; `status` has the state of each. Raises a `Refusal` for
+        an invalid target.
         """
         self._requests.change(targets=tuple(str(target) for target in targets_of(targets)))
 
     def tare(self) -> None:
-        """Take a tare; `status` tells what came of it, and a setup with it uses it."""
+        """Take a tare; `status` has the result, which is in use once a setup contains it."""
         self._requests.act(TakeTare())
 
     def record(self, path: Path | None) -> None:
-        """Record to `path` from now on, or end that with None; `status` tells what came of it."""
+        """Record to `path` from now on, or end recording with None; `status` has the result."""
         self._requests.change(recording=path and path.absolute())
 
-    def entrust(self, data: bytes) -> None:
-        """Keep `data` in the engine for a window that resumes it."""
-        self._requests.change(entrusted=data)
+    def store_window_state(self, data: bytes) -> None:
+        """Store `data` in the engine for a window that resumes it."""
+        self._requests.change(window_state=data)
 
     def note(self, text: str) -> None:
         """Add `text` to the events, and record it with them."""
@@ -234,7 +238,7 @@ class Engine:
         self._requests.act(Note(text))
 
     def status(self) -> Status:
-        # One that is being written is not there to read: the last is nearer the truth than none.
+        # While one is being written there is none to read: then the last one is used.
         if (read := self._ring.read_status()) is not None:
             self._seen = read
             self._requests.acknowledge(read.requested, read.reported)
@@ -244,19 +248,19 @@ class Engine:
         return self._seen
 
     def latest(self, status: Status, sequence: int | None = None) -> Estimate | None:
-        """The newest estimate of the generation that `status` tells of, or of one frame before.
+        """The newest estimate of the generation in `status`, or that of the frame `sequence`.
 
-        The frame with this `sequence` may be gone: the last 64 are there at most.
+        None if it is not available: at most the last 64 estimates are.
         """
         if status.slot is None:
             return None
         return self._ring.read(status.generation, status.slot, sequence)
 
     def recent(self, status: Status, after: int) -> tuple[Array, Array, int]:
-        """Device times (T,) in s and what is `traced` (T, 3 k, P) of the estimates since `after`.
+        """Device times (T,) in s and `traced` quantities (T, 3 k, P) of estimates since `after`.
 
-        Of each of k quantities the components: of `curvature` in 1/m. `after` is a number that the
-        last call answered with, 0 at first; at most the last 64 are there.
+        The three components of each of k quantities, such as `curvature` in 1/m. `after` is the
+        number that the last call returned, 0 at first; at most the last 64 estimates.
         """
         if status.slot is None:
             return np.empty(0), np.empty((0, 3, 0)), 0
@@ -275,7 +279,7 @@ class Engine:
         self.close()
 
     def _reap(self) -> None:
-        """Wait for the process to end, or end it."""
+        """Wait for the process to end; kill it after a time limit."""
         if self._process is not None:
             self._process.join(_ORDERLY if self._requested.recording is None else _WRITTEN)
             if self._process.is_alive():
@@ -285,15 +289,15 @@ class Engine:
         self._requests.disconnect()
         self._process = None
 
-    def _give_memory_back(self) -> None:
+    def _release_memory(self) -> None:
         for ring in (self._ring, self._compared_ring):
             if self.resumed is None:
                 ring.destroy()
             else:
-                ring.close()  # the process that was resumed gives it back
+                ring.close()  # the resumed process releases it
 
     def close(self) -> None:
-        """End the process and give the memory back."""
+        """End the process and release the memory."""
         self._requests.say_goodbye()
         self._reap()
-        self._give_memory_back()
+        self._release_memory()

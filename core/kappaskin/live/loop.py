@@ -66,7 +66,7 @@ class EngineLoop:
             compared, self._builder, status.compared or PipelineStatus()
         )
         self._tare = TareCapture(self._builder, self._status.tare)
-        self._publishing, self._reported_events = Publishing(), self._status.happened
+        self._publishing, self._reported_events = Publishing(), self._status.event_count
         self._haste = ProcessPriority()
         self._arrivals, self._rate_limit = ArrivalTimes(), RateLimit()
         self._changing, self._again = False, math.inf
@@ -321,7 +321,7 @@ class EngineLoop:
         self._status = replace(
             self._status,
             sensor=sensor,
-            meetings=self._status.meetings + (sensor is not None),
+            connections=self._status.connections + (sensor is not None),
         )
         self._main.connect(sensor)
         self._compared.connect(sensor)
@@ -347,7 +347,7 @@ class EngineLoop:
                 replay=source.replay if isinstance(source, ReplayedSource) else None,
             )
         self._publishing.report(status.source_status(self._reported_events))
-        self._reported_events = status.happened
+        self._reported_events = status.event_count
         computed = self._main.status
         self._status = replace(
             status,

@@ -21,14 +21,14 @@ from kappaskin.scenes import Scene
 _RESEND = 0.5  # s after which an engine that reports, but not of what was sent, did not get it
 
 SETTINGS = ("setup", "compared", "region", "targets", "source", "scene", "recording")
-"""The fields of `Requested` that the engine does something about when they change."""
+"""The fields of `Requested` that the engine reacts to when they change."""
 
 
 @dataclass(frozen=True)
 class Seek:
-    """Go on with a scene or recording from its time `at` in s, or from where it is, at a `speed`.
+    """Continue a scene or recording from time `at` in s, or from its present time, at a `speed`.
 
-    A recording that is `looped` begins again at its end; None leaves that as it is.
+    A recording that is `looped` restarts at its end; None leaves this setting unchanged.
     """
 
     at: float | None
@@ -36,7 +36,7 @@ class Seek:
     looped: bool | None = None
 
     def overtakes(self, other: "Action | str") -> bool:
-        """Whether nobody would see what the `other` request does, which came just before."""
+        """Whether this request makes the `other` one, which came just before, ineffective."""
         if not isinstance(other, Seek) or self.at is None:
             return False
         return other.looped is None or self.looped is not None
@@ -63,21 +63,21 @@ class Note:
 
 @dataclass(frozen=True)
 class RestartEffects:
-    """Let what spoils the readings of a simulated sensor start anew, as from rest."""
+    """Restart the simulated sensor's effects, as from rest."""
 
 
 Action = Seek | StepFrames | TakeTare | Note | RestartEffects
-"""What is to be done once, as opposed to settings that last."""
+"""Requests carried out once, as opposed to lasting settings."""
 
 
 @dataclass(frozen=True)
 class Requested:
-    """All that is requested of the engine; another engine can go on with it.
+    """All that is requested of the engine; another engine can continue with it.
 
-    The settings that last come first: with a scene or recording it goes on at `speed`, `looped` or
-    not, and `entrusted` is kept for a window that resumes the engine. `actions` are the last ones,
-    each with the `number` that the value had with it; the settings in `changed` were requested with
-    that number. `over` ends the engine.
+    Lasting settings come first: a scene or recording plays at `speed`, `looped` or not, and
+    `window_state` is stored for a window that resumes the engine. `actions` are the last ones, each
+    with the `number` of the value that added it; `changed` has the number with which each setting
+    was last requested. `over` ends the engine.
     """
 
     setup: Setup = field(default_factory=Setup)
@@ -89,7 +89,7 @@ class Requested:
     recording: Path | None = None
     speed: float = 1.0
     looped: bool = False
-    entrusted: bytes = b""
+    window_state: bytes = b""
     actions: tuple[tuple[int, Action], ...] = ()
     over: bool = False
     number: int = 0
@@ -113,7 +113,7 @@ class Requested:
     def since(self, number: int) -> "list[str | Action]":
         """The settings, by name, and actions requested after `number`, in order.
 
-        Without positions in a source that were left for another one at once.
+        A seek that the next one overtakes is left out.
         """
         settings = [(self.changed.get(name, 0), name) for name in SETTINGS]
         # A stable sort: of one number the settings go first, the source before its scene.
@@ -128,13 +128,13 @@ class Requested:
         return found
 
     def update(self, number: int) -> "Update":
-        """What makes this value of any one from `number` on."""
+        """The update that turns any value from `number` on into this one."""
         changed = {name: at for name, at in self.changed.items() if at > number}
         values = {name: getattr(self, name) for name in changed}
         return Update(self.number, number, values, changed)
 
     def updated(self, update: "Update") -> "Requested":
-        """The value that an `update` brings, or this one where it is as new."""
+        """The value after an `update`, or this one where the update is not newer."""
         if not update.number > self.number >= update.since:
             return self
         changed = {**self.changed, **update.changed}
@@ -200,7 +200,7 @@ class RequestSender:
                 self._line.send(self.requested.changing(over=True).update(self._known))
 
     def disconnect(self) -> None:
-        """Let go of the line."""
+        """Close the line."""
         if self._line is not None:
             self._line.close()
         self._line = None

@@ -1,4 +1,4 @@
-"""Status of the engine, as it reports it to the window."""
+"""Status of the engine, as reported to the window."""
 
 import math
 from collections.abc import Sequence
@@ -21,26 +21,26 @@ from kappaskin.sources import Accounting
 
 OFF, WAITING, STREAMING, LOST = "off", "waiting", "streaming", "lost"
 
-_EVENTS = 64  # last ones that are told
+_EVENTS = 64  # last events in the status
 
 
 @dataclass(frozen=True)
 class Status:
-    """How the engine is doing.
+    """State of the engine.
 
-    `state` is off, waiting (open, but the device has not said what it is), streaming or lost, and
+    `state` is off, waiting (open, but the device has not sent its information), streaming or lost;
     `message` says why. `setup` is the one in use, `refusal` says why it is not the one requested
-    last, `computing` that another is being prepared. `region` is scanned unless `region_refusal`
-    says why not. `meetings` counts the devices that said what they are, `skipped` the frames that
-    came in faster than they could be computed. `rate` in frames/s, `reader_gap` the 99th percentile
-    of the time between two arrivals in s, `last_frame` and `reported` on the monotonic clock.
-    `playing` tells where a simulated scene is at a device time. `events` are the last of those that
-    `happened`. `temperature` in degrees Celsius is the device's, NaN if it does not tell. `tare`
-    tells of those taken, `drift` is that since the tare of the `setup`, None without one. `health`
-    tells which channels are not to be trusted, `publishing` where estimates are sent to,
-    `recording` what is being written, `replay` where in a recording the source is, None for any
-    other, and `compared` what else is computed of the same frames, None where nothing is.
-    `requested` is the number of the newest request that the engine has.
+    last, `computing` whether another is being prepared. `region` is scanned unless `region_refusal`
+    says why not. `connections` counts the devices connected so far, `skipped` the frames that
+    arrived faster than they could be computed. `rate` in frames/s; `reader_gap` in s is the 99th
+    percentile of the time between two arrivals; `last_frame` and `reported` in s on the monotonic
+    clock. `playing` maps device time to the time of a simulated scene. `events` are the last of
+    `event_count`. `temperature` of the device in degrees Celsius, NaN if it sends none. `tare` is
+    the state of tares, `drift` the drift since the tare of the `setup`, None without one. `health`
+    lists faulty channels, `publishing` the state of each target, `recording` that of the file being
+    written, `replay` the position in a recording (None for any other source), `compared` the state
+    of the second pipeline (None without one). `requested` is the number of the newest request that
+    the engine has received.
     """
 
     state: str = OFF
@@ -48,7 +48,7 @@ class Status:
     message: str = ""
     refusal: str = ""
     sensor: Sensor | None = None
-    meetings: int = 0
+    connections: int = 0
     setup: Setup = field(default_factory=Setup)
     computing: bool = False
     region: Region = field(default_factory=Region)
@@ -63,7 +63,7 @@ class Status:
     reported: float = -math.inf
     playing: Playback = field(default_factory=Playback)
     events: tuple[Event, ...] = ()
-    happened: int = 0
+    event_count: int = 0
     temperature: float = math.nan
     tare: TareStatus = field(default_factory=TareStatus)
     drift: Drift | None = None
@@ -75,12 +75,12 @@ class Status:
     requested: int = 0
 
     def after(self, events: Sequence[Event]) -> "Status":
-        """The same status once `events` happened."""
+        """The same status with `events` appended."""
         last = (*self.events, *events)[-_EVENTS:]
-        return replace(self, events=last, happened=self.happened + len(events))
+        return replace(self, events=last, event_count=self.event_count + len(events))
 
     def without_source(self) -> "Status":
-        """The same where nothing is read."""
+        """The same status without a source."""
         return replace(
             self,
             state=OFF,
@@ -100,16 +100,16 @@ class Status:
 
     @property
     def kind(self) -> str:
-        """Where readings come from, as receivers read it; empty without a sensor."""
+        """Kind of source in published messages: live, sim or replay; empty without a sensor."""
         if self.sensor is None:
             return ""
         if self.replay is not None:
             return "replay"
         return "sim" if self.sensor.simulated else "live"
 
-    def source_status(self, happened: int) -> SourceState:
-        """What receivers get, with the events after so many had `happened`."""
-        fresh = min(self.happened - happened, len(self.events))
+    def source_status(self, reported: int) -> SourceState:
+        """State of the source for receivers, with the events after the first `reported` ones."""
+        fresh = min(self.event_count - reported, len(self.events))
         events = self.events[len(self.events) - fresh :]
         rest = self.message, self.sensor, self.rate, self.last_frame
         return SourceState(self.state, self.kind, *rest, events)

@@ -12,7 +12,7 @@ from kappaskin.live.requests import Requested
 from kappaskin.recording import RecordingStatus
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.recovery import (
-    Entrusting,
+    WindowStateStore,
     settings_in,
     settings_left,
     settings_text,
@@ -26,8 +26,8 @@ BEFORE = Settings(
 )
 
 
-def left(source: str | None, entrusted: bytes = b"") -> ResumeInfo:
-    asked = Requested(source=source, recording=Path("press.mcap"), entrusted=entrusted)
+def left(source: str | None, window_state: bytes = b"") -> ResumeInfo:
+    asked = Requested(source=source, recording=Path("press.mcap"), window_state=window_state)
     return ResumeInfo(asked, ("", ""), 1, 5.0)
 
 
@@ -41,7 +41,7 @@ def test_the_next_window_goes_on_as_the_last_one_was(
     opened, abandoned, folder: Path, tmp_path: Path, until, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("kappaskin.live.resume._ANSWER", 30.0)  # s, or a busy one passes for stuck
-    alone = abandoned(folder, tmp_path / "press.mcap", entrusted=settings_text(BEFORE).encode())
+    alone = abandoned(folder, tmp_path / "press.mcap", window_state=settings_text(BEFORE).encode())
     until(lambda: bool(list(folder.glob("*.note"))))
     window: MainWindow = opened("/dev/ttyABSENT7", Engine(resume_from=folder))
     until(lambda: window.display.badge.state == "SIM" and window.taping.recording)
@@ -82,23 +82,23 @@ def test_what_is_said_names_file_and_source_and_what_was_asked_for_if_it_is_anot
 
 
 class Trusted:
-    """Stands in for an engine, to see what it is entrusted with."""
+    """Stands in for an engine, to see what it is given to store."""
 
     def __init__(self) -> None:
         self.data: list[bytes] = []
 
-    def entrust(self, data: bytes) -> None:
+    def store_window_state(self, data: bytes) -> None:
         self.data.append(data)
 
 
-def test_settings_are_entrusted_once_each_and_only_while_it_records(qapp) -> None:
+def test_settings_are_stored_once_each_and_only_while_it_records(qapp) -> None:
     history, engine = History(Settings()), Trusted()
-    entrusting = Entrusting(history, engine)
+    storing = WindowStateStore(history, engine)
     recording = Status(recording=RecordingStatus("x.mcap", active=True))
-    entrusting.follow(Status())
+    storing.follow(Status())
     assert engine.data == []
     for status in (recording, recording, Status()):
-        entrusting.follow(status)
+        storing.follow(status)
     history.change("x", -1, functions_x=6)
-    entrusting.follow(recording)
+    storing.follow(recording)
     assert [settings_in(data.decode()).functions_x for data in engine.data] == [8, 6]

@@ -227,7 +227,7 @@ def test_a_scene_stands_still_where_it_is_sought_and_the_status_says_so(engine) 
 
 def test_another_skin_is_met_as_another_device_is(engine) -> None:
     engine.connect("sim:centre")
-    before, meetings = next_estimate(engine), engine.status().meetings
+    before, connections = next_estimate(engine), engine.status().connections
     patch = Patch(0.04, 0.03, 0.0129)
     layout = SensorLayout.regular(patch, 7, 9)
 
@@ -235,7 +235,7 @@ def test_another_skin_is_met_as_another_device_is(engine) -> None:
     after = next_estimate(engine, before.generation)
 
     status = engine.status()
-    assert (status.state, status.meetings) == (STREAMING, meetings + 1)
+    assert (status.state, status.connections) == (STREAMING, connections + 1)
     assert status.sensor is not None
     assert status.sensor.layout.patch == patch
     assert after.curvature.shape == (3, 63)
@@ -443,7 +443,7 @@ def test_revived_it_goes_on_with_what_was_asked_for_last_and_says_so(own_engine,
     assert wait_for(lambda: next_estimate(engine).coefficients.shape == (6, 5))
     engine.revive()  # one that lives is left alone
     before, pid = engine.status(), engine.pid
-    assert before.happened == 0
+    assert before.event_count == 0
 
     died = time.monotonic()
     killed(engine)
@@ -458,7 +458,7 @@ def test_revived_it_goes_on_with_what_was_asked_for_last_and_says_so(own_engine,
     assert [(event.kind, event.text) for event in status.events] == [
         ("engine", "the engine process ended unexpectedly and was started again")
     ]
-    assert (status.happened, status.message) == (1, "")
+    assert (status.event_count, status.message) == (1, "")
     assert died < status.events[0].time < start
     assert after.coefficients.shape == (6, 5)
     assert wait_for(lambda: next_estimate(engine).true_contact.tolist() == [0.03, 0.06])
@@ -481,19 +481,19 @@ def test_the_third_death_within_ten_seconds_is_the_last_until_it_is_connected(
     for deaths in (1, 2):
         killed(engine)
         assert engine.alive
-        assert engine.status().happened == deaths
+        assert engine.status().event_count == deaths
     killed(engine)
     engine.revive()
     assert not engine.alive
     status = engine.status()
-    assert (status.state, status.happened) == (LOST, 3)
+    assert (status.state, status.event_count) == (LOST, 3)
     assert status.message == status.events[-1].text
     assert "ended 3 times within 10 s" in status.message
     assert "fewer functions, then connect again" in status.message
 
     engine.connect("sim:")
 
-    assert state(engine, STREAMING).happened == 3
+    assert state(engine, STREAMING).event_count == 3
     killed(engine)
     assert engine.alive  # it is forgiven
 

@@ -185,7 +185,7 @@ CONNECT = {"source": "x", "scene": None, "speed": 1.0, "looped": False}
         ((Seek(1.0, 1.0, True), Seek(2.0, 1.0)), [Seek(1.0, 1.0, True), Seek(2.0, 1.0)]),
         ((Seek(1.0, 1.0, True), Seek(2.0, 1.0, False)), [Seek(2.0, 1.0, False)]),
         ((StepFrames(1), StepFrames(1)), [StepFrames(1), StepFrames(1)]),
-        (({"entrusted": b"mine"},), []),
+        (({"window_state": b"mine"},), []),
     ],
 )
 def test_the_engine_does_the_difference_in_the_order_of_the_requests(

@@ -105,7 +105,7 @@ def test_a_recording_outlives_a_killed_parent_and_is_adopted_without_a_gap(
         status = wait_for(lambda: (s := engine.status()).events and len(s.events) == 2 and s)
         first = wait_for(lambda: engine.latest(engine.status()))
         assert first.coefficients.shape == (6, 7)
-        assert (status.generation, status.meetings) == (engine_alone.generation, 1)
+        assert (status.generation, status.connections) == (engine_alone.generation, 1)
         assert [event.text for event in status.events] == [
             "the window ended unexpectedly while it recorded",
             f"the recording {engine.resumed.lasted}",
@@ -224,7 +224,7 @@ def test_whoever_comes_is_told_all_that_was_asked_for_and_asks_from_then_on(
     sender, asker = asked_by()
     sender.change(setup=Setup(5, 4))
     sender.change(source="sim:line")
-    sender.change(entrusted=b"mine")
+    sender.change(window_state=b"mine")
     sender.disconnect()
     assert wait_for(lambda: not (asker.receive(0.0) or asker.resumable) or asker.check(True))
 

@@ -222,12 +222,12 @@ class Costing(QObject):
         """What is not as it was when the costs were measured, or nothing."""
         if self.scene is None:
             return ""
-        simulated, meetings, noise = self._of
+        simulated, connections, noise = self._of
         if simulated != self._session.inside:
             return "on another skin"
         if simulated:
             return _unlike(self.scene, self._session.scene)
-        if meetings != self._session.status.meetings:
+        if connections != self._session.status.connections:
             return "on another skin"
         now = self._noise()
         return "with other noise" if not 1 / _NOISIER < now / noise < _NOISIER else ""
@@ -275,7 +275,7 @@ class Costing(QObject):
             self.scene = scene_of_sensor(status.sensor, noise)
             self.about = f"With a point load in the middle and the noise of now, {noise:.2g} 1/m."
         if self.scene is not None:
-            self._of = session.inside, status.meetings, noise
+            self._of = session.inside, status.connections, noise
             self._tried = self._to_try(self.scene)
 
     def _to_try(self, scene: Scene) -> tuple[Setting, ...]:

@@ -78,7 +78,7 @@ class Calibrating(QObject):
         super().__init__(parent)
         self._history, self._clock = history, clock
         self._status = Status()
-        self._meeting = 0
+        self._connection = 0
         self.seconds = 1.0
         self.procedure: Procedure | None = None
         self.result: Result | None = None
@@ -128,7 +128,7 @@ class Calibrating(QObject):
         except Refusal as refusal:
             self._tell(str(refusal))
             return
-        self.seconds, self._meeting, self.result = seconds, self._status.meetings, None
+        self.seconds, self._connection, self.result = seconds, self._status.connections, None
         self._lay()
         self._tell("")
 
@@ -263,7 +263,7 @@ class Calibrating(QObject):
 
     def _ended_by(self, status: Status) -> str:
         """Why the procedure cannot go on, or nothing."""
-        if status.meetings != self._meeting:
+        if status.connections != self._connection:
             return (
                 "Another device answered, or the same one restarted or changed. What was taken is "
                 "not of this one: begin anew."

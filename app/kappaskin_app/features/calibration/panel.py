@@ -118,7 +118,7 @@ class CalibratePanel(Panel):
             self.body.addWidget(page)
         self._calibrating: Calibrating | None = None
         self._status = Status()
-        self._meeting = 0
+        self._connection = 0
         self._phase: QWidget = self.start
         self._show_page()
         for editor in (self.start.seconds, self.start.hold):
@@ -146,8 +146,8 @@ class CalibratePanel(Panel):
         self._status = status
         self.steps.all.setVisible(simulating)
         self.start.begin.setEnabled(status.sensor is not None and status.state == "streaming")
-        if status.sensor is not None and status.meetings != self._meeting:
-            self._meeting = status.meetings
+        if status.sensor is not None and status.connections != self._connection:
+            self._connection = status.connections
             radii = ", ".join(f"{1e3 * radius:g}" for radius in radii_for(status.sensor))
             with QSignalBlocker(self.start.radii):
                 self.start.radii.setText(radii)

@@ -35,7 +35,7 @@ class Taring(QObject):
         super().__init__(parent)
         self._history, self._engine, self._tares = history, engine, tares
         self._status = Status()
-        self._meetings, self._aside = 0, False
+        self._connections, self._aside = 0, False
         self._before: Tare | None = None  # what was in use when the last was taken
         self._last = history.settings.tare
         self.stored: Tare | None = None
@@ -81,8 +81,8 @@ class Taring(QObject):
     def follow(self, status: Status) -> None:
         """Take note of how the engine is doing."""
         was, self._status = self._status, status
-        if status.sensor is not None and status.meetings != self._meetings:
-            self._meetings = status.meetings
+        if status.sensor is not None and status.connections != self._connections:
+            self._connections = status.connections
             self._find(status.sensor)
         news = status.tare
         if news != was.tare:

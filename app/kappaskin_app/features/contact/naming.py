@@ -44,7 +44,7 @@ class Naming(QObject):
         if estimate is None or sensor is None:
             self._naming.stop()
             self.named.emit("")
-        elif self._key != (key := (status.meetings, status.setup.edge or sensor.edge)):
+        elif self._key != (key := (status.connections, status.setup.edge or sensor.edge)):
             self._key = key
             self._learning.run(ObjectFinder, sensor.plate, sensor.layout, key[1])
         elif self._learning.running:

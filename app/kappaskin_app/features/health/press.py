@@ -29,7 +29,7 @@ class MapTesting(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._status, self._meeting = Status(), 0
+        self._status, self._connection = Status(), 0
         self.test: PressTest | None = None
         self.verdict: MapVerdict | None = None
         self.message = ""
@@ -49,7 +49,7 @@ class MapTesting(QObject):
         except Refusal as refusal:
             self._tell(str(refusal))
             return
-        self.verdict, self._meeting = None, self._status.meetings
+        self.verdict, self._connection = None, self._status.connections
         self.begun.emit()
         self._tell("")
 
@@ -78,7 +78,7 @@ class MapTesting(QObject):
     def follow(self, status: Status) -> None:
         """End a test whose device has gone."""
         self._status = status
-        gone = status.state != "streaming" or status.meetings != self._meeting
+        gone = status.state != "streaming" or status.connections != self._connection
         if self.running and gone:
             self.stop(_ENDED)
 

@@ -32,7 +32,7 @@ class EventLog(QDialog):
         self.setObjectName("event_log")
         self.setWindowTitle("What happened")
         self.resize(720, 320)
-        self._happened = 0
+        self._event_count = 0
         self._lines: deque[str] = deque(maxlen=_KEPT)
         self.list = QPlainTextEdit(readOnly=True, placeholderText=_NOTHING)  # pyright: ignore[reportCallIssue]
         self.list.setLineWrapMode(QPlainTextEdit.LineWrapMode.WidgetWidth)
@@ -55,10 +55,10 @@ class EventLog(QDialog):
 
     def follow(self, status: Status) -> None:
         """Take up what happened since the last time."""
-        new = status.events[max(0, len(status.events) - status.happened + self._happened) :]
-        if status.happened == self._happened or not new:
+        new = status.events[max(0, len(status.events) - status.event_count + self._event_count) :]
+        if status.event_count == self._event_count or not new:
             return
-        self._happened = status.happened
+        self._event_count = status.event_count
         self._add(new)
         self.told.emit("; ".join(dict.fromkeys(_sentence(event.text) for event in new[-2:])))
 

@@ -13,7 +13,7 @@ from kappaskin_app.shell.folders import newest, recordings_folder
 from kappaskin_app.shell.menus import DOTS
 from kappaskin_app.shell.opening import Kind
 from kappaskin_app.shell.pages import LIVE
-from kappaskin_app.shell.recovery import Entrusting
+from kappaskin_app.shell.recovery import WindowStateStore
 from kappaskin_app.shell.session import RECORDED
 from kappaskin_app.shell.window import MainWindow
 
@@ -42,8 +42,8 @@ class RecordingFeature:
     def _wire_taping(self, shell: MainWindow) -> None:
         session, taping = shell.session, self.taping
         session.reported.connect(guarded(taping.follow))
-        self._entrusting = Entrusting(shell.history, session.engine)
-        session.reported.connect(guarded(self._entrusting.follow))
+        self._window_state = WindowStateStore(shell.history, session.engine)
+        session.reported.connect(guarded(self._window_state.follow))
         taping.changed.connect(guarded(self._show_mark))
         taping.told.connect(guarded(shell.tell))
         self.mark.clicked.connect(guarded(taping.dismiss))

@@ -150,7 +150,7 @@ class Seeing(QObject):
         s, sensor = self._history.settings, status.sensor
         functions = s.functions_x, 1 if sensor.layout.patch.strip else s.functions_y
         edge = s.fit_edge or sensor.edge
-        asked = (status.meetings, edge, functions)
+        asked = (status.connections, edge, functions)
         if asked != self._asked:
             self._asked = asked
             if functions[0] * functions[1] <= MOST:

@@ -152,7 +152,7 @@ class Picking(QObject):
         self._history, self._session, self._display = history, session, display
         self.card, self.traces = ElementCard(), Traces()
         self.element = -1
-        self._past, self._met = Past(), 0
+        self._past, self._connection = Past(), 0
         self._of, self._after = (0, 0), 0
         self._next_plots = self._next_words = self._next_spectrum = 0.0
         session.estimated.connect(guarded(self.receive))
@@ -209,11 +209,11 @@ class Picking(QObject):
     def receive(self, estimate: Estimate) -> None:
         """Keep what is read, and show it as often as it can be seen."""
         status, now = self._session.status, time.monotonic()
-        if status.meetings != self._met:
-            self._met, self.element = status.meetings, -1
+        if status.connections != self._connection:
+            self._connection, self.element = status.connections, -1
             self._past.forget(0)  # another skin may have as many elements, on a clock that goes on
             self.card.show_facts("", "")
-        key = status.meetings, estimate.generation
+        key = status.connections, estimate.generation
         if key != self._of:
             self._of, self._after = key, 0
         times, readings, self._after = self._session.engine.recent(status, self._after)

@@ -60,7 +60,7 @@ def bench(qapp: QApplication) -> Bench:
     made = Bench(cast("Any", None), history, 100.0, Status(), laid, Simulator(SCENE))
     made.calibrating = Calibrating(history, Tasks(qapp), clock=lambda: made.now)
     made.calibrating.laid.connect(laid.append)
-    made.tell(state="streaming", sensor=SCENE.sensor(), meetings=1, generation=1)
+    made.tell(state="streaming", sensor=SCENE.sensor(), connections=1, generation=1)
     return made
 
 
@@ -176,7 +176,7 @@ def test_a_step_without_readings_is_given_up(bench: Bench) -> None:
 @pytest.mark.parametrize(
     ("changed", "why"),
     [
-        ({"meetings": 2}, "another device"),
+        ({"connections": 2}, "another device"),
         ({"state": "lost", "message": "unplugged"}, "unplugged"),
         ({"state": "off"}, "connection ended"),
     ],

@@ -55,7 +55,7 @@ class Bench:
         self.panel.show_status(self.status, False)
 
     def meet(self, sensor=SENSOR):
-        self.tell(sensor=sensor, meetings=self.status.meetings + 1, state="streaming")
+        self.tell(sensor=sensor, connections=self.status.connections + 1, state="streaming")
 
     def end(self, tare=None, refusal=""):
         self.tell(tare=TareStatus(False, self.status.tare.ended + 1, tare, refusal))

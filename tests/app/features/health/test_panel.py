@@ -172,13 +172,13 @@ def test_without_a_sensor_there_is_nothing_to_press(qapp) -> None:
 def test_going_back_after_a_verdict_asks_nothing_of_another_skin(qapp) -> None:
     testing, asked = MapTesting(), []
     sensor, other = (load_scene(name).sensor() for name in ("centre", "fingertip"))
-    testing.follow(Status(state="streaming", sensor=sensor, meetings=1))
+    testing.follow(Status(state="streaming", sensor=sensor, connections=1))
     testing.begin(False)
     while testing.running:
         testing.skip()
     testing.asked.connect(asked.append)
 
-    testing.follow(Status(state="streaming", sensor=other, meetings=2))
+    testing.follow(Status(state="streaming", sensor=other, connections=2))
     testing.back()
 
     assert set(asked) == {-1}

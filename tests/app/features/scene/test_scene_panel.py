@@ -63,10 +63,10 @@ def test_text_and_forms_change_the_scene_and_each_other_while_it_plays(
     panel.setCurrentIndex(EDIT)
     text = panel.editor.text
     assert text.toPlainText() == scene_file("tapping").read_text()
-    meetings = window.session.status.meetings
+    connections = window.session.status.connections
     text.setPlainText(text.toPlainText().replace("force = 0.15", "force = 0.3"))
     until(lambda: window.session.scene.stimuli[0].what.force == 0.3)
-    assert window.session.status.meetings == meetings  # the same skin goes on
+    assert window.session.status.connections == connections  # the same skin goes on
     panel.editor.form.edited.emit(text.toPlainText().replace("x = 0.06", "x = 0.04"))
     until(lambda: window.session.scene.stimuli[0].what.x == 0.04)
     assert "x = 0.04" in text.toPlainText()
@@ -165,12 +165,12 @@ def test_effects_are_planned_and_forced_while_the_scene_plays(window, panel, unt
     assert why
     assert row_of(panel, "creep")[0] == ""
     assert not panel.effects.forces["creep"].isEnabled()
-    meetings = window.session.status.meetings
+    connections = window.session.status.connections
     force(panel, "gaussian-noise", "off")
     until(lambda: window.session.scene.choice.off == {"gaussian-noise"})
     until(lambda: row_of(panel, "gaussian-noise")[0] == "left out", 60.0)
     assert 'off = ["gaussian-noise"]' in panel.editor.text.toPlainText()
-    assert window.session.status.meetings == meetings
+    assert window.session.status.connections == connections
     force(panel, "quantisation", "on")
     assert window.history.stack.undoText() == "force quantisation"
     window.history.stack.undo()

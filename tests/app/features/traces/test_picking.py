@@ -150,10 +150,10 @@ def test_while_elements_are_chosen_to_scan_a_click_in_a_heatmap_picks_none(
 def test_another_skin_with_as_many_elements_has_no_past(window: MainWindow, until) -> None:
     session, past = window.session, window.picking._past  # noqa: SLF001
     until(lambda: len(past.of([0])[0]) > 100)
-    met, kept = session.status.meetings, []
+    met, kept = session.status.connections, []
 
     def note(_: object) -> None:
-        if session.status.meetings != met:
+        if session.status.connections != met:
             kept.append(len(past.of([0])[0]))
 
     session.estimated.connect(note)
