@@ -49,15 +49,15 @@ _SERVER_INFO: _Answer = {
     "op": "serverInfo",
     "name": "kappaskin",
     "capabilities": [],
-    "sessionId": str(time.time_ns()),  # of this process: one that comes back goes on
+    "sessionId": str(time.time_ns()),  # of this process: a client that reconnects continues
 }
 _ADVERTISED = {"op": "advertise", "channels": [channel.advertised for channel in CHANNELS]}
 _BY_NUMBER = {channel.number: channel for channel in CHANNELS}
 
-LARGEST = 65536  # bytes of what a client says
-PER_SECOND = 2**18  # bytes that a client may say in a second: more is no viewer
+LARGEST = 65536  # bytes of a client's message
+PER_SECOND = 2**18  # bytes that a client may send in a second: no viewer sends more
 _WAITING = 2**18  # bytes in the socket that the client has not taken yet
-_REST = 2**20  # bytes besides, of answers to a client that asks and asks and takes nothing
+_REST = 2**20  # bytes of replies to a client that sends requests but reads nothing
 _PATIENCE = 5.0  # s for a handshake
 STUCK = 30.0  # s for which a client may take nothing
 _MOMENT = 1e-3  # s that the other thread may have the socket
@@ -116,7 +116,7 @@ class FoxgloveClient:
             self._lock.release()
 
     def _flush(self) -> None:
-        """Write what the socket takes of what is left, without waiting."""
+        """Write as much of the unsent bytes as the socket accepts, without waiting."""
         if not self._rest or self.ended:
             return
         try:
@@ -130,7 +130,7 @@ class FoxgloveClient:
         self._moved = time.monotonic()
 
     def go_on(self) -> None:
-        """Write what was left, and end what is over: called now and then."""
+        """Write unsent bytes, and close an ended connection: called now and then."""
         now = time.monotonic()
         # The lock is taken for who lags behind alone: were this thread put to sleep with it, the
         # one that computes would drop messages to a client that takes all of them.
@@ -146,7 +146,7 @@ class FoxgloveClient:
         self.ended = self.ended or stuck
 
     def read(self) -> None:
-        """Take in what came, and answer it."""
+        """Read received bytes, and reply."""
         try:
             data = self.socket.recv(LARGEST)
         except BlockingIOError:
@@ -195,7 +195,7 @@ class FoxgloveClient:
             self._protocol.send_text(json.dumps(answer).encode())
 
     def _handle(self, text: bytes) -> bool:
-        """Do what a message asks for; whether it could be understood."""
+        """Carry out a client's message; whether it was valid."""
         try:
             request = cast("_Answer", json.loads(text))
             if request["op"] == "subscribe":
@@ -231,10 +231,10 @@ class FoxgloveClient:
 
 
 MOST_CLIENTS = 16
-"""So many clients at most are served at the same time."""
+"""Clients served at the same time, at most."""
 
 FRAME = 1 / 30  # s between two pictures of the skin
-_TICK = 0.1  # s between two looks at clients that say nothing
+_TICK = 0.1  # s between two checks of silent clients
 _READ = 65536
 
 
@@ -343,7 +343,7 @@ class Foxglove:
         self._selector.close()
 
     def _turn(self) -> bool:
-        """Wait for something to be done, and do it; True at the end."""
+        """Wait for the next event, and handle it; True at the end."""
         watched = any(SKIN in client.subscribed for client in self._clients)
         for key, _ in self._selector.select(FRAME if watched else _TICK):
             if key.fileobj is self._ending:
@@ -379,7 +379,7 @@ class Foxglove:
         self._clients = tuple(other for other in self._clients if other is not client)
 
     def _draw(self) -> None:
-        """Send the skin as it is now to those who look at it, if it is another than the last."""
+        """Send the present skin to its subscribers, if it differs from the last one sent."""
         now, message = time.monotonic(), self._latest
         if message is None or message is self._drawn or now < self._next_cloud:
             return

@@ -87,7 +87,7 @@ def text_of(numbers: Iterable[float], form: str) -> str:
 
 
 def epoch() -> float:
-    """When this machine's monotonic clock began, in s since 1970, as its other clock tells now."""
+    """Zero of this machine's monotonic clock in s since 1970, by its present wall clock."""
     best = math.inf, 0.0
     for _ in range(3):  # of which the system interrupts one at most
         before, now, after = time.monotonic(), time.time(), time.monotonic()

@@ -21,7 +21,7 @@ from kappaskin.publish.message import EstimateMessage, MessageHeader, SourceStat
 
 @dataclass(frozen=True)
 class Receiver:
-    """A receiver of messages: how many were `sent` and `dropped`, and why the last of these was."""
+    """A receiver of messages: counts of `sent` and `dropped`, and why the last one was dropped."""
 
     name: str
     sent: int = 0
@@ -44,18 +44,18 @@ class Publisher(Protocol):
         ...
 
     def send(self, message: EstimateMessage) -> None:
-        """Send what one frame says."""
+        """Send the estimate of one frame."""
         ...
 
     def report(self, state: SourceState) -> None:
-        """Send how the source is doing; called several times a second."""
+        """Send the state of the source; called several times a second."""
         ...
 
     def close(self) -> None: ...
 
 
 MOST_TARGETS = 8
-"""So many targets at most are published to at the same time."""
+"""Targets published to at the same time, at most."""
 
 PORTS = {"udp": 9870, "foxglove": 8765}  # PlotJuggler's and Foxglove's own
 _HOSTS = {"udp": "", "foxglove": "127.0.0.1"}
@@ -67,7 +67,7 @@ _LONGEST = 253  # characters of a name on the internet
 
 @dataclass(frozen=True)
 class Target:
-    """Where messages go, and how: by `scheme`."""
+    """Destination of messages, and by `scheme` their transport."""
 
     scheme: str
     host: str
@@ -79,7 +79,7 @@ class Target:
 
 
 def target_of(text: str) -> Target:
-    """The target called `text`, refused where it is none."""
+    """The target that `text` names; a `Refusal` for an invalid one."""
     found = _FORM.fullmatch(text.strip())
     scheme = found[1].lower() if found else ""
     if found is None or scheme not in PORTS:
@@ -103,7 +103,7 @@ def _port(text: str | None, usual: int) -> int:
 
 
 def targets_of(texts: Sequence[str]) -> tuple[Target, ...]:
-    """The targets with these names, none of them twice."""
+    """The targets with these names; a `Refusal` for duplicates."""
     targets = tuple(map(target_of, texts))
     for number, target in enumerate(targets):
         if target in targets[:number]:
@@ -119,8 +119,8 @@ def reason(error: OSError | UnicodeError) -> str:
 
 
 def opened(target: Target) -> Publisher:
-    """The transport to `target`; a `Refusal` where there can be none. This may take a while."""
-    try:  # by name: a transport is imported when somebody asks for it
+    """The transport to `target`; a `Refusal` where it cannot be opened. May take seconds."""
+    try:  # by name: a transport is imported when it is first used
         module = importlib.import_module(f"kappaskin.publish.{target.scheme}")
     except ImportError as error:
         raise lacking(target.scheme, str(target), error) from error
@@ -132,7 +132,7 @@ SHAPES = 0.01
 
 _PATIENCE = 5.0  # s that finding a host and binding a port may take
 _KEPT = 1024  # messages that the percentiles are taken over
-_EVERY = 1.0  # s between two looks at them
+_EVERY = 1.0  # s between two computations of them
 
 Opened = Callable[[Target], Publisher]
 
@@ -152,7 +152,7 @@ class Latency:
 
 @dataclass(frozen=True)
 class TargetStatus:
-    """How a target is doing: `opening`, refused and why, or sent to.
+    """State of a target: `opening`, refused and why, or sent to.
 
     `sent` and `dropped` count with receivers that have gone.
     """
@@ -167,7 +167,7 @@ class TargetStatus:
 
 @dataclass(frozen=True)
 class PublishStatus:
-    """How each target is doing, and how late messages are."""
+    """State of each target, and the latency of messages."""
 
     targets: tuple[TargetStatus, ...] = ()
     latency: Latency = field(default_factory=Latency)
@@ -181,13 +181,13 @@ class _OpenTarget:
         self.publisher: Publisher | None = None
         self.refusal, self._until = "", clock() + _PATIENCE
         self._opening: Future[Publisher] = Future()
-        # A daemon: nothing ends a look for a name, and none is worth waiting for.
+        # A daemon: a name lookup cannot be cancelled, and is not worth waiting for.
         threading.Thread(
             target=_open, args=(self._opening, how, target), name="target-opener", daemon=True
         ).start()
 
     def check(self) -> None:
-        """Take over what was opened, or why it cannot be."""
+        """Take over the opened transport, or the reason why it cannot be opened."""
         if self.publisher is not None or self.refusal:
             return
         if self._opening.done():
@@ -213,7 +213,7 @@ class _OpenTarget:
 
 
 def _open(opening: "Future[Publisher]", how: Opened, target: Target) -> None:
-    """Open `target`; closed again where nobody waits for it any more."""
+    """Open `target`; closed again if it is no longer requested."""
     try:
         made = how(target)
     except Refusal as refusal:
@@ -227,7 +227,7 @@ def _open(opening: "Future[Publisher]", how: Opened, target: Target) -> None:
 
 
 class Publishing:
-    """Publishes to the requested targets; at first there are none."""
+    """Publishes to the requested targets, initially none."""
 
     def __init__(self, how: Opened = opened, clock: Callable[[], float] = time.monotonic) -> None:
         self._how, self._clock = how, clock
@@ -256,11 +256,11 @@ class Publishing:
 
     @property
     def active(self) -> bool:
-        """Whether anything is to be published."""
+        """Whether there are targets."""
         return bool(self._places)
 
     def send(self, estimate: Estimate, pipeline: Pipeline, began: float) -> None:
-        """Send what was estimated by the `pipeline` just now, which `began` at a monotonic time."""
+        """Send an estimate of the `pipeline`, computed since the monotonic time `began` in s."""
         senders = [place.publisher for place in self._places if place.publisher is not None]
         fit = pipeline.fitted
         if not senders or fit is None:
@@ -277,7 +277,7 @@ class Publishing:
         self._parts.append((began - estimate.host_time, ready - began, self._clock() - ready))
 
     def report(self, state: SourceState) -> None:
-        """Say how the source is doing, and see which targets have been opened."""
+        """Send the state of the source, and take over targets that have been opened."""
         self._source, self._epoch = state.source, epoch()
         for place in self._places:
             place.check()

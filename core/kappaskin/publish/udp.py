@@ -13,11 +13,11 @@ from kappaskin.errors import Refusal
 from kappaskin.publish.message import LARGEST, VERSION, EstimateMessage, SourceState
 from kappaskin.publish.publishing import Receiver, Target, reason
 
-_AGAIN = 1.0  # s between two tries to find a way to a network that was gone
+_AGAIN = 1.0  # s between two tries to reach a network that was lost
 
 
 def opened(target: Target) -> "Udp":
-    """A socket to the first address of `target` that can be sent to."""
+    """A socket connected to the first reachable address of `target`."""
     try:
         found = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_DGRAM)
     except (OSError, UnicodeError) as error:
@@ -40,7 +40,7 @@ def opened(target: Target) -> "Udp":
 
 
 def _connected(family: int, address: object) -> socket.socket:
-    """A socket that never waits; connected, it learns when nobody receives."""
+    """A non-blocking socket; connected, so that it reports when nobody receives."""
     made = socket.socket(family, socket.SOCK_DGRAM)
     try:
         made.setblocking(False)
@@ -94,7 +94,7 @@ class Udp:
         try:
             self._socket.send(data)
         except ConnectionRefusedError:
-            # JsonMessage of the last one, which nobody received, in the place of sending this one.
+            # The error is of the last message, which nobody received, and this one was not sent.
             self._sent -= 1
             self._drop("nobody receives there")
             self._socket.send(data)
@@ -104,7 +104,7 @@ class Udp:
         self._trouble = why
 
     def _find_way(self) -> None:
-        """Look for the way anew, now and then: the network may have come back another."""
+        """Reconnect now and then: the network may have changed."""
         now = time.monotonic()
         if now >= self._again:
             self._again = now + _AGAIN
@@ -118,14 +118,14 @@ class Udp:
 _SHOWN = 0.1  # s between two contacts that are shown: nobody reads a thousand lines a second
 _BUFFER = 2**20  # bytes that may wait while this process sleeps
 _LARGEST = 65536
-_ENDLESS = 1e300  # no quantity of ours
-_AT_ONCE = 1000  # datagrams read without a look at anything else
+_ENDLESS = 1e300  # larger than any published quantity
+_AT_ONCE = 1000  # datagrams read in one call at most
 
 JsonMessage = dict[str, Any]
 
 
 class UdpListener:
-    """What comes to a UDP `port`, as lines of text; gaps in `number` show what was lost."""
+    """Messages received on a UDP `port`, as lines of text; gaps in `number` are losses."""
 
     def __init__(self, port: int, clock: Callable[[], float] = time.monotonic) -> None:
         if not 0 < port < 65536:
@@ -138,7 +138,7 @@ class UdpListener:
         self.contacts = self.lost = self.foreign = 0
 
     def read(self, timeout: float) -> list[JsonMessage]:
-        """The messages that came, after at most `timeout` s."""
+        """The messages received, after at most `timeout` s."""
         self._socket.settimeout(timeout)
         came: list[JsonMessage] = []
         with suppress(TimeoutError, BlockingIOError):
@@ -156,7 +156,7 @@ class UdpListener:
         return came
 
     def lines(self, message: JsonMessage) -> list[str]:
-        """What a message says, and what is missing before it; often nothing that is news."""
+        """Lines for a message and for a gap before it; none where nothing new is to be shown."""
         lines: list[str] = []
         if message["kind"] == "contact":
             lines += self._gap(message.get("number"))
@@ -192,7 +192,7 @@ class UdpListener:
 
 
 def _bound(port: int) -> socket.socket:
-    """A socket that hears both kinds of addresses, where the system has both."""
+    """A socket for IPv4 and IPv6, where the system has both."""
     both = socket.has_dualstack_ipv6()
     made = socket.socket(socket.AF_INET6 if both else socket.AF_INET, socket.SOCK_DGRAM)
     try:
@@ -207,7 +207,7 @@ def _bound(port: int) -> socket.socket:
 
 
 def _understood(data: bytes) -> JsonMessage | None:
-    """The message in a datagram, if it is one of ours that is known here."""
+    """The message in a datagram; None if it is of no known kind."""
     try:
         message = json.loads(data)
     except (ValueError, RecursionError):
@@ -221,7 +221,7 @@ def _understood(data: bytes) -> JsonMessage | None:
 
 
 def _plain(line: str) -> str:
-    """What may be shown on a terminal, whoever sent it."""
+    """The text without characters that would control a terminal."""
     return "".join(c if c.isprintable() else "?" for c in line)
 
 

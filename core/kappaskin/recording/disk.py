@@ -41,11 +41,11 @@ class ReservedFile:
 
     @property
     def stream(self) -> IO[bytes]:
-        """Itself, to those who know no other kind of file."""
+        """Itself, for callers that wrap files."""
         return cast("IO[bytes]", self)
 
     def reserve(self, size: int) -> None:
-        """Keep room for `size` bytes more."""
+        """Reserve `size` more bytes."""
         if self._reserve is not None and size > self._reserved:
             _write(self._reserve, bytes(size - self._reserved))
             self._reserved = size
@@ -76,10 +76,10 @@ class ReservedFile:
         self._file.seek(self._at)
 
     def flush(self) -> None:
-        """Nothing waits in this process."""
+        """No effect: nothing is buffered in this process."""
 
     def sync(self) -> None:
-        """Wait until it is on the disk, where a loss of power leaves it."""
+        """Wait until it is on the disk, where it survives a loss of power."""
         os.fsync(self._file.fileno())
 
     @property
@@ -123,14 +123,14 @@ def _locked(file: IO[bytes]) -> bool:
 
 
 def is_there(path: Path) -> bool:
-    """Whether anything is at `path`; a `Refusal` where that cannot be told, as of too long a name.
+    """Whether anything is at `path`; a `Refusal` if unknown, as for too long a name.
 
     The path's own `exists` raises then, which would end the process that is live.
     """
     try:
         return path.exists() or path.is_symlink()
     except OSError as error:
-        raise Refusal(f"{path}: cannot be looked for ({_why(error)}); {_ELSEWHERE}") from error
+        raise Refusal(f"{path}: cannot be accessed ({_why(error)}); {_ELSEWHERE}") from error
 
 
 def _write(file: IO[bytes], data: bytes) -> None:

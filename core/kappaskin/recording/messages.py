@@ -216,10 +216,10 @@ TOPICS = (
     POSES,
     SKIN,
 )
-"""Every channel that a recording has."""
+"""Every channel of a recording."""
 
 FRAME = "skin"
-"""The coordinate frame of everything that has one."""
+"""The coordinate frame of all messages that have one."""
 
 _LINE = struct.Struct("<4sd?3xI")
 _CONTACT = struct.Struct("<4siII5s7xQ4d4?4xq40d")

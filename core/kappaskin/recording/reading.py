@@ -64,7 +64,7 @@ _FAULTS = (
 
 
 class CorruptRecord(Exception):
-    """A record is cut off, or is not what it says it is."""
+    """A record is cut off, or its contents contradict its header."""
 
 
 class McapRecord(NamedTuple):
@@ -90,7 +90,7 @@ _Kind = TypeVar("_Kind")
 def record_at(file: Bytes, at: int, size: int) -> McapRecord:
     """The record at the byte `at` of a `file` of `size` bytes."""
     if not 0 <= at <= size:
-        raise CorruptRecord("it is said to begin beyond the end")
+        raise CorruptRecord("its stated start is beyond the end")
     file.seek(at)
     head = file.read(_HEAD.size)
     if len(head) < _HEAD.size:
@@ -112,10 +112,10 @@ def parsed(kind: type[_Kind], body: bytes) -> _Kind:
 
 
 def unpacked(body: bytes) -> bytes:
-    """What is in the chunk of a record's `body`: the bytes of its records, checked."""
+    """The bytes of the records in the chunk of a record's `body`, checked."""
     chunk = parsed(Chunk, body)
     if chunk.uncompressed_size > LARGEST:
-        raise CorruptRecord(f"a chunk says that it holds {chunk.uncompressed_size} bytes")
+        raise CorruptRecord(f"a chunk claims to hold {chunk.uncompressed_size} bytes")
     data = decompressed(chunk.compression, chunk.data)
     if len(data) != chunk.uncompressed_size or (
         chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc
@@ -125,7 +125,7 @@ def unpacked(body: bytes) -> bytes:
 
 
 def decompressed(compression: str, data: bytes) -> bytes:
-    """The bytes as far as they are there, at most one more than are allowed."""
+    """The decompressed bytes, at most one more than allowed."""
     try:
         if compression == "zstd":
             with zstandard.ZstdDecompressor().stream_reader(data) as reader:
@@ -136,9 +136,7 @@ def decompressed(compression: str, data: bytes) -> bytes:
     except _FAULTS as error:
         raise CorruptRecord(f"a chunk cannot be decompressed ({error!s:.80})") from error
     if compression:
-        raise CorruptRecord(
-            f"a chunk is compressed by {compression!r:.20}, which nobody here knows"
-        )
+        raise CorruptRecord(f"a chunk is compressed by {compression!r:.20}, which is not supported")
     return data
 
 
@@ -157,7 +155,7 @@ def records_in(data: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def summary_of(file: Bytes, size: int) -> Iterator[McapRecord]:
-    """The records at the end of a `file` of `size` bytes that say what is in it.
+    """The summary records at the end of a `file` of `size` bytes.
 
     None where it has no such end; a `CorruptRecord` where that is damaged.
     """
@@ -176,7 +174,7 @@ def summary_of(file: Bytes, size: int) -> Iterator[McapRecord]:
 
 
 def check_file(path: Path) -> None:
-    """Refuse what is there but is no file, as a pipe that nobody writes to: opening it may wait."""
+    """Refuse anything but a regular file: opening a pipe without a writer would block."""
     if is_there(path) and not path.is_file():
         raise Refusal(f"{path}: cannot be read; expected a file")
 
@@ -187,7 +185,7 @@ _KINDS = {topic.name: topic.kind.name for topic in TOPICS}
 
 
 class RecordedMessage(NamedTuple):
-    """What one message says: when it was logged in ns since 1970, and its bytes."""
+    """One message: when it was logged in ns since 1970, and its bytes."""
 
     topic: str
     stamp: int
@@ -204,7 +202,7 @@ class ChunkAt(NamedTuple):
 
 
 class Recording:
-    """The recording at `path`, open until `close`; a `Refusal` when it is none.
+    """The recording at `path`, open until `close`; a `Refusal` for any other file.
 
     `whole` says whether it was ended as it should be; one that was not is read up to where it
     breaks off. `first` and `last` are the times it spans, in ns since 1970, `counts` how many
@@ -250,7 +248,7 @@ class Recording:
             record = record_at(self._file, len(MAGIC), self._size)
             self.library = parsed(Header, record.body).library
         except CorruptRecord as fault:
-            raise Damaged(f"{self.path}: is no recording: {fault}") from fault
+            raise Damaged(f"{self.path}: not a valid recording: {fault}") from fault
 
     def _check_format(self) -> None:
         if self.format > FORMAT:
@@ -269,10 +267,10 @@ class Recording:
                 f"{self.library or 'another'!r:.60}"
             )
 
-    # What a file says of itself at its end.
+    # The summary at the end of a file.
 
     def _summarised(self) -> bool:
-        """Take what the end says, if the file has one."""
+        """Read the summary, if the file has one."""
         try:
             for record in list(summary_of(self._file, self._size)):
                 self._take(record)
@@ -281,7 +279,7 @@ class Recording:
             return False
 
     def _take(self, record: McapRecord) -> None:
-        """Take in a record of the end, or one of the body outside of its chunks."""
+        """Take a record of the summary, or one outside of chunks."""
         self._learn(record.code, record.body)
         if record.code == Opcode.STATISTICS:
             found = parsed(Statistics, record.body).channel_message_counts
@@ -313,7 +311,7 @@ class Recording:
             self._count(record)
 
     def _count(self, record: McapRecord) -> None:
-        """Take in a chunk of a file that does not say at its end what is in it."""
+        """Take a chunk of a file without a summary."""
         chunk, counts = parsed(Chunk, record.body), Counter[str]()
         for message in self._messages_in(unpacked(record.body)):
             counts[message.topic] += 1
@@ -324,7 +322,7 @@ class Recording:
         self.counts = dict(Counter(self.counts) + counts)
 
     def _learn(self, code: int, body: bytes) -> None:
-        """Learn of a channel."""
+        """Add a channel."""
         if code == Opcode.SCHEMA:
             schema = parsed(Schema, body)
             self._schemas[schema.id] = schema.name
@@ -334,10 +332,10 @@ class Recording:
             if ours and channel.message_encoding == "cdr":
                 self._topics[channel.id] = channel.topic
 
-    # Without an end.
+    # Without a summary.
 
     def _scan(self) -> None:
-        """Go through the file up to where it breaks off."""
+        """Scan the file up to where it breaks off."""
         self.counts, self.chunks, at = {}, [], len(MAGIC)
         try:
             while at < self._size:
@@ -349,7 +347,7 @@ class Recording:
         except CorruptRecord:
             return
 
-    # What is in it.
+    # Contents.
 
     @cached_property
     def first(self) -> int:
@@ -394,7 +392,7 @@ class Recording:
             yield from self.messages_of(place)
 
     def messages_on(self, *topics: Topic) -> Iterator[RecordedMessage]:
-        """The messages of these topics, without a look at what has none of them."""
+        """The messages of these topics; chunks without any of them are not read."""
         names = {topic.name for topic in topics}
         channels = {n for n, topic in self._topics.items() if topic in names}
         for chunk in self.chunks:

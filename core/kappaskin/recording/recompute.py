@@ -23,7 +23,7 @@ from kappaskin.recording.reading import RecordedMessage, Recording
 from kappaskin.sensing import Sensor
 from kappaskin.sources import Accounting, ClockState, Decoder, Interpreter, RecordedClock, wire
 
-_UNREAD = 2**16  # messages kept until the device says what they are of
+_UNREAD = 2**16  # messages buffered until the device's information is read
 _FUNCTIONS = 128  # of a truth along one side, at most
 _SETUPS = 500  # of a recording, the first of more
 
@@ -48,14 +48,14 @@ class RecordedFrames:
 
     @property
     def trouble(self) -> str:
-        """Why what was recorded cannot be used; empty when it can."""
+        """Why the recording cannot be used; empty if it can."""
         return self._means.unusable
 
     def accounting(self) -> Accounting:
         return self._decoder.accounting()
 
     def begin_with(self, message: RecordedMessage) -> None:
-        """Take it, from the middle of a recording, that a device or clock was last told of so."""
+        """Start in the middle of a recording with the last message about a device or clock."""
         if message.topic == m.CLOCKS.name:
             self._map(decode(m.CLOCK, message.data) | {"since": math.nan})
         else:
@@ -109,7 +109,7 @@ class RecordedFrames:
                 yield replace(frame, truth=self._truth)
 
     def _introduced(self) -> bool:
-        """Whether the device is known, now that it has been looked for in what came."""
+        """Whether the device is known from the messages so far."""
         for _, message in self._pending:
             if isinstance(message, wire.Information):
                 self._means.learn(message.text)
@@ -118,7 +118,7 @@ class RecordedFrames:
 
 
 def _truth(fields: dict[str, Any], sensor: Sensor | None) -> Truth | None:
-    """The truth of the frames that follow; None where there is none."""
+    """The truth of the following frames; None without one."""
     shape, coefficients = tuple(fields["shape"].tolist()), fields["coefficients"]
     if sensor is None or not coefficients.size:
         return None
@@ -188,7 +188,7 @@ class Recomputation:
         self.pipeline.leave_out(fields["kinds"], fields["badness"])
 
     def _follow_device(self) -> None:
-        """Another device, if that is what the next frame is of, has no pipeline yet."""
+        """Drop the pipeline if the next frame is of another device."""
         if self._frames.sensor is self.sensor:
             return
         self.sensor, self.pipeline, self._last = self._frames.sensor, None, None
@@ -210,7 +210,7 @@ class Recomputation:
         self.pipeline, self._made = made, self._made + 1
 
     def _pass_over(self, count: int) -> None:
-        """Let the first `count` of the frames that wait be remembered."""
+        """Apply the first `count` of the waiting frames to the pipeline's state."""
         if self.pipeline is not None and self._memory:
             self.pipeline.restore(self._memory)
             self._memory = {}
@@ -227,7 +227,7 @@ class Recomputation:
         return self._worked_out(next(places, -1))
 
     def newest(self) -> Estimate | None:
-        """Of the frame that came last; None where it went through no pipeline."""
+        """The estimate of the last frame; None if no pipeline computed it."""
         return self._worked_out(len(self._waiting) - 1)
 
     def _worked_out(self, place: int) -> Estimate | None:
@@ -242,7 +242,7 @@ def _shaped(fields: dict[str, Any]) -> Array:
     try:
         return fields["values"].reshape(fields["shape"])
     except ValueError as error:
-        raise Refusal(f"expected what was remembered in its shape: {error!s:.80}") from error
+        raise Refusal(f"expected a recorded state of the right shape: {error!s:.80}") from error
 
 
 def recorded_setups(recording: Recording) -> list[tuple[float, Setup]]:
@@ -258,9 +258,9 @@ def recorded_setups(recording: Recording) -> list[tuple[float, Setup]]:
 
 @dataclass(frozen=True)
 class RecordingSummary:
-    """What there is to know of the recording at `path` before it is played; `length` is in s.
+    """Overview of the recording at `path` before it is played; `length` in s.
 
-    `setups` it was made with, each from a time in s on, and why they cannot be told.
+    `setups` it was made with, each from a time in s on, and why they cannot be read.
     """
 
     path: Path
@@ -270,7 +270,7 @@ class RecordingSummary:
     trouble: str = ""
 
     def setup_at(self, at: float) -> Setup | None:
-        """The one in use at `at` s; before the first, that."""
+        """The setup in use at `at` s; before the first setup, that one."""
         used = [setup for since, setup in self.setups if since <= at] or [
             setup for _, setup in self.setups[:1]
         ]
@@ -278,7 +278,7 @@ class RecordingSummary:
 
 
 def summary_of(path: Path) -> RecordingSummary:
-    """What the file at `path` holds; a `Refusal` where it is no recording."""
+    """Contents of the file at `path`; a `Refusal` where it is no recording."""
     with Recording(path) as recording:
         length = recording.seconds(recording.last)
         try:
@@ -293,7 +293,7 @@ _COMPARED = {
     m.CURVATURES.name: m.CURVATURE,
     m.SHAPES.name: m.COEFFICIENTS,
 }
-_TOLD = 1000  # messages between two times that the share is told
+_REPORTED = 1000  # messages between two reports of the share done
 
 
 _GETTERS: dict[str, Getter] = {**getters(), "shape": attrgetter("estimate.coefficients.shape")}
@@ -301,10 +301,10 @@ _GETTERS: dict[str, Getter] = {**getters(), "shape": attrgetter("estimate.coeffi
 
 @dataclass(frozen=True)
 class Verification:
-    """What came of it: contacts, curvatures and shapes `compared`, of `frames`; `different` ones.
+    """Counts of contacts, curvatures and shapes `compared`, of `frames`, and `different`.
 
-    `first` tells the first difference, `largest` is the largest one as a share of the largest
-    number beside it. `missing` counts recorded results whose frames are not there.
+    `first` describes the first difference, `largest` is the largest as a share of the largest
+    number in the same array. `missing` counts recorded results whose frames are missing.
     """
 
     frames: int
@@ -323,18 +323,18 @@ class Verification:
         """The verdict as a sentence or two."""
         counts = f"{self.compared:,} recorded results of {self.frames:,} frames"
         if not self.compared:
-            return f"{counts}: there is nothing to compare"
+            return f"{counts}: nothing to compare"
         parts = [f"{counts}: {'the same bit for bit' if self.same else 'not the same'}"]
         if self.different:
             parts.append(f"{self.different:,} differ, by {self.largest:.1g} of the largest number")
-            parts.append(f"first {self.first}")
+            parts.append(f"first difference: {self.first}")
         if self.missing:
-            parts.append(f"the frames of {self.missing:,} more are not there")
+            parts.append(f"the frames of {self.missing:,} more are missing")
         return "; ".join(parts)
 
     @staticmethod
     def steps(path: Path) -> "Generator[float | Verification]":
-        """Recompute everything that was recorded in `path`, and compare.
+        """Recompute all results recorded in `path`, and compare.
 
         Yields the share that is done now and then, and the verdict at the end. To be run in one
         thread, as the engine is: several sum in another order. A `Refusal` where it is no
@@ -345,13 +345,13 @@ class Verification:
             span = max(recording.last - recording.first, 1)
             for n, message in enumerate(recording.messages()):
                 worker(message)
-                if n % _TOLD == 0:
+                if n % _REPORTED == 0:
                     yield (message.stamp - recording.first) / span
             yield worker.verdict()
 
 
 class _Worker:
-    """Takes the messages as they were written."""
+    """Processes messages in the order in which they were written."""
 
     def __init__(self, recording: Recording) -> None:
         self._recomputation = Recomputation(recording)
@@ -366,7 +366,7 @@ class _Worker:
             self._frames += 1
 
     def _compare(self, recorded: dict[str, Any]) -> None:
-        """Work out the frame that a recorded estimate is of, and hold the two together."""
+        """Recompute the frame of a recorded estimate, and compare the two."""
         estimate = self._recomputation.estimate(recorded["sequence"])
         if estimate is None:
             self._missing += 1
@@ -380,7 +380,7 @@ class _Worker:
         self._first = self._first or "; ".join(differences[:1])
 
     def _difference(self, name: str, value: Any, estimate: Estimate) -> str:
-        """In which way one number, or list of numbers, is another now; nothing if it is not."""
+        """How a number, or list of numbers, differs from the recorded one; empty if it does not."""
         again = _GETTERS[name](Reported(estimate))
         was, now = np.asarray(value).ravel(), np.asarray(again).ravel()
         real = was.dtype.kind == now.dtype.kind == "f" and was.shape == now.shape

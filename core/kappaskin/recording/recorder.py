@@ -28,7 +28,7 @@ _COLUMNS = ("x", "y", "z", "displacement", "xx", "yy", "xy")
 
 
 class Recorder:
-    """Writes the recording `path`; a `Tape` for a source, and for all that becomes of its frames.
+    """Writes the recording `path`: a `Tape` for a source, and the results of its frames.
 
     A `Refusal` where no file can be made. No call waits for the disk.
     """
@@ -49,7 +49,7 @@ class Recorder:
         return self._file.written
 
     def end(self) -> None:
-        """Let what waits be written, and the file ended."""
+        """Begin to end the file, once all waiting messages are written."""
         self._file.end()
 
     def close(self) -> None:
@@ -57,10 +57,10 @@ class Recorder:
         self._file.close()
 
     def goes_on(self, now: float) -> None:
-        """What comes next belongs to the time `now`: a while may have passed without a source."""
+        """Continue at the time `now` in s, after a pause without a source."""
         self._now = now
 
-    # What the source brings.
+    # Input of the source.
 
     def connected(self, information: str) -> None:
         self._file.put(m.DEVICE, self._now, encode(m.STRING, {"data": information}))
@@ -74,7 +74,7 @@ class Recorder:
         self._file.put(m.LINES, host_time, m.pack_line(host_time, True, data))
 
     def disconnected(self, host_time: float) -> None:
-        """Recorded as no bytes at all."""
+        """Record a disconnection, as a message of no bytes."""
         self.received(host_time, b"")
 
     def clock(self, since: float, state: ClockState) -> None:
@@ -108,10 +108,10 @@ class Recorder:
             fields["coefficients"] = truth.coefficients.ravel()
         self._file.put(m.TRUTHS, frame.host_time, self._truths(fields))
 
-    # What is computed of it.
+    # Results.
 
     def plays(self, scene: Scene) -> None:
-        """The scene is this from now on."""
+        """Record that this scene is simulated from now on."""
         name = f"scene-{len(self._attached)}.toml"
         self._attached.add(name)
         try:
@@ -121,7 +121,7 @@ class Recorder:
         self._file.attach(name, "application/toml", text.encode())
 
     def set_up(self, pipeline: Pipeline) -> None:
-        """Frames go through `pipeline` from now on."""
+        """Record that `pipeline` is in use from now on."""
         text, files = setup_to_text(pipeline.setup)
         for name in files.keys() - self._attached:
             self._attached.add(name)
@@ -130,13 +130,13 @@ class Recorder:
         self._views = _Views(pipeline)
 
     def add_memory(self, memory: StateArrays) -> None:
-        """The pipeline goes on from this."""
+        """Record the state from which the pipeline continues."""
         for name, values in memory.items():
             fields = {"name": name, "shape": values.shape, "values": values.ravel()}
             self._file.put(m.MEMORIES, self._now, encode(m.MEMORY, fields))
 
     def left_out(self, kinds: "np.ndarray[tuple[int], np.dtype[np.uint8]]", badness: Array) -> None:
-        """These channels are left out from now on."""
+        """Record that these channels are excluded from now on."""
         fields = {"kinds": kinds, "badness": badness}
         self._file.put(m.LEFT_OUTS, self._now, encode(m.LEFT_OUT, fields))
 
@@ -170,7 +170,7 @@ def _truths_like(truth: Truth) -> MessageLayout:
 
 
 def _same(a: Truth, b: Truth) -> bool:
-    """Bit for bit, which is ten times as fast to see as whether numbers are equal."""
+    """Whether arrays are the same bit for bit: ten times as fast as comparing numbers."""
     if a.edge != b.edge or a.contact.tobytes() != b.contact.tobytes():
         return False
     shapes = a.coefficients.shape, b.coefficients.shape
@@ -216,12 +216,12 @@ class _Views:
         self._cloud_size = {"height": 1, "width": P, "point_step": step, "row_step": P * step}
         fit = pipeline.fit
         self.every = isinstance(fit, Stateful) and not fit.has_memory
-        """Whether estimates depend on which others were made, and so all have to be recorded."""
+        """Whether estimates depend on which frames were computed, so that all are recorded."""
         bytes_each = 4 * C + 4 * C + 8 * 3 * P + 8 * math.prod(N) + P * step
         self.affordable = _RateLimit(min(_HEAVY, _BYTES / bytes_each))
 
     def heavy(self, frame: Frame, estimate: Estimate, stamp: int) -> list[tuple[m.Topic, bytes]]:
-        """What is as large as a frame."""
+        """The messages that are as large as a frame."""
         head = {
             **_stamped(stamp),
             "sequence": estimate.sequence,
@@ -246,7 +246,7 @@ class _Views:
         return found
 
     def _points(self, estimate: Estimate) -> dict[str, object]:
-        """The skin where its elements are, with what they read."""
+        """The surface at the elements, with their readings."""
         f = self._displacement @ estimate.coefficients.ravel()
         rest, normal = self._patch.at_rest(self._positions)
         columns = [*(rest - normal * f[:, None]).T, f, *estimate.curvature]

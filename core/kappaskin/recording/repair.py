@@ -60,7 +60,7 @@ class Repaired:
 
     @property
     def words(self) -> str:
-        """What was saved, and what was not."""
+        """Counts of what was saved and lost, as text."""
         lost = f"{self.lost:,} bytes could not be read" if self.lost else "nothing was lost"
         if not (self.total or self.attachments):
             return f"no message could be saved; {lost}"
@@ -87,13 +87,13 @@ class Repaired:
 
 
 def check_new(out: Path) -> None:
-    """Refuse a file that is there, or is being written."""
+    """Refuse a file that exists or is being written."""
     if is_there(out) or is_there(part_of(out)):
-        raise Refusal(f"{out}: is there already; choose another name")
+        raise Refusal(f"{out}: already exists; choose another name")
 
 
 class _Repair:
-    """Goes through the bytes of one file once."""
+    """Reads the bytes of one file once."""
 
     def __init__(self, path: Path, data: mmap.mmap, out: Path) -> None:
         self._path, self._data, self._out, self._size = path, data, out, len(data)
@@ -126,7 +126,7 @@ class _Repair:
         return Repaired(dict(self._counts), self._attached, self._lost, self._ended)
 
     def _begin(self) -> None:
-        """Begin as the file itself did."""
+        """Write the header of the original file."""
         profile, library = "", "kappaskin"
         self._at = len(MAGIC)
         if self._data[: len(MAGIC)] == MAGIC:
@@ -146,7 +146,7 @@ class _Repair:
         self._expect(library)
 
     def _expect(self, library: str) -> None:
-        """Learn of the channels where the chunk that tells of them may be damaged."""
+        """Add the channels of our recordings: the chunk that defines them may be damaged."""
         if library.startswith("kappaskin"):
             for n, (topic, kind) in enumerate(TOPICS, 1):
                 self._schemas[n] = Schema(n, kind.definition, "ros2msg", kind.name)
@@ -159,7 +159,7 @@ class _Repair:
             return
 
     def _through(self) -> Iterator[int]:
-        """Save record after record; where each begins."""
+        """Save record after record; yields where each begins."""
         while self._at < self._size and not self._ended:
             yield self._at
             if (record := self._record(self._at)) is not None:
@@ -175,7 +175,7 @@ class _Repair:
             self._go_on(self._next_chunk(self._at + 1))
 
     def _go_on(self, at: int) -> None:
-        """Go on from `at`: what is before is lost."""
+        """Continue at `at`; the bytes before are lost."""
         self._lost += at - self._at
         self._at = at
 
@@ -188,7 +188,7 @@ class _Repair:
         return record if record.code in _KNOWN or record.code >= _PRIVATE else None
 
     def _next_chunk(self, at: int) -> int:
-        """Where the next chunk begins that is whole; the end of the file if none does."""
+        """Start of the next complete chunk; the end of the file if there is none."""
         while at < self._size:
             places = [self._data.find(name, at + _COMPRESSION) for name in _NAMES]
             found = min((place for place in places if place >= 0), default=-1)
@@ -220,7 +220,7 @@ class _Repair:
             self._ended = True
 
     def _save_part(self) -> None:
-        """Of a chunk that is cut off by the end of the file, save what comes before that."""
+        """Save the complete messages of a chunk that is cut off by the end of the file."""
         body = self._data[self._at + 9 : min(self._size, self._at + 9 + LARGEST)]
         name = next((n for n in _NAMES if body[_COMPRESSION - 9 :].startswith(n)), None)
         cut_off = self._at + 9 + int.from_bytes(self._data[self._at + 1 : self._at + 9], "little")
@@ -234,7 +234,7 @@ class _Repair:
             return
 
     def _take(self, code: int, body: bytes) -> None:
-        """Save what is in a chunk, or might be."""
+        """Save the messages of a chunk that may be damaged."""
         if code == Opcode.SCHEMA:
             schema = parsed(Schema, body)
             self._schemas[schema.id] = schema
@@ -251,7 +251,7 @@ class _Repair:
                 self._counts[self._channels[channel].topic] += 1
 
     def _channel(self, number: int) -> int | None:
-        """What the channel is called in the new file; None where nothing tells what it is."""
+        """The channel's number in the new file; None where its definition is lost."""
         if number in self._new:
             return self._new[number]
         if (channel := self._channels.get(number)) is None:
@@ -279,7 +279,7 @@ class _Repair:
 
 
 class RepairTask:
-    """Saves what is whole of the file `path` to the new file `out`; no call waits.
+    """Saves the complete messages of the file `path` to the new file `out`; no call waits.
 
     A `Refusal` where `out` is there. It ends when it is done, when `close` is called, which leaves
     nothing of what is not whole, or when the process that started it is gone.
@@ -297,7 +297,7 @@ class RepairTask:
         return self._task.done
 
     def poll(self) -> list[float | Repaired]:
-        """The shares that are done since the last call, and in the end what was saved.
+        """The shares done since the last call, and at the end the result.
 
         A `Refusal` where nothing could be.
         """

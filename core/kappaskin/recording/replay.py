@@ -18,7 +18,7 @@ from kappaskin.sensing import Sensor
 from kappaskin.sources import Accounting, InputRecorder, register_scheme
 
 FASTEST = 10.0
-"""How many times as fast as it was a recording is played at most."""
+"""Largest playback speed, as a multiple of real time."""
 
 _NAP = 0.02  # s
 _MOST = 512  # frames given at once
@@ -31,10 +31,10 @@ _LONGEST = 200  # characters of an event
 
 @dataclass(frozen=True)
 class Replay:
-    """Where a recording is played: `at` s of `length` s, `speed` times as fast, 0 while it stands.
+    """Playback position: `at` s of `length` s, at `speed` times real time, 0 while paused.
 
-    It begins anew at its end if it is `looped`. `gaps` are the times in s, from and to, in which
-    nothing came, `events` what happened and when, in s, the first of many. It was `begun` so many s
+    It restarts at its end if `looped`. `gaps` are the times in s, from and to, without
+    messages; `events` the first events and their times in s. It was `begun` so many s
     after 1970; one that is not `whole` was never ended, and is played up to where it breaks off.
     """
 
@@ -63,7 +63,7 @@ class ReplayedSource:
     """
 
     SCHEME = "replay:"
-    """Begins the names of such sources."""
+    """Prefix of the names of these sources."""
 
     def __init__(
         self,
@@ -106,12 +106,12 @@ class ReplayedSource:
                 brief = gaps and begin - gaps[-1][1] < _BRIEF
                 gaps.append((gaps.pop()[0] if brief else begin, end))
         events: list[Event] = []
-        with suppress(Refusal):  # damage is told of where it is played
+        with suppress(Refusal):  # damage is reported when it is played
             for event in islice(self._recording.events(), _MOST_LISTED):
                 events.append(_brief(event))
         return tuple(gaps[:_MOST_LISTED]), tuple(events)
 
-    # Where it is played.
+    # Position.
 
     @property
     def replay(self) -> Replay:
@@ -123,7 +123,7 @@ class ReplayedSource:
         return self._from + (self._clock() - self._since) * self._speed
 
     def _go_to(self, at: float) -> None:
-        """Go on from `at` s."""
+        """Continue at `at` s."""
         self._from, self._since = at, self._clock()
         self._frames = RecordedFrames(str(self._recording.path), self._made)
         self._ready: deque[_Ready] = deque()
@@ -141,7 +141,7 @@ class ReplayedSource:
         self._ready.clear()
 
     def seek(self, at: float | None, speed: float, looped: bool | None = None) -> None:
-        """Go on from `at` s, or from where it is, at a `speed` of at most `FASTEST`; 0 stands.
+        """Continue at `at` s, or at the present time, at a `speed` of at most `FASTEST`; 0 pauses.
 
         Standing, it gives the one frame that is next.
         """
@@ -156,7 +156,7 @@ class ReplayedSource:
             self._steps = 0 if self._speed else 1
 
     def step(self, frames: int) -> None:
-        """Stand still, so many `frames` further on, or if negative back.
+        """Pause so many `frames` further on, or back if negative.
 
         Those that were asked for the same way before, and were not given yet, are added.
         """
@@ -171,17 +171,17 @@ class ReplayedSource:
 
     @property
     def stands(self) -> bool:
-        """Whether no frame follows by itself."""
+        """Whether it is paused or at its end."""
         return not self._speed or self._next is None
 
     def again(self) -> None:
-        """Give the frame that is shown once more, where none follows it by itself."""
+        """Return the shown frame once more, if paused or at the end."""
         if self._last is not None and not self._steps and self.stands:
             self._ready.appendleft(self._last)
             self._steps, self._moves = 1, False
 
     def _go_back(self, frames: int) -> None:
-        """Stand before the frame that was given so many before the last one."""
+        """Pause before the frame that was returned so many before the last one."""
         here, back = self._last.mark if self._last else (self._first, 0), _BACK
         marks, start = deque[tuple[int, int]](), 1.0
         while len(marks) < frames and start > 0:
@@ -198,16 +198,16 @@ class ReplayedSource:
         while self._fill() and self._ready[0].mark < mark:
             yield self._ready.popleft()
 
-    # What comes.
+    # Frames.
 
     def _take(self, message: RecordedMessage) -> None:
-        """Let one message be the last that came."""
+        """Take one message."""
         for n, frame in enumerate(self._frames(message)):
             self._ready.append(_Ready((message.stamp, n), frame, self._frames.sensor))
         self._next = next(self._messages, None)
 
     def _fill(self, until: float = float("inf")) -> bool:
-        """Make a frame ready that is due at `until` s; whether there is one."""
+        """Prepare the next frame due by `until` s; whether there is one."""
         while not self._ready and self._next is not None:
             if self._recording.seconds(self._next.stamp) > until:
                 break
@@ -254,7 +254,7 @@ class ReplayedSource:
         return frames
 
     def _give(self, ready: _Ready) -> Frame:
-        """The frame, as if it had come when it was due."""
+        """The frame, with the times at which it was due."""
         self._sensor, frame = ready.sensor, ready.frame
         self._last = ready
         came = self._clock()
@@ -272,16 +272,16 @@ class ReplayedSource:
 
     @property
     def temperature(self) -> float:
-        """Not recorded by itself."""
+        """NaN: not recorded."""
         return float("nan")
 
     def events(self) -> list[Event]:
-        """What happened, as it is played."""
+        """Events up to the playback position."""
         events, self._events = self._events, []
         return events
 
     def record(self, recorder: InputRecorder | None) -> None:
-        """Not recorded again: it is a recording."""
+        """No effect: a recording is not recorded again."""
 
     def accounting(self) -> Accounting:
         return self._frames.accounting()

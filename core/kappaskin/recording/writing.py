@@ -16,20 +16,20 @@ from kappaskin.recording.disk import ReservedFile, is_there
 from kappaskin.recording.messages import TOPICS, Topic
 
 FORMAT = 1
-"""Version of what our own messages mean."""
+"""Version of the meaning of our own messages."""
 
 _FLUSH = 0.1  # s between two times that all there is goes to the file: what a killed process loses
 _SYNC = 2.0  # s between two times that the file goes to the disk: what a loss of power takes
 _CHUNK = 2**20  # bytes
 _BACKLOG = 2**26  # bytes that may wait for the disk
-_EACH = 128  # bytes of memory that a message takes beside its own
+_EACH = 128  # bytes of memory for each message in addition to its own
 _SUMMED = 512  # bytes of the end of the file for each chunk
 _UNDATED = 0
 
 
 @dataclass(frozen=True)
 class RecordingStatus:
-    """How a recording is doing: where it goes, for how long (s) and how much it is.
+    """State of a recording: its path, duration in s, and size.
 
     `path` is empty where none was asked for. `lost` counts messages that found too many waiting for
     the disk. `trouble` says why it ended before it was asked to, or does not begin.
@@ -47,7 +47,7 @@ class RecordingStatus:
 class RecordingFile:
     """A recording at `path`, called `path` + `.part` until it is closed.
 
-    It is on what `disk` makes. `put` and `attach` never wait; `written` tells what has become of
+    The file is opened by `disk`. `put` and `attach` never wait; `written` is the state of
     it. One that ends by itself, as on a full disk, is closed as one that is asked to.
     """
 
@@ -56,12 +56,12 @@ class RecordingFile:
         for there in (self.path, self.part):
             if is_there(there):
                 raise Refusal(
-                    f"{there}: is there already; choose another name"
+                    f"{there}: already exists; choose another name"
                     + (f", or see `kappaskin repair {there}`" if there == self.part else "")
                 )
         self._disk = disk(self.part)
         self._began = time.monotonic()
-        # Wall-clock time is looked at once, so that a clock that is set does not reorder messages.
+        # Wall-clock time is read once, so that a clock that is set does not reorder messages.
         self._wall = time.time_ns() - time.monotonic_ns()
         self._waiting: deque[tuple[int, int, bytes]] = deque()
         self._attachments: deque[tuple[str, str, bytes]] = deque()
@@ -118,7 +118,7 @@ class RecordingFile:
         self._attachments.append((name, kind, data))
 
     def _work(self) -> None:
-        """Write what there is, now and then, until it is to end."""
+        """Write waiting messages now and then, until the end is requested."""
         try:
             while not (self._closing.wait(_FLUSH) or self._disk.trouble):
                 self._write()
@@ -155,10 +155,10 @@ class RecordingFile:
         )
 
     def _finish(self) -> None:
-        """Give the whole file its name."""
+        """Rename the complete file."""
         self._disk.sync()
         if self.path.exists():
-            raise OSError(f"{self.path.name} has appeared beside it")
+            raise OSError(f"{self.path.name} has been created meanwhile")
         self.part.rename(self.path)
         trouble = self._disk.trouble
         self._stop(f"{self.path}: {trouble}; it is whole up to then" if trouble else "")
@@ -167,7 +167,7 @@ class RecordingFile:
         self.written = replace(self.written, active=False, trouble=trouble)
 
     def _sync(self) -> None:
-        """Let what is written reach the disk; in a thread of its own, since that may take long."""
+        """Flush to the disk; in a thread of its own, since this may take long."""
         while not self._closing.wait(_SYNC) and self.written.active:
             try:
                 self._disk.sync()
@@ -186,11 +186,11 @@ class RecordingFile:
 
 
 def part_of(path: Path) -> Path:
-    """What a recording at `path` is called until it is closed."""
+    """Path of a recording until it is complete."""
     return path.with_name(path.name + ".part")
 
 
 def unused(path: Path) -> Path:
-    """`path`, or one that is numbered, where no recording is yet."""
+    """`path`, or a numbered one, that does not exist yet."""
     names = (path.with_stem(f"{path.stem}-{n}") if n > 1 else path for n in itertools.count(1))
     return next(name for name in names if not (name.exists() or part_of(name).exists()))

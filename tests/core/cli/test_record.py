@@ -69,7 +69,7 @@ def test_no_file_is_written_over(tmp_path, capsys) -> None:
     out = tmp_path / "a.mcap"
     out.write_bytes(b"mine")
     assert main(["record", "sim:", str(out), "--seconds", "1e-9"]) == 2
-    assert "is there already" in capsys.readouterr().err
+    assert "already exists" in capsys.readouterr().err
     assert out.read_bytes() == b"mine"
 
 

@@ -70,7 +70,7 @@ def test_that_another_recording_is_refused_is_told_while_the_last_one_still_ends
     for _ in range(2):
         assert keeping.check(None) == ""
         assert keeping.status.path == str(taken)
-        assert "is there already" in keeping.status.trouble
+        assert "already exists" in keeping.status.trouble
         keeping.close()
 
 

@@ -112,7 +112,7 @@ def test_what_is_there_is_never_written_over(tmp_path) -> None:
     path = tmp_path / "there.mcap"
     for there in (path, part_of(path)):
         there.write_bytes(b"mine")
-        with pytest.raises(Refusal, match="is there already"):
+        with pytest.raises(Refusal, match="already exists"):
             RecordingFile(path)
         assert there.read_bytes() == b"mine"
         there.unlink()
@@ -126,7 +126,7 @@ def test_a_file_that_appears_meanwhile_stays(tmp_path) -> None:
     file.put(m.LINES, 0.0, LINE)
     path.write_bytes(b"mine")
     file.close()
-    assert "a.mcap has appeared beside it" in file.written.trouble
+    assert "a.mcap has been created meanwhile" in file.written.trouble
     assert path.read_bytes() == b"mine"
     with Recording(part_of(path)) as recording:
         assert recording.whole

@@ -494,7 +494,7 @@ def test_what_makes_no_file_is_refused(name: str, asked: dict, why: str, taps, t
 def test_what_is_there_already_is_not_written_over(there: str, taps, tmp_path) -> None:
     (tmp_path / there).write_text("mine")
     asked = {"at": 0.1} if there in ("out.stl", "out.json") else {"every": 0.1}
-    with pytest.raises(Refusal, match="is there already"):
+    with pytest.raises(Refusal, match="already exists"):
         ExportRequest(taps[0], tmp_path / ("out.stl" if "at" in asked else "out.pvd"), **asked)
     assert (tmp_path / there).read_text() == "mine"
 

@@ -418,7 +418,7 @@ def test_where_no_file_can_be_the_session_goes_on(engine, tmp_path) -> None:
     streaming(engine)
     part_of(tmp_path / "b.mcap").write_bytes(b"")
     engine.record(tmp_path / "b.mcap")
-    assert wait_for(lambda: "is there already" in engine.status().recording.trouble)
+    assert wait_for(lambda: "already exists" in engine.status().recording.trouble)
     engine.record(tmp_path / "c.mcap")
     streaming(engine)
     part_of(tmp_path / "c.mcap").unlink()

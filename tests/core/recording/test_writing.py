@@ -219,5 +219,5 @@ def test_a_damaged_chunk_is_said_to_be_one(whole, tmp_path) -> None:
     ids=["record", "read", "repair", "export"],
 )
 def test_a_name_that_no_file_can_have_is_refused(use, tmp_path) -> None:
-    with pytest.raises(Refusal, match=r"cannot be looked for \(File name too long\)"):
+    with pytest.raises(Refusal, match=r"cannot be accessed \(File name too long\)"):
         use(tmp_path / f"{'x' * 300}.csv")

@@ -60,19 +60,19 @@ class ExportRequest:
 
     @property
     def metadata_file(self) -> Path | None:
-        """The file beside an STL file, with what that cannot hold itself."""
+        """The JSON file for an STL file, with what STL cannot hold."""
         return self.to.with_suffix(".json") if self.format == ".stl" else None
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """All that is made: files, and the folder of a series."""
+        """All outputs: files, and the folder of a series."""
         alone = self.format == ".stl" and self.folder is not None
         places = (None if alone else self.to, self.folder, self.metadata_file)
         return tuple(place for place in places if place is not None)
 
     @property
     def first(self) -> float:
-        """From when on frames are taken, in s since the beginning."""
+        """Start of the exported span in s since the beginning."""
         return self.begin if self.at is None else self.at
 
     def _check_times(self) -> None:
@@ -111,12 +111,12 @@ class ExportRequest:
     def _check_place(self) -> None:
         for place in self.files:
             if is_there(place):
-                raise Refusal(f"{place}: is there already; choose another name")
+                raise Refusal(f"{place}: already exists; choose another name")
 
 
 @dataclass(frozen=True)
 class RecordingInfo:
-    """What the frames are of: a `sensor`, and at most so many `functions` along x and y.
+    """Subject of the frames: a `sensor`, and at most so many `functions` along x and y.
 
     `facts` has all of it as JSON values.
     """
@@ -143,7 +143,7 @@ class _StampedText(NamedTuple):
 
 
 def recording_info(recording: Recording, request: ExportRequest) -> RecordingInfo:
-    """What files of the requested span say; a `Refusal` where there were two devices."""
+    """Facts for files of the requested span; a `Refusal` where there were two devices."""
     path = recording.path
     devices = list(_in_force(recording.devices(), request))
     if not devices:
@@ -168,7 +168,7 @@ def recording_info(recording: Recording, request: ExportRequest) -> RecordingInf
 
 
 def another(at: float) -> str:
-    """The message about a device that came `at` s after the beginning, as another one."""
+    """The error for a second device, `at` s after the beginning."""
     before, after = math.ceil(1e3 * at - 1) / 1e3, math.floor(1e3 * at + 1) / 1e3
     return (
         f"another device, or another skin, came at {at:.6g} s, and a file is of one: export the "
@@ -177,7 +177,7 @@ def another(at: float) -> str:
 
 
 def _in_force(texts: Iterable[tuple[float, str]], request: ExportRequest) -> Iterator[_StampedText]:
-    """The texts that held at some time of the span."""
+    """The texts valid at some time of the span."""
     last = None
     for one in [_StampedText(number, at, text) for number, (at, text) in enumerate(texts)]:
         if one.at > request.end:
@@ -236,7 +236,7 @@ class ExportedFrame:
 
     @cached_property
     def reported(self) -> Reported:
-        """What the table of quantities is computed of."""
+        """The estimate and its fit, for the table of quantities."""
         return Reported(self.estimate, self.pipeline.fitted)
 
 
@@ -246,13 +246,13 @@ class ExportWriter(Protocol):
     def __init__(self, scratch: Path, request: ExportRequest, info: RecordingInfo) -> None: ...
 
     def take(self, frame: ExportedFrame) -> bool:
-        """Write one frame; whether there was anything to write."""
+        """Write one frame; whether it contained anything to write."""
         ...
 
     def finish(self) -> None:
-        """Write what is still to be written."""
+        """Write buffered rows, and finish the file."""
         ...
 
     def close(self) -> None:
-        """Hold no file open any more."""
+        """Close all files."""
         ...

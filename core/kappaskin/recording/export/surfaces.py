@@ -40,7 +40,7 @@ class SkinSurface:
 
 
 class SkinMesh:
-    """The skin of a `basis` by nx x ny points of its rectangle, those beside its rim on that."""
+    """The skin of a `basis` at nx x ny points; those outside its rim are moved onto it."""
 
     def __init__(self, basis: Basis, nx: int, ny: int) -> None:
         self._basis, patch = basis, basis.patch
@@ -70,7 +70,7 @@ class SkinMesh:
 
 
 def _no_error(rows: Array) -> Array:
-    """The covariance (..., 6, 6) of the shape as it is given."""
+    """The covariance (..., 6, 6) of the given shape."""
     return np.zeros((*rows.shape[:-1], rows.shape[-2]))
 
 
@@ -84,14 +84,14 @@ def _triangles(on: NDArray[np.bool_]) -> Triangles:
 
 
 class SurfaceWriter(ABC):
-    """Surfaces, of which a kind of file need only say how one of them is written."""
+    """Writer of surfaces; a format defines how one surface is written."""
 
     suffix: str
 
     def __init__(self, scratch: Path, request: ExportRequest, info: RecordingInfo) -> None:
         self.scratch, self.request, self.info = scratch, request, info
         self.times: dict[str, float] = {}
-        """Of the surfaces that were written, in s, by the file's place beside the others."""
+        """Times in s of the surfaces written, by file name."""
         self._made: tuple[Pipeline, SkinMesh] | None = None
         if request.folder is not None:
             (scratch / request.folder.name).mkdir()
@@ -101,7 +101,7 @@ class SurfaceWriter(ABC):
         if not np.isfinite(coefficients).all():
             if self.request.at is not None:
                 raise Refusal(
-                    f"the readings at {frame.at:.6g} s decide no shape; choose another moment"
+                    f"the readings at {frame.at:.6g} s determine no shape; choose another time"
                 )
             return False
         name = self.request.to.name
@@ -118,7 +118,7 @@ class SurfaceWriter(ABC):
         return self._made[1]
 
     def description(self, frame: ExportedFrame) -> str:
-        """What a file says of the surface of one frame, as JSON."""
+        """Metadata of the surface of one frame, as JSON."""
         estimate = frame.estimate
         numbers = {"time": frame.at, "sequence": estimate.sequence, "setup": estimate.generation}
         force = estimate.contact.force
@@ -131,12 +131,12 @@ class SurfaceWriter(ABC):
     def finish(self) -> None: ...
 
     def close(self) -> None:
-        """Let go of the skin; every file is closed once it is written."""
+        """Release the skin; every file is closed once it is written."""
         self._made = None
 
 
 class StlSurfaces(SurfaceWriter):
-    """Binary STL in m; what that cannot say stands in a JSON file beside it."""
+    """Binary STL in m; its metadata are in a JSON file of the same name."""
 
     suffix = ".stl"
 

@@ -35,7 +35,7 @@ class Column(NamedTuple):
     value: Callable[[ExportedFrame], Any]
 
     def heads(self) -> list[str]:
-        """What its numbers are called one by one, with their unit."""
+        """Names of its numbers, each with the unit."""
         unit = f" [{self.unit}]" if self.unit else ""
         return [f"{self.name}{label}{unit}" for label in self.labels or ("",)]
 
@@ -107,7 +107,7 @@ _BLOCK = 2**22  # bytes of rows that are written at once, about
 
 
 class TableWriter(ABC):
-    """A table, of which a kind of file need only say how some rows (n, ...) are written."""
+    """Writer of a table; a format defines how rows (n, ...) are written."""
 
     def __init__(self, scratch: Path, request: ExportRequest, info: RecordingInfo) -> None:
         self.path, self.info, self.columns = scratch / request.to.name, info, columns(info)
@@ -146,7 +146,7 @@ class TableWriter(ABC):
 
 
 class CsvTable(TableWriter):
-    """Numbers as short as they come back bit for bit; 0 or 1 for what is so or not."""
+    """Numbers as the shortest text that reads back bit for bit; 0 or 1 for booleans."""
 
     def begin(self, scratch: Path) -> None:
         self._file = self.path.open("w", encoding="utf-8", newline="\n")
@@ -204,7 +204,7 @@ class _File(io.FileIO):
 
 
 class Hdf5Table(TableWriter):
-    """Data sets that grow with the rows."""
+    """HDF5: data sets that grow with the rows."""
 
     def begin(self, scratch: Path) -> None:
         try:

@@ -35,17 +35,16 @@ FORMATS: dict[str, type[ExportWriter]] = {
     ".pvd": VtpSurfaces,
     ".stl": StlSurfaces,
 }
-"""What writes files of each suffix: another format is a class more."""
+"""Writers by suffix: a new format is one more class."""
 
-_TOLD = 0.05  # s between two reports
+_REPORT = 0.05  # s between two reports
 
 
 class Exported(NamedTuple):
     """How many frames were `written`.
 
-    `unsettled` frames came before there were settings to work them out with, and of `shapeless`
-    ones the readings decide no surface: neither are written. `whole` is whether the recording was
-    ended as it should be.
+    `unsettled` frames were recorded before the first settings, and of `shapeless` ones the readings
+    determine no surface: neither are written. `whole` is whether the recording was ended properly.
     """
 
     written: int
@@ -55,19 +54,19 @@ class Exported(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What was written, and what was not."""
+        """Counts of frames written and left out, as text."""
         parts = [f"{self.written:,} frame{'s' * (self.written != 1)}"]
         if self.unsettled:
-            parts.append(f"{self.unsettled:,} that came before there were settings are left out")
+            parts.append(f"{self.unsettled:,} recorded before the first settings left out")
         if self.shapeless:
-            parts.append(f"{self.shapeless:,} whose readings decide no shape are left out")
+            parts.append(f"{self.shapeless:,} whose readings determine no shape left out")
         if not self.whole:
             parts.append("the recording broke off, and this is up to there")
         return "; ".join(parts)
 
 
 def export_steps(request: ExportRequest, scratch: Path) -> Generator[float | Exported]:
-    """Write all that is requested into the folder `scratch`.
+    """Write all requested files into the folder `scratch`.
 
     Now and then the share that is done, and what came of it at the end.
     """
@@ -93,7 +92,7 @@ def _exported(
             if not work.take(message):
                 break
             if time.monotonic() >= next_report:
-                next_report = time.monotonic() + _TOLD
+                next_report = time.monotonic() + _REPORT
                 yield work.share(message)
         work.check()
         writer.finish()
@@ -101,7 +100,7 @@ def _exported(
 
 
 class _Work:
-    """Takes the messages as they were written, until all that is requested is written."""
+    """Takes the messages in order, until all requested files are written."""
 
     def __init__(
         self,
@@ -143,7 +142,7 @@ class _Work:
             self._shapeless += 1
 
     def _check_device(self, at: float, sensor: Sensor | None) -> None:
-        """Refuse a frame of another device than the file is of."""
+        """Refuse a frame of another device."""
         if sensor is self._sensor or sensor is None:
             return
         if sensor_to_json(sensor) != self._device:
@@ -151,16 +150,16 @@ class _Work:
         self._sensor = sensor
 
     def check(self) -> None:
-        """Refuse to end with nothing."""
+        """Raise a `Refusal` if nothing was written."""
         if self._written:
             return
         span = f"from {self._request.first:g} s on"
         if math.isfinite(self._request.end):
             span = f"from {self._request.first:g} s until {self._request.end:g} s"
         if self._unsettled:
-            why = f"those {span} came before there were settings to work them out with"
+            why = f"those {span} were recorded before the first settings"
         elif self._shapeless:
-            why = f"the readings {span} decide no shape"
+            why = f"the readings {span} determine no shape"
         elif math.isnan(self._last):
             why = "got none that can be used"
         else:
@@ -181,7 +180,7 @@ class _Work:
 
 
 class ExportTask:
-    """Writes what is requested, in a folder beside it until it is whole; only `wait` waits.
+    """Writes the requested files, in a temporary folder until complete; only `wait` waits.
 
     Refused where there is no place. It ends when it is done, when `close` is called, which leaves
     nothing of what is not whole, or when the process that started it is gone.

@@ -288,7 +288,7 @@ def test_one_typed_as_a_source_is_played_with_its_settings(
     [
         (b"", "expected a recording"),
         (b"no recording at all", "expected a recording"),
-        (b"\x89MCAP0\r\n" + bytes(40), "is no recording"),
+        (b"\x89MCAP0\r\n" + bytes(40), "not a valid recording"),
         (None, "cannot be read"),
     ],
 )

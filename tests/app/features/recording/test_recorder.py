@@ -116,7 +116,7 @@ def test_nothing_is_ever_written_over(window: MainWindow, tmp_path: Path, until)
     there = tmp_path / "there.mcap"
     there.write_bytes(b"mine")
     window.taping.begin(there)
-    until(lambda: "is there already" in window.recording.message.text())
+    until(lambda: "already exists" in window.recording.message.text())
     assert there.read_bytes() == b"mine"
     assert not window.taping.recording
     assert not _mark(window).isVisible()  # it never began

@@ -105,7 +105,7 @@ def test_no_file_is_written_over(dialog: RepairDialog, broken: Path) -> None:
     assert dialog.to.text() == str(broken.with_name("broken-repaired-2.mcap"))
     dialog.to.setText(str(there))
     dialog.begin_button.click()
-    assert "is there already" in dialog.words.text()
+    assert "already exists" in dialog.words.text()
     assert there.read_bytes() == b"mine"
 
 
