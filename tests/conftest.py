@@ -239,7 +239,7 @@ def recording(
     recorder = Recorder(path, begun)
 
     def source() -> SimulatedSource:
-        recorder.goes_on(now[0])
+        recorder.resume(now[0])
         made = SimulatedSource(scene, lambda: now[0])
         made.record(recorder)
         recorder.set_up(Pipeline(made.sensor, setups[-1]))

@@ -37,7 +37,7 @@ class Frame:
     Channel `component * P + element` is one reading of the (3, P) array of a skin with P
     elements. Times are in seconds: `device_time` on the device's own clock when the scan began,
     `host_time` on this machine's monotonic clock when the bytes were read, and on it `taken` +-
-    `taken_sd`, when the scan began; NaN and infinity where nothing tells.
+    `taken_sd`, when the scan began; NaN and infinity if unknown.
     """
 
     sequence: int
@@ -69,8 +69,8 @@ class Contact:
 
     `force` and `force_sd` in N, `displacement` and `displacement_sd` in m, of the skin at the
     contact; `spare` readings more than a point load needs tell the noise. `single` says whether one
-    point load explains the readings as well as the shape does. `near_rim` warns that the contact is
-    too near a held edge, where no force moves the skin, for its place and force to be trusted.
+    point load fits the readings as well as the shape. `near_rim` warns that the contact is
+    too near a held edge, where no force moves the skin, for a reliable position and force.
     Every number is NaN when the readings hold no contact that stands out of the noise.
     """
 

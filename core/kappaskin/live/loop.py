@@ -46,7 +46,7 @@ _FRESH = 1.5e-3  # s of computing between two reads where receivers wait for the
 
 
 class EngineLoop:
-    """The engine at work: takes requests, reads, computes, records, publishes and reports."""
+    """The engine's loop: takes requests, reads, computes, records, publishes and reports."""
 
     def __init__(self, requests: RequestReceiver, ring: Ring, compared: Ring) -> None:
         self._requests, self._ring = requests, ring
@@ -72,11 +72,11 @@ class EngineLoop:
         self._changing, self._again = False, math.inf
 
     def run(self) -> None:
-        """Serve until the window says goodbye, or is gone and none resumes this engine."""
+        """Serve until the window ends it, or is gone and none resumes this engine."""
         while True:
             for request in self._requests.receive(0.05 if self._source is None else 0.0):
                 self._carry_out(request)
-            if not self._goes_on():
+            if not self._may_continue():
                 break
             if self._source is not None:
                 self._read(self._source)
@@ -92,7 +92,7 @@ class EngineLoop:
         self._publishing.close()
         self._builder.shutdown(wait=False, cancel_futures=True)
 
-    def _goes_on(self) -> bool:
+    def _may_continue(self) -> bool:
         """Whether there is a window, or one may come yet for what is recorded."""
         if change := self._requests.check(self._recorder.active):
             self._add_event(Event(time.monotonic(), "engine", change))
@@ -101,11 +101,11 @@ class EngineLoop:
 
     @property
     def may_be_resumed(self) -> bool:
-        """Whether it goes on where the window is gone."""
+        """Whether it continues without a window."""
         return self._requests.resumable and self._recorder.active
 
     def _carry_out(self, request: str | Action) -> None:
-        """Go over to the setting of `Requested` of this name, or do what is to be done once."""
+        """Apply the setting of `Requested` of this name, or carry out an action."""
         requested = self._requests.requested
         match request:
             case "setup":
@@ -243,7 +243,7 @@ class EngineLoop:
             self._check_health(frame)
 
     def _lose(self, message: str) -> None:
-        """Let go of a source of which nothing more comes."""
+        """Close a source that failed."""
         if self._source is not None:
             self._status = replace(self._status, accounting=self._source.accounting())
         self._close()
@@ -255,7 +255,7 @@ class EngineLoop:
         within = (_FRESH,) if self._publishing.active else ()
         source = self._source
         paused = isinstance(source, ReplayedSource) and source.stands
-        least = min(len(frames), int(paused))  # or nobody would see what was requested
+        least = min(len(frames), int(paused))  # or a requested frame would not be shown
         late = len(frames) - max(self._rate_limit.affordable(len(frames), *within), least)
         if late:
             self._status = replace(self._status, skipped=self._status.skipped + late)
@@ -381,7 +381,7 @@ def serve(
     # for each, a loop that always computes would starve it below the rate of the line.
     sys.setswitchinterval(_SWITCH)
     gc.freeze()  # what was imported is no garbage: to look through it takes 27 ms each time
-    # Ctrl+C and a terminal that closes are the parent's: it says goodbye, or is gone.
+    # Ctrl+C and a terminal that closes are the parent's: it ends this process, or is gone.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(signal, "SIGHUP"):
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
@@ -404,7 +404,7 @@ def serve(
 def _end_with_parent(loop: EngineLoop) -> None:
     """End this process soon after the one that started it, whatever is being computed.
 
-    What was recorded is ended first. What is being recorded, and may be adopted, goes on.
+    A recording is ended first, unless another window may resume it.
     """
     if parent := multiprocessing.parent_process():
         parent.join()

@@ -1,4 +1,4 @@
-"""Recorder of the engine: what the source brings and the pipeline computes, to a file."""
+"""Recorder of the engine: the source's input and the pipeline's results, to a file."""
 
 import time
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from kappaskin.sources import SimulatedSource, Source
 
 
 class LiveRecorder:
-    """Records what a source brings and what a pipeline computes of it; `status` reports on it.
+    """Records the input of a source and the results of a pipeline; `status` has its state.
 
     No call does anything until `begin`. Only `close` waits for the disk.
     """
@@ -49,30 +49,30 @@ class LiveRecorder:
                 recorder.left_out(*host.excluded)
 
     def connect(self, source: Source | None) -> None:
-        """Record what `source` brings from now on; nothing of a recording."""
+        """Record the input of `source` from now on; nothing if it is a recording."""
         self._live = not isinstance(source, ReplayedSource)
         if self._recorder is not None and source is not None:
-            self._recorder.goes_on(time.monotonic())
+            self._recorder.resume(time.monotonic())
             source.record(self._recorder)
             self.add_scene(source)
 
     def add_scene(self, source: Source) -> None:
-        """Another scene may be simulated from now on."""
+        """Record the scene that is simulated from now on."""
         if self._recorder is not None and isinstance(source, SimulatedSource):
             self._recorder.plays(source.scene)
 
     def source_ended(self) -> None:
-        """The source brings nothing more."""
+        """Record that the source ended."""
         if self._recorder is not None and self._live:
             self._recorder.disconnected(time.monotonic())
 
     def set_up(self, host: PipelineHost) -> None:
-        """Another pipeline is in use."""
+        """Record that another pipeline is in use."""
         if self._recorder is not None and host.pipeline is not None and self._live:
             self._recorder.set_up(host.pipeline)
 
     def exclude(self, host: PipelineHost) -> None:
-        """Other channels are left out."""
+        """Record that other channels are excluded."""
         if self._recorder is not None and host.excluded is not None and self._live:
             self._recorder.left_out(*host.excluded)
 

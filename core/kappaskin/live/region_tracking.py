@@ -8,16 +8,16 @@ from kappaskin.sensing import Sensor
 from kappaskin.sources import SerialSource, SimulatedSource, Source
 
 _NOT_ON_A_LINE = {
-    Region.INTRINSIC: "a device on a line tells of no force/torque sensor at its base",
-    Region.TURNS: "turns change the list with every frame, a device on a line is told 20 a second",
-    Region.ADAPTIVE: "the list changes with every frame, a device on a line is told 20 a second",
+    Region.INTRINSIC: "a serial device does not report a force/torque sensor at its base",
+    Region.TURNS: "turns need a new scan list in every frame; a serial device takes 20 a second",
+    Region.ADAPTIVE: "it needs a new scan list in every frame; a serial device takes 20 a second",
 }
 
 
 class SimulatedTracking:
     """Lets `source` scan `region`.
 
-    Called with each contact that the skin reports, and the estimator that told its shape.
+    Called with each estimated contact and its estimator.
     """
 
     refusal = ""
@@ -40,7 +40,7 @@ class SimulatedTracking:
 
 
 class SerialTracking:
-    """Lets the device on a line scan `region`, and requests another list as a contact moves.
+    """Lets a serial device scan `region`, and requests another list as the contact moves.
 
     Called like `SimulatedTracking`; `refusal` says why the device does not, once that is known.
     """
@@ -62,8 +62,8 @@ class SerialTracking:
 def track_region(source: Source, region: Region) -> SimulatedTracking | SerialTracking | None:
     """The tracking that lets `source` scan `region`; None where that is off.
 
-    Raises a `Refusal` when the source cannot or the region is not on its skin; it then goes on with
-    everything.
+    Raises a `Refusal` when the source cannot or the region is not on its skin; it then scans
+    all channels.
     """
     if isinstance(source, SimulatedSource):
         source.scan(None)

@@ -34,16 +34,16 @@ _LARGEST = 4096  # bytes of a note
 _QUEUE = 16  # that may wait to be heard
 _KEY = 32  # bytes
 _ANSWER = 2.0  # s within which one that is alive answers
-_AGAIN = 0.1  # s after somebody who had no key
+_AGAIN = 0.1  # s after a connection without a key
 _FOREIGN = (UnpicklingError, AttributeError, ImportError, IndexError, TypeError)
 """What reading the answer of another version may raise."""
 
 
 @dataclass(frozen=True)
 class ResumeInfo:
-    """What an engine that was left alone reports to the window that resumes it.
+    """Information that an engine without a window sends to the window that resumes it.
 
-    What was `requested` of it, the names of the `rings` that it writes to, its `pid`, and for how
+    The state `requested` of it, the names of the `rings` that it writes to, its `pid`, and for how
     long in s it has been `alone`.
     """
 
@@ -54,29 +54,29 @@ class ResumeInfo:
 
     @property
     def lasted(self) -> str:
-        """How long it went on, as text."""
+        """How long it recorded without a window, as text."""
         minutes, seconds = divmod(round(self.alone), 60)
         lasted = f"{minutes} min {seconds} s" if minutes else f"{seconds} s"
-        return f"went on for {lasted} after the last window ended"
+        return f"continued for {lasted} after the last window ended"
 
 
 def resume_folder() -> Path:
-    """Folder where engines of this user and machine that were left alone leave a note."""
+    """Folder of the notes of this user's and machine's engines without a window."""
     state = platformdirs.user_state_path("kappaskin", appauthor=False)
     return state / "left-alone" / platform.node()
 
 
 def _address(note: Path) -> str:
-    """Where the process listens that left a note."""
+    """Address of the process that left a note."""
     if os.name == "nt":
         return rf"\\.\pipe\kappaskin-{note.stem}"
     return str(note.with_suffix(".sock"))
 
 
 class ResumeListener:
-    """Waits until another process connects, and sends it `info`; `line` is the one to it.
+    """Waits until another process connects, and sends it `info`; `line` is the connection.
 
-    `sent` is what it was sent. An `OSError` where no note can be left in `folder`.
+    `sent` is the information sent. An `OSError` where no note can be written to `folder`.
     """
 
     def __init__(self, folder: Path, info: Callable[[], ResumeInfo]) -> None:
@@ -91,7 +91,7 @@ class ResumeListener:
         except OSError:
             self._listener.close()
             raise
-        self._thread = threading.Thread(target=self._wait, name="orphan", daemon=True)
+        self._thread = threading.Thread(target=self._wait, name="resume-listener", daemon=True)
         self._thread.start()
 
     def _wait(self) -> None:
@@ -142,7 +142,7 @@ class ResumedProcess:
         self._over(timeout)
 
     def _over(self, timeout: float | None) -> bool:
-        """Whether it ended within `timeout` s: it says nothing more, so that is all to be read."""
+        """Whether it ended within `timeout` s: only then is there anything to read."""
         try:
             return self.line.poll(timeout)
         except OSError:
@@ -159,14 +159,14 @@ class ResumedProcess:
 def resume_process(folder: Path) -> ResumedProcess | None:
     """A process that left a note in `folder`, None where there is none.
 
-    Notes of those that are gone are taken away.
+    Notes of ended processes are removed.
     """
     found = (_reached(note) for note in sorted(folder.glob("*.note")))
-    return next((orphan for orphan in found if orphan is not None), None)
+    return next((process for process in found if process is not None), None)
 
 
 def _reached(note: Path) -> ResumedProcess | None:
-    """The process that left a `note`; None where it is gone, another came first, or it is stuck."""
+    """The process that left a `note`; None if it ended, was resumed by another, or is stuck."""
     try:
         version, key = _read(note)
         if version != metadata.version("kappaskin"):
@@ -190,7 +190,7 @@ def _reached(note: Path) -> ResumedProcess | None:
 
 
 def _read(note: Path) -> tuple[str, bytes]:
-    """The version that left a note, and its key; a `ValueError` where it is none."""
+    """The version that wrote a note, and its key; a `ValueError` for an invalid note."""
     with note.open("rb") as file:
         version, key = file.read(_LARGEST).decode().split()
     return version, bytes.fromhex(key)
@@ -202,7 +202,7 @@ _ALONE = "the window ended unexpectedly while it recorded"
 class RequestReceiver:
     """The engine's side: holds what is `requested`, by the `line` to a window, until it is `over`.
 
-    It is over where the window says so. Where the line ends without that, another window may
+    It is over when the window requests it. Where the line ends without that, another window may
     resume the engine that finds a note in `folder`; without a folder, a recording or anybody within
     `patience` s it is over too. That window gets all that is requested, and the names of the
     `rings`.
@@ -241,7 +241,7 @@ class RequestReceiver:
         return self.requested.since(before)
 
     def check(self, recording: bool) -> str:
-        """What became of the window since the last check, as text; empty where nothing did."""
+        """Change of the window's state since the last check, as text; empty without one."""
         if self.over or self._line is not None:
             return ""
         if self._listener is None:

@@ -17,7 +17,7 @@ from kappaskin.sources import Source
 
 @dataclass(frozen=True)
 class TareStatus:
-    """Whether one is being taken, how many ended, and how the last: with a `tare`, or why not.
+    """State of tares: whether one is being taken, the number ended, and the last result.
 
     A `tare` that was taken is not in use before a setup has it.
     """
@@ -31,7 +31,7 @@ class TareStatus:
 class TareCapture:
     """Takes one tare at a time, which the `worker` computes in the background.
 
-    `status` goes on from the one `before`, of an engine that may have died taking a tare.
+    `status` continues the one `before`, of an engine that may have died taking a tare.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class TareCapture:
             self._end("the engine ended while it was taken; tare again")
 
     def begin(self, sensor: Sensor | None) -> None:
-        """Take a tare of `sensor` from the frames that come from now on; None when none do."""
+        """Take a tare of `sensor` from the next frames; None when nothing streams."""
         if sensor is None:
             self._end("nothing streams: connect a sensor, then tare")
             return

@@ -1,4 +1,4 @@
-"""Timing of frames: when they came, how evenly, and how many there is time to compute."""
+"""Timing of frames: arrival times, and how many can be computed in time."""
 
 import math
 import time
@@ -13,7 +13,7 @@ _ALL = 0.8  # of the time: where estimates of all frames take less, every one is
 _SHARE = 0.4  # of it, for estimates where they take more: reading and drawing must not wait
 _SAVED = 0.05  # s of computing that may be saved up for a burst, or be owed
 _AT_ONCE = 0.02  # s of computing between two reads at most
-_SEEN = 1 / 30  # s after which one is computed whatever there is time for: somebody looks on
+_SHOWN = 1 / 30  # s after which one is computed in any case: the screen shows it
 _LATEST = 0.1  # weight of the last costs in what one is taken to cost
 _WHILE = 0.5  # s over which it is judged how many come
 
@@ -40,7 +40,7 @@ class RateLimit:
             latest = min(1.0, passed / _WHILE)
             self._rate += latest * (waiting / passed - self._rate)
         self._credit = min(_SAVED, self._credit + _SHARE * passed)
-        least = int(now - self._seen >= _SEEN)
+        least = int(now - self._seen >= _SHOWN)
         if not self._cost:
             return min(waiting, least)
         allowed = _AT_ONCE if self._rate * self._cost <= _ALL else self._credit

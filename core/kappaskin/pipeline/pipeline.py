@@ -199,7 +199,7 @@ class Pipeline:
         )
 
     def _is_determined(self, fit: Fit) -> bool:
-        """Whether a shape's error bars are told; fits to the same channels mostly share them."""
+        """Whether a shape is determined; fits to the same channels mostly share error bars."""
         if fit.uncertainty is not self._judged:
             self._judged, norm = fit.uncertainty, np.linalg.norm(fit.unit_sd)
             self._determined = bool(norm <= self._loosest)
@@ -268,7 +268,7 @@ class Pipeline:
         return found
 
     def restore(self, state: StateArrays) -> None:
-        """Go on from the `state` of another of the same sensor and setup."""
+        """Continue from the `state` of another pipeline of the same sensor and setup."""
         self.past.hold.restore(state, "hold.")
         if self.past.correct is not None:
             self.past.correct.restore(state, "correct.")

@@ -107,15 +107,15 @@ def _shapes(
 ) -> dict[str, NDArray[Any]]:
     """`coefficients`, `sd` and `residual` of all T frames; `sigma` may be of each of them."""
 
-    def told(fit: Fit) -> dict[str, NDArray[Any]]:
+    def arrays_of(fit: Fit) -> dict[str, NDArray[Any]]:
         return {"coefficients": fit.coefficients, "sd": fit.sd, "residual": fit.residual}
 
     if sigma is None or sigma.ndim < 3:
-        return told(estimator_for(method, basis, layout, sigma)(curvature))
+        return arrays_of(estimator_for(method, basis, layout, sigma)(curvature))
     frames: list[dict[str, NDArray[Any]]] = []
     for number, own in enumerate(sigma):
         try:
-            frames.append(told(estimator_for(method, basis, layout, own)(curvature[number])))
+            frames.append(arrays_of(estimator_for(method, basis, layout, own)(curvature[number])))
         except Refusal as error:
             raise type(error)(f"frame {number}: {error}") from error
     return {name: np.stack([frame[name] for frame in frames]) for name in frames[0]}
@@ -219,7 +219,7 @@ def _contacts(fits: list[Fit], contacts: list[Contact], forces: bool) -> dict[st
 
 
 def _objects(found: list[ContactObject]) -> dict[str, NDArray[Any]]:
-    """What touches the skin in each frame (`ContactObject`); without a contact NaN and "".
+    """The object in contact in each frame (`ContactObject`); without a contact NaN and "".
 
     `object` (T,) is one of `KINDS` or "", `object_probability` (T, 4) of each of them;
     `object_radius` (T,) and `object_radius_95` (T, 2) in m; `object_axis` and `object_axis_95` (T,)

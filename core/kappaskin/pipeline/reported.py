@@ -1,6 +1,6 @@
 """The table of what an estimate reports, from which files, messages and the screen are made.
 
-It stands here, beside what makes an estimate, since some error bars need the fit that it comes
+It is in this room, with the pipeline, since some error bars need the fit that it comes
 from, and since all that shows, sends or writes an estimate lies above. Another quantity is one
 entry of `REPORTED` and the function that computes it.
 """
@@ -573,7 +573,7 @@ _FIT = (
                 f"Residual {name}",
                 f"r<sub>{name}</sub>",
                 f"What the shape leaves of each reading of {name}: reading less fit. Noise alone "
-                "has no pattern; one that stays tells of too few functions or a wrong edge.",
+                "has no pattern; one that stays indicates too few functions or a wrong edge.",
                 least=0.1,
                 group="residual",
             )

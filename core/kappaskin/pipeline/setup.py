@@ -90,7 +90,7 @@ SETUP = Part(
     },
     (Setup,),
 )
-"""All that a setup says; in text, a calibration and a tare are the names of their files."""
+"""All keys of a setup; in text, a calibration and a tare are the names of their files."""
 
 _LONGEST = 2**16  # characters of a setup
 
@@ -106,7 +106,7 @@ def setup_to_text(setup: Setup) -> tuple[str, dict[str, bytes]]:
 
 
 def setup_from_text(text: str, file: Callable[[str], bytes]) -> Setup:
-    """The setup that `text` tells of, `file` giving what a name stands for.
+    """The setup in `text`; `file` returns the content of a named file.
 
     A `Refusal` when it is none.
     """

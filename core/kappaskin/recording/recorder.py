@@ -56,7 +56,7 @@ class Recorder:
         """End the file, and wait until it is on the disk."""
         self._file.close()
 
-    def goes_on(self, now: float) -> None:
+    def resume(self, now: float) -> None:
         """Continue at the time `now` in s, after a pause without a source."""
         self._now = now
 

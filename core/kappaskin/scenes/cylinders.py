@@ -13,7 +13,7 @@ from kappaskin.frames import Array
 from kappaskin.sensing import Sensor
 
 RADII = (0.1, 0.05, 0.033, 0.025, 0.02, 0.017, 0.0145, 0.013)
-"""Radii in m whose curvatures are about 10 1/m apart, up to the paper's fingertip's 77 1/m."""
+"""Radii in m, in curvature steps of about 10 1/m, up to the paper's fingertip's 77 1/m."""
 
 FEWEST_RADII = 3
 _LADDER = 5  # cylinders for a sensor that cannot read the usual ones
@@ -27,7 +27,7 @@ ADVICE = (
     "What the skin reads depends on the way it came: slide it from each cylinder to the next "
     "without letting it spring back, and wait until it lies still."
 )
-"""What a person must know before the first step."""
+"""Instructions before the first step."""
 
 WAYS = {
     "there": "on the way there",
@@ -163,7 +163,7 @@ def _most_read(sensor: Sensor, most: float) -> float:
 def radii_for(sensor: Sensor) -> tuple[float, ...]:
     """Radii in m of cylinders that `sensor` can read: `RADII`, or larger ones in whole mm.
 
-    The larger ones have curvatures evenly apart. Gains may be off by a third.
+    The larger ones have evenly spaced curvatures. Gains may be off by a third.
     """
     most = min(1 / min(RADII), sensor.transduction.strain_limit_curvature)
     most = min(most, _most_read(sensor, _HEADROOM * most) / _HEADROOM)
@@ -201,7 +201,7 @@ def check_strain(steps: tuple[CylinderStep, ...], sensor: Sensor) -> None:
 
 @dataclass(frozen=True)
 class Presentation:
-    """Steps that follow one another by themselves, each for `dwell` s, or its hold if longer."""
+    """Automatic steps, each for `dwell` s, or its hold if longer."""
 
     steps: tuple[CylinderStep, ...]
     dwell: float

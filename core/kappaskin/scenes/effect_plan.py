@@ -1,4 +1,4 @@
-"""Plan of a simulation: which effects a scene calls for at the accuracy asked for, and why."""
+"""Plan of a simulation: which effects are needed for the requested accuracy, and why."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -26,7 +26,7 @@ from kappaskin.scenes.scene import EffectSelection, Scene, survey
 
 @dataclass(frozen=True)
 class PlanEntry:
-    """One effect in a plan: how large it is, whether it is `kept`, and why."""
+    """One effect in a plan: its size, whether it is `kept` (simulated), and why."""
 
     name: str
     size: Size
@@ -49,7 +49,7 @@ class PlanEntry:
 class Plan:
     """What is simulated of a scene: an entry for every effect that is known.
 
-    Those `kept` are in the order in which they come about.
+    Those `kept` are in physical order.
     """
 
     entries: tuple[PlanEntry, ...]
@@ -57,7 +57,7 @@ class Plan:
 
     @property
     def left_out(self) -> float:
-        """By how much all that was left out changes a reading, as a share of the peak."""
+        """Error of a reading by all omitted effects, as a share of the peak."""
         return sum(entry.size.error for entry in self.entries if not entry.kept)
 
     def __iter__(self) -> Iterator[PlanEntry]:
@@ -65,7 +65,7 @@ class Plan:
 
 
 def effects_of(scene: Scene) -> dict[str, Effect]:
-    """All effects that there are in `scene`, by name, in the order in which they come about."""
+    """All effects in `scene`, by name, in physical order."""
     plate, layout = scene.plate, scene.layout
     there: list[Effect] = []
     if plate.tension and plate.rigidity:  # a drum head is no skin without its tension
@@ -87,7 +87,7 @@ def effects_of(scene: Scene) -> dict[str, Effect]:
 
 
 def plan(scene: Scene) -> Plan:
-    """What to simulate of `scene`, by its `choice`, with the size of every effect in it."""
+    """Plan of `scene` by its `choice`, with the size of every effect."""
     there, seen = effects_of(scene), survey(scene)
     sizes = {name: effect.size(seen) for name, effect in there.items()}
     reasons = _reasons(scene.choice, there, sizes)
@@ -105,7 +105,7 @@ def plan(scene: Scene) -> Plan:
 def _reasons(
     choice: EffectSelection, there: dict[str, Effect], sizes: dict[str, Size]
 ) -> dict[str, tuple[bool, str]]:
-    """Whether each effect that is `there` is kept, and why."""
+    """For each effect whether it is simulated, and why."""
     found, spent = dict[str, tuple[bool, str]](), 0.0
     for name in sorted(there, key=lambda name: sizes[name].error):
         error = sizes[name].error

@@ -71,7 +71,7 @@ _LARGEST_SCENE = 2**24  # bytes
 _LARGEST_RECORD = 2**22  # bytes of a recorded motion
 
 _SIDE = Within(1e-4, 10, "m")
-_MOST_ELEMENTS = 2**16 // 3  # as many as the wire's format can tell apart
+_MOST_ELEMENTS = 2**16 // 3  # as many as the wire format can number
 _MOST_VALUES = 2**25  # of functions at channels, a quarter of a gigabyte
 _MOST_FUNCTIONS, _MOST_THAT_MIX = 64**2, 20**2  # some seconds to make the skin of
 
@@ -110,12 +110,12 @@ def read_scene_text(file: Path) -> str:
 
 
 def read_scene(text: str, file: Path) -> Scene:
-    """The scene that `text`, of `file`, describes; files that it names lie beside it."""
+    """The scene in the `text` of `file`; files that it names are in the same folder."""
     return scene_of(TomlTable(parsed(text, file), text, str(file)), file)
 
 
 def scene_of(top: TomlTable, file: Path) -> Scene:
-    """The scene that a file says at its `top`, besides what somebody else has asked for there."""
+    """The scene in the table `top` of a file; keys of other readers are left unread."""
     name, folder = file.stem.removesuffix(".scene"), file.parent
     if (version := SCENE.value(top, "format")) != FORMAT:
         raise top.refusal(
@@ -217,7 +217,7 @@ def _electronics(table: TomlTable) -> Transduction:
 
 
 def _changed(table: TomlTable, part: Any) -> Any:
-    """The `part` of the electronics with what the table says of it."""
+    """The `part` of the electronics with the values in the table."""
     hints = get_type_hints(cast("type[Any]", type(part)))
     changes = {f.name: table.get(f.name, hints[f.name]) for f in fields(part) if f.name in table}
     table.done()
@@ -238,7 +238,7 @@ def _cylinders(table: TomlTable, scene: Scene) -> Presentation:
 def _effects(
     top: TomlTable, electronics: Transduction, layout: SensorLayout
 ) -> tuple[EffectSelection, tuple[Effect, ...]]:
-    """Which effects the file chooses, and those that it says the parameters of."""
+    """The selection of effects in the file, and the effects with parameters."""
     table = top.table("effects")
     found = list[Effect]()
     for name, kind in EFFECTS.items():
@@ -281,7 +281,7 @@ def _choice(table: TomlTable, accuracy: float) -> EffectSelection:
 
 
 def _wanted(table: TomlTable) -> set[str]:
-    """The effects that a file asks for by name."""
+    """The effects that a file names."""
     named = EFFECT.value(table, "choose")
     return {*EFFECT.value(table, "on"), *(() if isinstance(named, str) else named)}
 
@@ -289,7 +289,7 @@ def _wanted(table: TomlTable) -> set[str]:
 def _stimulus(
     table: TomlTable, plate: Plate, moved: Callable[[Load, float], Load], folder: Path
 ) -> Stimulus:
-    """What a [[touch]] of `plate` says; `moved` makes a load move its place so far in m."""
+    """The stimulus of a [[touch]] table; `moved` gives a load a displacement in m."""
     what: Load | Indenter
     if (name := TOUCH.value(table, "what")) in OBJECTS:
         what = table.make(Indenter, rigid=_object(table, OBJECTS[name].made, folder))
@@ -316,20 +316,20 @@ def _object(table: TomlTable, kind: type[RigidObject], folder: Path) -> RigidObj
     """The rigid object that the table describes, read from a file in `folder` if it has one."""
     with table.blamed():
         if kind is Mesh:
-            return Mesh.read(_beside(table, "file", folder), TOUCH.value(table, "unit"))
+            return Mesh.read(_scene_file(table, "file", folder), TOUCH.value(table, "unit"))
         if kind is HeightMap:
             sizes = (TOUCH.value(table, key) for key in ("length", "width", "relief"))
-            return HeightMap.read(_beside(table, "file", folder), *sizes)
+            return HeightMap.read(_scene_file(table, "file", folder), *sizes)
         return table.make(kind)
 
 
-def _beside(table: TomlTable, key: str, folder: Path) -> Path:
-    """The file that the table names, which lies beside that of the scene."""
+def _scene_file(table: TomlTable, key: str, folder: Path) -> Path:
+    """The file that the table names, in the folder of the scene."""
     file = folder / TOUCH.value(table, key)
     if not file.is_file():
         raise table.refusal(
-            f"expected the name of a file beside that of the scene, got {str(file)!r:.200}, where "
-            "there is none",
+            f"expected the name of a file in the folder of the scene, "
+            f"got {str(file)!r:.200}, which does not exist",
             key,
         )
     return file
@@ -346,7 +346,7 @@ def _motion(table: TomlTable, folder: Path) -> Motion | None:
         return made
     if "recorded" in table:
         with table.blamed("recorded"):
-            return _recorded(_beside(table, "recorded", folder))
+            return _recorded(_scene_file(table, "recorded", folder))
     steps = [_step(step) for step in table.tables("path")]
     with table.blamed("path"):
         return MotionPath(tuple(steps)) if "path" in table else None
@@ -377,7 +377,7 @@ def _recorded(file: Path) -> RecordedMotion:
 
 
 def check_sides(patch: Patch) -> None:
-    """Refuse a skin that no sensor is as large or small as."""
+    """Refuse a skin of unrealistic size."""
     if patch.a not in _SIDE or patch.b not in _SIDE:
         raise Refusal(
             f"expected sides of {_SIDE}, got {patch.a:g} x {patch.b:g} m; lengths are in metres"
@@ -391,7 +391,7 @@ def check_elements(m: int, n: int = 1) -> None:
 
 
 def _check_functions(patch: Patch, edge: str, counts: tuple[int, int], elements: int) -> None:
-    """Refuse more functions of the true shape than a few seconds and some memory are enough for."""
+    """Refuse more functions of the true shape than can be computed in a few seconds."""
     whole = isinstance(patch, Disk | Polygon)
     mix = whole or patch.base_curvature or edge != "hinged"
     most = _MOST_THAT_MIX if mix else _MOST_FUNCTIONS
@@ -404,5 +404,5 @@ def _check_functions(patch: Patch, edge: str, counts: tuple[int, int], elements:
 
 
 def usual_reference(patch: Patch) -> tuple[int, int]:
-    """The number of functions of the true shape of a skin that says none."""
+    """The default number of functions of the true shape."""
     return (15, 1 if patch.strip else 15)

@@ -19,7 +19,7 @@ from kappaskin.sensing import Sensor, SensorLayout, Transduction
 
 @dataclass(frozen=True)
 class EffectSelection:
-    """Which effects are simulated: those that matter, or all there are; `on` and `off` by name.
+    """Selected effects: those that matter, or all; `on` and `off` by name.
 
     With `auto` an effect is left out when it and all others left out change no reading by more than
     `accuracy`, a share of the scene's peak curvature.
@@ -95,7 +95,7 @@ class Scene:
         return basis_for(self.plate.patch, self.edge, *self.reference)
 
     def sensor(self) -> Sensor:
-        """What the simulated device says it is."""
+        """The description that the simulated device sends."""
         return Sensor(
             self.layout,
             self.transduction,
@@ -109,7 +109,7 @@ class Scene:
         )
 
     def touched_by(self, *loads: Load, motion: Motion | None = None) -> "Scene":
-        """The same scene under other loads, all of which move as `motion` says."""
+        """The same scene under other loads, all moving by `motion`."""
         return replace(self, stimuli=tuple(Stimulus(load, motion) for load in loads))
 
     def laid_on(self, laid: Presentation) -> "Scene":
@@ -118,17 +118,17 @@ class Scene:
 
     @property
     def loads(self) -> tuple[Load, ...]:
-        """The loads where they are before they move, pressing wholly."""
+        """The loads before they move, at full force."""
         each = (stimulus.what for stimulus in self.stimuli)
         return tuple(what for what in each if not isinstance(what, Indenter))
 
     @property
     def indenter(self) -> Stimulus | None:
-        """The rigid object that presses, if one does."""
+        """The rigid object in contact, if any."""
         return next((s for s in self.stimuli if isinstance(s.what, Indenter)), None)
 
     def loads_at(self, time: float) -> tuple[Load, ...]:
-        """The loads that press, where they are at `time` in s."""
+        """The loads in contact at `time` in s."""
         there = [stimulus.load_at(time) for stimulus in self.stimuli]
         return tuple([load for load in there if load is not None])
 
@@ -188,7 +188,7 @@ def scaled_to(plate: Plate, load: Load, displacement: float, basis: Basis) -> Lo
 class Playback:
     """Playback of a scene: at `at` s when device time was `since` s, `speed` times as fast since.
 
-    At a speed of zero it stands still, while the device goes on reading it.
+    At a speed of zero it is paused, while the device continues to read it.
     """
 
     at: float = 0.0
@@ -231,13 +231,13 @@ class LoadingHistory:
         self.take(scene)
 
     def take(self, scene: Scene) -> None:
-        """Go on with what touches the same skin in another `scene`."""
+        """Continue with the stimuli of another `scene` of the same skin."""
         self._scene, self._indenter = scene, scene.indenter
         if self._indenter and self._press is None:
             self._press = IndentationSolver(self._plate, self._basis)
 
     def __call__(self, time: float) -> AppliedLoads:
-        """What presses at `time` in s."""
+        """The loads at `time` in s."""
         stimulus = self._indenter
         if stimulus is None or self._press is None or not isinstance(stimulus.what, Indenter):
             loads = self._scene.loads_at(time)

@@ -558,7 +558,7 @@ _EFFECT_KEYS: dict[str, dict[str, Key]] = {
 
 
 def _kind_of(effect: type[Effect]) -> PartKind:
-    """The kind of table that tells an effect; it may leave out what has a default."""
+    """The kind of table of an effect; keys with a default are optional."""
     may = (name for name, (_, default, _) in fields_of(effect).items() if default is not REQUIRED)
     keys = _EFFECT_KEYS.get(effect.name, {})
     return PartKind(effect.called(), effect, effect.example, tuple(may), keys)

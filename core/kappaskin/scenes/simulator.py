@@ -1,4 +1,4 @@
-"""Simulator: the counts that a real device would send of a scene, with the truth beside them."""
+"""Simulator: the counts that a real device would send of a scene, and the truth."""
 
 import math
 import zlib
@@ -30,7 +30,7 @@ _FROM_THE_BEGINNING = Playback()
 
 
 class Simulator:
-    """Makes the frames of a scene; they must be asked for in order to repeat with a seed.
+    """Makes the frames of a scene; they repeat with a seed if requested in the same order.
 
     Only the effects that the scene calls for are there. With skew, each channel is read at its own
     instant of the scan, on a skin that moves meanwhile; the truth that comes with a frame is that
@@ -45,7 +45,7 @@ class Simulator:
         self._start_effects()
 
     def change(self, scene: Scene) -> None:
-        """Go on with other loads, motion or effects; the effects start anew if they changed.
+        """Continue with other loads, motion or effects; changed effects restart.
 
         Another list of them, another seed or another number of elements does.
         """
@@ -64,11 +64,11 @@ class Simulator:
             self._start_effects()
 
     def play(self, playing: Playback) -> None:
-        """Go on with the scene from another of its times, or at another speed."""
+        """Continue the scene at another time, or at another speed."""
         self.playing = playing
 
     def _pressed(self, time: float) -> AppliedLoads:
-        """What presses at device `time` in s."""
+        """The loads at device `time` in s."""
         return self._pressing(self.playing.time(time))
 
     def _take_stimuli(self) -> None:
@@ -122,7 +122,7 @@ class Simulator:
         return truth
 
     def loads(self, time: float) -> tuple[Load, ...]:
-        """What presses at device `time` in s; a rigid object as the points that bear it."""
+        """The loads at device `time` in s; a rigid object as its contact points."""
         return self._pressed(time).loads
 
     def _read(self, scan: Scan, time: float, truth: Truth) -> Array:
@@ -140,7 +140,7 @@ class Simulator:
         return first + s * (4 * middle - 3 * first - last + s * 2 * (first + last - 2 * middle))
 
     def _true(self, scan: Scan, time: float) -> tuple[Truth | None, Array]:
-        """The truth, None where no coefficients can tell it, and curvature (3 P,) in 1/m."""
+        """The truth, None where coefficients cannot express it, and curvature (3 P,) in 1/m."""
         if self.scene.laid is not None:
             laid = self.scene.laid.curvature(self.playing.time(time))
             return None, np.repeat(laid, len(self.scene.layout))
@@ -184,7 +184,7 @@ class Simulator:
         return _ROOM + warming[0].warmer(time) if warming else math.nan
 
     def failure(self, n: int) -> str:
-        """What becomes of frame `n` on the link: the name of what fails, nothing if it arrives."""
+        """The failure of frame `n` on the link by name; empty if it arrives."""
         return next((name for name, hits in self._link if hits(n)), "")
 
     def frame(self, n: int, clock: Callable[[], float]) -> Frame:

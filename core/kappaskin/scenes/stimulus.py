@@ -48,7 +48,7 @@ class Motion(Protocol):
 
     @property
     def duration(self) -> float:
-        """Seconds after which it begins anew."""
+        """Seconds after which it repeats."""
         ...
 
     @property
@@ -337,7 +337,7 @@ class Indenter:
             )
 
     def check(self, patch: Patch, pose: Pose) -> None:
-        """Refuse an object that, standing as `pose` says, is beside the skin or all through it."""
+        """Refuse an object that at `pose` is outside the skin or entirely through it."""
         reach, x, y = math.hypot(*self.rigid.extent), self.x + pose.dx, self.y + pose.dy
         if not (-reach <= x <= patch.a + reach and -reach <= y <= patch.b + reach):
             raise self._missing(patch, pose)
@@ -349,10 +349,10 @@ class Indenter:
             )
 
     def check_pressing(self, patch: Patch, pose: Pose) -> None:
-        """Refuse an object that is to press as `pose` says where nothing of the skin is below."""
+        """Refuse an object that would press at `pose` where there is no skin below."""
         self.check(patch, pose)
         place = np.array([self.x + pose.dx, self.y + pose.dy])
-        over = patch.moves(place[None])[0]  # the usual, and quickly told
+        over = patch.moves(place[None])[0]  # the usual case, and cheap
         if not over and not PlacedObject(self.rigid, place, self.turn + pose.turn).meets(patch):
             raise self._missing(patch, pose)
 
@@ -364,7 +364,7 @@ class Indenter:
         )
 
     def into(self, press: IndentationSolver, pose: Pose, after: Indentation | None) -> Indentation:
-        """What it does to the skin when it stands as `pose` says; `after` starts the search."""
+        """The contact with the skin at `pose`; the search starts `after` another one."""
         return press(
             self.rigid,
             self.x + pose.dx,

@@ -42,10 +42,10 @@ _MOST_CELLS = 2**20  # of a grid that is looked for
 def write_scene(scene: Scene) -> str:
     """The text of a file of `scene`, whose name is the file's.
 
-    `on` of effects that there is nothing of asks for nothing, and is left out. What no file can
+    `on` of effects that the scene lacks has no effect, and is left out. What no file can
     say is refused: objects and motions that came from files of their own, or 20 m of skin.
     """
-    scene.sensor()  # as for a reader, a rate that cannot be kept is refused
+    scene.sensor()  # as when reading, an impossible rate is refused
     tables = [
         table("", _top(scene), SCENE.comments()),
         table("[skin]", _skin(scene), SKIN.comments()),
@@ -141,7 +141,7 @@ def _electronics(electronics: Transduction) -> list[str]:
 
 
 def _changes(electronics: Transduction, chain: Transduction) -> dict[str, dict[str, Any]]:
-    """What each part says where it differs from that of `chain`."""
+    """The keys of each part that differ from `chain`."""
     names = [field.name for field in fields(chain)]
     return {name: _fields(getattr(electronics, name), getattr(chain, name)) for name in names}
 
@@ -189,7 +189,7 @@ def _effect(effect: Effect, scene: Scene) -> dict[str, Any]:
 
 
 def _choice(scene: Scene) -> dict[str, Any]:
-    """What the file says in `choose`, `on` and `off`."""
+    """The keys `choose`, `on` and `off` of the file."""
     choice, off = scene.choice, scene.choice.off
     on = choice.on & effects_of(scene).keys()
     named: dict[str, Any] = {}
@@ -205,14 +205,14 @@ def _choice(scene: Scene) -> dict[str, Any]:
 
 
 def _touch(stimulus: Stimulus) -> dict[str, Any]:
-    """What a [[touch]] says of the stimulus; what came from another file is refused."""
+    """The [[touch]] table of the stimulus; one that was read from another file is refused."""
     what = stimulus.what
     values = _pressed(what) if isinstance(what, Indenter) else _load(what)
     return {**values, **_motion(stimulus.motion)}
 
 
 def _name(among: Mapping[str, PartKind], one: object) -> str:
-    """What a file calls `one`; the first of two names for the same."""
+    """The name of `one` in a file; the first of two names."""
     for name, kind in among.items():
         if type(one) is kind.made:
             return name

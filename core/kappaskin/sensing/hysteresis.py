@@ -148,7 +148,7 @@ class _CreepState(Stateful):
 
     def _begin(self, time: float) -> float:
         """Advance the slow part to `time` in s; the weight of the present curvature in it."""
-        # A first frame finds the skin at rest; a clock that went back tells of no time.
+        # A first frame finds the skin at rest; after a clock went back no time is counted.
         keep, last, new = _step(time - self._time, self._tau)
         self._time = time
         self._s = keep * self._s + last * self._x

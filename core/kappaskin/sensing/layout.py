@@ -77,7 +77,7 @@ def _over_points(basis: Basis, positions: Array, L: float, x: float, y: float) -
 
 
 _SHORTEST = 1e-6  # m: the mean over a shorter gage is lost in rounding
-_ROUNDING = 1e-9  # of a depth: gages as long as elements are apart end on the rim
+_ROUNDING = 1e-9  # of a depth: gages as long as the element distance end on the rim
 
 
 def _channels(patch: Patch, elements: int) -> Mask:

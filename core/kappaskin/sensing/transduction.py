@@ -27,7 +27,7 @@ def _require_not_negative(owner: object, name: str) -> None:
 
 @dataclass(frozen=True)
 class HalfBridge:
-    """Back-to-back strain gages in a half-bridge, and the dummy half-bridge beside it (Fig. 4).
+    """Back-to-back strain gages in a half-bridge, and the dummy half-bridge next to it (Fig. 4).
 
     Thicknesses in m, `excitation` V_in in V; the gage factor has no unit. `gage_resistance` R_g in
     ohm is that of an unstrained gage, `gage_mismatch` the share of it by which the lower gage of a

@@ -50,7 +50,7 @@ def test_the_next_window_goes_on_as_the_last_one_was(
     assert window.history.settings == BEFORE
     assert not window.history.stack.canUndo()
     text = window.recording.message.text()
-    assert text.startswith("The recording press.mcap of the simulated skin went on for ")
+    assert text.startswith("The recording press.mcap of the simulated skin continued for ")
     assert text.endswith(
         "You asked for /dev/ttyABSENT7: Connect goes there, and the recording goes on with it."
     )

@@ -117,9 +117,9 @@ def inside(source, x, frame):
 @pytest.mark.parametrize(
     ("around", "why"),
     [
-        ("intrinsic", "tells of no force/torque sensor"),
-        ("turns", "change the list with every frame"),
-        ("adaptive", "changes with every frame"),
+        ("intrinsic", "does not report a force/torque sensor"),
+        ("turns", "new scan list in every frame"),
+        ("adaptive", "new scan list in every frame"),
     ],
 )
 def test_a_region_that_no_line_carries_is_refused_and_everything_scanned(source, around, why):

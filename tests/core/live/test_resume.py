@@ -366,4 +366,4 @@ def test_where_nobody_left_a_note_nobody_is_found(folder: Path) -> None:
 
 
 def test_how_long_it_went_on_is_told_in_minutes_and_seconds() -> None:
-    assert LEFT.lasted == "went on for 3 min 12 s after the last window ended"
+    assert LEFT.lasted == "continued for 3 min 12 s after the last window ended"

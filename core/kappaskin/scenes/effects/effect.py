@@ -21,7 +21,7 @@ from kappaskin.sensing import SensorLayout, Transduction
 
 
 def _check_ranges(name: str, effect: object) -> None:
-    """Refuse an `effect`, called `name`, that is told by a number out of its range."""
+    """Refuse an `effect`, called `name`, with a parameter out of its range."""
     for parameter, within in parameters(type(effect)).items():
         value = getattr(effect, parameter)
         if value not in within:
@@ -52,7 +52,7 @@ class Survey:
 
     @cached_property
     def peak(self) -> float:
-        """The largest reading in 1/m; that of one count where nothing touches."""
+        """The largest reading in 1/m; that of one count without a contact."""
         return max(float(np.abs(self.curvature).max(initial=0.0)), self.transduction.resolution)
 
     @cached_property
@@ -77,7 +77,7 @@ class Survey:
         return plate.compliance(self.basis).after(self.forces) @ self.operator.T
 
     def readings_on(self, plate: Plate) -> Array:
-        """What point-like elements would read of the same forces on another `plate`, (S, 3 P)."""
+        """Readings (S, 3 P) of point-like elements for the same forces on another `plate`."""
         return self._whole if plate == self.plate else self._on(plate)
 
     @cached_property
@@ -117,36 +117,36 @@ class Effect(ABC):
     """
 
     name: ClassVar[str]
-    """What scenes and plans call it."""
+    """Name in scenes and plans."""
     formula: ClassVar[str]
-    """The number of its `Size`, in words."""
+    """Formula of the number of its `Size`, in words."""
     label: ClassVar[str] = ""
-    """What people call it, where that is not its name."""
+    """Label on the screen, where it differs from the name."""
     example: ClassVar[Mapping[str, Any]] = {}
-    """What a scene file says of one; nothing of an effect that follows from the rest of it."""
+    """Keys in a scene file; none for an effect that follows from the rest of it."""
     elsewhere: ClassVar[str] = ""
-    """Where the rest of a scene file says it."""
+    """Other keys of a scene file that define it."""
     authored: ClassVar[bool] = False
-    """Whether only a scene's author decides on it: a failure, whose `Size` tells of no error."""
+    """Whether only a scene's author selects it: a failure, whose `Size` has no error."""
 
     def __post_init__(self) -> None:
         _check_ranges(self.name, self)
 
     @classmethod
     def called(cls) -> str:
-        """What people call it."""
+        """Label on the screen."""
         return cls.label or cls.name.replace("-", " ").capitalize()
 
     @abstractmethod
     def size(self, survey: Survey) -> Size:
-        """How large it is in a scene that was surveyed."""
+        """Its size in a surveyed scene."""
 
 
 class ReadingEffect(Effect):
     """An effect that changes one reading after the other, from curvature to curvature."""
 
     at_once: ClassVar[bool] = False
-    """Whether at work it takes many frames (T, C) in one call, as it would one after the other."""
+    """Whether it takes many frames (T, C) in one call, with the same result as one by one."""
 
     @abstractmethod
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:

@@ -112,7 +112,7 @@ class _LinkFailure(Effect):
         return Size(self.share, 0.0)
 
     def start(self, rng: np.random.Generator) -> Callable[[int], bool]:
-        """Whether frame n is hit: of a frame asked for twice, or out of turn, it is the same."""
+        """Whether frame n is hit: independent of the order and number of calls."""
         from kappaskin.scenes.effects.at_work.failures import hits
 
         return hits(self.share, rng)
@@ -128,7 +128,7 @@ class DroppedFrames(_LinkFailure):
 
 @dataclass(frozen=True)
 class CorruptedFrames(_LinkFailure):
-    """The `share` of all frames arrives with wrong bytes, which its checksum tells."""
+    """The `share` of all frames arrives with wrong bytes, which the checksum detects."""
 
     name: ClassVar = "corrupted-frames"
     example: ClassVar = {"share": 0.01}

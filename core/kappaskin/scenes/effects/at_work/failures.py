@@ -34,7 +34,7 @@ def intermittent(
 
     def read(curvature: Array, time: float) -> Array:
         nonlocal there, last
-        # A first frame finds them as they are; a clock that went back tells of no time.
+        # A first frame finds them as they are; after a clock went back no time is counted.
         elapsed, last = time - last, time
         if elapsed > 0:
             # Solved exactly: how likely each is to have changed, once or any odd number of times.

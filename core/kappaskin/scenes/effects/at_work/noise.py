@@ -30,7 +30,7 @@ def flicker(
 
     def move(k: int, time: float) -> None:
         elapsed, moved[k] = time - moved[k], time
-        # A first frame finds the parts as they are; a clock that went back tells of no time.
+        # A first frame finds the parts as they are; after a clock went back no time is counted.
         if elapsed > 0:
             z = 2 * math.pi * corners[k] * elapsed
             rng.standard_normal(out=drawn)
