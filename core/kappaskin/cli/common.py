@@ -40,7 +40,7 @@ Whole = Annotated[int, Parameter(converter=_whole)]
 """A whole number; of itself the command line would take 2.5 for 2."""
 
 Pair = Annotated[str, Parameter(allow_leading_hyphen=True)]
-"""Two numbers such as 8x8; a hyphen is let through so that -1x8 is refused as that."""
+"""Two numbers such as 8x8; a leading hyphen is accepted so that -1x8 is refused clearly."""
 
 
 def pair(text: str, what: str) -> tuple[int, int]:
@@ -53,7 +53,7 @@ def pair(text: str, what: str) -> tuple[int, int]:
 
 
 def stops() -> list[int]:
-    """The signals to stop (Ctrl+C, and the end of a service) that are received from now on."""
+    """List that receives the stop signals (Ctrl+C, end of a service) from now on."""
     stopped: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda got, _: stopped.append(got))

@@ -312,7 +312,7 @@ def tables(
     json: Switch = False,
     as_printed: Switch = False,
 ) -> None:
-    """Compute the paper's Tables 1 and 2 and print them beside the printed numbers.
+    """Compute the paper's Tables 1 and 2 and print them next to the printed numbers.
 
     Example: `kappaskin tables --method bayes --basis 15x15`
 

@@ -34,7 +34,9 @@ class Finding:
     retained: bool = False
 
     def __str__(self) -> str:
-        retained = "; kept, as the shape is not determined without it" if self.retained else ""
+        retained = (
+            "; not excluded, since the shape is undetermined without it" if self.retained else ""
+        )
         return f"{self.component} of element {self.element} {self.kind}: {self.figure}{retained}"
 
 
@@ -63,7 +65,9 @@ class Health:
         if math.isfinite(self.contact_cost):
             words.append(f"at the contact {100 * (self.contact_cost - 1):+.0f} %")
         if self.retained:
-            words.append(f"{self.retained} faulty but kept: without, the shape is not determined")
+            words.append(
+                f"{self.retained} faulty but not excluded: the shape is undetermined without them"
+            )
         return ", ".join(words)
 
 

@@ -394,7 +394,7 @@ def _table_line(row: dict[str, Any]) -> str:
 
 
 def tables_text(rows: list[dict[str, Any]]) -> str:
-    """Tables 1 and 2 with the paper's numbers beside ours."""
+    """Tables 1 and 2 with the paper's numbers next to ours."""
     lines: list[str] = []
     for table, title in _TITLES.items():
         head = (
@@ -415,7 +415,7 @@ def tables_text(rows: list[dict[str, Any]]) -> str:
 
 
 def misprints_text(rows: list[dict[str, Any]]) -> str:
-    """What is misprinted, one paragraph each."""
+    """The misprints, one paragraph each."""
     lines: list[str] = []
     for row in rows:
         gives = [("gives", f"{value:.4g}  {what}") for what, value in row["gives"].items()]

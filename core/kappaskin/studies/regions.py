@@ -51,7 +51,7 @@ def scene_of(period: float) -> Scene:
 
 
 class _Clock:
-    """A clock that only sleeping moves: arithmetic takes no time here."""
+    """A clock that advances only by sleeping: computing takes no time here."""
 
     def __init__(self) -> None:
         self.now = 0.0

@@ -59,7 +59,7 @@ def simulated_readings(
     }
 
 
-# What each effect costs per frame, measured here, beside its place in the plan
+# Computing time of each effect per frame, measured here, with its entry in the plan
 
 _TURNS, _FRAMES, _LEAST = 7, 40, 4  # turns, and frames of each: usually, and at least
 _TURN = 0.02  # s that the frames of one turn may take

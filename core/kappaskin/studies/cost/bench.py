@@ -407,8 +407,8 @@ class _EffectJudge:
         self._scanned = SCANS[setting.scanned](scene.layout, contact)
         frames = np.arange(SETTLING + _EACH) / scene.rate
         # One after the other, however short the scene.
-        apart = max(scene.survey_duration / _PLACES, len(frames) / scene.rate)
-        self._times = np.add.outer(apart * np.arange(_PLACES), frames)
+        spacing = max(scene.survey_duration / _PLACES, len(frames) / scene.rate)
+        self._times = np.add.outer(spacing * np.arange(_PLACES), frames)
 
     def answer(self, scene: Scene, names: frozenset[str]) -> tuple[Array, Array]:
         """Coefficients in m, fitted (T, N) and true (T, Nr), of the frames judged of `scene`.

@@ -38,7 +38,7 @@ _MOST = 1024
 
 
 class Workers(Protocol):
-    """Compute tasks, so many of them at once."""
+    """Compute `count` tasks at a time."""
 
     @property
     def count(self) -> int: ...
@@ -47,14 +47,14 @@ class Workers(Protocol):
 
 
 def scheduler_lost() -> Refusal:
-    """The refusal once no scheduler answers any more."""
+    """The refusal when the scheduler no longer replies."""
     return Refusal(
         "connection to the scheduler lost; the results so far are saved, the same command resumes"
     )
 
 
 class _Processes:
-    """Processes of this machine; where one dies all are begun anew."""
+    """Processes of this machine; if one dies, all are restarted."""
 
     def __init__(self, count: int, context: Context) -> None:
         self.count, self._context = count, context
@@ -127,7 +127,7 @@ def cluster(address: str) -> Generator[Workers]:
         client = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
         raise Refusal(
-            f"{address}: no Dask scheduler answers there ({error}); start one by dask scheduler, "
+            f"{address}: no Dask scheduler replies there ({error}); start one by dask scheduler, "
             "and give the address that it prints"
         ) from error
     try:
@@ -139,7 +139,7 @@ def cluster(address: str) -> Generator[Workers]:
 
 
 def _check_connection(address: str) -> None:
-    """Raise an error unless somebody is there: Dask itself would go on trying for 15 s."""
+    """Raise an error unless the port is open: Dask itself would retry for 15 s."""
     place = urlsplit(address if "//" in address else f"tcp://{address}")
     if place.scheme not in ("tcp", "tls") or place.hostname is None or place.port is None:
         raise ValueError("expected an address such as tcp://10.0.0.5:8786")
@@ -223,7 +223,7 @@ class _Run:
                 yield self.known[-1], block
 
     def fill(self) -> bool:
-        """Hand out tasks until all workers have enough; whether any are at work.
+        """Submit tasks until all workers have enough; whether any are running.
 
         A task that was in hand when a worker died may be what kills them: it is handed out alone.
         """
@@ -247,7 +247,7 @@ class _Run:
         self._running[self._workers.submit(task)] = known, task
 
     def collect(self) -> None:
-        """Take the results that are there within some time."""
+        """Take the results that arrive within some time."""
         for future in wait(self._running, _PROGRESS_EVERY, FIRST_COMPLETED).done:
             known, task = self._running.pop(future)
             result = self._result(future, task)
@@ -289,7 +289,7 @@ def run_study(
 ) -> list[PointResults]:
     """The results of every point of `study`; `show_progress` gets a line now and then.
 
-    Results go to the `folder` one by one, and what is there already is not computed again.
+    Results are saved in the `folder` one by one; existing ones are not computed again.
     """
     run = _Run(study, folder, workers)
     try:

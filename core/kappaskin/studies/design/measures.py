@@ -69,7 +69,7 @@ class FrameBlock:
 
     @cached_property
     def coefficients(self) -> Array:
-        """What was fitted, (T, N) in m."""
+        """The fitted coefficients, (T, N) in m."""
         return self.fit.coefficients.reshape(len(self.curvature), -1)
 
     @cached_property
@@ -79,16 +79,16 @@ class FrameBlock:
 
     @cached_property
     def contact(self) -> Array:
-        """Where the skin was pressed, (T, 2) in m or (1, 2)."""
+        """True contact positions, (T, 2) in m or (1, 2)."""
         return np.array([truth.contact for truth in self.truths])
 
     def forces(self) -> Array:
-        """What pressed in all, (T,) in N or (1,)."""
+        """True total force, (T,) in N or (1,)."""
         times = frame_times(self.scene, len(self.truths)).tolist()
         return np.array([sum(load.force for load in self.simulator.loads(t)) for t in times])
 
     def rms_error(self) -> Array:
-        """RMS over the skin of what was fitted less what was true, (T,) in m."""
+        """RMS error of the fitted surface over the skin, (T,) in m."""
         basis, reference = self.estimator.basis, self.scene.basis
         return rms_distance(basis, self.coefficients, reference, self.true)
 
@@ -226,12 +226,12 @@ _BLOCK, _MOST = 250, 5_000  # frames at a time, and in all
 
 
 def placed_estimator(
-    scene: Scene, functions: tuple[int, int], by: str, apart: float, method: str
+    scene: Scene, functions: tuple[int, int], by: str, distance: float, method: str
 ) -> Estimator:
-    """The estimator of a `method` for the elements placed `by` a name, `apart` in m or more."""
+    """The estimator of a `method` for elements placed `by` a name, at a least `distance` in m."""
     patch, (Ni, Nj) = scene.plate.patch, functions
     basis = basis_for(patch, scene.edge, Ni, 1 if patch.strip else Nj)
-    return estimator_for(method, basis, place_elements(scene.layout, basis, by, apart))
+    return estimator_for(method, basis, place_elements(scene.layout, basis, by, distance))
 
 
 @dataclass(frozen=True)

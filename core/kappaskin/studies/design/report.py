@@ -52,7 +52,7 @@ def mean_text(mean: Mean, measure: StudyMeasure) -> str:
 
 
 def header_of(study: Study) -> list[str]:
-    """What stands above the columns of `rows_of`."""
+    """Heads of the columns of `rows_of`."""
     units = [f"{MEASURES[name].title} [{MEASURES[name].unit}]" for name in study.measures]
     return [*map(study.called, study.places), *units, "frames"]
 
@@ -68,7 +68,7 @@ def rows_of(study: Study, known: Sequence[PointResults]) -> list[list[str]]:
 
 
 def remarks_on(study: Study, known: Sequence[PointResults]) -> list[str]:
-    """What a reader of the tables must know: what failed, what is missing, what is not exact."""
+    """Remarks on the tables: failures, missing results, approximations."""
     remarks: list[str] = []
     for one in known:
         values = one.point.values.items()
@@ -200,7 +200,7 @@ def _table(study: Study, known: Sequence[PointResults]) -> str:
 _COLOURS = (style.BLUE, style.ORANGE, "#63a878", "#7a4b9a", "#c9a227", "#3f9aa5", "#c2487a",
             style.FAINT, style.GREY)  # fmt: skip
 _PANEL = (18.0, 14.0, 92.0, 62.0)  # mm: left, bottom, width, height
-_ALONE = 150.0  # mm: the width of one without names of curves beside it
+_ALONE = 150.0  # mm: the width of one without a legend
 _WIDE = 20.0  # from the least to the largest by such a factor: shown by factors
 _LONGEST_LABEL = 44  # characters of the name of a curve
 

@@ -35,7 +35,7 @@ from kappaskin.studies.design.study import (
 # Tasks
 
 MEANING = 2
-"""Goes up with every change that makes the same study give other numbers."""
+"""Incremented with every change that alters the numbers of a study."""
 
 _ONE_BY_ONE = threading.Lock()  # what blocks share is not made for several threads
 
@@ -137,7 +137,7 @@ def _drawn(task: BlockTask) -> tuple[dict[str, Any], PointSetup]:
 
 
 def run_task(task: BlockTask) -> BlockMoments:
-    """What is measured in the block; raises a `Refusal` for one that cannot be computed."""
+    """The measured values of the block; raises a `Refusal` if it cannot be computed."""
     if task.version != version():
         raise Refusal(
             f"expected a worker with {task.version}, got one with {version()}; install the same "
@@ -218,7 +218,7 @@ class PointResults:
         self.required = self.study.stop.least
 
     def take(self, block: int, result: BlockMoments | str) -> range:
-        """Numbers of the blocks to compute next, when `block` was the last of those required.
+        """Numbers of the blocks to compute next, when `block` was the last one required.
 
         They follow from the results of all before alone, whoever computed them in whatever order.
         """
@@ -254,7 +254,7 @@ class PointResults:
 
     @property
     def enough(self) -> bool:
-        """Whether all means are known as well as the study asks."""
+        """Whether all means are as accurate as the study requires."""
         stop = self.study.stop
         return all(self.mean(name).within(stop.within) for name in stop.of)
 

@@ -313,7 +313,7 @@ class PlacementSettings:
         if self.by not in PLACEMENTS:
             raise Refusal(f"expected by among {', '.join(PLACEMENTS)}, got {self.by!r}")
         if not 0 < self.apart < 1:
-            raise Refusal(f"expected elements apart by a distance above zero in m, got {self}")
+            raise Refusal(f"expected a distance between elements above zero in m, got {self}")
 
 
 @dataclass(frozen=True)

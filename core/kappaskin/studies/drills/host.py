@@ -82,11 +82,11 @@ CALIBRATION_DRILLS = [
 _WITHIN = 1.0  # s
 _BLOCKED = 0.3  # s that a read may take on a busy machine
 _SLOW = 0.5  # s that one write takes
-_ROOM = 2**16  # bytes of a file, until the disk is full but for what is kept in reserve
+_ROOM = 2**16  # bytes of a file, until the disk is full except for the reserve
 
 
 class _SlowDisk(ReservedFile):
-    """One on which every write takes its time."""
+    """A disk on which every write is slow."""
 
     def put(self, data: bytes) -> None:
         time.sleep(_SLOW)
@@ -94,7 +94,7 @@ class _SlowDisk(ReservedFile):
 
 
 class _FullDisk(ReservedFile):
-    """A disk with little room apart from the reserve."""
+    """A disk with little room in addition to the reserve."""
 
     def put(self, data: bytes) -> None:
         room = _ROOM - self.tell()
@@ -115,7 +115,7 @@ class _Listener(Recorder):
 
 
 def _recorded(disk: Callable[[Path], ReservedFile], full: bool, stand: Stand) -> DrillOutcome:
-    """Record for a while to a bad disk: reads go on, the file is whole, and trouble is reported."""
+    """Record to a bad disk: reads continue, the file is whole, and the trouble is reported."""
     stand.settle()
     with TemporaryDirectory(prefix="kappaskin-drill-") as folder:
         path = Path(folder) / "drill.mcap"
@@ -137,7 +137,7 @@ def _recorded(disk: Callable[[Path], ReservedFile], full: bool, stand: Stand) ->
 def _claims(
     path: Path, written: RecordingStatus, received: int, full: bool
 ) -> list[tuple[bool, str]]:
-    """Whether the file is what it should be, of so many bytes that the recorder received."""
+    """Whether the file is as expected, given the bytes that the recorder received."""
     try:
         with Recording(path) as recording:
             whole = recording.whole
@@ -226,7 +226,7 @@ def _streaming(stand: Stand, engine: Engine) -> bool:
 
 
 def _suspend(stand: Stand) -> DrillOutcome:
-    """Stop the live process for a while, and let it go on."""
+    """Suspend the live process for a while, and resume it."""
     with Engine() as engine:
         streaming = _streaming(stand, engine)
         span = _drained(stand, engine).span - stand.relay.spent  # some were sent before it listened
@@ -312,7 +312,7 @@ def _kill(pid: int | None, number: int) -> None:
 
 
 def _gone(pid: int) -> bool:
-    """Whether a process ended, be it that nobody asked for its exit code yet."""
+    """Whether a process ended, even if its exit code was not read yet."""
     with suppress(OSError):
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
     try:
@@ -323,7 +323,7 @@ def _gone(pid: int) -> bool:
 
 
 def _blocks_of(pid: int) -> list[Path]:
-    """The shared memory that a process has, where the system lists it."""
+    """The shared memory of a process, where the system lists it."""
     with suppress(OSError):
         lines = Path(f"/proc/{pid}/maps").read_text().splitlines()
         return sorted({Path(line.split()[-1]) for line in lines if f"{_MEMORY}/psm_" in line})
@@ -331,7 +331,12 @@ def _blocks_of(pid: int) -> list[Path]:
 
 
 PROCESS_DRILLS = [
-    Drill("engine suspended", "the live process stands still and goes on", _suspend, _WITHIN),
+    Drill("engine suspended", "the live process is suspended and resumes", _suspend, _WITHIN),
     Drill("engine killed", "kill -9 of the live process: another takes over", _killed, _RESTARTED),
-    Drill("app killed", "kill -9 of what shows: the live process ends too", _orphaned, _WITHIN),
+    Drill(
+        "app killed",
+        "kill -9 of the window's process: the live process ends too",
+        _orphaned,
+        _WITHIN,
+    ),
 ]

@@ -167,7 +167,7 @@ def received_at(data: bytes, sent_at: float, read_at: float) -> bytes:
 
 
 def speed_code(baud_rate: int) -> int:
-    """How the system numbers a baud rate."""
+    """The system's constant of a baud rate."""
     import termios
 
     return getattr(termios, f"B{baud_rate}", baud_rate)
@@ -182,7 +182,7 @@ _SEARCH = 12.0  # s to find one of seven baud rates
 
 
 def _spoilt(make: Callable[[Stand], Spoil], stand: Stand) -> DrillOutcome:
-    """Spoil what passes for some time."""
+    """Corrupt the traffic for some time."""
     with stand.fault(_WITHIN):
         stand.relay.spoil = make(stand)
         stand.run(10.0 if stand.long else 0.8)
@@ -204,7 +204,7 @@ def _cuts(stand: Stand) -> DrillOutcome:
 
 
 def _speed(baud_rate: int, stand: Stand) -> DrillOutcome:
-    """A device that means something at one baud rate only."""
+    """A device that is readable at one baud rate only."""
     relay, code = stand.relay, speed_code(baud_rate)
     rates = {speed_code(rate): rate for rate in BAUD_RATES}
 
@@ -242,7 +242,7 @@ BYTE_DRILLS = [
         partial(_spoilt, lambda stand: FlippedBits(20_000, stand.rng)),
         _WITHIN,
     ),
-    Drill("cuts", "messages broken off after every byte, and begun again", _cuts, _WITHIN),
+    Drill("cuts", "messages cut off after every byte, and restarted", _cuts, _WITHIN),
     Drill(
         "baud rate too low",
         "bits at 2,000,000 baud read at 921,600",
@@ -256,7 +256,7 @@ BYTE_DRILLS = [
         _WITHIN,
     ),
     Drill(
-        "baud rate", "a device that speaks at 921,600 baud only", partial(_speed, 921_600), _SEARCH
+        "baud rate", "a device that sends at 921,600 baud only", partial(_speed, 921_600), _SEARCH
     ),
 ]
 
@@ -282,7 +282,7 @@ def _nothing_lost(stand: Stand) -> DrillOutcome:
 
 
 def _stall(stand: Stand) -> DrillOutcome:
-    """Stop in the middle of a message, and go on with the rest of it."""
+    """Stop in the middle of a message, then send the rest of it."""
     with stand.fault(_WITHIN):
         stand.relay.held = True
         stand.until(lambda: not stand.relay.empty, _WITHIN)
@@ -302,14 +302,14 @@ def _flood(stand: Stand) -> DrillOutcome:
 
 
 def _not_read(stand: Stand) -> DrillOutcome:
-    """Let nobody ask for frames; the thread that reads goes on."""
+    """Read no frames; the reader thread continues."""
     with stand.fault(_WITHIN):
         stand.until(lambda: False, 10.0 if stand.long else 1.5, stand.pump)
     return _nothing_lost(stand)
 
 
 def _deaf(stand: Stand) -> DrillOutcome:
-    """Let nobody read what the program writes, until there is no more room for it."""
+    """Do not read what the program writes, until the line's buffer is full."""
     stand.settle()
     stand.relay.deaf = True
     line = os.open(stand.relay.port, os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
@@ -345,7 +345,7 @@ def _without_information(stand: Stand) -> DrillOutcome:
 
 
 def _restart(stand: Stand) -> DrillOutcome:
-    """Begin again with the first number, at the device's time 0."""
+    """Restart with the first number, at device time 0."""
     stand.settle()
     stand.until(lambda: stand.relay.sequence > _NUMBERED, 5.0)
     began = stand.last.device_time if stand.last else 0.0
@@ -358,7 +358,7 @@ def _restart(stand: Stand) -> DrillOutcome:
 
 
 def _other(key: str, event: str, stand: Stand) -> DrillOutcome:
-    """Change what it reports of itself while it is plugged in."""
+    """Change the device's description while it is plugged in."""
     stand.settle()
     stand.relay.rewrite = InformationChange(key, "drill")
     reported = stand.until(lambda: stand.reported(event), _BACK)
@@ -408,7 +408,7 @@ def _unplug(stand: Stand) -> DrillOutcome:
 
 
 def _suspend(stand: Stand) -> DrillOutcome:
-    """Stop the process that plays the device for a while."""
+    """Suspend the process of the simulated device for a while."""
     with stand.fault(_WITHIN):
         stand.device.signal(signal.SIGSTOP)
         try:
@@ -453,13 +453,13 @@ def _host_clock(stand: Stand) -> DrillOutcome:
 
 
 DEVICE_DRILLS = [
-    Drill("stall", "a device that stops in the middle of a frame, and goes on", _stall, _WITHIN),
+    Drill("stall", "a device that stops in the middle of a frame, and resumes", _stall, _WITHIN),
     Drill("flood", "frames at 10 times the rate", _flood, _WITHIN),
-    Drill("not read", "nobody asks for frames for a while", _not_read, _WITHIN),
+    Drill("not read", "the program reads no frames for a while", _not_read, _WITHIN),
     Drill("deaf", "a device that does not read what it is sent", _deaf, _WITHIN),
-    Drill("twice", "every message comes twice", _twice, _WITHIN),
-    Drill("untold", "a device that says late what it is", _without_information, _BACK),
-    Drill("restart", "a device that begins anew while it is connected", _restart, _WITHIN),
+    Drill("twice", "every message arrives twice", _twice, _WITHIN),
+    Drill("untold", "a device that sends its description late", _without_information, _BACK),
+    Drill("restart", "a device that restarts while it is connected", _restart, _WITHIN),
     Drill(
         "other device",
         "another one on the same line",
@@ -474,7 +474,7 @@ DEVICE_DRILLS = [
     ),
     Drill("other plugged in", "another one on the port", _other_plugged_in, _BACK),
     Drill("unplug", "unplugged and plugged in again and again", _unplug, _BACK),
-    Drill("suspend", "the device stands still and goes on", _suspend, _WITHIN),
+    Drill("suspend", "the device is suspended and resumes", _suspend, _WITHIN),
     Drill("device clock", "the device's clock is set", _device_clock, _WITHIN),
     Drill("host clock", "this machine's clock is set", _host_clock, _WITHIN),
 ]

@@ -39,7 +39,7 @@ def clean(data: bytes) -> bytes:
 
 
 class Relay:
-    """Passes what `device` sends to whoever opens `port`, and back what they ask for.
+    """Relay between `device` and the program that opens `port`, in both directions.
 
     It numbers the messages anew: `sent` keeps the counts of every scan under its number until they
     are asked for, `spent` counts numbers. `rewrite` makes other messages of each, `spoil` other
@@ -62,7 +62,7 @@ class Relay:
         self.plug()
 
     def plug(self) -> None:
-        """Let there be a port."""
+        """Create the port."""
         self._master, slave = os.openpty()
         tty.setraw(slave)
         os.set_blocking(self._master, False)
@@ -70,7 +70,7 @@ class Relay:
         os.close(slave)
 
     def unplug(self) -> None:
-        """Let there be none; what was under way is lost."""
+        """Remove the port; bytes under way are lost."""
         if self._master >= 0:
             os.close(self._master)
             self._link.unlink()
@@ -80,7 +80,7 @@ class Relay:
 
     @property
     def speed(self) -> int:
-        """The baud rate that the program has set, as the system numbers it."""
+        """The system's constant of the baud rate that the program has set."""
         import termios
 
         return termios.tcgetattr(self._master)[5]
@@ -90,7 +90,7 @@ class Relay:
         return not self._outbox
 
     def pump(self) -> None:
-        """Pass on what has come."""
+        """Pass on the received bytes."""
         for _, data in self._device.take(0.0):
             for message in self._decoder.feed(data):
                 if not isinstance(message, wire.Command):
@@ -103,12 +103,12 @@ class Relay:
                 self._device.write(os.read(self._master, _BLOCK))
 
     def forget(self) -> None:
-        """Throw away what the device has sent."""
+        """Discard what the device has sent."""
         for _, data in self._device.take(0.0):
             self._decoder.feed(data)
 
     def ignore(self) -> None:
-        """Throw away what the program asks for."""
+        """Discard the program's commands."""
         with suppress(OSError):  # nothing more
             while os.read(self._master, _BLOCK):
                 pass
@@ -308,7 +308,7 @@ class Stand:
         return self._source
 
     def step(self) -> list[Frame]:
-        """Let relay and source do what there is to do; the frames that came."""
+        """Run relay and source once; the frames received."""
         source = self.source  # opened first: nothing may be sent before
         self.relay.pump()
         began = time.monotonic()
@@ -342,24 +342,24 @@ class Stand:
     def until(
         self, done: Callable[[], object], within: float, step: Callable[[], object] | None = None
     ) -> bool:
-        """Go on, by `step` or as usual, until `done`; whether it was within so many s."""
+        """Continue, by `step` or as usual, until `done`; whether within the time limit in s."""
         end = time.monotonic() + within
         while not done() and time.monotonic() < end:
             (step or self.step)()
         return bool(done())
 
     def pump(self) -> None:
-        """Let the relay work while the source reads nothing."""
+        """Run the relay while the source reads nothing."""
         self.relay.pump()
         time.sleep(0.002)
 
     def settle(self) -> None:
-        """Go on until frames come."""
+        """Continue until frames arrive."""
         if not self.until(lambda: self.frames >= _SETTLED, _START):
             raise SourceError(f"no frames come: {self.source.trouble or 'the device is silent'}")
 
     def heal(self) -> None:
-        """End the fault: from now on all that is sent is good."""
+        """End the fault: from now on all messages are good."""
         self.relay.rewrite, self.relay.spoil = unchanged, clean
         self.relay.held = self.relay.deaf = False
 
@@ -379,7 +379,7 @@ class Stand:
             self.recovered = time.monotonic() - began
 
     def drain(self) -> None:
-        """Send no more, and read until everything that was sent has been taken."""
+        """Send no more, and read all that was sent."""
         idle, came = 0, -1
         while idle < _IDLE:
             self.relay.forget()

@@ -1,4 +1,4 @@
-"""Stability: every hard case by every method that claims it, and the verdict on the answer.
+"""Stability: every hard case by every method that supports it, and the verdict on the answer.
 
 The verdicts, in the order in which they are found:
 
@@ -97,12 +97,12 @@ class Restartable(Protocol):
     """An estimator whose answers depend on earlier frames, until it is restarted."""
 
     def restart(self) -> None:
-        """Forget every frame."""
+        """Restart without earlier frames."""
         ...
 
 
 def answer_of(case: HardCase, make: Callable[[], Estimator]) -> MethodAnswer | Refusal:
-    """What an estimator answers, or why it does not.
+    """The answer of an estimator, or the reason for its refusal.
 
     One that remembers answers each frame after the one before it, and knows no others: of forty
     frames of a skin at rest its errors would be one error. Sequences it follows whole.

@@ -28,7 +28,7 @@ _BENDS = 0.3  # 1/m by each function: slopes are then too slight to matter
 
 
 class CaseKind(Enum):
-    """What a case asks of a method; which methods claim it follows."""
+    """Requirements of a case; they determine which methods support it."""
 
     ANY = "any method that takes the skin"
     LINEAR = "readings as a skin of slight slope gives them, to more digits than slopes allow"
@@ -379,7 +379,7 @@ def _large(count: int) -> HardCase:
 
 
 def gallery(long: bool = False) -> Iterator[HardCase]:
-    """Every case, made when it is asked for; the largest only when `long`."""
+    """Every case, made on demand; the largest only when `long`."""
     for room in (_sizes, _arcs, _loads, _elements, _scales, _readings, _slopes):
         yield from room()
     yield _sequence(1000, 6, 4)

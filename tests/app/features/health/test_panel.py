@@ -36,8 +36,8 @@ def test_findings_are_listed_with_their_age_and_figure(qapp) -> None:
         ["57", "yy", "stuck", "30 s", "reads \N{MINUS SIGN}1.70 1/m"],
     ]
     assert panel.words.text() == (
-        "1 channel excluded, error bars +8 %, at the contact +30 %, 1 faulty but kept: without, "
-        "the shape is not determined."
+        "1 channel excluded, error bars +8 %, at the contact +30 %, 1 faulty but not "
+        "excluded: the shape is undetermined without them."
     )
     panel._show(Health(), 130.0)  # noqa: SLF001
     assert told(panel) == []

@@ -139,7 +139,7 @@ def test_a_scheduler_that_is_not_there_is_refused_at_once(address):
     began = time.monotonic()
 
     with (
-        pytest.raises(Refusal, match="no Dask scheduler answers there"),
+        pytest.raises(Refusal, match="no Dask scheduler replies there"),
         cluster(address.format(free_port())),
     ):
         pass
