@@ -74,7 +74,7 @@ def test_settings_that_cannot_be_read_are_those_of_the_source(data: bytes) -> No
 def test_what_is_said_names_file_and_source_and_what_was_asked_for_if_it_is_another() -> None:
     told = f"The recording press.mcap of the simulated skin {left('').lasted}."
     assert words(left("sim:"), "sim:") == told
-    assert "press.mcap of COM7 went on" in words(left("COM7"), "COM7")
+    assert "press.mcap of COM7 continued" in words(left("COM7"), "COM7")
     assert words(left(None), "sim:") == f"The recording press.mcap {left('').lasted}."
     assert words(left("sim:"), "COM3") == (
         f"{told} You asked for COM3: Connect goes there, and the recording goes on with it."

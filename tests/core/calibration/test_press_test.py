@@ -189,7 +189,7 @@ def test_what_is_skipped_or_silent_confirms_no_map():
     assert verdict.words == (
         "no error was found: 1 element responds where pressed",
         "element 5 was not pressed",
-        "element 6 does not answer, nor does any other",
+        "element 6 does not respond, nor does any other",
     )
 
 

@@ -153,7 +153,7 @@ def test_a_test_that_is_over_has_a_verdict_and_ends_with_its_device(
     page.quick.click()
     while testing.running:
         testing.skip()
-    assert page.verdict.text().startswith("No press shows anything of the map; element 0")
+    assert page.verdict.text().startswith("The presses do not determine the map; element 0")
     page.quick.click()
     window.session.disconnect_from()
     until(lambda: not testing.running)
