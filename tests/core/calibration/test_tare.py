@@ -233,7 +233,9 @@ def test_every_ready_scene_is_refused_while_it_presses_and_tared_when_it_does_no
 def test_a_load_is_told_from_elements_that_are_off_by_as_much(load):
     scene = spoilt(SCENE.touched_by(load), replace(OFF, offset_sd=0.3))
 
-    with pytest.raises(Refusal, match=r"loaded: .* mN near \(\d+, \d+\) mm explain \d+ % of"):
+    with pytest.raises(
+        Refusal, match=r"loaded: .* mN at \(\d+, \d+\) mm; this contact explains \d+ % of"
+    ):
         taken(scene)
 
 
