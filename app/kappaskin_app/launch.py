@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
 
     from kappaskin.live import Engine
-    from kappaskin_app.shell.logbook import Logbook
+    from kappaskin_app.shell.log_files import Logbook
     from kappaskin_app.shell.recovery import Recovering
     from kappaskin_app.shell.splash import Splash
     from kappaskin_app.shell.window import MainWindow
@@ -213,7 +213,7 @@ def _theme_in(path: Path) -> "Theme":
 
 def _logbook() -> "Logbook | None":
     """What goes wrong to files, or nothing where none can be written."""
-    from kappaskin_app.shell.logbook import Logbook, log_folder
+    from kappaskin_app.shell.log_files import Logbook, log_folder
 
     try:
         return Logbook(log_folder())

@@ -11,7 +11,7 @@ import pytest
 from PySide6.QtGui import QImage
 
 from kappaskin_app.shell.badge import SIM, STALE, WAITING, colour_of
-from kappaskin_app.shell.layouts.kept import Kept, KeptFile
+from kappaskin_app.shell.window_file import Kept, KeptFile
 from kappaskin_app.theme import DARK
 
 

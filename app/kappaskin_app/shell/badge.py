@@ -1,10 +1,10 @@
-"""The badge: whether what is shown is live, simulated, replayed, stale or lost."""
+"""The badge, whether readings are live, simulated, replayed, stale or lost, and the header bar."""
 
 import math
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFontInfo, QMouseEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
+from PySide6.QtGui import QAction, QColor, QFontInfo, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QLabel, QSizePolicy, QToolBar, QWidget
 
 from kappaskin.live import Status
 from kappaskin.recording import Replay
@@ -162,3 +162,26 @@ def in_use(status: Status) -> str:
     across = 1 if sensor is not None and sensor.layout.patch.strip else setup.Nj
     method = METHOD_SHORT.get(setup.method, setup.method)
     return f"In use: {method}, {setup.Ni} x {across} functions. {sentence(status.refusal)}"
+
+
+class Header(QToolBar):
+    """Begins with the `badge`."""
+
+    def __init__(self, badge: Badge) -> None:
+        super().__init__("Header")
+        self.setObjectName("header")
+        self.setMovable(False)
+        self.toggleViewAction().setEnabled(False)
+        self._first: QAction | None = None
+        self.addWidget(badge)
+
+    def add(self, widget: QWidget) -> None:
+        """Show a widget after all others."""
+        shown = self.addWidget(widget)
+        self._first = self._first or shown
+
+    def add_mark(self, widget: QWidget) -> QAction:
+        """Show a widget right after the badge; the action shows and hides it."""
+        if self._first is None:
+            return self.addWidget(widget)
+        return self.insertWidget(self._first, widget)

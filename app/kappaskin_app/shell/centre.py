@@ -1,8 +1,114 @@
-"""The centre of the window: a view, what stands beside and below it, and a banner above."""
+"""The centre of the window: the main view, with a banner above it."""
 
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 
-from kappaskin_app.shell.banner import Offer
+from PySide6.QtCore import QEvent, Qt, QTimer, Signal
+from PySide6.QtGui import QCursor, QResizeEvent
+from PySide6.QtWidgets import (
+    QHBoxLayout,
+    QLabel,
+    QMenu,
+    QPushButton,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from kappaskin_app.guard import guarded
+from kappaskin_app.widgets.layout import Flow
+
+
+@dataclass(frozen=True)
+class Offered:
+    """Something to do, in words that a `tip` explains: what is called, or a menu to choose from."""
+
+    text: str
+    tip: str
+    act: Callable[[], object] | QMenu
+
+
+class Offer(QWidget):
+    """Shows words, and a button for each thing that is offered; hides once one is taken.
+
+    `offered` says that there are other buttons.
+    """
+
+    offered = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("offer")
+        self.setAccessibleName("Offer")
+        self.words, self.away = QLabel(), QToolButton()
+        self.buttons: list[QPushButton] = []
+        self.away.setText("\N{MULTIPLICATION SIGN}")
+        self.away.setAccessibleName("Put the offer away")
+        self.away.setToolTip("Put this away (Esc)")
+        self.away.setAutoRaise(True)
+        self.away.clicked.connect(self.hide)
+        row, self._flow = QHBoxLayout(self), Flow()
+        row.setContentsMargins(8, 3, 4, 3)
+        row.addLayout(self._flow, 1)
+        row.addWidget(self.away, 0, Qt.AlignmentFlag.AlignTop)
+        self._flow.addWidget(self.words)
+        self._ending = QTimer(self, singleShot=True)  # pyright: ignore[reportCallIssue]
+        self._ending.timeout.connect(guarded(self._end))
+        self.hide()
+
+    def show_offer(
+        self, words: str, tip: str, offered: Sequence[Offered], seconds: float = 0.0
+    ) -> None:
+        """Offer, in `words` that a `tip` explains, what can be done; for so long, 0 for good."""
+        for button in self.buttons:
+            self._flow.removeWidget(button)
+            button.deleteLater()
+        self.words.setText(words)
+        self.words.setToolTip(tip)
+        self.buttons = [self._button(each) for each in offered]
+        for before, after in pairwise([self, *self.buttons, self.away]):
+            QWidget.setTabOrder(before, after)
+        self._ending.stop()  # that of the last one, which may have been put away
+        self._ending.setInterval(round(1e3 * seconds))
+        if seconds:
+            self._ending.start()
+        self.show()
+        self._heighten()
+        self.offered.emit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._heighten()
+
+    def _heighten(self) -> None:
+        """Claim the height of all lines: a main window asks for no height that goes by width."""
+        self.setMinimumHeight(self.heightForWidth(self.width()))
+
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.FontChange:
+            self._heighten()
+
+    def _button(self, offered: Offered) -> QPushButton:
+        button = QPushButton(offered.text, self)
+        button.setToolTip(offered.tip)
+        if isinstance(act := offered.act, QMenu):
+            button.setMenu(act)
+            act.triggered.connect(self.hide)
+        else:
+            button.clicked.connect(guarded(lambda *_: (self.hide(), act())))
+        self._flow.addWidget(button)
+        return button
+
+    def _end(self) -> None:
+        """Go by itself, unless somebody is at it."""
+        focused = self.focusWidget()
+        at_it = focused is not None and focused.hasFocus()
+        if at_it or self.rect().contains(self.mapFromGlobal(QCursor.pos())):
+            self._ending.start()
+        else:
+            self.hide()
 
 
 class Centre(QWidget):

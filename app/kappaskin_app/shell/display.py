@@ -17,10 +17,9 @@ from kappaskin.frames import COMPONENTS, Estimate
 from kappaskin.live import Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import Tasks
-from kappaskin_app.shell.badge import GAP, LOST, OFF, STALE, WAITING, Badge
+from kappaskin_app.shell.badge import GAP, LOST, OFF, STALE, WAITING, Badge, Header
 from kappaskin_app.shell.centre import Centre
 from kappaskin_app.shell.colouring import SHADES, Colouring, Ranges
-from kappaskin_app.shell.header import Header
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.status_bar import Notice, StatusBar, warnings

@@ -8,10 +8,9 @@ from PySide6.QtGui import QUndoStack
 
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions
-from kappaskin_app.shell.finder.finder import Finder
-from kappaskin_app.shell.finder.sheet import CheatSheet
-from kappaskin_app.shell.finder.things import Things, things_in
+from kappaskin_app.shell.finder import Finder, Things, things_in
 from kappaskin_app.shell.parts import EDIT, FILE, HELP, VIEW, Parts
+from kappaskin_app.shell.shortcuts import CheatSheet
 from kappaskin_app.shell.welcome import Welcome
 
 _LONGEST = 60  # characters of a step in a menu

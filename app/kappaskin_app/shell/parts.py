@@ -10,7 +10,7 @@ from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.docks import Docks
 from kappaskin_app.shell.history import History
-from kappaskin_app.shell.layouts.choosing import Layouts
+from kappaskin_app.shell.layouts import Layouts
 from kappaskin_app.shell.opening import Opening
 from kappaskin_app.shell.pages import Pages
 from kappaskin_app.shell.requests import Requests

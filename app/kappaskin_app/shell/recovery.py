@@ -16,7 +16,7 @@ from PySide6.QtCore import QLockFile, QObject
 from kappaskin.errors import Refusal
 from kappaskin.live import Engine, ResumeInfo, Status
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.banner import Offered
+from kappaskin_app.shell.centre import Offered
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.parts import Parts
 from kappaskin_app.shell.settings import Settings

@@ -6,7 +6,7 @@ from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QMenu
 
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.banner import Offer, Offered
+from kappaskin_app.shell.centre import Offer, Offered
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.requests import Requests
 from kappaskin_app.shell.session import Session

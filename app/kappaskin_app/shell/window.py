@@ -9,12 +9,12 @@ from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent
 
 from kappaskin.live import Engine, ResumeInfo, Status
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.layouts.keeping import Keeping
 from kappaskin_app.shell.menus import Menus
 from kappaskin_app.shell.parts import Parts
 from kappaskin_app.shell.recovery import settings_left
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.simulation import settings_for
+from kappaskin_app.shell.window_file import Keeping
 from kappaskin_app.theme import THEMES, apply_look
 from kappaskin_app.widgets.layout import widen
 

@@ -8,8 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
 from kappaskin.scenes import scene_file
-from kappaskin_app.shell.finder.finder import Finder, score
-from kappaskin_app.shell.finder.things import FinderEntry, things_in
+from kappaskin_app.shell.finder import Finder, FinderEntry, score, things_in
 from kappaskin_app.shell.window import MainWindow
 
 WORDS = st.text("abc- ", min_size=1, max_size=12)

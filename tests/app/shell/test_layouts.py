@@ -9,10 +9,7 @@ from PySide6.QtCore import QRect
 from PySide6.QtWidgets import QLabel, QMainWindow, QTabWidget
 
 from kappaskin import Refusal
-from kappaskin_app.shell.docks import Docks
-from kappaskin_app.shell.layouts.keeping import clamped
-from kappaskin_app.shell.layouts.kept import Kept, from_text, to_text
-from kappaskin_app.shell.layouts.layout import (
+from kappaskin_app.shell.arrangement import (
     AREAS,
     FLOATING,
     Layout,
@@ -21,7 +18,9 @@ from kappaskin_app.shell.layouts.layout import (
     layout_of,
     ready_layout,
 )
+from kappaskin_app.shell.docks import Docks
 from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.shell.window_file import Kept, clamped, from_text, to_text
 
 BELOW = (
     *("cost", "stability", "scene", "health", "compare", "design"),

@@ -7,9 +7,9 @@ from PySide6.QtWidgets import QApplication, QLabel, QMainWindow
 
 from kappaskin import Refusal
 from kappaskin_app.shell.actions import WITHIN, Actions, in_words
-from kappaskin_app.shell.finder.sheet import CheatSheet
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.shortcuts import CheatSheet
 from kappaskin_app.theme import DARK, LIGHT, palette
 
 CONTROL = Qt.KeyboardModifier.ControlModifier

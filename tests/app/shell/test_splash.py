@@ -9,9 +9,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from kappaskin_app.launch import _all_stays, _theme_in
-from kappaskin_app.shell.layouts.kept import Kept, KeptFile
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.splash import Splash
+from kappaskin_app.shell.window_file import Kept, KeptFile
 from kappaskin_app.theme import DARK, LIGHT, THEMES, Theme, apply_look
 
 

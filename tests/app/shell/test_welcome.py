@@ -7,10 +7,10 @@ from PySide6.QtGui import QCursor
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu, QVBoxLayout, QWidget
 
-from kappaskin_app.shell.banner import Offer, Offered
-from kappaskin_app.shell.layouts.kept import KeptFile
+from kappaskin_app.shell.centre import Offer, Offered
 from kappaskin_app.shell.recovery import Last, Recovering
 from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.shell.window_file import KeptFile
 
 
 class Bench(QWidget):

@@ -5,7 +5,7 @@ from functools import partial
 
 from kappaskin_app.features.guide.panel import GuidePanel, Page, page_called, pages
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.finder.things import FinderEntry
+from kappaskin_app.shell.finder import FinderEntry
 from kappaskin_app.shell.parts import HELP
 from kappaskin_app.shell.window import MainWindow
 

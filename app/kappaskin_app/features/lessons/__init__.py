@@ -5,9 +5,9 @@ from functools import partial
 from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QWidget
 
+from kappaskin_app.features.lessons.lesson_file import DOCKS
 from kappaskin_app.features.lessons.panel import LessonPanel
 from kappaskin_app.features.lessons.pointing import ControlPointer
-from kappaskin_app.features.lessons.reading import DOCKS
 from kappaskin_app.features.lessons.teaching import Teaching
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import Form

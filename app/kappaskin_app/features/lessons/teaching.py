@@ -13,10 +13,10 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate
 from kappaskin_app.features.lessons.figures import Watch
+from kappaskin_app.features.lessons.hand_in import sheet
 from kappaskin_app.features.lessons.lesson import LessonTask, whole
+from kappaskin_app.features.lessons.lesson_file import READY, read_lesson
 from kappaskin_app.features.lessons.progress import Progress
-from kappaskin_app.features.lessons.reading import READY, read_lesson
-from kappaskin_app.features.lessons.sheet import sheet
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.history import History

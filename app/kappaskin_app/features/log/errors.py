@@ -22,7 +22,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions
 from kappaskin_app.shell.background import BackgroundThread, Tasks
 from kappaskin_app.shell.folders import recordings_folder
-from kappaskin_app.shell.logbook import CRASHES, LOG, log_folder
+from kappaskin_app.shell.log_files import CRASHES, LOG, log_folder
 from kappaskin_app.shell.recovery import settings_text
 from kappaskin_app.shell.work_dialog import WorkDialog, beside, choosing, ended, named, path_in
 from kappaskin_app.theme import current, follow_look

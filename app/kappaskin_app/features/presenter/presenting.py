@@ -17,7 +17,7 @@ from kappaskin_app.features.presenter.sound import Sound
 from kappaskin_app.features.presenter.stage import Stage
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.badge import GAP, SIM, origin
-from kappaskin_app.shell.banner import Offer
+from kappaskin_app.shell.centre import Offer
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.docks import drawn_once
 from kappaskin_app.shell.loads import may_choose, touches_at

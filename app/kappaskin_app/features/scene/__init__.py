@@ -14,7 +14,7 @@ from kappaskin_app.features.scene.staging import Staging
 from kappaskin_app.features.scene.timeline import Timeline
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import plain
-from kappaskin_app.shell.finder.things import FinderEntry, enter
+from kappaskin_app.shell.finder import FinderEntry, enter
 from kappaskin_app.shell.loads import may_choose, touches_at
 from kappaskin_app.shell.menus import DOTS
 from kappaskin_app.shell.opening import Kind

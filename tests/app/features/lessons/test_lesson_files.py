@@ -12,9 +12,15 @@ from kappaskin import Refusal
 from kappaskin_app.features.lessons.expression import NUMBER, TRUTH, WORD, expression
 from kappaskin_app.features.lessons.figures import KINDS, SETTINGS, Watch
 from kappaskin_app.features.lessons.lesson import UNITS, LessonTask, NumberAnswer, whole
+from kappaskin_app.features.lessons.lesson_file import (
+    DOCKS,
+    READY,
+    SETTABLE,
+    checked_setting,
+    lesson_of,
+    read_lesson,
+)
 from kappaskin_app.features.lessons.progress import Answer, Progress, judged, number_in
-from kappaskin_app.features.lessons.reading import DOCKS, READY, lesson_of, read_lesson
-from kappaskin_app.features.lessons.setting import SETTABLE, checked_setting
 from kappaskin_app.shell.settings import Settings, ask_of
 from kappaskin_app.shell.settings.asks import Range
 

@@ -16,9 +16,8 @@ from kappaskin_app.features.lessons.lesson import (
     NumberAnswer,
     Question,
 )
+from kappaskin_app.features.lessons.lesson_file import DOCKS, READOUTS, SETTABLE
 from kappaskin_app.features.lessons.progress import DONE
-from kappaskin_app.features.lessons.reading import DOCKS, READOUTS
-from kappaskin_app.features.lessons.setting import SETTABLE
 from kappaskin_app.shell.window import MainWindow
 
 

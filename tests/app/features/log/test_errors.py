@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QApplication
 from kappaskin import Refusal
 from kappaskin_app import guard
 from kappaskin_app.features.log.errors import Told, write_report
-from kappaskin_app.shell.logbook import CRASHES, LOG, Logbook
+from kappaskin_app.shell.log_files import CRASHES, LOG, Logbook
 from kappaskin_app.shell.window import MainWindow
 
 

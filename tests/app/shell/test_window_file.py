@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Refusal
-from kappaskin_app.shell.layouts.kept import Kept, KeptFile, from_text, to_text
-from kappaskin_app.shell.layouts.layout import Layout, Place
+from kappaskin_app.shell.arrangement import Layout, Place
+from kappaskin_app.shell.window_file import Kept, KeptFile, from_text, to_text
 
 HOSTILE = (
     "",

@@ -8,8 +8,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
+from kappaskin_app.features.lessons.lesson_file import SETTABLE
 from kappaskin_app.features.lessons.progress import Progress
-from kappaskin_app.features.lessons.setting import SETTABLE
 from kappaskin_app.shell.settings import Settings, ask_of
 from kappaskin_app.shell.settings.asks import Choice, Range, Several, Switch
 from kappaskin_app.theme import LIGHT, palette

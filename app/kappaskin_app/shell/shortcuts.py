@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 from kappaskin.errors import Refusal
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions, plain
-from kappaskin_app.shell.finder.finder import Listing, best, clearable, row, score
+from kappaskin_app.shell.finder import Listing, best, clearable, row, score
 from kappaskin_app.shell.history import History
 from kappaskin_app.widgets.parts import button, in_a_row
 

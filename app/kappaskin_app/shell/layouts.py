@@ -17,15 +17,15 @@ from PySide6.QtWidgets import (
 
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions, plain
-from kappaskin_app.shell.docks import Docks
-from kappaskin_app.shell.history import History
-from kappaskin_app.shell.layouts.layout import (
+from kappaskin_app.shell.arrangement import (
     Layout,
     arrange,
     layout_of,
     ready_layout,
     words_of,
 )
+from kappaskin_app.shell.docks import Docks
+from kappaskin_app.shell.history import History
 from kappaskin_app.shell.pages import LIVE, Pages
 
 _HELD = 50  # ms between two looks whether the mouse has let go
