@@ -21,31 +21,31 @@ from kappaskin_app.widgets.layout import Flow
 
 
 @dataclass(frozen=True)
-class Offered:
-    """Something to do, in words that a `tip` explains: what is called, or a menu to choose from."""
+class BannerAction:
+    """A button of the banner: its text, its tooltip, and the function or menu behind it."""
 
     text: str
     tip: str
     act: Callable[[], object] | QMenu
 
 
-class Offer(QWidget):
-    """Shows words, and a button for each thing that is offered; hides once one is taken.
+class ActionBanner(QWidget):
+    """Shows a text and a button for each action; hides once one is pressed.
 
-    `offered` says that there are other buttons.
+    `shown` reports new buttons.
     """
 
-    offered = Signal()
+    shown = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("offer")
-        self.setAccessibleName("Offer")
+        self.setAccessibleName("Banner")
         self.words, self.away = QLabel(), QToolButton()
         self.buttons: list[QPushButton] = []
         self.away.setText("\N{MULTIPLICATION SIGN}")
-        self.away.setAccessibleName("Put the offer away")
-        self.away.setToolTip("Put this away (Esc)")
+        self.away.setAccessibleName("Close the banner")
+        self.away.setToolTip("Close (Esc)")
         self.away.setAutoRaise(True)
         self.away.clicked.connect(self.hide)
         row, self._flow = QHBoxLayout(self), Flow()
@@ -57,10 +57,10 @@ class Offer(QWidget):
         self._ending.timeout.connect(guarded(self._end))
         self.hide()
 
-    def show_offer(
-        self, words: str, tip: str, offered: Sequence[Offered], seconds: float = 0.0
+    def show_actions(
+        self, words: str, tip: str, offered: Sequence[BannerAction], seconds: float = 0.0
     ) -> None:
-        """Offer, in `words` that a `tip` explains, what can be done; for so long, 0 for good."""
+        """Show `words` with a tooltip and these actions, for so many seconds; 0: until closed."""
         for button in self.buttons:
             self._flow.removeWidget(button)
             button.deleteLater()
@@ -75,14 +75,14 @@ class Offer(QWidget):
             self._ending.start()
         self.show()
         self._heighten()
-        self.offered.emit()
+        self.shown.emit()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._heighten()
 
     def _heighten(self) -> None:
-        """Claim the height of all lines: a main window asks for no height that goes by width."""
+        """Set the height of all lines: a main window asks for no height for a width."""
         self.setMinimumHeight(self.heightForWidth(self.width()))
 
     def changeEvent(self, event: QEvent) -> None:
@@ -90,7 +90,7 @@ class Offer(QWidget):
         if event.type() == QEvent.Type.FontChange:
             self._heighten()
 
-    def _button(self, offered: Offered) -> QPushButton:
+    def _button(self, offered: BannerAction) -> QPushButton:
         button = QPushButton(offered.text, self)
         button.setToolTip(offered.tip)
         if isinstance(act := offered.act, QMenu):
@@ -102,7 +102,7 @@ class Offer(QWidget):
         return button
 
     def _end(self) -> None:
-        """Go by itself, unless somebody is at it."""
+        """Hide after its time, unless it has the focus or the mouse is over it."""
         focused = self.focusWidget()
         at_it = focused is not None and focused.hasFocus()
         if at_it or self.rect().contains(self.mapFromGlobal(QCursor.pos())):
@@ -112,21 +112,21 @@ class Offer(QWidget):
 
 
 class Centre(QWidget):
-    """Holds the main `view`, once a feature shows one."""
+    """Holds the main `view`, once a feature sets one."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.offer = Offer()
+        self.banner = ActionBanner()
         self.view: QWidget | None = None
         self._row, self._column = QHBoxLayout(), QVBoxLayout(self)
         self._column.setContentsMargins(0, 0, 0, 0)
         for layout in (self._row, self._column):
             layout.setSpacing(0)
-        self._column.addWidget(self.offer)
+        self._column.addWidget(self.banner)
         self._column.addLayout(self._row, 1)
 
     def show_view(self, view: QWidget) -> None:
-        """Have `view` in the middle of the window."""
+        """Set the main view."""
         self.view = view
         self._row.insertWidget(0, view, 1)
 

@@ -1,4 +1,4 @@
-"""Colours of the skin and its heatmaps: quantities, ranges that hold still, values."""
+"""Colours of the skin and its heatmaps: quantities, steady ranges, values."""
 
 import math
 import time

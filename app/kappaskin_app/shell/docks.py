@@ -1,4 +1,4 @@
-"""Docks around the skin of a window: beside it, and below it one in the place of another."""
+"""Docks beside and below the skin."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -50,7 +50,7 @@ class Title(QWidget):
         row.setContentsMargins(6, 1, 4, 1)
         row.setSpacing(2)
         row.addWidget(self.words, 1)
-        self.float = self._button(icons.SP_TitleBarNormalButton, "Let it float, or put it back")
+        self.float = self._button(icons.SP_TitleBarNormalButton, "Float or dock")
         self.float.clicked.connect(guarded(lambda *_: dock.setFloating(not dock.isFloating())))
         self.close_ = self._button(icons.SP_TitleBarCloseButton, "Close")
         self.close_.clicked.connect(guarded(lambda *_: dock.close()))

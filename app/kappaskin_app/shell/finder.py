@@ -1,4 +1,4 @@
-"""The command finder: actions, settings, panels, files and pages by a few letters."""
+"""The command finder: actions, settings, panels, files and pages, by a few letters."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -34,12 +34,12 @@ from kappaskin_app.shell.settings import ask_of
 from kappaskin_app.shell.settings.asks import Choice
 from kappaskin_app.widgets.layout import scroll_to
 
-_NOT_NOW = "not with what is chosen now"
+_NOT_NOW = "not available with the present settings"
 
 
 @dataclass(frozen=True)
 class FinderEntry:
-    """Something to find and do: what it is called, where it stands, and why it cannot be done."""
+    """An entry of the finder: its title, its place, its function, why it is disabled."""
 
     name: str
     title: str
@@ -49,23 +49,23 @@ class FinderEntry:
     why_not: str = ""
 
 
-Things = Callable[[], Iterable[FinderEntry]]
+EntrySource = Callable[[], Iterable[FinderEntry]]
 
 
-def things_in(window: Parts, others: Iterable[Things]) -> list[FinderEntry]:
-    """All that can be found in the window now, with what `others` tell."""
+def entries_in(window: Parts, others: Iterable[EntrySource]) -> list[FinderEntry]:
+    """All entries of the window now, with those of `others`."""
     return [
         *_actions(window),
         *_panels(window),
         *_settings(window),
         *_layouts(window),
         *_files(window),
-        *(thing for things in others for thing in things()),
+        *(entry for entries in others for entry in entries()),
     ]
 
 
 def reveal(widget: QWidget) -> None:
-    """Show a widget, whichever dock and page it is on, and give it the focus."""
+    """Show a widget, with its dock and page, and give it the focus."""
     for around in _around(widget):
         if isinstance(around, QTabWidget):
             around.setCurrentIndex(_page(around, widget))
@@ -86,7 +86,7 @@ def _around(widget: QWidget) -> Iterator[QTabWidget | QDockWidget]:
 
 
 def _page(pages: QTabWidget, widget: QWidget) -> int:
-    """Which of the pages a widget is on."""
+    """The index of the page that a widget is on."""
     page: QWidget | None = widget
     while page is not None and pages.indexOf(page) < 0:
         page = page.parentWidget()
@@ -135,7 +135,7 @@ def _settings(window: Parts) -> Iterator[FinderEntry]:
 
 
 def _setting(window: Parts, form: Form, editor: QWidget) -> Iterator[FinderEntry]:
-    """The setting that `editor` is for, and each value of a choice."""
+    """The setting of `editor`, and each value of a choice."""
     name = editor.objectName()
     how, place = ask_of(name), f"{_where(form)}, {form.title()}"
     why_not = "" if form.form.isRowVisible(editor) else _NOT_NOW
@@ -146,14 +146,14 @@ def _setting(window: Parts, form: Form, editor: QWidget) -> Iterator[FinderEntry
     if isinstance(how, Choice):
         for value, words in how.options:
             refused = why_not or _refused(editor, value)
-            wish = partial(window.requests.set, name, value)
+            select = partial(window.requests.set, name, value)
             yield FinderEntry(
-                f"setting:{name}={value}", f"{title}: {words}", place, wish, "", refused
+                f"setting:{name}={value}", f"{title}: {words}", place, select, "", refused
             )
 
 
 def _refused(box: QWidget, value: str) -> str:
-    """Why a choice cannot have a value now, if so."""
+    """Why a choice cannot have a value now; empty where it can."""
     model = box.model() if isinstance(box, QComboBox) else None
     if isinstance(box, QComboBox) and isinstance(model, QStandardItemModel):
         return "" if model.item(box.findData(value)).isEnabled() else _NOT_NOW
@@ -162,7 +162,7 @@ def _refused(box: QWidget, value: str) -> str:
 
 def _files(window: Parts) -> Iterator[FinderEntry]:
     for file in window.opening.last_ones():
-        why_not = "" if file.is_file() else "not there any more: moved or deleted"
+        why_not = "" if file.is_file() else "moved or deleted"
         act = partial(window.opening.open, file)
         yield FinderEntry(f"file:{file}", f"Open {file.name}", f"{file.parent}", act, "", why_not)
 
@@ -176,12 +176,12 @@ def _layouts(window: Parts) -> Iterator[FinderEntry]:
 
 _BEGINS, _FOLLOWS, _SKIPS = 8, 5, 0.2  # points of a letter that begins a word, or has its neighbour
 _WHOLE = 4  # points more where the text begins so
-_FAR = 0.3  # of the best one's points, below which it is not what was meant
-_ELSEWHERE = 0.4  # of the points, for what is found only in where a thing stands
+_FAR = 0.3  # of the best one's points, below which an entry is not listed
+_ELSEWHERE = 0.4  # of the points, for what is found only in the place of an entry
 
 
 def score(query: str, text: str, place: str = "") -> float:
-    """Points of `text`, which stands at `place`, for all words of `query`; 0 where one misses.
+    """Points of `text`, at `place`, for all words of `query`; 0 where one is not found.
 
     The words may come in any order, their letters only in theirs.
     """
@@ -192,7 +192,7 @@ def score(query: str, text: str, place: str = "") -> float:
 
 
 def best(points: Mapping[str, float]) -> list[str]:
-    """Those that were meant, the best first; of equal ones in the order given."""
+    """The best names, in falling order of their points."""
     least = _FAR * max(points.values(), default=0.0)
     return sorted((name for name in points if points[name] > least), key=lambda name: -points[name])
 
@@ -237,14 +237,14 @@ _ROOM = 5  # px between two rows
 
 
 def clearable(editor: QLineEdit | QKeySequenceEdit) -> None:
-    """Give an `editor` a button that clears it, and the button a name."""
+    """Add a button that clears an `editor`, with an accessible name."""
     editor.setClearButtonEnabled(True)
     for made in editor.findChildren(QToolButton):
         made.setAccessibleName("Clear")
 
 
 class Listing(QTreeWidget):
-    """Rows of three texts each; the arrows in `line` lead it."""
+    """Rows of three texts; the arrow keys in `line` select one."""
 
     def __init__(self, line: QLineEdit, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -261,14 +261,14 @@ class Listing(QTreeWidget):
         line.installEventFilter(self)
 
     def show_rows(self, rows: list[QTreeWidgetItem]) -> None:
-        """List these, the first of them chosen."""
+        """List these rows, and select the first."""
         self.clear()
         self.addTopLevelItems(rows)
         if rows:
             self.setCurrentItem(rows[0])
 
     def chosen(self) -> object:
-        """What the chosen row is of; None where there is none."""
+        """The object of the selected row; None where there is none."""
         row = self.currentItem()
         return row.data(0, Qt.ItemDataRole.UserRole) if row is not None else None
 
@@ -282,7 +282,7 @@ class Listing(QTreeWidget):
 
 
 def row(texts: tuple[str, str, str], of: object, grey: bool = False) -> QTreeWidgetItem:
-    """A row of what it is `of`, with the second text fainter, and all of it where it is `grey`."""
+    """A row for the object `of`, its second text fainter, or all where it is `grey`."""
     made = QTreeWidgetItem(list(texts))
     made.setData(0, Qt.ItemDataRole.UserRole, of)
     made.setSizeHint(0, QSize(0, QFontMetrics(QApplication.font()).height() + _ROOM))
@@ -294,35 +294,35 @@ def row(texts: tuple[str, str, str], of: object, grey: bool = False) -> QTreeWid
     return made
 
 
-_KEPT = 12  # of what was done last, which comes first
-_RECENT = 3.0  # points more of what was done last, less of what was before
+_KEPT = 12  # recent entries, which are listed first
+_RECENT = 3.0  # points more of the last entry, less of earlier ones
 _SIZE = (0.62, 0.66)  # of the window's
-_HINT = "\N{UPWARDS ARROW} \N{DOWNWARDS ARROW} choose   Enter do it   Esc leave"
-_NOTHING = "Nothing here is called so: try fewer letters."
+_HINT = "\N{UPWARDS ARROW} \N{DOWNWARDS ARROW} select   Enter run   Esc close"
+_NOTHING = "No match: try fewer letters."
 
 
 class Finder(QDialog):
-    """Finds one of what `things` tells, and does it; `recent` are the names of the last ones."""
+    """Finds and runs one of the `entries`; `recent` are the names of the last ones."""
 
-    def __init__(self, things: Callable[[], list[FinderEntry]], parent: QWidget) -> None:
+    def __init__(self, entries: Callable[[], list[FinderEntry]], parent: QWidget) -> None:
         super().__init__(parent, Qt.WindowType.Dialog | Qt.WindowType.FramelessWindowHint)
         self.setObjectName("finder")
         self.setWindowTitle("Find a command")
-        self._window, self._ask, self._things = parent, things, list[FinderEntry]()
+        self._window, self._get_entries, self._entries = parent, entries, list[FinderEntry]()
         self.recent: list[str] = []
         self.line, self.hint = QLineEdit(), QLabel(_HINT)
         self.list = Listing(self.line)
         self.line.setPlaceholderText(
             "A command, a setting, a scene, a panel, a file\N{HORIZONTAL ELLIPSIS}"
         )
-        self.line.setAccessibleName("What to find")
+        self.line.setAccessibleName("Search")
         self.line.setToolTip(
-            "A few letters of its name are enough, in their order: nogau is Noise: Gaussian."
+            "A few letters of a name, in their order: nogau finds Noise: Gaussian."
         )
         clearable(self.line)
         self.list.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the line keeps it
-        self.list.setAccessibleName("What was found")
-        self.list.setToolTip("What was found, where it stands, and its shortcut.")
+        self.list.setAccessibleName("Matches")
+        self.list.setToolTip("Matches, with their places and shortcuts.")
         frame = QFrame(self, frameShape=QFrame.Shape.StyledPanel)  # pyright: ignore[reportCallIssue]
         around, layout = QVBoxLayout(self), QVBoxLayout(frame)
         around.setContentsMargins(0, 0, 0, 0)
@@ -330,13 +330,13 @@ class Finder(QDialog):
         for widget in (self.line, self.list, self.hint):
             layout.addWidget(widget)
         self.line.textChanged.connect(guarded(self._list))
-        self.line.returnPressed.connect(guarded(self._do))
-        self.list.itemClicked.connect(guarded(lambda *_: self._do()))
+        self.line.returnPressed.connect(guarded(self._run))
+        self.list.itemClicked.connect(guarded(lambda *_: self._run()))
 
     def open_empty(self) -> None:
-        """Show all there is, the last ones first."""
+        """Show all entries, the recent ones first."""
         window = self._window
-        self._things = self._ask()
+        self._entries = self._get_entries()
         wide, high = (
             round(s * n) for s, n in zip(_SIZE, (window.width(), window.height()), strict=True)
         )
@@ -351,45 +351,45 @@ class Finder(QDialog):
         self.line.setFocus()
 
     def found(self) -> list[FinderEntry]:
-        """What the letters typed may mean, the best first."""
+        """The entries that match the text typed, the best first."""
         query = self.line.text()
         if not query.strip():
             return self._last_first()
-        points = {thing.name: score(query, thing.title, thing.place) for thing in self._things}
+        points = {entry.name: score(query, entry.title, entry.place) for entry in self._entries}
         for age, name in enumerate(self.recent):
             if points.get(name, 0.0) > 0:
                 points[name] += _RECENT * (1 - age / _KEPT)
-        things = {thing.name: thing for thing in self._things}
-        return [things[name] for name in best(points)]
+        entries = {entry.name: entry for entry in self._entries}
+        return [entries[name] for name in best(points)]
 
     def _last_first(self) -> list[FinderEntry]:
         ages = {name: age for age, name in enumerate(self.recent)}
-        return sorted(self._things, key=lambda thing: ages.get(thing.name, _KEPT))
+        return sorted(self._entries, key=lambda entry: ages.get(entry.name, _KEPT))
 
     def _list(self, *_: object) -> None:
         found = self.found()
-        self.list.show_rows([_row(thing) for thing in found])
+        self.list.show_rows([_row(entry) for entry in found])
         self.hint.setText(_HINT if found else _NOTHING)
 
-    def _do(self) -> None:
-        """Do what is chosen; what cannot be done says why in its row."""
-        thing = self.list.chosen()
-        if not isinstance(thing, FinderEntry):
+    def _run(self) -> None:
+        """Run the selected entry, or show why it is disabled."""
+        entry = self.list.chosen()
+        if not isinstance(entry, FinderEntry):
             return
-        if thing.why_not:
-            self.hint.setText(f"{thing.title}: {thing.why_not}.")
+        if entry.why_not:
+            self.hint.setText(f"{entry.title}: {entry.why_not}.")
             return
-        self.recent = [thing.name, *(name for name in self.recent if name != thing.name)][:_KEPT]
+        self.recent = [entry.name, *(name for name in self.recent if name != entry.name)][:_KEPT]
         self.accept()
-        thing.act()
+        entry.act()
 
     def changeEvent(self, event: QEvent) -> None:
         super().changeEvent(event)
         if event.type() == QEvent.Type.ActivationChange and not self.isActiveWindow():
-            self.close()  # who clicks elsewhere has left it
+            self.close()  # a click elsewhere closes it
 
 
-def _row(thing: FinderEntry) -> QTreeWidgetItem:
-    """A thing as it is listed: grey, with why, where it cannot be done."""
-    texts = thing.title, thing.why_not or thing.place, thing.keys
-    return row(texts, thing, grey=bool(thing.why_not))
+def _row(entry: FinderEntry) -> QTreeWidgetItem:
+    """The row of an entry: grey, with the reason, where it is disabled."""
+    texts = entry.title, entry.why_not or entry.place, entry.keys
+    return row(texts, entry, grey=bool(entry.why_not))

@@ -1,4 +1,4 @@
-"""What the colours mean: a scale with its limits and unit, which may be locked."""
+"""Colour bars: a scale with its limits and unit, and a lock."""
 
 import numpy as np
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
@@ -109,14 +109,14 @@ class ColourBar(QWidget):
 
 
 class LockButton(QToolButton):
-    """Says whether a range of colours is locked; `wanted` says that it should be, or not."""
+    """A button that locks a range of colours; `wanted` requests it."""
 
     wanted = Signal(bool)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setCheckable(True)
-        self.setToolTip("Keep the colours' range as it is now; else it follows what is shown.")
+        self.setToolTip("Fix the range of the colours; else it follows the values shown.")
         self.clicked.connect(self._ask)
         self.show_locked(False)
 
@@ -130,7 +130,7 @@ class LockButton(QToolButton):
 
 
 class SkinScale(QWidget):
-    """What colours the skin, on which scale, its lock, and how many times larger it is drawn."""
+    """The scale of the skin: quantity, colour bar, lock, and vertical exaggeration."""
 
     lock_wanted = Signal(bool)
 
@@ -143,8 +143,7 @@ class SkinScale(QWidget):
         self._symbol = ""
         self.times = QLabel(alignment=Qt.AlignmentFlag.AlignHCenter)  # pyright: ignore[reportCallIssue]
         self.times.setToolTip(
-            "How many times the displacement is drawn larger: what Height asks for, or as much of "
-            "it as fits into the picture."
+            "Vertical exaggeration: that set as Height, or as much of it as fits the view."
         )
         around = QVBoxLayout(self)
         around.setContentsMargins(0, 4, 0, 4)

@@ -1,4 +1,4 @@
-"""Layouts of widgets: in columns, in rows, flowing, and rows of a table."""
+"""Layouts of widgets: rows, scrolled columns, flow, table rows."""
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QSize, Qt
 from PySide6.QtGui import QResizeEvent, QShowEvent

@@ -1,4 +1,4 @@
-"""A height in pixels to letters of that height, and words to where they are painted."""
+"""Fonts of a given capital height, and texts painted in rectangles."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""One line of text that changes many times a second."""
+"""A line of text that changes many times a second."""
 
 from PySide6.QtCore import QEvent, QSize, Qt
 from PySide6.QtGui import QFontMetrics, QHelpEvent, QPainter, QPaintEvent

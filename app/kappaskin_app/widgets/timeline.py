@@ -1,4 +1,4 @@
-"""A timeline: its course under a handle, its buttons and its clock."""
+"""Timelines: a slider, buttons and a clock."""
 
 import math
 from collections.abc import Callable

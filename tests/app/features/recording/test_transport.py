@@ -129,7 +129,7 @@ def test_the_handle_follows_the_mouse_and_not_the_replay_while_it_is_held(
 def test_flags_and_gaps_say_what_they_are(row: Transport) -> None:
     course = row.course
     assert course.tip_at(course.at(2.0)) == "0:02.000  note: here\n0:02.010  tare: taken"
-    assert course.tip_at(course.at(4.7)) == "Nothing came for 1.50 s, from 0:04.000 on."
+    assert course.tip_at(course.at(4.7)) == "Gap of 1.50 s from 0:04.000."
     assert course.tip_at(course.at(9.0)).startswith("0:09.000")
 
 
