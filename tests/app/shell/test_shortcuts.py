@@ -6,7 +6,7 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QApplication, QLabel, QMainWindow
 
 from kappaskin import Refusal
-from kappaskin_app.shell.actions import WITHIN, Actions, in_words
+from kappaskin_app.shell.actions import WITHIN, Actions, with_keys
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.shortcuts import ShortcutDialog
@@ -122,7 +122,7 @@ def test_a_changed_shortcut_and_all_that_were_reset_come_back(
     ],
 )
 def test_a_text_names_the_keys_of_now(text: str, told: str) -> None:
-    assert in_words(text, {"Ctrl+S": "Ctrl+T", "Ctrl+T": "Ctrl+S", "F1": "", "": "Ctrl+J"}) == told
+    assert with_keys(text, {"Ctrl+S": "Ctrl+T", "Ctrl+T": "Ctrl+S", "F1": "", "": "Ctrl+J"}) == told
 
 
 def test_tooltips_follow_a_changed_shortcut_and_one_that_is_set_meanwhile(actions: Actions) -> None:

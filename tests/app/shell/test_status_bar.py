@@ -27,7 +27,7 @@ def suspecting(**why: int) -> np.ndarray:
     ("contact", "strained", "words"),
     [
         (INSIDE, 0, ""),
-        (NEAR, 0, "contact near the rim: unreliable"),
+        (NEAR, 0, "Contact near the rim: unreliable"),
         (INSIDE, 1, "1 element over 1 % strain"),
         (NEAR, 12, "12 elements over 1 % strain; contact near the rim: unreliable"),
     ],
@@ -49,7 +49,7 @@ def test_elements_that_are_left_out_are_named(suspect: np.ndarray, words: str) -
 
 
 def test_an_iteration_that_gave_up_is_told() -> None:
-    words = "no convergence; least squares shown"
+    words = "No convergence; least squares shown"
     assert warnings(replace(ESTIMATE, converged=False), 0) == words
 
 

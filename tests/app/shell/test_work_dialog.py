@@ -41,7 +41,7 @@ def test_only_a_file_chosen_by_its_whole_name_is_written_over(tmp_path: Path) ->
     assert with_ending(str(tmp_path / "mine"), ".toml") == file
     file.touch()
     assert with_ending(str(file), ".toml") == file
-    with pytest.raises(Refusal, match=r"mine\.toml is there already"):
+    with pytest.raises(Refusal, match=r"mine\.toml exists already"):
         with_ending(str(tmp_path / "mine"), ".toml")
 
 

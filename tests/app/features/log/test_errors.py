@@ -144,7 +144,7 @@ def test_a_report_that_is_cancelled_leaves_nothing(tmp_path: Path) -> None:
 
 def test_a_report_is_written_over_nothing(tmp_path: Path) -> None:
     (tmp_path / "report.zip").write_bytes(b"mine")
-    with pytest.raises(Refusal, match="is there already"):
+    with pytest.raises(Refusal, match="exists already"):
         list(write_report(tmp_path / "report.zip", ReportContents({}), tmp_path))
     with pytest.raises(Refusal, match="ends in"):
         list(write_report(tmp_path / "report.txt", ReportContents({}), tmp_path))
