@@ -83,10 +83,7 @@ def opened(source: str, kept: Path | None = None) -> "tuple[QApplication, MainWi
 
 @contextmanager
 def _all_stays() -> Iterator[None]:
-    """What is loaded is no garbage: to look through it again and again takes 0.3 s of a start.
-
-    And 50 ms each time later, in which nothing is drawn.
-    """
+    """No garbage collection of loaded modules: it takes 0.3 s of a start, and 50 ms each later."""
     gc.disable()
     try:
         yield
@@ -130,7 +127,7 @@ def _stand_behind() -> None:
 
 
 def _connected(source: str) -> "Engine":
-    """An engine that reads `source`, or one that a window left that is gone."""
+    """An engine that reads `source`, or one that still records for an earlier window."""
     from kappaskin.live import Engine, resume_folder
 
     engine = Engine(resume_from=resume_folder())
@@ -200,7 +197,7 @@ def _kept_file() -> Path:
 def _theme_in(path: Path) -> "Theme":
     """The theme that is kept at `path`; that of a first start where none can be read.
 
-    What is wrong with the file is told by who reads all of it.
+    Errors in the file are reported when all of it is read.
     """
     from kappaskin_app.theme import DARK, THEMES
 

@@ -264,7 +264,7 @@ class _Table:
     def parse(cls, name: str, text: str, line: int) -> "_Table":
         try:
             values = tomllib.loads(text)
-            repr(values)  # refused here: a number in hexadecimal that is too long to be told
+            repr(values)  # refused here: a number in hexadecimal that is too long to be shown
             return cls(name, text, line, values)
         except (ValueError, RecursionError) as error:  # also for a number too long to read
             at = _AT_LINE.search(str(error))
