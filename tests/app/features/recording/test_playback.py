@@ -327,7 +327,7 @@ def test_one_never_ended_is_played_up_to_where_it_breaks_off(
     part.write_bytes(recording.read_bytes()[:within_the_last])
     window.playback.open_file(part)
     until(lambda: window.display.badge.state.startswith("REPLAY"))
-    assert "was never ended" in window.recording.message.text()
+    assert "is unfinished" in window.recording.message.text()
     assert window.recording.copy_button.isVisibleTo(window.recording)
     until(lambda: "never ended" in window.connection.device.text())
 

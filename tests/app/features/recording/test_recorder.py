@@ -154,7 +154,7 @@ def test_what_was_never_ended_is_offered_to_be_repaired(opened, until, folder: P
     window = opened("sim:")
     until(lambda: window.display.badge.state == "SIM")
     text = window.recording.message.text()
-    assert "it's mine.mcap.part was never ended" in text
+    assert "it's mine.mcap.part is unfinished" in text
     window.recording.copy_button.click()
     command = QGuiApplication.clipboard().text()
     assert command.startswith("kappaskin repair ")
