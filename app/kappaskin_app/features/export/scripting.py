@@ -24,7 +24,7 @@ import time
 $paths
 from kappaskin import $names
 
-$values
+$setup
 
 def estimates(seconds):
     """The newest estimate, ten times a second."""

@@ -215,7 +215,7 @@ def test_a_port_is_named_and_no_scene_with_it(asked: Asked) -> None:
 
 def test_without_a_source_there_is_nothing_to_copy(asked: Asked) -> None:
     asked.session.source = ""
-    with pytest.raises(Refusal, match="expected a source that is read"):
+    with pytest.raises(Refusal, match="expected an open source"):
         asked.text(Path("nowhere"))
 
 
