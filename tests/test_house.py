@@ -15,7 +15,7 @@ ROOMS = (
 # What the house may come to at most; who brings a count down brings its limit down. The house is
 # to have 340 modules and 32,000 statements. A feature that raises a count says why beside it.
 LIMITS = {
-    "modules": 329,
+    "modules": 322,
     "statements": 35_074,
     "loose modules of core": 8,
     "loose modules of the app": 8,

@@ -1,4 +1,4 @@
-"""`kappaskin app` and `demo`: open the window. Nothing heavy is imported before it is asked for."""
+"""The commands `app`, `demo` and `replay`, which open the window."""
 
 import os
 import sys
@@ -41,16 +41,16 @@ def run(
     Parameters
     ----------
     file
-        A recording or a scene to play, a calibration of the source's sensor, or a mesh to touch it.
+        A recording or a scene to play, a calibration of the sensor, or a mesh as the object.
     source
         `sim:`, `sim:SCENE`, `replay:FILE`, or a port or URL for pyserial.
     seconds
-        Close by itself after so long; the window begins in its first theme and layout.
+        Close after this many seconds; the window opens with the default theme and layout.
     screenshot
-        Save a picture of the window just before it closes by itself.
+        Save a picture of the window just before it closes.
     """
     if file is not None and not file.is_file():
-        raise Refusal(f"{file}: is not there; check its name")
+        raise Refusal(f"{file}: no such file; check its name")
     _open(source, seconds, screenshot, file=file)
 
 
@@ -58,19 +58,19 @@ def run(
 def present(*, seconds: float | None = None, screenshot: Path | None = None) -> None:
     """Demonstrate telemanipulation with no hardware: a hand presses and rolls an object.
 
-    Your mouse is the hand. What the simulated skin reads comes back as a force, a radius and a
-    place, each with its error bar, in letters that are read from three metres. Drag on the pad
-    moves the object, the wheel presses harder, the buttons choose another one; Esc shows the
-    whole window, F11 comes back.
+    The mouse moves and presses the object. The app shows the estimated force, radius and
+    position, each with its error bar, readable from three metres. Drag on the pad moves the
+    object, the wheel changes the force, the buttons select another object; Esc shows the whole
+    window, F11 the full screen.
 
     Example: `kappaskin demo`
 
     Parameters
     ----------
     seconds
-        Close by itself after so long; the window begins in its first theme and layout.
+        Close after this many seconds; the window opens with the default theme and layout.
     screenshot
-        Save a picture of the window just before it closes by itself.
+        Save a picture of the window just before it closes.
     """
     _open("sim:demo", seconds, screenshot, presenting=True)
 
@@ -105,9 +105,9 @@ def replay(file: Path, *, seconds: float | None = None, screenshot: Path | None 
     file
         The recording.
     seconds
-        Close by itself after so long; the window begins in its first theme and layout.
+        Close after this many seconds; the window opens with the default theme and layout.
     screenshot
-        Save a picture of the window just before it closes by itself.
+        Save a picture of the window just before it closes.
     """
     from kappaskin.recording import Recording
 

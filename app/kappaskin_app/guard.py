@@ -1,4 +1,4 @@
-"""The one place where an exception in a slot ends, instead of in Qt."""
+"""Exceptions in slots: logged and reported instead of passed to Qt."""
 
 import functools
 import logging
@@ -14,7 +14,7 @@ _listeners: list[Callable[[str], None]] = []
 
 
 def on_failure(listener: Callable[[str], None]) -> None:
-    """Tell `listener` in words of every exception caught from now on."""
+    """Call `listener` with a text for every exception caught from now on."""
     _listeners.append(listener)
 
 
@@ -24,20 +24,20 @@ def forget(listener: Callable[[str], None]) -> None:
 
 
 def failed(error: Exception, where: object) -> None:
-    """Log an exception, and tell of it."""
+    """Log an exception, and report it."""
     log.error("in %s", where, exc_info=error)
     for listener in list(_listeners):
         listener(f"Something went wrong: {error or type(error).__name__}")
 
 
 def guarded(slot: Callable[..., Any]) -> Callable[..., Any]:
-    """`slot`, with whatever it raises logged and told rather than lost in Qt or fatal."""
+    """`slot`, whose exceptions are logged and reported."""
 
     @functools.wraps(slot, assigned=_NAMES)
     def safe(*arguments: Any) -> Any:
         try:
             return slot(*arguments)
-        except Exception as error:  # a slot has no caller that could do better
+        except Exception as error:  # a slot has no caller that could handle it
             failed(error, getattr(slot, "__qualname__", slot))
             return None
 

@@ -1,6 +1,6 @@
-"""Starts the engine, Qt and the window, and ends them in order.
+"""Start of the engine, Qt and the window, and their end.
 
-Nothing of the library is imported before something is seen.
+The library is imported only after the splash screen is shown.
 """
 
 import gc
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
 
     from kappaskin.live import Engine
-    from kappaskin_app.shell.logbook import Logbook
-    from kappaskin_app.shell.recovery import Recovering
+    from kappaskin_app.shell.log_files import LogFiles
+    from kappaskin_app.shell.recovery import Recovery
     from kappaskin_app.shell.splash import Splash
     from kappaskin_app.shell.window import MainWindow
     from kappaskin_app.theme import Theme
@@ -32,10 +32,10 @@ if TYPE_CHECKING:
 log = logging.getLogger("kappaskin")
 
 _LOADED = {
-    "pyvistaqt": "Loading the drawing in three dimensions (VTK)",
+    "pyvistaqt": "Loading 3-D graphics (VTK)",
     "kappaskin_app.features": "Loading panels and views",
 }
-"""What takes long to import, in this order, and what is said meanwhile."""
+"""Modules that take long to import, in this order, with the texts of the splash screen."""
 
 _BEHIND = 5  # of 19 steps that drawing stands behind the engine when both want a core
 
@@ -68,14 +68,14 @@ def opened(source: str, kept: Path | None = None) -> "tuple[QApplication, MainWi
         from kappaskin_app.shell.window import MainWindow
 
         if splash is not None:
-            splash.say("Making the window")
+            splash.say("Building the window")
         window = MainWindow([made() for made in FEATURES], source, engine)
     except BaseException:
         engine.close()
         raise
     window.show()
     if kept is not None:
-        window.keeping.begin(kept)
+        window.saver.begin(kept)
     if splash is not None:
         splash.finish(window)
     return application, window
@@ -83,10 +83,7 @@ def opened(source: str, kept: Path | None = None) -> "tuple[QApplication, MainWi
 
 @contextmanager
 def _all_stays() -> Iterator[None]:
-    """What is loaded is no garbage: to look through it again and again takes 0.3 s of a start.
-
-    And 50 ms each time later, in which nothing is drawn.
-    """
+    """No garbage collection of loaded modules: it takes 0.3 s of a start, and 50 ms each later."""
     gc.disable()
     try:
         yield
@@ -130,7 +127,7 @@ def _stand_behind() -> None:
 
 
 def _connected(source: str) -> "Engine":
-    """An engine that reads `source`, or one that a window left that is gone."""
+    """An engine that reads `source`, or one that still records for an earlier window."""
     from kappaskin.live import Engine, resume_folder
 
     engine = Engine(resume_from=resume_folder())
@@ -155,7 +152,7 @@ def launch(
     asked: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda got, _: asked.append(got))
-    logbook = _logbook()
+    log_files = _logbook()
     # What a script opens for some seconds is the same whatever was before.
     application, window = opened(source, _kept_file() if seconds is None else None)
     recovering = _recovering(window)
@@ -181,7 +178,7 @@ def launch(
     if seconds is not None:
         QTimer.singleShot(round(seconds * 1e3), end)
     application.exec()
-    for kept in (recovering, logbook):
+    for kept in (recovering, log_files):
         if kept is not None:
             kept.close()
     if saved == [False]:
@@ -200,7 +197,7 @@ def _kept_file() -> Path:
 def _theme_in(path: Path) -> "Theme":
     """The theme that is kept at `path`; that of a first start where none can be read.
 
-    What is wrong with the file is told by who reads all of it.
+    Errors in the file are reported when all of it is read.
     """
     from kappaskin_app.theme import DARK, THEMES
 
@@ -211,23 +208,23 @@ def _theme_in(path: Path) -> "Theme":
         return DARK
 
 
-def _logbook() -> "Logbook | None":
+def _logbook() -> "LogFiles | None":
     """What goes wrong to files, or nothing where none can be written."""
-    from kappaskin_app.shell.logbook import Logbook, log_folder
+    from kappaskin_app.shell.log_files import LogFiles, log_folder
 
     try:
-        return Logbook(log_folder())
+        return LogFiles(log_folder())
     except OSError as error:
-        log.warning("no log is written: %s", error)
+        log.warning("no log file is written: %s", error)
         return None
 
 
-def _recovering(window: "MainWindow") -> "Recovering | None":
+def _recovering(window: "MainWindow") -> "Recovery | None":
     """What helps the next window after a crash of this one, or nothing where it cannot be kept."""
-    from kappaskin_app.shell.recovery import Recovering, state_folder
+    from kappaskin_app.shell.recovery import Recovery, state_folder
 
     try:
-        return Recovering(window, state_folder())
+        return Recovery(window, state_folder())
     except OSError as error:
-        log.warning("what this window is at is not kept: %s", error)
+        log.warning("the state of this window is not saved: %s", error)
         return None

@@ -2,7 +2,7 @@
 
 The palette of the application says which theme is in use. Qt repaints every widget when it
 changes: what is painted with the colours of `current` follows by itself, and so do labels whose
-foreground role is `FAINT` or `ALERT`. What holds colours otherwise asks `follow_look`.
+foreground role is `FAINT` or `ALERT`. What holds other colours uses `follow_look`.
 """
 
 from collections.abc import Callable
@@ -134,7 +134,7 @@ def apply_look(theme: Theme, percent: float = 100.0) -> None:
 
 
 class _LookFollower(QObject):
-    """Calls `show` when Qt tells a widget of another palette or font."""
+    """Calls `show` when the palette or font of a widget changes."""
 
     def __init__(self, widget: QWidget, show: Callable[[], object]) -> None:
         super().__init__(widget)
@@ -148,9 +148,9 @@ class _LookFollower(QObject):
 
 
 def follow_look(widget: QWidget, show: Callable[[], object]) -> None:
-    """Call `show` now, and again whenever the theme or the letters are others.
+    """Call `show` now, and again when the theme or the font changes.
 
-    `widget` has no style sheet: Qt tells one with a style sheet nothing.
+    `widget` has no style sheet: Qt sends one with a style sheet no such events.
     """
     _LookFollower(widget, show)
     show()
@@ -164,7 +164,7 @@ def letters(percent: float) -> QFont:
 
 
 def grown(px: float) -> int:
-    """As many px in the letters of now as `px` are in the system's."""
+    """`px` of the system's font, scaled to the present one."""
     return round(px * QGuiApplication.font().pointSizeF() / letters(100).pointSizeF())
 
 

@@ -106,7 +106,7 @@ def _lone_panels(qapp: QApplication) -> Iterator[LonePanels]:
     window.session.engine.disconnect()
     window.session.timer.stop()
     panels = window.panels
-    for signal in (panels.requested, panels.reset_requested, panels.read_wanted):
+    for signal in (panels.requested, panels.reset_requested, panels.guide_requested):
         signal.disconnect()
     yield LonePanels(window)
     window.close()

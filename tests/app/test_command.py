@@ -11,7 +11,7 @@ import pytest
 from PySide6.QtGui import QImage
 
 from kappaskin_app.shell.badge import SIM, STALE, WAITING, colour_of
-from kappaskin_app.shell.layouts.kept import Kept, KeptFile
+from kappaskin_app.shell.window_file import WindowFile, WindowState
 from kappaskin_app.theme import DARK
 
 
@@ -22,7 +22,7 @@ def run(*arguments: str, **more: object) -> subprocess.CompletedProcess[str]:
 
 def test_the_app_opens_takes_its_picture_and_closes(tmp_path: Path) -> None:
     picture, config = tmp_path / "window.png", {"XDG_CONFIG_HOME": str(tmp_path)}
-    KeptFile(tmp_path / "kappaskin" / "window.toml").write(Kept(theme="light"))
+    WindowFile(tmp_path / "kappaskin" / "window.toml").write(WindowState(theme="light"))
     asked = ("--source", "sim:line", "--seconds", "4", "--screenshot", str(picture))
     done = run(*asked, env=os.environ | config)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

@@ -20,7 +20,7 @@ from kappaskin import Pipeline, Setup, Simulator, Status, load_scene
 from kappaskin_app.features.contact.numbers import ELEMENTS, elements_of, facts_of
 from kappaskin_app.features.contact.readouts import Readouts
 from kappaskin_app.features.heatmaps.maps import Maps
-from kappaskin_app.features.lessons.reading import READOUTS
+from kappaskin_app.features.lessons.lesson_file import READOUTS
 from kappaskin_app.features.traces.element_card import ElementCard, Traces
 from kappaskin_app.features.traces.picking import facts
 from kappaskin_app.shell.background import Tasks

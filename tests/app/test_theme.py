@@ -207,7 +207,7 @@ def parts_of(window: MainWindow) -> dict[str, QWidget]:
     """All that a window shows, by name."""
     docks = {name: window.docks.widget(name) for name in window.docks.by_name()}
     panels = {panel.title(): panel for panel in window.panels.all()}
-    frame = {"header": window.display.header, "foot": window.display.foot}
+    frame = {"header": window.display.header, "foot": window.display.status_bar}
     centre = {"skin": window.membrane, "scale": window.scale, "timeline": window.timeline}
     stage = {"transport": window.transport, "operator": window.stage.operator}
     stage |= {f"board {number}": board for number, board in enumerate(window.stage.boards)}

@@ -20,7 +20,7 @@ from PySide6.QtWidgets import QApplication
 
 from kappaskin import Engine
 from kappaskin_app.features import FEATURES
-from kappaskin_app.shell.layouts.layout import BOTTOM, LEFT, RIGHT, Layout, Place
+from kappaskin_app.shell.arrangement import BOTTOM, LEFT, RIGHT, Layout, Place
 from kappaskin_app.shell.settings.shown import COLOURS
 from kappaskin_app.shell.window import MainWindow
 

@@ -47,7 +47,7 @@ from kappaskin.sources.wire import (
     encode_reply,
     encode_samples,
 )
-from kappaskin_app.features.lessons.reading import READY, read_lesson
+from kappaskin_app.features.lessons.lesson_file import READY, read_lesson
 
 Read = Callable[[bytes, Path], object]
 

@@ -1,4 +1,4 @@
-"""Every action a person can take, registered once: menus, shortcuts and palette come from here."""
+"""The registry of actions, from which menus, shortcuts and the finder are made."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -12,49 +12,49 @@ from kappaskin.errors import Refusal
 from kappaskin_app.guard import guarded
 
 WITHIN = " > "
-"""Between the title of a menu and that of one in it."""
+"""Separator between the titles of a menu and its submenu."""
 _TYPES_NOTHING = re.compile(r".*(Ctrl|Alt|Meta)\+.+|(Shift\+)?F\d+")
 
 
-_OWN, _SHOWN = "own-tip", "shown-tip"  # properties of a widget: its tooltip, and as it was retold
+_OWN, _SHOWN = "own-tip", "shown-tip"  # properties of a widget: its own tooltip, and the one shown
 _NONE = "no shortcut"
 
 
 class KeyTips(QObject):
-    """Has the tooltips of a `window` name its keys as they are now."""
+    """Updates the keys that the tooltips of a `window` name."""
 
     def __init__(self, window: QWidget) -> None:
         super().__init__(window)
         self._window = window
         self._keys: Mapping[str, str] = {}
 
-    def retell(self, keys: Mapping[str, str]) -> None:
-        """Name each of the `keys` as it is now, in what tooltips say next too."""
+    def update_tips(self, keys: Mapping[str, str]) -> None:
+        """Replace each default key by the present one, in later tooltips too."""
         if not keys and not self._keys:
-            return  # of a window whose keys are its own no event is looked at
+            return  # no event filter while all keys are the defaults
         self._keys = keys
         for widget in self._window.findChildren(QWidget):
             if widget.toolTip():
-                self._retell(widget)
+                self._update_tip(widget)
                 widget.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.ToolTipChange and isinstance(watched, QWidget):
-            self._retell(watched)
+            self._update_tip(watched)
         return False
 
-    def _retell(self, widget: QWidget) -> None:
+    def _update_tip(self, widget: QWidget) -> None:
         tip = widget.toolTip()
         own = widget.property(_OWN) if tip == widget.property(_SHOWN) else tip
-        told = in_words(str(own), self._keys)
-        if told != tip:
+        current = with_keys(str(own), self._keys)
+        if current != tip:
             widget.setProperty(_OWN, own)
-            widget.setProperty(_SHOWN, told)
-            widget.setToolTip(told)
+            widget.setProperty(_SHOWN, current)
+            widget.setToolTip(current)
 
 
-def in_words(text: str, keys: Mapping[str, str]) -> str:
-    """A text with each of the `keys` that it names as it is now."""
+def with_keys(text: str, keys: Mapping[str, str]) -> str:
+    """A text in which each of the `keys` is replaced by its value."""
     named = sorted(filter(None, keys), key=len, reverse=True)
     if not named:
         return text
@@ -64,7 +64,7 @@ def in_words(text: str, keys: Mapping[str, str]) -> str:
 
 @dataclass(frozen=True)
 class Entry:
-    """An action with the menu it stands in, and the shortcut that it has by itself."""
+    """An action with its menu and its default shortcut."""
 
     name: str
     menu: str
@@ -81,7 +81,7 @@ class Actions:
         self._menus: dict[str, QMenu] = {}
         self._why_not: dict[str, str] = {}
         self._tips = KeyTips(window)
-        for title in menus:  # in this order, whoever is first to have an action in one
+        for title in menus:  # in this order, whichever gets the first action
             self._menu(title)
 
     def add(
@@ -93,7 +93,7 @@ class Actions:
         shortcut: str = "",
         tip: str = "",
     ) -> QAction:
-        """An action called `name` that calls `act`."""
+        """Add an action called `name` that calls `act`."""
         action = QAction(text, self._window)
         if tip:
             action.setToolTip(tip)
@@ -104,7 +104,7 @@ class Actions:
         return action
 
     def register(self, name: str, menu: str, action: QAction) -> None:
-        """Take in an action that Qt made (undo, redo, showing a dock)."""
+        """Register an action that Qt made (showing a dock)."""
         if name in self.entries:
             raise ValueError(f"expected a new name for an action, got {name!r} twice")
         action.setObjectName(name)
@@ -114,22 +114,22 @@ class Actions:
         self._window.addAction(action)
 
     def repeat(self, name: str, menu: str) -> None:
-        """Have an action in another menu too."""
+        """Add an action to another menu too."""
         self._menu(menu).addAction(self[name])
 
     def allow(self, name: str, why_not: str) -> None:
-        """Let an action be taken, or say why it cannot be now."""
+        """Enable an action, or disable it with a reason."""
         action = self[name]
         action.setEnabled(not why_not)
         action.setStatusTip(why_not or action.toolTip())
         self._why_not[name] = why_not
 
     def why_not(self, name: str) -> str:
-        """Why an action cannot be taken now; empty where it can."""
+        """Why an action is disabled; empty where it is enabled."""
         return "" if self[name].isEnabled() else self._why_not.get(name) or "not now"
 
     def _menu(self, title: str) -> QMenu:
-        """The menu of this title, which may stand within another."""
+        """The menu of this title, which may be a submenu."""
         if title not in self._menus:
             around, _, own = title.rpartition(WITHIN)
             bar = self._menu(around) if around else self._window.menuBar()
@@ -137,7 +137,7 @@ class Actions:
         return self._menus[title]
 
     def drop_empty_menus(self) -> None:
-        """Leave out menus in which nothing stands."""
+        """Hide empty menus."""
         for menu in self._menus.values():
             menu.menuAction().setVisible(not menu.isEmpty())
 
@@ -147,30 +147,30 @@ class Actions:
     # Shortcuts.
 
     def key(self, name: str) -> str:
-        """The shortcut of an action, as it is written: "Ctrl+S"; empty where it has none."""
+        """The shortcut of an action as text: "Ctrl+S"; empty where it has none."""
         return self[name].shortcut().toString()
 
     def own_key(self, name: str) -> str:
-        """The shortcut that an action has unless a person changes it."""
+        """The default shortcut of an action."""
         return self.entries[name].key
 
     def changed_keys(self) -> dict[str, str]:
-        """The shortcuts that a person changed, by name."""
+        """The shortcuts that differ from the defaults, by name."""
         return {
             name: self.key(name) for name in self.entries if self.key(name) != self.own_key(name)
         }
 
     def change_key(self, name: str, key: str) -> None:
-        """Give an action another shortcut, or none; refused where another action has it."""
+        """Change or remove a shortcut; refused where another action has it."""
         if why_not := self.why_no_key(name, key):
             raise Refusal(why_not)
         self[name].setShortcut(QKeySequence(key))
-        self.retell()
+        self.update_tips()
 
-    def retell(self) -> None:
-        """Let what names shortcuts name those of now."""
+    def update_tips(self) -> None:
+        """Update the shortcuts named in tooltips."""
         changed = self.changed_keys()
-        self._tips.retell({self.own_key(name): key for name, key in changed.items()})
+        self._tips.update_tips({self.own_key(name): key for name, key in changed.items()})
 
     def why_no_key(self, name: str, key: str) -> str:
         """Why an action cannot have a shortcut; empty where it can."""
@@ -178,14 +178,14 @@ class Actions:
             return ""
         wanted = QKeySequence(key)
         if wanted.count() != 1 or not _TYPES_NOTHING.fullmatch(key):
-            return f"{key} is for typing: take a key with Ctrl or Alt, or a function key"
+            return f"{key} is for typing: use a key with Ctrl or Alt, or a function key"
         for other, entry in self.entries.items():
             if other != name and entry.action.shortcut() == wanted:
                 return f"{key} is the shortcut of {plain(entry.action.text())}: change that first"
         return ""
 
     def take_keys(self, changed: dict[str, str]) -> list[str]:
-        """Change shortcuts all at once, the rest as their own; why those left out cannot be."""
+        """Set all shortcuts, the others to their defaults; returns why some were refused."""
         for name, entry in self.entries.items():
             entry.action.setShortcut(QKeySequence("" if name in changed else entry.key))
         known = {name: key for name, key in changed.items() if name in self.entries}
@@ -195,10 +195,10 @@ class Actions:
                 self.change_key(name, key)
             except Refusal as refusal:
                 refused.append(str(refusal))
-        self.retell()
+        self.update_tips()
         return refused
 
 
 def plain(text: str) -> str:
-    """The words of a menu or a button, without the mark of its letter."""
+    """The text of a menu or a button, without & and dots."""
     return text.replace("&", "").rstrip("\N{HORIZONTAL ELLIPSIS}")

@@ -1,4 +1,4 @@
-"""Background tasks: the one way to compute something while the window goes on, and to end it."""
+"""Background tasks: computing in threads and processes, with progress and cancelling."""
 
 import threading
 import time
@@ -16,22 +16,22 @@ from kappaskin.errors import Refusal
 from kappaskin.live import Status
 from kappaskin_app.guard import failed, guarded
 
-_MOMENT = 0.3  # s that needs no words
-_LOOK = 20  # ms between two looks at what runs
+_MOMENT = 0.3  # s before a task is shown
+_LOOK = 20  # ms between two polls of running tasks
 _GRACE = 1.0  # s that threads have to end in when the window closes
-_ENGINE = "Computing the new settings; Ctrl+Z takes them back"
+_ENGINE = "Computing the new settings; Ctrl+Z undoes them"
 _EXPECTED = Refusal, MemoryError, np.linalg.LinAlgError
-"""What a computation may end with where nothing is wrong with the program."""
+"""Errors of a computation that are no failures of the program."""
 
 _Item = TypeVar("_Item")
 
 
 class Cancelled(Refusal):
-    """A person has cancelled a task."""
+    """The user has cancelled a task."""
 
 
 class Work(Protocol):
-    """What runs: `poll` returns the items since the last call, or raises what it failed with."""
+    """Running work: `poll` returns the items since the last call, or raises its error."""
 
     @property
     def done(self) -> bool: ...
@@ -44,8 +44,8 @@ class Work(Protocol):
 class BackgroundThread(threading.Thread):
     """Computes the items of `make(*about)` as a `BackgroundProcess` does, in a thread.
 
-    For what takes less than a second to its next item, where it ends once it is closed. The program
-    ends after it: a picture that is being written is whole.
+    For work with less than a second between items, where it ends once it is closed. The program
+    waits for it: a picture that is being written is whole.
     """
 
     def __init__(self, make: Callable[..., Any], *about: object) -> None:
@@ -62,7 +62,7 @@ class BackgroundThread(threading.Thread):
                     if self._closed:
                         return
                     self._items.append(item)
-        except Exception as error:  # of whatever kind: `poll` raises it where it can be told
+        except Exception as error:  # of whatever kind: `poll` raises it in the GUI thread
             self._error = error
 
     def poll(self) -> list[Any]:
@@ -78,12 +78,12 @@ class BackgroundThread(threading.Thread):
 
 
 class BackgroundTask(Generic[_Item]):
-    """A place for one computation beside the window at a time; what is begun there ends the last.
+    """One computation in the background at a time; starting another ends it.
 
-    Each item that it computes goes to `take` and what it fails with to `refuse`, which tells a
-    `Refusal` at the foot of the window where none is given; then it has `ended`. All are called on
-    the GUI's thread, and none once it is stopped. `words` tell at the foot of the window what takes
-    long, `cancelled` what it is refused with where a person cancels it; without, nobody can.
+    Each item goes to `take` and an error to `refuse`, by default to the status bar; then `ended` is
+    called. All are called in the GUI thread, and none once it is stopped. `words` name a long task
+    in the status bar, `cancelled` is the message when the user cancels it; without one it cannot
+    be cancelled.
     """
 
     def __init__(
@@ -114,7 +114,7 @@ class BackgroundTask(Generic[_Item]):
         self.begin(lambda: BackgroundProcess(name, items_of, make, *about))
 
     def begin(self, start: Callable[[], Work]) -> None:
-        """Run what `start` starts, or refuse it; nothing begins once the window closes."""
+        """Run the work that `start` returns, or refuse it; none starts once the window closes."""
         self.stop()
         if not self._tasks.closed:
             try:
@@ -124,13 +124,13 @@ class BackgroundTask(Generic[_Item]):
                 self._fail(refusal)
 
     def look(self) -> None:
-        """Take what was computed since the last look."""
+        """Take the items since the last poll."""
         work = self._work
         if work is None:
             return
         try:
             items = work.poll()
-        except Exception as error:  # of whatever kind: it would come again at every look
+        except Exception as error:  # of whatever kind: it would come again at every poll
             self._fail(error)
             return
         for item in items:
@@ -141,7 +141,7 @@ class BackgroundTask(Generic[_Item]):
             self._ended()
 
     def cancel(self) -> None:
-        """End it as a person requests, if it runs."""
+        """Cancel it on request of the user, if it runs."""
         if self.running:
             self._fail(Cancelled(self.cancelled))
 
@@ -160,12 +160,12 @@ class BackgroundTask(Generic[_Item]):
 
 
 class Tasks(QObject):
-    """The tasks that run; `told` says what goes on for longer than a moment, `refused` why not.
+    """The running tasks; `notified` brings the text of a long one, `refused` that of an error.
 
-    Of several it is the one that goes on longest, `task`, which `cancel` ends.
+    Of several it is the longest, `task`, which `cancel` ends.
     """
 
-    told = Signal(str)
+    notified = Signal(str)
     refused = Signal(str)
 
     def __init__(
@@ -181,7 +181,7 @@ class Tasks(QObject):
         self._timer.timeout.connect(guarded(self._look))
 
     def follow(self, task: BackgroundTask[Any]) -> None:
-        """Look after a task that runs, to its end."""
+        """Poll a running task until it ends."""
         if task not in self._running:
             self._running.append(task)
         if not self._timer.isActive():
@@ -195,12 +195,12 @@ class Tasks(QObject):
             self._timer.stop()
 
     def refuse(self, error: Exception) -> None:
-        """Tell of a refusal that no task has a better place for."""
+        """Report an error in the status bar."""
         if isinstance(error, _EXPECTED):
             self.refused.emit(str(error))
 
-    def tell(self, status: Status) -> None:
-        """Tell what takes longer than a moment, here or in the engine."""
+    def report(self, status: Status) -> None:
+        """Report tasks that take long, here or in the engine."""
         now, engine = self._clock(), [_ENGINE] * status.computing
         going = {task.words: task for task in self._running if task.words and task.running}
         self._since = {words: self._since.get(words, now) for words in (*going, *engine)}
@@ -212,25 +212,25 @@ class Tasks(QObject):
             words = f"{longest}: {now - self._since[longest]:.0f} s{more}"
         if words != self._words:
             self._words = words
-            self.told.emit(words)
+            self.notified.emit(words)
 
     @property
     def may_cancel(self) -> bool:
         return self.task is not None and bool(self.task.cancelled)
 
     def cancel(self) -> None:
-        """End what is told of."""
+        """Cancel the task that is shown."""
         if self.task is not None and self.may_cancel:
             self.task.cancel()
 
     def close(self) -> None:
-        """End all within a second, and let nothing begin any more."""
+        """End all within a second, and let no other start."""
         self.closed = True
         self._timer.stop()
         for task in self._running:
             task.stop()
         end = time.monotonic() + _GRACE
-        for thread in threading.enumerate():  # of those that were stopped before, too
+        for thread in threading.enumerate():  # also those that were stopped before
             if isinstance(thread, BackgroundThread):
                 thread.join(max(0.0, end - time.monotonic()))
 
@@ -239,7 +239,7 @@ _EVERY = 40  # ms between two
 
 
 class Newest(QObject):
-    """Does what it is given at once, and what follows at most 25 times a second."""
+    """Rate limit: calls the newest function given, at most 25 times a second."""
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -248,7 +248,7 @@ class Newest(QObject):
         self._timer.timeout.connect(guarded(self._go_on))
 
     def __call__(self, act: Callable[[], None]) -> None:
-        """Do this, unless something newer comes before it may be done."""
+        """Call `act` when the rate allows, unless a newer one comes before."""
         self._waiting = act
         if not self._timer.isActive():
             self._go_on()
@@ -260,6 +260,6 @@ class Newest(QObject):
             act()
 
     def forget(self) -> None:
-        """Do no more of what was given."""
+        """Drop the waiting call."""
         self._waiting = None
         self._timer.stop()

@@ -1,10 +1,10 @@
-"""The badge: whether what is shown is live, simulated, replayed, stale or lost."""
+"""The badge, whether readings are live, simulated, replayed, stale or lost, and the header bar."""
 
 import math
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFontInfo, QMouseEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
+from PySide6.QtGui import QAction, QColor, QFontInfo, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QLabel, QSizePolicy, QToolBar, QWidget
 
 from kappaskin.live import Status
 from kappaskin.recording import Replay
@@ -14,49 +14,48 @@ from kappaskin_app.widgets.parts import sentence
 
 LIVE, SIM, WAITING = "LIVE", "SIM", "WAITING"
 STALE, LOST, OFF = "STALE", "LOST", "OFF"
-_BESIDE = " \N{MIDDLE DOT} "  # parts a state from what more is true of it, below it
+_BESIDE = " \N{MIDDLE DOT} "  # between a source and its condition
 _GAP, _SATURATED, _PAUSED, _RECORDING = "gap", "saturated", "paused", "recording"
 REPLAY = "REPLAY"
 GAP = f"{REPLAY}{_BESIDE}{_GAP}"
 
 _TIPS = {
-    LIVE: "Readings of a real sensor, as they come.",
-    SIM: "Readings of a simulation, not of a real sensor.",
-    WAITING: "Connecting, or computing what this skin needs: the first reading is still to come.",
-    STALE: "No reading has come for half a second: what is shown is old.",
-    LOST: "The connection ended or could not be made: what is shown is the last that came. "
-    "A device that comes back is gone on with by itself.",
+    LIVE: "Readings of a connected sensor.",
+    SIM: "Readings of a simulated sensor.",
+    WAITING: "Connecting, or preparing the estimator: no reading yet.",
+    STALE: "No reading for half a second: the values shown are old.",
+    LOST: "Connection lost or not opened; retrying. The values shown are the last received.",
     OFF: "Nothing is connected.",
-    REPLAY: "A recording is played: what is shown was once so.",
-    _GAP: "Nothing came for a while here: what is shown is old.",
-    _SATURATED: "Elements are at the end of what their electronics can tell: there the skin may be "
-    "bent more than is shown.",
-    _PAUSED: "It stands still until it is let go on: Ctrl+P.",
-    _RECORDING: "What comes in is being recorded.",
+    REPLAY: "A recording is played.",
+    _GAP: "Nothing was recorded here: the values shown are old.",
+    _SATURATED: "Elements are beyond the range of their electronics: the skin may be bent more "
+    "than shown.",
+    _PAUSED: "Paused; Ctrl+P continues.",
+    _RECORDING: "The readings are being recorded.",
 }
 
 _WIDTH, _HEIGHT, _LARGE = 8.6, 2.5, 1.54  # of the size of letters elsewhere
 _ROUND = 6  # px: radius of its corners
-_MORE = "Click it, or F4, to read what happened."
+_MORE = "Click, or F4: event log."
 
 
 def is_now(word: str, *, gap: bool = False, saturated: bool = False, paused: bool = False) -> str:
-    """The state of readings from where `word` says, with the gravest of what is true of them.
+    """The state: the source `word` and its most severe condition.
 
-    Where they come from is never left out: nobody may take a simulation for a skin. Below it, what
-    makes them old wins over what makes them wrong, and that over what makes them rest.
+    The source is always part of it: a simulation must not be taken for a sensor. A gap precedes
+    saturation, and saturation precedes a pause.
     """
     true = ((_GAP, gap), (_SATURATED, saturated), (_PAUSED, paused))
     return _BESIDE.join([word, *[below for below, holds in true if holds][:1]])
 
 
 def origin(state: str) -> str:
-    """The state without what is true of it besides."""
+    """The source of a state, without its condition."""
     return state.partition(_BESIDE)[0]
 
 
 class Badge(QLabel):
-    """Shows one of the states in its colour; `clicked` asks what happened."""
+    """Shows one of the states in its colour; `clicked` requests the event log."""
 
     clicked = Signal()
 
@@ -66,7 +65,7 @@ class Badge(QLabel):
         self.state, self._recording = "", False
 
     def show_state(self, state: str, recording: bool = False) -> None:
-        """Show a state; whether it is `recording` stands below it where nothing graver does."""
+        """Show a state; below it its condition, else whether it is `recording`."""
         if (state, recording) != (self.state, self._recording):
             self.state, self._recording = state, recording
             also = [_RECORDING] if recording else []
@@ -103,7 +102,7 @@ class Badge(QLabel):
 
 
 def colour_of(state: str, theme: Theme) -> str:
-    """The ground on which a state is written in white."""
+    """The background colour of a state, which is written in white."""
     word, _, below = state.partition(_BESIDE)
     if below in (_GAP, _SATURATED):
         return theme.warning
@@ -124,10 +123,9 @@ _STALE_AFTER = 0.5  # s without a frame
 def state_of(status: Status, computed: float | None, now: float, paused: bool) -> str:
     """The badge's state.
 
-    `computed` is the host time in s of the frame that the newest estimate is of, None without one;
-    `paused` says that a simulation stands still.
-
-    No line wins over no reading yet, that over old readings, and these over where they come from.
+    `computed` is the host time in s of the frame of the newest estimate, None without one;
+    `paused` says that a simulation is paused. No connection precedes no reading, and no reading
+    precedes old readings.
     """
     if status.state == "off":
         return OFF
@@ -153,12 +151,35 @@ def _replayed(replay: Replay, saturated: bool) -> str:
 
 
 def in_use(status: Status) -> str:
-    """Why the fit is not the one asked for, and which it is; nothing when it is."""
+    """Why the requested setup is not in use, and which one is; empty when it is in use."""
     if not status.refusal:
         return ""
     if status.slot is None:
-        return f"Nothing is in use. {sentence(status.refusal)}"
+        return f"No setup is in use. {sentence(status.refusal)}"
     setup, sensor = status.setup, status.sensor
     across = 1 if sensor is not None and sensor.layout.patch.strip else setup.Nj
     method = METHOD_SHORT.get(setup.method, setup.method)
     return f"In use: {method}, {setup.Ni} x {across} functions. {sentence(status.refusal)}"
+
+
+class Header(QToolBar):
+    """The header bar; its first widget is the `badge`."""
+
+    def __init__(self, badge: Badge) -> None:
+        super().__init__("Header")
+        self.setObjectName("header")
+        self.setMovable(False)
+        self.toggleViewAction().setEnabled(False)
+        self._first: QAction | None = None
+        self.addWidget(badge)
+
+    def add(self, widget: QWidget) -> None:
+        """Show a widget after all others."""
+        shown = self.addWidget(widget)
+        self._first = self._first or shown
+
+    def add_mark(self, widget: QWidget) -> QAction:
+        """Show a widget right after the badge; the action shows and hides it."""
+        if self._first is None:
+            return self.addWidget(widget)
+        return self.insertWidget(self._first, widget)

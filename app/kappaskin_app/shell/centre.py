@@ -1,26 +1,132 @@
-"""The centre of the window: a view, what stands beside and below it, and a banner above."""
+"""The centre of the window: the main view, with a banner above it."""
 
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 
-from kappaskin_app.shell.banner import Offer
+from PySide6.QtCore import QEvent, Qt, QTimer, Signal
+from PySide6.QtGui import QCursor, QResizeEvent
+from PySide6.QtWidgets import (
+    QHBoxLayout,
+    QLabel,
+    QMenu,
+    QPushButton,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from kappaskin_app.guard import guarded
+from kappaskin_app.widgets.layout import Flow
+
+
+@dataclass(frozen=True)
+class BannerAction:
+    """A button of the banner: its text, its tooltip, and the function or menu behind it."""
+
+    text: str
+    tip: str
+    act: Callable[[], object] | QMenu
+
+
+class ActionBanner(QWidget):
+    """Shows a text and a button for each action; hides once one is pressed.
+
+    `shown` reports new buttons.
+    """
+
+    shown = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("offer")
+        self.setAccessibleName("Banner")
+        self.words, self.away = QLabel(), QToolButton()
+        self.buttons: list[QPushButton] = []
+        self.away.setText("\N{MULTIPLICATION SIGN}")
+        self.away.setAccessibleName("Close the banner")
+        self.away.setToolTip("Close (Esc)")
+        self.away.setAutoRaise(True)
+        self.away.clicked.connect(self.hide)
+        row, self._flow = QHBoxLayout(self), Flow()
+        row.setContentsMargins(8, 3, 4, 3)
+        row.addLayout(self._flow, 1)
+        row.addWidget(self.away, 0, Qt.AlignmentFlag.AlignTop)
+        self._flow.addWidget(self.words)
+        self._ending = QTimer(self, singleShot=True)  # pyright: ignore[reportCallIssue]
+        self._ending.timeout.connect(guarded(self._end))
+        self.hide()
+
+    def show_actions(
+        self, words: str, tip: str, offered: Sequence[BannerAction], seconds: float = 0.0
+    ) -> None:
+        """Show `words` with a tooltip and these actions, for so many seconds; 0: until closed."""
+        for button in self.buttons:
+            self._flow.removeWidget(button)
+            button.deleteLater()
+        self.words.setText(words)
+        self.words.setToolTip(tip)
+        self.buttons = [self._button(each) for each in offered]
+        for before, after in pairwise([self, *self.buttons, self.away]):
+            QWidget.setTabOrder(before, after)
+        self._ending.stop()  # that of the last one, which may have been put away
+        self._ending.setInterval(round(1e3 * seconds))
+        if seconds:
+            self._ending.start()
+        self.show()
+        self._heighten()
+        self.shown.emit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._heighten()
+
+    def _heighten(self) -> None:
+        """Set the height of all lines: a main window asks for no height for a width."""
+        self.setMinimumHeight(self.heightForWidth(self.width()))
+
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.FontChange:
+            self._heighten()
+
+    def _button(self, offered: BannerAction) -> QPushButton:
+        button = QPushButton(offered.text, self)
+        button.setToolTip(offered.tip)
+        if isinstance(act := offered.act, QMenu):
+            button.setMenu(act)
+            act.triggered.connect(self.hide)
+        else:
+            button.clicked.connect(guarded(lambda *_: (self.hide(), act())))
+        self._flow.addWidget(button)
+        return button
+
+    def _end(self) -> None:
+        """Hide after its time, unless it has the focus or the mouse is over it."""
+        focused = self.focusWidget()
+        at_it = focused is not None and focused.hasFocus()
+        if at_it or self.rect().contains(self.mapFromGlobal(QCursor.pos())):
+            self._ending.start()
+        else:
+            self.hide()
 
 
 class Centre(QWidget):
-    """Holds the main `view`, once a feature shows one."""
+    """Holds the main `view`, once a feature sets one."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.offer = Offer()
+        self.banner = ActionBanner()
         self.view: QWidget | None = None
         self._row, self._column = QHBoxLayout(), QVBoxLayout(self)
         self._column.setContentsMargins(0, 0, 0, 0)
         for layout in (self._row, self._column):
             layout.setSpacing(0)
-        self._column.addWidget(self.offer)
+        self._column.addWidget(self.banner)
         self._column.addLayout(self._row, 1)
 
     def show_view(self, view: QWidget) -> None:
-        """Have `view` in the middle of the window."""
+        """Set the main view."""
         self.view = view
         self._row.insertWidget(0, view, 1)
 

@@ -1,4 +1,4 @@
-"""Colours of the skin and its heatmaps: quantities, ranges that hold still, values."""
+"""Colours of the skin and its heatmaps: quantities, steady ranges, values."""
 
 import math
 import time
@@ -39,11 +39,11 @@ HEALTH = Tint(HEALTH_COLOURS, (0.0, len(FAULTS) - 1.0), "", kinds=HEALTH_WORDS)
 
 
 class Shade(SkinColour):
-    """A quantity that the skin may be coloured by, as it is shown."""
+    """A quantity that colours the skin, in the units of the screen."""
 
     @property
     def scale(self) -> float:
-        """What a value in SI units is multiplied by for the screen."""
+        """The factor from SI units to those of the screen."""
         return _UNITS[self.unit][0]
 
     @property
@@ -78,7 +78,7 @@ _PATIENCE = 2.0  # s that the values must stay small before the range narrows
 
 
 class SteadyRange:
-    """Follows the largest value shown; a locked range is whatever it was locked to."""
+    """A range that follows the largest value, and narrows only after a delay."""
 
     def __init__(self, least: float) -> None:
         self.least = self.limit = least
@@ -141,11 +141,11 @@ def locked_at(name: str, settings: Settings) -> float:
     return getattr(settings, f"range_{name}", 0.0) * SHADES[name].scale
 
 
-_AGAIN = 0.5  # s after which error bars that depend on the readings themselves are made anew
+_AGAIN = 0.5  # s after which error bars that depend on the readings are updated
 
 
 class _Made(NamedTuple):
-    """Error bars of one setup and one set of readings; None where these decide no shape."""
+    """Error bars of one setup and set of readings; None where these do not determine a shape."""
 
     key: tuple[object, ...]
     bars: ErrorBars | None
@@ -153,7 +153,7 @@ class _Made(NamedTuple):
 
 
 class Colouring:
-    """Makes what a quantity takes when it is first asked for, error bars in the background."""
+    """Computes quantities of estimates when they are needed, error bars in the background."""
 
     def __init__(self, tasks: Tasks) -> None:
         self._status = Status()
@@ -164,11 +164,11 @@ class Colouring:
         self._estimator: tuple[object, Estimator] | None = None
 
     def follow(self, status: Status) -> None:
-        """Take up which sensor and setup the next estimates are of."""
+        """Take the sensor and setup of the next estimates."""
         self._status = status
 
     def quantities(self, estimate: Estimate) -> Quantities | None:
-        """What tells the numbers of `estimate`; None while it is of another sensor."""
+        """The quantities of `estimate`; None while it is of another sensor."""
         sensor, setup = self._status.sensor, self._status.setup
         if sensor is None or estimate.curvature.shape[1] != len(sensor.layout):
             return None
@@ -181,7 +181,7 @@ class Colouring:
         return self._quantities
 
     def on_surface(self, name: str, estimate: Estimate) -> Array:
-        """The values (ny, nx) of a quantity that there is at every point of the skin."""
+        """The values (ny, nx) of a quantity at the points of the skin."""
         found = self._asked(name, estimate)
         if found is None:
             return np.full(estimate.surface.shape, np.nan)
@@ -195,7 +195,7 @@ class Colouring:
         return SHADES[name].scale * found.of_elements(name, estimate)
 
     def at_rest(self, name: str, estimate: Estimate) -> float:
-        """What a skin at rest has of a quantity."""
+        """The value of a quantity of a skin at rest."""
         found = self.quantities(estimate)
         return 0.0 if found is None else SHADES[name].scale * found.at_rest(name)
 
@@ -208,7 +208,7 @@ class Colouring:
     # Error bars: a moment for each set of readings, longer with many functions.
 
     def error_bars(self, estimate: Estimate) -> ErrorBars | None:
-        """Those of the setup of `estimate`, as soon as they are known."""
+        """The error bars of the setup of `estimate`; None until they are computed."""
         found = self.quantities(estimate)
         if found is None or not np.isfinite(estimate.noise):
             return None

@@ -1,4 +1,4 @@
-"""What is shown of the estimates: how old it is, in which colours, what is marked and warned of."""
+"""Display of estimates: age, colours, marks and warnings."""
 
 import math
 import time
@@ -17,18 +17,17 @@ from kappaskin.frames import COMPONENTS, Estimate
 from kappaskin.live import Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import Tasks
-from kappaskin_app.shell.badge import GAP, LOST, OFF, STALE, WAITING, Badge
+from kappaskin_app.shell.badge import GAP, LOST, OFF, STALE, WAITING, Badge, Header
 from kappaskin_app.shell.centre import Centre
 from kappaskin_app.shell.colouring import SHADES, Colouring, Ranges
-from kappaskin_app.shell.header import Header
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.status_bar import Notice, StatusBar, warnings
 from kappaskin_app.widgets.tint import Tint
 
-_OLD = (LOST, OFF, STALE, WAITING, GAP)  # what is shown is not so now
+_OLD = (LOST, OFF, STALE, WAITING, GAP)  # the values shown are not the present ones
 _HINT, _NO_LOAD_HINT = "Drag the red arrow to move the load; F1: shortcuts", "F1: shortcuts"
-_NUMBERS = 0.2  # s between two readouts: faster cannot be read
+_NUMBERS = 0.2  # s between two updates of numbers
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -36,31 +35,30 @@ Kinds = NDArray[np.uint8]
 
 
 class Shown:
-    """An estimate as views show it: with what is left out of it and what is on a rail."""
+    """An estimate for views, with its excluded and its saturated channels."""
 
     def __init__(self, estimate: Estimate, display: "Display", now: float) -> None:
         self.estimate, self.now, self._display = estimate, now, display
 
     @cached_property
     def kinds(self) -> Kinds:
-        """Why each channel (3, P) is left out, by number in `WHY`; 0 where it is not."""
+        """Why each channel (3, P) is excluded, as an index of `FAULTS`; 0 where it is not."""
         return self._display.kinds(self.estimate)
 
     @cached_property
     def railed(self) -> Mask:
-        """Which readings (3, P) stand on a rail, as far as that is known."""
+        """Which readings (3, P) are saturated, as far as that is known."""
         return self._display.railed(self.estimate, self.kinds)
 
 
 class Display(QObject):
-    """Brings each estimate of the `session` to the views (`shown`), and the slow ones (`numbers`).
+    """Brings estimates of the `session` to the views (`shown`), slower to numbers (`numbers`).
 
-    Owns what frames them: `header` with the `badge`, `centre`, and the `foot`. `restarted` tells
-    that another sensor answers, `drawn` that the main view has drawn an estimate, `unit_changed`
-    the pixels of a unit of a picture that fills the screen (0: none does), `object_found` what
-    touches the skin and in which estimate.
-    `views` are those that can be saved as pictures, by menu and name; `places` the widgets that a
-    lesson may point at, `figures` those that it may ask of, by name.
+    Owns the `header` with the `badge`, the `centre` and the `status_bar`. `restarted` reports
+    another sensor, `drawn` that the main view has drawn an estimate, `unit_changed` the pixels of
+    a unit of a full-screen picture (0: none), `object_found` the object in contact with its
+    estimate. `views` can be saved as pictures, by menu and name; `places` are the widgets that a
+    lesson may point at, `figures` the numbers that it may use, by name.
     """
 
     shown = Signal(object)
@@ -75,13 +73,17 @@ class Display(QObject):
         super().__init__(parent)
         self._session = session
         self.badge, self.notice = Badge(), Notice(_HINT)
-        self.header, self.centre, self.foot = Header(self.badge), Centre(), StatusBar(self.notice)
+        self.header, self.centre, self.status_bar = (
+            Header(self.badge),
+            Centre(),
+            StatusBar(self.notice),
+        )
         self.colouring, self.ranges = Colouring(tasks), Ranges()
         self.settings = Settings()
         self.old = True
-        """Whether what is shown is not coming in any more."""
+        """Whether the values shown are old."""
         self.ages: Callable[[], list[float]] = list
-        """How old in s what was drawn within the last second was, as the main view tells."""
+        """Ages in s of the estimates drawn in the last second, from the main view."""
         self.age_sd = math.nan
         self.limits: list[Callable[[], Mapping[str, float]]] = []
         self.views: dict[str, dict[str, QWidget]] = {}
@@ -95,12 +97,12 @@ class Display(QObject):
         self.settings = settings
 
     def limits_shown(self) -> dict[str, float]:
-        """How far the colours of each view that is seen reach, in SI units, by its setting."""
+        """The colour limits of the visible views, in SI units, by setting."""
         found = {name: limit for source in self.limits for name, limit in source().items()}
         return {f"range_{name}": limit for name, limit in found.items() if name != "health"}
 
     def show_numbers_soon(self) -> None:
-        """Have the slow views show the newest estimate with the next status."""
+        """Update the numbers with the next status."""
         self._next_numbers = 0.0
 
     def _show_status(self, status: Status) -> None:
@@ -126,7 +128,7 @@ class Display(QObject):
         self.shown.emit(Shown(estimate, self, time.monotonic()))
 
     def age(self) -> tuple[float, bool]:
-        """How old in s what is drawn is, and whether that is only the least."""
+        """The median age in s of what is drawn, and whether it is only a lower bound."""
         recent = self.ages()
         known = math.isfinite(self.age_sd)
         return (float(np.median(recent)) if recent else math.nan), not known
@@ -134,26 +136,26 @@ class Display(QObject):
     def _warn(self, estimate: Estimate | None) -> None:
         there = self._session.inside and estimate is not None and self._session.scene.stimuli
         self.notice.show_hint(_HINT if there else _NO_LOAD_HINT)
-        told = [self._session.stranger()]
+        texts = [self._session.other_device()]
         if estimate is not None:
             crossed, _ = self.marks(estimate.curvature)
-            told.append(warnings(estimate, int(crossed.sum())))
-        self.notice.show_warning("; ".join(filter(None, told)))
+            texts.append(warnings(estimate, int(crossed.sum())))
+        self.notice.show_warning("; ".join(filter(None, texts)))
 
     def estimate_shown(self) -> Estimate | None:
-        """The newest estimate, None while what it shows is not coming in any more."""
+        """The newest estimate, None while it is old."""
         lost = self._session.badge() in _OLD
         return None if lost else self._session.estimate
 
     def of_elements(self, name: str, estimate: Estimate, kinds: Kinds) -> Array:
-        """What to colour the elements (P,) by, on the screen's scale."""
+        """The values (P,) that colour the elements, on the screen's scale."""
         if name == "health":
             return kinds.max(axis=0).astype(float)
         return self.colouring.of_elements(name, estimate)
 
     def tint(self, name: str, estimate: Estimate, values: Array, now: float) -> Tint:
         shade, at_rest = SHADES[name], self.colouring.at_rest(name, estimate)
-        if shade.row >= 0:  # whatever is shown of them, one range for the skin and the map
+        if shade.row >= 0:  # one range for the skin and the map
             values = self.colouring.of_elements(name, estimate)
         elif name == "displacement":
             values = 1e3 * estimate.surface
@@ -162,27 +164,27 @@ class Display(QObject):
         return shade.tint(limit, at_rest, pulled)
 
     def railed(self, estimate: Estimate, kinds: Kinds) -> Mask:
-        """Which readings (3, P) stand on a rail, as far as that is known."""
+        """Which readings (3, P) are saturated, as far as that is known."""
         status = self._session.status
         on_rail = kinds == FAULTS.index("saturated")
         if status.sensor is not None and status.region.around == "off":
-            # Every channel was scanned: what lives and has no reading is at the end of its range.
+            # Every channel was scanned: a live one without a reading is saturated.
             on_rail |= np.isnan(estimate.nominal) & status.sensor.layout.live & (kinds == 0)
         return on_rail
 
     def kinds(self, estimate: Estimate) -> Kinds:
-        """Why each channel (3, P) is left out, by number in `WHY`; 0 where it is not."""
+        """Why each channel (3, P) is excluded, as an index of `FAULTS`; 0 where it is not."""
         found = np.zeros(estimate.curvature.shape, np.uint8)
         for finding in self._session.status.health.findings:
-            if finding.element < len(estimate.suspect):  # or it is of another skin
+            if finding.element < len(estimate.suspect):  # else it is of another skin
                 row = COMPONENTS.index(finding.component)
                 found[row, finding.element] = FAULTS.index(finding.kind)
-        # What the fit itself suspects, it suspects of an element as a whole.
+        # The fit excludes whole elements.
         whole = np.where(found.any(axis=0), 0, estimate.suspect)
         return np.maximum(found, whole)
 
     def marks(self, curvature: Array) -> tuple[Mask, Mask]:
-        """Which elements are bent beyond their strain limit, and which were chosen to scan."""
+        """Which elements exceed their strain limit, and which are selected to scan."""
         sensor, settings = self._session.status.sensor, self.settings
         none = np.zeros(curvature.shape[1], bool)
         crossed = none if sensor is None else sensor.transduction.overstrained(curvature)
@@ -193,8 +195,8 @@ class Display(QObject):
 
 
 def of_row(name: str, of_channels: NDArray[Any]) -> NDArray[Any]:
-    """What holds for the elements (P,), of what holds for channels (3, P).
+    """Values of elements (P,) from those of channels (3, P).
 
-    Of that component which a quantity is made from, or of any of them.
+    Those of the component that a quantity is computed from, or the largest of the three.
     """
     return of_channels[row] if (row := SHADES[name].row) >= 0 else of_channels.max(axis=0)

@@ -1,4 +1,4 @@
-"""Docks around the skin of a window: beside it, and below it one in the place of another."""
+"""Docks beside and below the skin."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -24,9 +24,9 @@ from kappaskin_app.widgets.line import Line
 
 @contextmanager
 def drawn_once(widget: QWidget) -> Iterator[None]:
-    """Draw nothing of `widget` until the end.
+    """Suspend painting of `widget`.
 
-    The 3-D view is else drawn anew with every size it has in between, 15 to 40 ms each.
+    Else the 3-D view is drawn with each size in between, 15 to 40 ms each.
     """
     before = widget.updatesEnabled()
     widget.setUpdatesEnabled(False)
@@ -37,9 +37,9 @@ def drawn_once(widget: QWidget) -> Iterator[None]:
 
 
 class Title(QWidget):
-    """Stands for Qt's own title of a `dock`, whose letters stay as they were when it was made.
+    """The title bar of a `dock`; Qt's own does not follow the font of the application.
 
-    The dock itself answers to the mouse, which drags it or, pressed twice, lets it float.
+    The dock itself handles the mouse: a drag moves it, a double click floats it.
     """
 
     def __init__(self, dock: QDockWidget) -> None:
@@ -50,7 +50,7 @@ class Title(QWidget):
         row.setContentsMargins(6, 1, 4, 1)
         row.setSpacing(2)
         row.addWidget(self.words, 1)
-        self.float = self._button(icons.SP_TitleBarNormalButton, "Let it float, or put it back")
+        self.float = self._button(icons.SP_TitleBarNormalButton, "Float or dock")
         self.float.clicked.connect(guarded(lambda *_: dock.setFloating(not dock.isFloating())))
         self.close_ = self._button(icons.SP_TitleBarCloseButton, "Close")
         self.close_.clicked.connect(guarded(lambda *_: dock.close()))
@@ -75,7 +75,7 @@ _BELOW = Qt.DockWidgetArea.BottomDockWidgetArea
 
 
 class Dock(QDockWidget):
-    """A dock that tells when a person closed it, as hiding or covering it is not."""
+    """A dock whose `closed` reports that the user closed it, not that it was hidden or covered."""
 
     closed = Signal()
 
@@ -103,7 +103,7 @@ class Docks:
         return self._docks[name]
 
     def widget(self, name: str) -> QWidget:
-        """What a dock shows, without what scrolls it where there is no room for all of it."""
+        """The widget of a dock, without its scroll area."""
         return self._shown[name]
 
     def by_name(self) -> dict[str, QDockWidget]:
@@ -111,26 +111,26 @@ class Docks:
 
     @property
     def below(self) -> list[QDockWidget]:
-        """Those that share the place below the skin."""
+        """The docks below the skin."""
         return [self._docks[name] for name in self._keys if name not in self._above]
 
     @property
     def right(self) -> list[Dock]:
-        """Those that stood right of the skin at first."""
+        """The docks that are right of the skin by default."""
         return [self._docks[name] for name in self._right]
 
     def at_first(self, layout: str) -> Iterator[tuple[str, Qt.DockWidgetArea, float]]:
-        """Each dock, where it began, and its share of the window in a ready layout; 0: hidden."""
+        """Each dock, its default area, and its share of the window in a ready layout; 0: hidden."""
         for name in (*self._above, *(name for name in self._docks if name not in self._above)):
             shares = self._layouts[name]
             yield name, self._areas[name], shares.get(layout, shares.get("", 0.0))
 
     def put_left(self, name: str, title: str, widget: QWidget, tip: str, share: float) -> None:
-        """Show a widget in a column left of the skin, in each ready layout so wide."""
+        """Put a widget in a column left of the skin; `share` is that of the window's width."""
         self._put(name, title, widget, Qt.DockWidgetArea.LeftDockWidgetArea, tip, {"": share})
 
     def put_right(self, name: str, title: str, widget: QWidget, tip: str, share: float) -> None:
-        """Show a widget in a column right of the skin, in each ready layout so wide."""
+        """Put a widget in a column right of the skin; `share` is that of the window's width."""
         self._put(name, title, widget, Qt.DockWidgetArea.RightDockWidgetArea, tip, {"": share})
         self._right.append(name)
 
@@ -164,10 +164,10 @@ class Docks:
         height: float = _HEIGHT,
         layouts: Mapping[str, float] = _NONE,
     ) -> None:
-        """Have a widget below the skin, hidden until it is asked for with `key`.
+        """Put a widget below the skin, hidden until it is shown with `key`.
 
-        It is also asked for in a `menu`, besides that of all docks; then it has the `height`, a
-        share of the window's. The ready `layouts` that show it have their own.
+        Its action is also in a `menu`, besides that of all docks. It is shown with the `height`, a
+        share of the window's; the ready `layouts` that show it have their own.
         """
         self._heights[name] = height
         if menu:
@@ -175,7 +175,7 @@ class Docks:
         before = self.below
         area = QScrollArea(widgetResizable=True)  # pyright: ignore[reportCallIssue]
         area.setFrameShape(QScrollArea.Shape.NoFrame)
-        area.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # a stop on the way of Tab that nobody sees
+        area.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # else an invisible stop of Tab
         area.setMinimumHeight(_LEAST)
         area.setWidget(widget)
         self._put(name, title, area, _BELOW, tip, layouts)
@@ -186,7 +186,7 @@ class Docks:
             self._window.tabifyDockWidget(before[-1], dock)
         # Wider than a column beside it.
         dock.setAllowedAreas(Qt.DockWidgetArea.TopDockWidgetArea | _BELOW)
-        dock.hide()  # so that a small window is left to the skin
+        dock.hide()  # so that a small window shows the skin
 
     def put_above(
         self,
@@ -198,7 +198,7 @@ class Docks:
         tip: str,
         layouts: Mapping[str, float],
     ) -> None:
-        """Have a widget above the `other` in its column, hidden until asked for with `key`.
+        """Put a widget above the `other` in its column, hidden until shown with `key`.
 
         In the ready `layouts` that show it the column is a share of the window's width.
         """
@@ -209,7 +209,7 @@ class Docks:
         self[name].hide()
 
     def add_actions(self, actions: Actions, menu: str) -> None:
-        """Register how each is shown and hidden."""
+        """Register the actions that show and hide docks."""
         for name, dock in self._docks.items():
             if name not in self._keys:
                 action = dock.toggleViewAction()
@@ -228,14 +228,14 @@ class Docks:
             actions.repeat(f"dock-{name}", other)
 
     def _turn(self, name: str) -> None:
-        """Show a dock, before the other in its place; hide one that is seen."""
+        """Show a dock in front of its tabs; hide a visible one."""
         if self[name].visibleRegion().isEmpty():
             self.reveal(name)
         else:
             self[name].hide()
 
     def reveal(self, name: str) -> None:
-        """Show a dock, before the other in its place."""
+        """Show a dock in front of its tabs."""
         dock = self[name]
         if not dock.visibleRegion().isEmpty():
             return
@@ -247,7 +247,7 @@ class Docks:
         dock.raise_()
 
     def _needed(self, name: str) -> int:
-        """The px of height that what a dock shows needs, in lines as wide as the window."""
+        """The height in px that the widget of a dock needs at the width of the window."""
         shown = self.widget(name)
         layout = shown.layout()
         if layout is not None and layout.hasHeightForWidth():

@@ -1,4 +1,4 @@
-"""A skin as it is drawn: its points at rest, moved in and out along its normals, in mm."""
+"""The drawn skin: its points at rest, displaced along its normals, in mm."""
 
 import math
 from dataclasses import dataclass

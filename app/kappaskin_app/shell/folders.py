@@ -1,4 +1,4 @@
-"""The user's folder of recordings: what is in it, and what the next one is called."""
+"""The user's folder of recordings: its files, and names of new ones."""
 
 import shlex
 from contextlib import suppress
@@ -14,12 +14,12 @@ _PART = ".part"
 
 
 def recordings_folder() -> Path:
-    """Where this user's recordings are, unless another place is chosen."""
+    """The default folder of this user's recordings."""
     return platformdirs.user_documents_path() / "Kappaskin"
 
 
 def proposed(folder: Path, now: datetime) -> Path:
-    """What a recording that begins `now` is called: nothing that is there already."""
+    """The unused path of a recording that begins `now`."""
     return unused(folder / f"kappaskin-{now:%Y%m%d-%H%M%S}.mcap")
 
 
@@ -29,18 +29,18 @@ def newest(folder: Path) -> list[Path]:
 
 
 def unfinished(folder: Path) -> list[Path]:
-    """Recordings in a folder that were never ended, nor are written now, the newest first."""
+    """Unfinished recordings in a folder that are not being written, the newest first."""
     return [path for path in _found(folder, f"*.mcap{_PART}") if not is_written(path)]
 
 
 def repaired(file: Path) -> Path:
-    """What the recording `file` is called once it is repaired: nothing that is there already."""
+    """The unused path of the repaired recording `file`."""
     stem = Path(file.name.removesuffix(_PART)).stem
     return unused(file.with_name(f"{stem}-repaired.mcap"))
 
 
 def repairing(file: Path) -> str:
-    """The command that makes the recording `file` whole, as another one beside it."""
+    """The command that repairs the recording `file` to a new one beside it."""
     return f"kappaskin repair {shlex.quote(str(file))} --out {shlex.quote(str(repaired(file)))}"
 
 

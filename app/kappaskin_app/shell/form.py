@@ -1,4 +1,4 @@
-"""Forms: editors for settings, made from what the settings say of each."""
+"""Forms: editors of settings, made from their metadata."""
 
 import math
 import re
@@ -43,7 +43,7 @@ _LEFT = (_ITS.Undo, _ITS.Redo, _ITS.DeleteEndOfLine)  # the last is Ctrl+K to an
 
 
 def for_the_window(event: QEvent) -> bool:
-    """Whether an editor is asked if it takes a key that is the window's: undo, redo, Ctrl+K."""
+    """Whether an event asks an editor for a shortcut of the window: undo, redo, Ctrl+K."""
     return (
         event.type() == QEvent.Type.ShortcutOverride
         and isinstance(event, QKeyEvent)
@@ -56,9 +56,9 @@ _TICKS = (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space)
 
 
 class SeveralButton(QToolButton):
-    """Says how many are chosen; `chosen` brings the values, in the order that they are offered.
+    """Shows the number of selected options; `chosen` brings their values in order.
 
-    The Down key takes one more, Up one less.
+    The Down key selects one more, Up one less.
     """
 
     chosen = Signal(tuple)
@@ -75,7 +75,7 @@ class SeveralButton(QToolButton):
     def _tick(self, words: str) -> QAction:
         tick = self.menu().addAction(words)
         tick.setCheckable(True)
-        tick.toggled.connect(self._tell)
+        tick.toggled.connect(self._emit_chosen)
         return tick
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -91,7 +91,7 @@ class SeveralButton(QToolButton):
     def _values(self) -> tuple[str, ...]:
         return tuple(value for value, tick in self.ticks.items() if tick.isChecked())
 
-    def _tell(self) -> None:
+    def _emit_chosen(self) -> None:
         self._write()
         self.chosen.emit(self._values())
 
@@ -109,7 +109,7 @@ class SeveralButton(QToolButton):
 
 
 class _OpenMenu(QMenu):
-    """A menu in which a tick is set without closing it."""
+    """A menu that stays open when an option is ticked."""
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
@@ -130,13 +130,13 @@ class _OpenMenu(QMenu):
 
 
 _AT_FIRST = Settings()
-_BEGUN = re.compile(r"[+-]?\d*\.?(\d*|\d+e[+-]?)", re.IGNORECASE)  # what may become a number
-_LONG, _SEEN = 22, 12  # letters of a choice that is cut short, and those seen at least
-_OTHER = "Only for the simulated skin of these panels (Ctrl+M)."
+_BEGUN = re.compile(r"[+-]?\d*\.?(\d*|\d+e[+-]?)", re.IGNORECASE)  # the beginning of a number
+_LONG, _SEEN = 22, 12  # characters: of a long choice, and at least visible
+_OTHER = "Available only for the simulated skin (Ctrl+M)."
 
 
 class WholeBox(QSpinBox):
-    """Takes any digits and goes to the nearest number allowed, instead of dropping digits."""
+    """Accepts any digits and corrects to the nearest allowed number."""
 
     def validate(self, text: str, position: int) -> object:
         return _typing(self, text.removesuffix(self.suffix())), text, position
@@ -150,7 +150,7 @@ class WholeBox(QSpinBox):
 
 
 class RealBox(QDoubleSpinBox):
-    """The same for numbers with decimals, and a comma is a point."""
+    """The same for decimals; a comma is read as a point."""
 
     def validate(self, text: str, position: int) -> object:
         text = text.replace(",", ".")
@@ -165,7 +165,7 @@ class RealBox(QDoubleSpinBox):
 
 
 class ChoiceBox(QComboBox):
-    """Where there is no room for all of the words, dots say so."""
+    """Elides a text that does not fit."""
 
     def words_shown(self) -> str:
         option = QStyleOptionComboBox()
@@ -185,7 +185,7 @@ class ChoiceBox(QComboBox):
 
 
 def _typed(text: str, before: float) -> float:
-    """The number typed, or that `before` where none is yet: an error here would end the app."""
+    """The number typed, or `before` where there is none yet: no error, which would end the app."""
     try:
         value = float(text)
     except ValueError:
@@ -203,8 +203,8 @@ def _typing(box: QSpinBox | QDoubleSpinBox, text: str) -> QValidator.State:
     return QValidator.State.Acceptable if inside else QValidator.State.Intermediate
 
 
-class _Manners(QObject):
-    """Makes an editor leave its keys to the window, and the wheel to the panel it scrolls in."""
+class _WindowKeyFilter(QObject):
+    """Passes an editor's shortcuts to the window, and the wheel to the page it scrolls in."""
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if for_the_window(event):
@@ -220,8 +220,8 @@ class _Manners(QObject):
         return False
 
 
-def well_behaved(editor: QWidget) -> None:
-    manners = _Manners(editor)
+def pass_window_keys(editor: QWidget) -> None:
+    manners = _WindowKeyFilter(editor)
     editor.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
     for widget in (editor, *editor.findChildren(QLineEdit)):
         widget.installEventFilter(manners)
@@ -229,29 +229,29 @@ def well_behaved(editor: QWidget) -> None:
 
 @dataclass(frozen=True)
 class _Editor:
-    """A widget with how to show a value in it."""
+    """A widget and the function that shows a value in it."""
 
     widget: QWidget
     show: Callable[[Any], None]
 
 
-def _whole(how: Range, said: Callable[[Any], None]) -> _Editor:
+def _whole(how: Range, changed: Callable[[Any], None]) -> _Editor:
     box = WholeBox()
     box.setRange(int(how.least), int(how.most))
     box.setSingleStep(int(how.step))
-    box.valueChanged.connect(said)
+    box.valueChanged.connect(changed)
     return _Editor(_dressed(box, how), lambda value: box.setValue(int(value)))
 
 
-def _range(how: Range, said: Callable[[Any], None]) -> _Editor:
+def _range(how: Range, changed: Callable[[Any], None]) -> _Editor:
     if not how.decimals and how.scale == 1:
-        return _whole(how, said)
+        return _whole(how, changed)
     box = RealBox()
     box.setLocale(QLocale.c())
     box.setDecimals(how.decimals)
     box.setRange(how.least * how.scale, how.most * how.scale)
     box.setSingleStep(how.step * how.scale)
-    box.valueChanged.connect(lambda value: said(value / how.scale))
+    box.valueChanged.connect(lambda value: changed(value / how.scale))
     return _Editor(_dressed(box, how), lambda value: box.setValue(value * how.scale))
 
 
@@ -269,51 +269,51 @@ def _tip_of(how: Range, most: float) -> str:
     return f"{how.tip} From {low:g} to {high:g} {how.unit}".rstrip() + "."
 
 
-def _choice(how: Choice, said: Callable[[Any], None]) -> _Editor:
+def _choice(how: Choice, changed: Callable[[Any], None]) -> _Editor:
     box = ChoiceBox()
     for value, words in how.options:
         box.addItem(words, value)
     if max(len(words) for _, words in how.options) > _LONG:
-        # Or one long answer would take its width from the skin beside the form.
+        # Else one long option would take its width from the skin.
         box.view().setMinimumWidth(box.sizeHint().width())
         box.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         box.setMinimumContentsLength(_SEEN)
         box.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-    box.activated.connect(lambda index: said(box.itemData(index)))
+    box.activated.connect(lambda index: changed(box.itemData(index)))
     return _Editor(box, lambda value: box.setCurrentIndex(box.findData(value)))
 
 
-def _several(how: Several, said: Callable[[Any], None]) -> _Editor:
+def _several(how: Several, changed: Callable[[Any], None]) -> _Editor:
     button = SeveralButton(how.options)
-    button.chosen.connect(said)
+    button.chosen.connect(changed)
     return _Editor(button, button.show_chosen)
 
 
-def _switch(how: Ask, said: Callable[[Any], None]) -> _Editor:
+def _switch(how: Ask, changed: Callable[[Any], None]) -> _Editor:
     box = QCheckBox(how.label)
-    box.toggled.connect(said)
+    box.toggled.connect(changed)
     return _Editor(box, box.setChecked)
 
 
-def _text(said: Callable[[Any], None]) -> _Editor:
+def _text(changed: Callable[[Any], None]) -> _Editor:
     box = QLineEdit()
-    box.editingFinished.connect(lambda: said(box.text().strip()))
+    box.editingFinished.connect(lambda: changed(box.text().strip()))
     return _Editor(box, box.setText)
 
 
-def _editor(name: str, said: Callable[[Any], None]) -> _Editor:
+def _editor(name: str, changed: Callable[[Any], None]) -> _Editor:
     how = ask_of(name)
     if isinstance(how, Text):
-        return _text(said)
+        return _text(changed)
     if isinstance(how, Range):
-        return _range(how, said)
+        return _range(how, changed)
     if isinstance(how, Several):
-        return _several(how, said)
-    return _choice(how, said) if isinstance(how, Choice) else _switch(how, said)
+        return _several(how, changed)
+    return _choice(how, changed) if isinstance(how, Choice) else _switch(how, changed)
 
 
 class Form(Panel):
-    """A panel with an editor for each of some settings; `reset_wanted` names those to reset."""
+    """A panel with an editor of each setting; `reset_wanted` brings the settings to reset."""
 
     reset_wanted = Signal(str, tuple)
 
@@ -328,20 +328,18 @@ class Form(Panel):
             self._add(name)
         self.reset = QToolButton(text="Reset")  # pyright: ignore[reportCallIssue]
         self.reset.setAccessibleName(f"Reset {title}")
-        self.reset.setToolTip(
-            "Every setting of this panel as it is at first; Ctrl+Z takes it back."
-        )
+        self.reset.setToolTip("Reset the settings of this panel; Ctrl+Z undoes it.")
         self.reset.clicked.connect(lambda: self.reset_wanted.emit(title, self.names))
         self.reset.hide()
         self._corner.insertWidget(0, self.reset)
 
     def _add(self, name: str) -> None:
         how = ask_of(name)
-        editor = _editor(name, lambda value: self.wished.emit(name, value))
+        editor = _editor(name, lambda value: self.requested.emit(name, value))
         if not isinstance(how, Range):
             editor.widget.setToolTip(how.tip)
         editor.widget.setObjectName(name)
-        well_behaved(editor.widget)
+        pass_window_keys(editor.widget)
         self._editors[name] = editor
         label = QLabel("" if isinstance(how, Switch) else how.label)
         label.setBuddy(editor.widget)
@@ -349,12 +347,12 @@ class Form(Panel):
         self.form.addRow(label, self.field(name, editor.widget))
 
     def field(self, name: str, editor: QWidget) -> QWidget:
-        """What stands beside the label of a setting: its editor, and what else one may want."""
+        """The widget beside the label of a setting: its editor, or more."""
         return editor
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The settings that it asks for."""
+        """The settings of the form."""
         return tuple(self._editors)
 
     def editors(self) -> list[QWidget]:
@@ -378,7 +376,7 @@ class Form(Panel):
             self.form.setRowVisible(editor.widget, name in names)
 
     def offer(self, name: str, values: Collection[str]) -> None:
-        """Let only these be chosen of the choice called `name`."""
+        """Enable only these values of the choice called `name`."""
         box = self.editor(name)
         model = box.model() if isinstance(box, QComboBox) else None
         if isinstance(box, QComboBox) and isinstance(model, QStandardItemModel):
@@ -386,7 +384,7 @@ class Form(Panel):
                 model.item(index).setEnabled(box.itemData(index) in values)
 
     def show_limit(self, name: str, most: float) -> None:
-        """Let the number asked for as `name` be at most `most`, in SI units."""
+        """Limit the number called `name` to `most`, in SI units."""
         how, box = ask_of(name), self.editor(name)
         if isinstance(how, Range) and isinstance(box, QDoubleSpinBox):
             with QSignalBlocker(box):
@@ -395,7 +393,7 @@ class Form(Panel):
 
 
 class SimulationForm(Form):
-    """A form that belongs to the simulation, and says so while a real sensor is connected."""
+    """A form of the simulation, disabled while another source is in use."""
 
     def show_status(self, status: Status, simulating: bool) -> None:
         for editor in self.editors():
@@ -406,5 +404,5 @@ class SimulationForm(Form):
             self.show_message(_OTHER, hint=True)
 
     def alarm(self, status: Status) -> str:
-        """What is wrong with what is asked for here, while it is simulated."""
+        """An error of these settings, while they are simulated; empty without one."""
         return ""

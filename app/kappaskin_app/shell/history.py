@@ -1,4 +1,4 @@
-"""The settings as they are, and every change a person makes as an undoable command."""
+"""The history of the settings: every change is an undoable command."""
 
 import time
 from collections.abc import Callable
@@ -14,22 +14,27 @@ from kappaskin_app.shell.settings import Settings, change_told
 _IN_A_ROW = 1.0  # s from one change of a setting to the next
 _MOST = 500  # steps that can be undone: a scene's text may be a megabyte
 _Some = TypeVar("_Some")
-Said = Callable[[_Some, _Some], str]
+Description = Callable[[_Some, _Some], str]
 
 
 class _Step(QUndoCommand):
-    """From one value to another, which `apply` makes so; those of one gesture are one command."""
+    """A change from one value to another by `apply`; those of one gesture merge."""
 
     def __init__(
-        self, apply: Callable[[Any], object], before: Any, after: Any, said: Said[Any], gesture: int
+        self,
+        apply: Callable[[Any], object],
+        before: Any,
+        after: Any,
+        describe: Description[Any],
+        gesture: int,
     ) -> None:
         super().__init__()
-        self._apply, self._said, self._gesture = apply, said, gesture
+        self._apply, self._describe, self._gesture = apply, describe, gesture
         self.before, self.after = before, after
         self._name()
 
     def _name(self) -> None:
-        text = self._said(self.before, self.after)
+        text = self._describe(self.before, self.after)
         self.setText(text[:1].lower() + text[1:])
 
     def id(self) -> int:
@@ -51,9 +56,9 @@ class _Step(QUndoCommand):
 
 
 class History(QObject):
-    """Holds the `settings`; `changed` tells of each new one.
+    """Holds the `settings`; `changed` reports new ones.
 
-    Its `stack` has also the steps that are no settings.
+    Its `stack` also has the steps that are not settings.
     """
 
     changed = Signal(Settings)
@@ -64,41 +69,43 @@ class History(QObject):
         self.stack = QUndoStack(self)
         self.stack.setUndoLimit(_MOST)
         self._gesture = 0
-        self._wished, self._wished_at, self._wish = "", 0.0, -1
+        self._requested, self._requested_at, self._request_gesture = "", 0.0, -1
 
-    def wish(self, name: str, **values: Any) -> None:
+    def request(self, name: str, **values: Any) -> None:
         """Change the setting `name`, and others with it.
 
         Changes of the same one in a row are one step to undo.
         """
         now = time.monotonic()
-        if name != self._wished or now - self._wished_at > _IN_A_ROW:
-            self._wish = self.new_gesture()
-        self._change(partial(change_told, name), self._wish, values)
-        self._wished, self._wished_at = name, now
+        if name != self._requested or now - self._requested_at > _IN_A_ROW:
+            self._request_gesture = self.new_gesture()
+        self._change(partial(change_told, name), self._request_gesture, values)
+        self._requested, self._requested_at = name, now
 
     def new_gesture(self) -> int:
-        """A number under which changes merge into one command, a drag say."""
+        """A number under which changes merge into one command, as those of a drag."""
         self._gesture += 1
         return self._gesture
 
     def change(self, text: str, gesture: int = -1, /, **values: Any) -> None:
-        """Change settings by name, as one command called `text`; what is equal changes nothing."""
+        """Change settings by name, as one command called `text`; equal values make none."""
         self._change(lambda *_: text, gesture, values)
 
-    def _change(self, said: Said[Settings], gesture: int, values: dict[str, Any]) -> None:
+    def _change(
+        self, describe: Description[Settings], gesture: int, values: dict[str, Any]
+    ) -> None:
         after = replace(self.settings, **values)
         if after != self.settings:
-            self.stack.push(_Step(self.apply, self.settings, after, said, gesture))
+            self.stack.push(_Step(self.apply, self.settings, after, describe, gesture))
 
     def step(
         self, text: str, apply: Callable[[_Some], object], before: _Some, after: _Some
     ) -> None:
-        """Have `apply` make so what is no setting, as one command called `text`."""
+        """Apply a change that is not a setting, as one command called `text`."""
         self.stack.push(_Step(apply, before, after, lambda *_: text, -1))
 
     def cancel(self, gesture: int) -> None:
-        """Take back what was changed under `gesture`, as if it had never been."""
+        """Undo what was changed under `gesture`, without a redo."""
         top = self.stack.command(self.stack.index() - 1)
         if gesture > 0 and isinstance(top, _Step) and top.id() == gesture:
             before = top.before
@@ -108,6 +115,6 @@ class History(QObject):
 
     def apply(self, settings: Settings) -> None:
         """For commands only: make `settings` the present ones."""
-        self._wished = ""  # what was undone or redone meanwhile ends a row
+        self._requested = ""  # an undo or redo ends a row of requests
         self.settings = settings
         self.changed.emit(settings)

@@ -8,21 +8,20 @@ from PySide6.QtGui import QUndoStack
 
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions
-from kappaskin_app.shell.finder.finder import Finder
-from kappaskin_app.shell.finder.sheet import CheatSheet
-from kappaskin_app.shell.finder.things import Things, things_in
+from kappaskin_app.shell.finder import EntrySource, Finder, entries_in
 from kappaskin_app.shell.parts import EDIT, FILE, HELP, VIEW, Parts
+from kappaskin_app.shell.shortcuts import ShortcutDialog
 from kappaskin_app.shell.welcome import Welcome
 
 _LONGEST = 60  # characters of a step in a menu
 _TIPS = {
-    "undo": "Take back the last change of a setting, scene or layout; what comes in goes on",
-    "redo": "Make the change again that was taken back last",
+    "undo": "Undo the last change of a setting, scene or layout; readings continue",
+    "redo": "Repeat the change that was undone last",
 }
 
 
-class Undoing(QObject):
-    """Keeps the actions on `stack` true; `settle` first brings in what a person has just done."""
+class UndoActions(QObject):
+    """The actions Undo and Redo of a `stack`; `settle` first records pending changes."""
 
     def __init__(
         self, stack: QUndoStack, settle: Callable[[], object], actions: Actions, menu: str
@@ -54,62 +53,64 @@ class Undoing(QObject):
 
 
 DOTS = "\N{HORIZONTAL ELLIPSIS}"
-_FIND = "Whatever this window can do, found by a few letters: commands, settings, scenes, files"
-_RESET = "Every setting as at first, but for calibration, tare and what is published"
-_PAUSE = "Let a scene or a recording stand; what a sensor sends goes on"
-_THEME = "Dark letters on a light ground, or light ones on a dark ground"
-_QUIT = "End the program; a recording that goes on is asked about first"
-_NEXT = "Turn to the next page of Settings: Live, Skin, Sensor, Calibrate"
-_PREVIOUS = "Turn to the page of Settings before"
-_SHEET = "Every shortcut, to look up and to change"
-_WELCOME = "Offer above the skin what one may begin with: a scene, a sensor, a lesson, a recording"
-_RECENT = "Scenes, recordings, calibrations and meshes opened last; each may also be dropped here"
+_FIND = "Find commands, settings, scenes, panels and files by a few letters"
+_RESET = "All settings to their defaults, except calibration, tare and publishing"
+_PAUSE = "Pause or continue a scene or a recording; a sensor is not paused"
+_THEME = "Switch between the light and the dark theme"
+_QUIT = "Close the program; asks first while a recording is made"
+_NEXT = "Next page of Settings: Live, Skin, Sensor, Calibrate"
+_PREVIOUS = "Previous page of Settings"
+_SHEET = "All shortcuts, to look up and to change"
+_WELCOME = "Where to start: a scene, a sensor, a lesson, a recording"
+_RECENT = (
+    "Files opened last: scenes, recordings, calibrations, meshes; they can also be dropped here"
+)
 
 
 class Menus(QObject):
     """Registers the shell's own actions before and after those of features.
 
-    `things` are what features have to be found besides actions, panels and settings.
-    `quit_wanted` tells that a person wants to close the window.
+    `entry_sources` yield the finder's entries of features, besides actions, panels and settings.
+    `quit_requested` requests that the window be closed.
     """
 
-    quit_wanted = Signal()
+    quit_requested = Signal()
 
     def __init__(self, window: Parts) -> None:
         super().__init__(window)
         self._window = window
-        self.things: list[Things] = []
+        self.entry_sources: list[EntrySource] = []
         self.welcome = Welcome(
-            window.display.centre.offer,
+            window.display.centre.banner,
             window.history,
             window.session,
             window.requests,
             window.opening.menu,
             window,
         )
-        self.finder = Finder(lambda: things_in(window, self.things), window)
+        self.finder = Finder(lambda: entries_in(window, self.entry_sources), window)
         add = window.actions_by_name.add
-        self.undoing = Undoing(
+        self.undoing = UndoActions(
             window.history.stack, window.layouts.note, window.actions_by_name, EDIT
         )
         add("reset", EDIT, "&Reset settings", window.requests.reset, "", _RESET)
         find = self.finder.open_empty
         add("find", EDIT, f"&Find a command{DOTS}", find, "Ctrl+K", _FIND)
-        add("pause", VIEW, "&Pause or go on", window.session.pause, "Ctrl+P", _PAUSE)
+        add("pause", VIEW, "&Pause or continue", window.session.pause, "Ctrl+P", _PAUSE)
         add("theme", VIEW, "Light or &dark", window.requests.switch_theme, "Ctrl+T", _THEME)
 
     def finish(self) -> None:
-        """Register what stands after all that features do."""
+        """Register the actions that follow those of features."""
         window, add = self._window, self._window.actions_by_name.add
         recent = add("recent", FILE, "Open r&ecent", lambda: None, "", _RECENT)
         recent.setMenu(window.opening.menu)
-        add("quit", FILE, "&Quit", self.quit_wanted.emit, "Ctrl+Q", _QUIT)
+        add("quit", FILE, "&Quit", self.quit_requested.emit, "Ctrl+Q", _QUIT)
         after, before = (partial(window.panels.turn, pages) for pages in (1, -1))
         add("next-panels", VIEW, "&Next panels", after, "Ctrl+PgDown", _NEXT)
         add("last-panels", VIEW, "&Previous panels", before, "Ctrl+PgUp", _PREVIOUS)
         window.docks.add_actions(window.actions_by_name, VIEW)
         window.layouts.add_actions(window.actions_by_name)
-        self.sheet = CheatSheet(window.actions_by_name, window.history, window)
-        add("shortcuts", HELP, "&Shortcuts", self.sheet.open_all, "F1", _SHEET)
+        self.shortcuts = ShortcutDialog(window.actions_by_name, window.history, window)
+        add("shortcuts", HELP, "&Shortcuts", self.shortcuts.open_all, "F1", _SHEET)
         add("begin", HELP, "&Welcome", self.welcome.offer, "", _WELCOME)
         window.actions_by_name.drop_empty_menus()

@@ -1,4 +1,4 @@
-"""Files that a person opens, whatever is in them, and the last of them in a menu."""
+"""Opening of files by their kind, and the menu of recent files."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,10 +21,10 @@ SCENES = "Scene (*.toml)"
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """Files that can be opened: in words, their `suffixes`, and what opens one.
+    """A kind of file: its name, its `suffixes`, and the function that opens one.
 
-    Of several kinds with one suffix, `is_one` says which a file is; the last that says nothing is
-    any other. One that `needs_sensor` waits for it.
+    Of several kinds with one suffix, `is_one` selects; the one without it takes the rest. One
+    that `needs_sensor` is opened once a sensor is known.
     """
 
     words: str
@@ -35,7 +35,7 @@ class Kind:
 
 
 class Drops(QObject):
-    """Watches `window`; a file dropped there is opened, a key left over is taken."""
+    """Event filter of `window`: opens files dropped there, handles keys that nothing else takes."""
 
     def __init__(self, window: QWidget, opening: "Opening") -> None:
         super().__init__(window)
@@ -45,7 +45,7 @@ class Drops(QObject):
         window.installEventFilter(self)
 
     def dropped_on(self, data: QMimeData) -> Path | None:
-        """The file among what is dragged that can be opened, if there is one."""
+        """The first dragged file that can be opened, if any."""
         files = [Path(url.toLocalFile()) for url in data.urls() if url.isLocalFile()]
         return next((file for file in files if self._opening.opens(file)), None)
 
@@ -64,9 +64,9 @@ class Drops(QObject):
 
 
 class Opening(QObject):
-    """Opens files by what they are; `told` says what came of it, `changed` that `recent` did."""
+    """Opens files by their kind; `notified` brings messages, `changed` reports other `recent`."""
 
-    told = Signal(str)
+    notified = Signal(str)
     changed = Signal()
 
     def __init__(self, window: QWidget, history: History, session: Session) -> None:
@@ -74,7 +74,7 @@ class Opening(QObject):
         self._history, self._session = history, session
         self._kinds: list[Kind] = []
         self.others: Callable[[], list[Path]] = list
-        """Files to offer besides the last ones."""
+        """Files listed after the recent ones."""
         self.recent: list[Path] = []
         self._first: Path | None = None
         self.menu = QMenu(window)
@@ -83,24 +83,24 @@ class Opening(QObject):
         self.drops = Drops(window, self)
 
     def add(self, kind: Kind) -> None:
-        """Open files of this `kind` too."""
+        """Register a kind of file."""
         self._kinds.append(kind)
 
     def opens(self, file: Path) -> bool:
-        """Whether this is a kind of file that can be opened."""
+        """Whether files of this suffix can be opened."""
         return any(file.suffix.lower() in kind.suffixes for kind in self._kinds)
 
     def open(self, file: Path) -> None:
-        """Do with a file what its kind is for, or say why that cannot be."""
+        """Open a file by its kind, or report why it cannot be opened."""
         try:
             self._kind(file).open(file)
         except Refusal as refusal:
-            self.told.emit(str(refusal))
+            self.notified.emit(str(refusal))
 
     def begin_with(self, file: Path) -> None:
-        """Open `file` in a new window; what needs a sensor once it is known which there is."""
+        """Open `file` in a new window; one that needs a sensor once a sensor is known."""
         if self._session.engine.resumed:
-            self.told.emit(f"{file.name} is not opened: the recording that was left goes on")
+            self.notified.emit(f"{file.name} is not opened: the resumed recording continues")
         elif self._session.status.sensor is None and self._waits(file):
             self._first = file
         else:
@@ -113,7 +113,7 @@ class Opening(QObject):
             return False
 
     def save_scene(self, name: str, write: Callable[[Path], object]) -> None:
-        """Ask for a file, `name` to begin with, and `write` a scene there."""
+        """Ask for a file, `name` by default, and `write` a scene there."""
         window = self.menu.parentWidget()
         file, _ = QFileDialog.getSaveFileName(window, "Save the scene", name, SCENES)
         if file:
@@ -121,18 +121,18 @@ class Opening(QObject):
                 path = with_ending(file, ".toml")
                 write(path)
                 self.note(path)
-                self.told.emit(f"Saved {path}")
+                self.notified.emit(f"Saved {path}")
             except (OSError, Refusal) as error:
-                self.told.emit(f"Could not write {file}: {error}")
+                self.notified.emit(f"Could not write {file}: {error}")
 
     def follow(self, status: Status) -> None:
-        """Open what waited for a sensor."""
+        """Open the file that waited for a sensor."""
         if self._first is not None and status.sensor is not None:
             file, self._first = self._first, None
             self.open(file)
 
     def _kind(self, file: Path) -> Kind:
-        """The kind of a file; refused where it is none, or cannot be read."""
+        """The kind of a file; refused where there is none, or it cannot be read."""
         alike = [kind for kind in self._kinds if file.suffix.lower() in kind.suffixes]
         for kind in sorted(alike, key=lambda kind: kind.is_one is None):
             if kind.is_one is None or kind.is_one(file):
@@ -140,24 +140,24 @@ class Opening(QObject):
         kinds = ", ".join(f"a {kind.words} ({' '.join(kind.suffixes)})" for kind in self._kinds)
         raise Refusal(f"{file}: expected {kinds}; choose such a file")
 
-    # The last ones.
+    # Recent files.
 
     def note(self, file: Path) -> None:
-        """Take a file up among the last ones."""
+        """Add a file to the recent ones."""
         file = file.absolute()
         self.recent = [file, *(other for other in self.recent if other != file)][:MOST_RECENT]
         self.changed.emit()
 
     def clear(self) -> None:
-        """Forget the last ones."""
-        self._history.step("clear the files opened last", self._have, self.recent, [])
+        """Clear the list of recent files."""
+        self._history.step("clear the recent files", self._restore, self.recent, [])
 
-    def _have(self, recent: list[Path]) -> None:
+    def _restore(self, recent: list[Path]) -> None:
         self.recent = recent
         self.changed.emit()
 
     def last_ones(self) -> list[Path]:
-        """The files opened last, and others besides."""
+        """The recent files, then the other ones."""
         others = [file for file in self.others() if file not in self.recent]
         return [*self.recent, *others]
 
@@ -174,12 +174,12 @@ class Opening(QObject):
 
     def _list_one(self, file: Path) -> None:
         there = file.is_file()
-        action = self.menu.addAction(_shown(file) if there else f"{_shown(file)}  (not there)")
+        action = self.menu.addAction(_shown(file) if there else f"{_shown(file)}  (missing)")
         action.setEnabled(there)
-        action.setToolTip(str(file) if there else f"{file} is not there any more: moved or deleted")
+        action.setToolTip(str(file) if there else f"{file} was moved or deleted")
         action.triggered.connect(guarded(lambda *_: self.open(file)))
 
 
 def _shown(file: Path) -> str:
-    """A file as a menu names it, where & would mark a letter."""
+    """The name of a file in a menu, where & would mark a letter."""
     return file.name.replace("&", "&&")

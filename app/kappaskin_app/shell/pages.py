@@ -1,4 +1,4 @@
-"""The pages of settings: features add panels to them; all show settings and status."""
+"""The pages of settings, to which features add panels."""
 
 from typing import TypeVar
 
@@ -18,30 +18,30 @@ _PAGES = (LIVE, SKIN, SENSOR, CALIBRATE)
 
 
 class Pages(QTabWidget):
-    """`requested` says which setting is to be what.
+    """Tabs of panels; `requested` brings the name and value of a setting.
 
-    `reset_requested` says of which panel, and which, are to be as they are at first, and
-    `read_wanted` which page of the guide a person wants to read.
+    `reset_requested` brings a panel's title and the settings to reset, `guide_requested` the name
+    of a page of the guide.
     """
 
     requested = Signal(str, object)
     reset_requested = Signal(str, tuple)
-    read_wanted = Signal(str)
+    guide_requested = Signal(str)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._pages: dict[str, list[Panel]] = {}
 
     def add(self, page: str, panel: _Some) -> _Some:
-        """A panel at the end of the page with this title."""
+        """Add a panel at the end of the page with this title."""
         self._pages.setdefault(page, []).append(panel)
         self.join(panel)
         return panel
 
     def join(self, panel: Panel) -> None:
-        """Pass on what is asked for in a panel, be it on a page or elsewhere."""
-        panel.wished.connect(self.requested)
-        panel.read_wanted.connect(self.read_wanted)
+        """Pass on the requests of a panel, on a page or elsewhere."""
+        panel.requested.connect(self.requested)
+        panel.guide_requested.connect(self.guide_requested)
         if isinstance(panel, Form):
             panel.reset_wanted.connect(self.reset_requested)
 
@@ -50,19 +50,19 @@ class Pages(QTabWidget):
         for title in _PAGES:
             if title in self._pages:
                 self.addTab(scrolled(*self._pages[title]), title)
-        self.setUsesScrollButtons(False)  # every title is to be seen
+        self.setUsesScrollButtons(False)  # every title must be visible
         self.tabBar().setElideMode(Qt.TextElideMode.ElideNone)
 
     def all(self) -> list[Panel]:
         return [panel for page in _PAGES for panel in self._pages.get(page, ())]
 
     def turn(self, pages: int) -> None:
-        """Show the page so many further on, round and round."""
+        """Show the page so many further on, cyclically."""
         self.setCurrentIndex((self.currentIndex() + pages) % self.count())
         self.tabBar().setFocus(Qt.FocusReason.TabFocusReason)
 
     def place(self, title: str) -> int:
-        """The place of the page of this title, counted from 0."""
+        """The index of the page of this title."""
         return [there for there in _PAGES if there in self._pages].index(title)
 
     def reveal(self, panel: Panel) -> None:

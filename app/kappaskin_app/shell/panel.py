@@ -1,4 +1,4 @@
-"""What every panel is: a titled box that shows what is so and says what a person wishes."""
+"""Panels: titled boxes that show a state and request changes of settings."""
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
@@ -22,19 +22,19 @@ _GROWN = 20  # ms after which the page of a panel that grew has grown too
 
 
 class Panel(QGroupBox):
-    """A titled box with a message at its foot; `wished` says which setting is to be what.
+    """A titled box with a message below; `requested` brings the name and value of a setting.
 
-    In its corner a button says what it is for, at its head, and `read_wanted` which page of the
-    guide a person wants to read on.
+    A button in its corner shows its purpose; `guide_requested` brings the name of a page of the
+    guide.
     """
 
     purpose = ""
-    """What it is for, with the equation where there is one."""
+    """Its purpose, with the equation where there is one."""
     guide_page = ""
-    """The page of the guide that says more."""
+    """The page of the guide about it."""
 
-    wished = Signal(str, object)
-    read_wanted = Signal(str)
+    requested = Signal(str, object)
+    guide_requested = Signal(str)
 
     def __init__(self, title: str, parent: QWidget | None = None) -> None:
         super().__init__(title, parent)
@@ -45,13 +45,13 @@ class Panel(QGroupBox):
         )
         self._hint = False
         self._grown = QTimer(self, singleShot=True, interval=_GROWN)  # pyright: ignore[reportCallIssue]
-        self._grown.timeout.connect(guarded(self._answer))
+        self._grown.timeout.connect(guarded(self._scroll_to_message))
         self.about = QLabel(wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
         self.about.setForegroundRole(FAINT)
         self.about.setTextInteractionFlags(how.TextBrowserInteraction)
-        self.about.linkActivated.connect(self.read_wanted)
+        self.about.linkActivated.connect(self.guide_requested)
         self.help = QToolButton(text="?", checkable=True)  # pyright: ignore[reportCallIssue]
-        self.help.setAccessibleName(f"What {title} is for")
+        self.help.setAccessibleName(f"About {title}")
         self.help.setToolTip(f"What this panel is for: {self.purpose}")
         self.help.toggled.connect(self.about.setVisible)
         self.help.setVisible(bool(self.purpose))
@@ -68,13 +68,13 @@ class Panel(QGroupBox):
         follow_look(self, self._dress)
 
     def show_settings(self, settings: Settings) -> None:
-        """Show what is chosen."""
+        """Show the settings."""
 
     def show_status(self, status: Status, simulating: bool) -> None:
-        """Show how the engine is doing, and whether the app's own simulation is playing."""
+        """Show the engine's status, and whether the app's own simulation runs."""
 
     def show_message(self, text: str, hint: bool = False) -> None:
-        """Say something at the foot, or nothing: an alarm, or only a hint."""
+        """Show an alarm or a hint below; nothing where `text` is empty."""
         if (text, hint) != (self.message.text(), self._hint):
             self._hint = hint
             self.message.setText(text)
@@ -99,16 +99,16 @@ class Panel(QGroupBox):
         if 0 < event.oldSize().height() < event.size().height():
             self._grown.start()
 
-    def _answer(self) -> None:
-        """Bring in sight what is said now to who has just asked for something here."""
-        asked = QApplication.focusWidget()
-        if asked is not None and self.isAncestorOf(asked):
+    def _scroll_to_message(self) -> None:
+        """Scroll to a message that follows an input in this panel."""
+        focused = QApplication.focusWidget()
+        if focused is not None and self.isAncestorOf(focused):
             scroll_to(self)
-            scroll_to(asked)
+            scroll_to(focused)
 
 
 def _corner_style() -> str:
-    """Words without a frame, until they are pointed at or reached by Tab."""
+    """Buttons without a frame until they have the mouse or the focus."""
     theme = current()
     seen = f"color: {theme.text}; border-color: {theme.accent};"
     return (

@@ -1,4 +1,4 @@
-"""The shell's parts, as one window: what features are installed into."""
+"""The parts of the shell, as one window that features are installed into."""
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QMainWindow
@@ -10,7 +10,7 @@ from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.docks import Docks
 from kappaskin_app.shell.history import History
-from kappaskin_app.shell.layouts.choosing import Layouts
+from kappaskin_app.shell.layouts import Layouts
 from kappaskin_app.shell.opening import Opening
 from kappaskin_app.shell.pages import Pages
 from kappaskin_app.shell.requests import Requests
@@ -27,15 +27,15 @@ MENUS = (FILE, EDIT, SOURCE, RECORDING, SKIN, VIEW, LAYOUT, FIGURES, EXPORT, HEL
 class Parts(QMainWindow):
     """A window with settings and their history, a session, a display, docks and actions.
 
-    `settings_shown` brings what all views follow. `begun` tells, once all is
-    there, what an engine was left with by another window (or None) and which source is read;
-    `read_wanted` which page of the guide a person wants to read. `closing` lets go of what runs
-    before the session ends, `closed` of what draws after it.
+    `settings_shown` brings the settings that views follow. `begun` reports, once all is
+    installed, the recording resumed from another window (or None) and the source;
+    `guide_requested` the page of the guide to show. `closing` ends tasks before the session
+    ends, `closed` ends views after it.
     """
 
     settings_shown = Signal(Settings)
     begun = Signal(object, str)
-    read_wanted = Signal(str)
+    guide_requested = Signal(str)
     closing = Signal()
     closed = Signal()
 
@@ -52,7 +52,7 @@ class Parts(QMainWindow):
         self.opening = Opening(self, self.history, self.session)
         self.layouts = Layouts(self, self.docks, self.panels, self.history)
 
-    def tell(self, text: str) -> None:
+    def notify(self, text: str) -> None:
         """Show a message for some seconds."""
         self.statusBar().showMessage(text, 10_000)
         if text:

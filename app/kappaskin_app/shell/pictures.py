@@ -1,4 +1,4 @@
-"""A view to a picture in a file, PNG or SVG, with a line below it that says what it shows."""
+"""Pictures of views as PNG or SVG files, with a caption."""
 
 from collections.abc import Callable
 from datetime import datetime
@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
 from kappaskin_app.shell.session import Session
-from kappaskin_app.shell.work_dialog import says_kind, with_ending
+from kappaskin_app.shell.work_dialog import has_suffix, with_ending
 
 _MARGIN, _TEXT = 8, 11  # px
 _MOST = 1000  # px of a caption
@@ -21,27 +21,27 @@ _WRAPPED = int(Qt.TextFlag.TextWordWrap)
 
 
 def caption_of(status: Status, at: float, now: datetime) -> str:
-    """What was shown `now`, `at` s of the device's time: device, settings, version, in words."""
+    """The caption of a view at `at` s of the device's time: device, settings, version."""
     setup, sensor = status.setup, status.sensor
     parts = [f"kappaskin {metadata.version('kappaskin')}", f"{now:%Y-%m-%d %H:%M:%S}"]
     if sensor is not None:
         parts += [f"{sensor.name} {sensor.serial_number}", f"{at:.3f} s"]
         parts.append(f"{setup.Ni} x {setup.Nj} functions, {setup.method}")
-        for name, kept in (("calibration", setup.calibration), ("tare", setup.tare)):
-            if kept is not None:
-                parts.append(f"{name} of {kept.date:%Y-%m-%d %H:%M} ({kept.digest[:8]})")
+        for name, found in (("calibration", setup.calibration), ("tare", setup.tare)):
+            if found is not None:
+                parts.append(f"{name} of {found.date:%Y-%m-%d %H:%M} ({found.digest[:8]})")
     return "  \N{MIDDLE DOT}  ".join(parts)
 
 
 def caption_now(session: Session) -> str:
-    """What the window shows now, in words."""
+    """The caption of what the window shows now."""
     estimate = session.estimate
     at = estimate.device_time if estimate is not None else float("nan")
     return caption_of(session.status, at, datetime.now())
 
 
 def write_png(image: QImage, path: Path) -> None:
-    """Write an `image`, in any thread; a `Refusal` where that cannot be."""
+    """Write an `image`, in any thread; a `Refusal` where that fails."""
     if not image.save(str(path)):
         raise _unwritable(path)
 
@@ -56,7 +56,7 @@ def save_view(
 ) -> None:
     """Write `view` as a PNG, or if it is `flat` as an SVG; `title` and `caption` go into both.
 
-    A `Refusal` where that cannot be.
+    A `Refusal` where that fails.
     """
     if path.suffix.lower() == ".png":
         write(_png(view, title, caption), path)
@@ -64,11 +64,11 @@ def save_view(
         _save_svg(view, path, title, caption)
     else:
         kinds = ".png or .svg" if flat else ".png, since it is in three dimensions"
-        raise Refusal(f"{path.name}: expected a file that ends in {kinds}")
+        raise Refusal(f"{path.name}: expected a file name that ends in {kinds}")
 
 
 def _png(view: QWidget, title: str, caption: str) -> QImage:
-    # What is drawn in three dimensions is in the window's picture alone.
+    # A 3-D view is only in the picture of the whole window.
     seen = view.window().grab(QRect(view.mapTo(view.window(), QPoint(0, 0)), view.size()))
     ratio = seen.devicePixelRatio()
     image = QImage(_size(view, caption) * ratio, QImage.Format.Format_RGB32)
@@ -84,7 +84,7 @@ def _png(view: QWidget, title: str, caption: str) -> QImage:
 
 def _save_svg(view: QWidget, path: Path, title: str, caption: str) -> None:
     try:
-        path.open("wb").close()  # Qt tells nobody why it could not
+        path.open("wb").close()  # Qt does not report the reason
     except OSError as error:
         raise _unwritable(path) from error
     drawing = QSvgGenerator()
@@ -101,7 +101,7 @@ def _save_svg(view: QWidget, path: Path, title: str, caption: str) -> None:
 
 
 def _size(view: QWidget, caption: str) -> QSize:
-    """Of the view, and of as many lines below it as the caption takes."""
+    """The size of the view with the lines of the caption below it."""
     return QSize(view.width(), view.height() + _lines(view, caption).height() + 2 * _MARGIN)
 
 
@@ -127,9 +127,9 @@ def _unwritable(path: Path) -> Refusal:
 
 
 def chosen_file(parent: QWidget, title: str, flat: bool) -> Path | None:
-    """The file that a person chooses for a picture, if any; a `Refusal` as of `with_ending`."""
+    """The file selected for a picture, if any; a `Refusal` as of `with_ending`."""
     kinds = "Picture (*.png);;Drawing (*.svg)" if flat else "Picture (*.png)"
     name, kind = QFileDialog.getSaveFileName(parent, f"Export {title}", "", kinds)
     if not name:
         return None
-    return Path(name) if says_kind(Path(name)) else with_ending(name, kind[-5:-1])
+    return Path(name) if has_suffix(Path(name)) else with_ending(name, kind[-5:-1])

@@ -1,4 +1,4 @@
-"""Recovery: settings as text, recordings that outlive a window, and what a crash left."""
+"""Recovery: settings as text, recordings that outlive a window, sessions that crashed."""
 
 import json
 import os
@@ -16,7 +16,7 @@ from PySide6.QtCore import QLockFile, QObject
 from kappaskin.errors import Refusal
 from kappaskin.live import Engine, ResumeInfo, Status
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.banner import Offered
+from kappaskin_app.shell.centre import BannerAction
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.parts import Parts
 from kappaskin_app.shell.settings import Settings
@@ -25,25 +25,25 @@ from kappaskin_app.shell.simulation import settings_for
 
 VERSION = 1
 OF_SENSORS = ("calibration", "tare")
-"""They belong to a sensor, and have files of their own."""
-_BEGUN = Settings()
+"""Settings that belong to a sensor and have files of their own."""
+_DEFAULTS = Settings()
 
 
 def settings_text(settings: Settings) -> str:
-    """JSON of all settings but those that belong to a sensor."""
-    said = {f.name: getattr(settings, f.name) for f in fields(settings)}
-    written = said["written"]
-    said["written"] = written and {"text": written.text, "file": str(written.file)}
+    """JSON of all settings except those that belong to a sensor."""
+    data = {f.name: getattr(settings, f.name) for f in fields(settings)}
+    written = data["written"]
+    data["written"] = written and {"text": written.text, "file": str(written.file)}
     for name in OF_SENSORS:
-        del said[name]
-    return json.dumps({"version": VERSION, "settings": said}, indent=1)
+        del data[name]
+    return json.dumps({"version": VERSION, "settings": data}, indent=1)
 
 
 def settings_in(text: str) -> Settings:
-    """The settings that a text says; the ready ones for what it does not say."""
+    """The settings in a text; defaults for those that it does not have."""
     try:
         found = json.loads(text)
-        version, said = found["version"], dict(found["settings"])
+        version, data = found["version"], dict(found["settings"])
     except (ValueError, KeyError, TypeError) as error:
         raise Refusal(
             f"expected settings as JSON, got {text!r:.40}; choose another file"
@@ -53,12 +53,12 @@ def settings_in(text: str) -> Settings:
             f"expected settings of version {VERSION}, got {version!r:.20}; update Kappaskin"
         )
     known = [f.name for f in fields(Settings) if f.name not in OF_SENSORS]
-    return Settings(**{name: _value(name, said[name]) for name in known if name in said})
+    return Settings(**{name: _value(name, data[name]) for name in known if name in data})
 
 
 def _value(name: str, value: Any) -> Any:
-    """What a setting is from what JSON made of it."""
-    was = getattr(_BEGUN, name)
+    """A setting from its JSON value."""
+    was = getattr(_DEFAULTS, name)
     if name == "written":
         try:
             return value and Written(str(value["text"]), Path(value["file"]))
@@ -75,8 +75,8 @@ def _value(name: str, value: Any) -> Any:
     return value
 
 
-class WindowStateStore:
-    """Stores the settings in the engine, which may outlive the window while it records."""
+class SettingsHandover:
+    """Hands the settings to the engine, which may outlive the window while it records."""
 
     def __init__(self, history: History, engine: Engine) -> None:
         self._history, self._engine = history, engine
@@ -90,7 +90,7 @@ class WindowStateStore:
 
 
 def settings_left(left: ResumeInfo) -> Settings:
-    """The settings of the window that is gone; those to begin with where they cannot be read."""
+    """The settings of the window that ended; defaults where they cannot be read."""
     setup = left.requested.setup
     try:
         settings = settings_in(left.requested.window_state.decode(errors="replace"))
@@ -99,13 +99,13 @@ def settings_left(left: ResumeInfo) -> Settings:
     return replace(settings, calibration=setup.calibration, tare=setup.tare)
 
 
-def words(left: ResumeInfo, wanted: str) -> str:
-    """What a person should know of what was `left`, who `wanted` this source."""
+def resume_text(left: ResumeInfo, wanted: str) -> str:
+    """What is reported of a resumed recording to a user who requested the source `wanted`."""
     file, source = Path(left.requested.recording or "").name, left.requested.source
-    told = f"The recording {file}{_of(source)} {left.lasted}."
+    text = f"The recording {file}{_of(source)} {left.lasted}."
     if wanted == (source or "sim:"):
-        return told
-    return f"{told} You asked for {wanted}: Connect goes there, and the recording goes on with it."
+        return text
+    return f"{text} You requested {wanted}: Connect opens it, and the recording continues with it."
 
 
 def _of(source: str | None) -> str:
@@ -115,45 +115,45 @@ def _of(source: str | None) -> str:
 
 
 _FILES = "window-*.json"
-_EVERY = 1.0  # s between two looks at what is to be kept
+_EVERY = 1.0  # s between two saves
 _TIP = (
-    "The program was ended, by itself or by the system, before it was closed. What you take up of "
-    "it can be undone (Ctrl+Z); Report saves what helps to find out why."
+    "The program ended before its window was closed. What you restore can be undone (Ctrl+Z); "
+    "Report saves a file for finding the cause."
 )
-_SETTINGS = "Every setting as it was then, but for the calibration and tare of a sensor."
+_SETTINGS = "All settings of that session except a sensor's calibration and tare."
 
 
 @dataclass(frozen=True)
-class Last:
-    """What a window was at: its `settings`, and what it read or `recording` it wrote, if any."""
+class LastSession:
+    """The state of a window: its `settings`, its source, and its `recording`, if any."""
 
     settings: Settings
     source: str = ""
     recording: str = ""
 
 
-class Running:
-    """Keeps in a `folder` what an open window is at, until it is closed in order."""
+class OpenWindow:
+    """Saves in a `folder` the state of an open window, until it is closed."""
 
     def __init__(self, folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self._file = folder / f"window-{os.getpid()}.json"
         self._lock = _lock(self._file)
         self._lock.tryLock(0)
-        self._kept: Last | None = None
+        self._kept: LastSession | None = None
 
-    def keep(self, last: Last) -> None:
-        """Write down what is so now, if it is something else."""
+    def keep(self, last: LastSession) -> None:
+        """Save the state, if it has changed."""
         if last == self._kept:
             return
         self._kept = last
-        said = {
+        data = {
             "settings": json.loads(settings_text(last.settings)),
             "source": last.source,
             "recording": last.recording,
         }
         part = self._file.with_suffix(".part")
-        part.write_text(json.dumps(said, indent=1), encoding="utf-8")
+        part.write_text(json.dumps(data, indent=1), encoding="utf-8")
         part.replace(self._file)  # whole, or not at all
 
     def close(self) -> None:
@@ -161,9 +161,9 @@ class Running:
         self._lock.unlock()
 
 
-def crashed(folder: Path) -> Last | None:
-    """What the last window was at that did not close in order; told once."""
-    left: list[tuple[float, Last]] = []
+def crashed(folder: Path) -> LastSession | None:
+    """The state of the last window that was not closed; returned once."""
+    left: list[tuple[float, LastSession]] = []
     for file in folder.glob(_FILES):
         lock = _lock(file)
         if lock.tryLock(0):  # nobody holds it who is alive
@@ -174,10 +174,10 @@ def crashed(folder: Path) -> Last | None:
     return max(left, key=lambda one: one[0])[1] if left else None
 
 
-def _read(file: Path) -> Last:
-    said = json.loads(file.read_text(encoding="utf-8"))
-    settings = settings_in(json.dumps(said["settings"]))
-    return Last(settings, str(said["source"]), str(said["recording"]))
+def _read(file: Path) -> LastSession:
+    data = json.loads(file.read_text(encoding="utf-8"))
+    settings = settings_in(json.dumps(data["settings"]))
+    return LastSession(settings, str(data["source"]), str(data["recording"]))
 
 
 def _lock(file: Path) -> QLockFile:
@@ -186,13 +186,13 @@ def _lock(file: Path) -> QLockFile:
     return lock
 
 
-class Recovering(QObject):
-    """Keeps in a `folder` what a `window` is at, and offers what one was at that crashed."""
+class Recovery(QObject):
+    """Saves in a `folder` the state of a `window`, and offers to restore that of a crashed one."""
 
     def __init__(self, window: Parts, folder: Path) -> None:
         super().__init__(window)
         self._window, last = window, crashed(folder)
-        self._running, self._next = Running(folder), 0.0
+        self._open_window, self._next = OpenWindow(folder), 0.0
         window.session.reported.connect(guarded(self._keep))
         # What went on recording by itself was taken over with its settings already.
         if last is not None and window.session.engine.resumed is None:
@@ -204,32 +204,34 @@ class Recovering(QObject):
             self._next = now + _EVERY
             recording = str(status.recording.path) if status.recording.active else ""
             window = self._window
-            self._running.keep(Last(window.history.settings, window.session.source, recording))
+            self._open_window.keep(
+                LastSession(window.history.settings, window.session.source, recording)
+            )
 
-    def offer(self, last: Last) -> None:
-        """Offer what is left of the last session: whoever wants none of it goes on."""
+    def offer(self, last: LastSession) -> None:
+        """Offer what is left of the last session in the banner."""
         window = self._window
-        offered = [Offered("Its se&ttings", _SETTINGS, partial(self._use, last))]
+        offered = [BannerAction("Its se&ttings", _SETTINGS, partial(self._use, last))]
         if last.source and not last.source.startswith("sim:"):
             connect = partial(window.session.request_source, last.source)
-            offered.append(Offered("Its s&ource", f"Connect {last.source} again.", connect))
+            offered.append(BannerAction("Its s&ource", f"Connect {last.source} again.", connect))
         if (recording := _left(last.recording)) is not None:
             play = partial(window.opening.open, recording)
-            offered.append(Offered("Its recordin&g", f"Play {recording}.", play))
+            offered.append(BannerAction("Its recordin&g", f"Play {recording}.", play))
         if (report := window.actions_by_name.entries.get("report")) is not None:
             words, act = report.action.text(), report.action.trigger
-            offered.append(Offered(words, report.action.toolTip(), act))
-        window.display.centre.offer.show_offer(
-            "The last session ended unexpectedly. Take up:", _TIP, offered
+            offered.append(BannerAction(words, report.action.toolTip(), act))
+        window.display.centre.banner.show_actions(
+            "The last session ended unexpectedly. Restore:", _TIP, offered
         )
 
-    def _use(self, last: Last) -> None:
+    def _use(self, last: LastSession) -> None:
         names = (f.name for f in fields(Settings) if f.name not in OF_SENSORS)
         values = {name: getattr(last.settings, name) for name in names}
         self._window.history.change("Settings of the last session", -1, **values)
 
     def close(self) -> None:
-        self._running.close()
+        self._open_window.close()
 
 
 def _left(recording: str) -> Path | None:
@@ -239,6 +241,6 @@ def _left(recording: str) -> Path | None:
 
 
 def state_folder() -> Path:
-    """Where open windows of this user and machine keep what they are at."""
+    """Where open windows of this user and machine save their state."""
     state = platformdirs.user_state_path("kappaskin", appauthor=False)
     return state / "open" / platform.node()

@@ -1,4 +1,4 @@
-"""What a person asks of the settings, as undoable changes."""
+"""Requests of changes of settings, as undoable commands."""
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
@@ -18,9 +18,9 @@ class Requests:
         self._history, self._session = history, session
 
     def set(self, name: str, value: Any) -> None:
-        """Make the setting `name` what is asked for, and change what follows from it."""
+        """Change the setting `name`, and what follows from it."""
         changed = with_consequences(self._history.settings, self._session.scene, name, value)
-        self._history.wish(name, **changed)
+        self._history.request(name, **changed)
 
     def toggle(self, name: str) -> None:
         self.set(name, not getattr(self._history.settings, name))
@@ -29,14 +29,14 @@ class Requests:
         self.set("theme", "light" if self._history.settings.theme == "dark" else "dark")
 
     def reset(self) -> None:
-        """Have all settings as they are at first, but for calibration, tare and publishing."""
+        """Reset all settings except calibration, tare and publishing."""
         now = self._history.settings
-        kept = Settings(calibration=now.calibration, tare=now.tare)  # no matter of taste
-        sending = {field.name: getattr(now, field.name) for field in fields(Sending)}  # nor this
-        self._history.change("Reset settings", -1, **vars(kept) | sending)
+        rest = Settings(calibration=now.calibration, tare=now.tare)
+        sending = {field.name: getattr(now, field.name) for field in fields(Sending)}
+        self._history.change("Reset settings", -1, **vars(rest) | sending)
 
     def reset_panel(self, title: str, names: Sequence[str]) -> None:
-        """Have some settings as they are at first, with what follows from each."""
+        """Reset some settings, with what follows from each."""
         now, first = self._history.settings, Settings()
         for name in names:
             if getattr(now, name) != (value := getattr(first, name)):

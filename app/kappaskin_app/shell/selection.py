@@ -1,4 +1,4 @@
-"""What a person points at, chooses and takes hold of on the skin, for all that show it."""
+"""Selection on the skin: elements, positions, the load and modes, shared by all views."""
 
 from typing import Any
 
@@ -6,10 +6,10 @@ from PySide6.QtCore import QObject, Signal
 
 
 class LoadHandle(QObject):
-    """The simulated load in a person's hand: any view of the skin offers it, the scene follows.
+    """The handle of the simulated load, which views of the skin drag.
 
-    Places are in m on the skin; `pressed` tells how many times as hard as when it was grabbed,
-    `replaced` the object that is to touch instead, as a scene's text has it, where and how hard.
+    Positions are in m on the skin. `pressed` brings the force relative to that when grabbed,
+    `replaced` another object as a table of a scene, its position and its force.
     """
 
     grabbed = Signal(float, float)
@@ -21,11 +21,11 @@ class LoadHandle(QObject):
 
 
 class Selection(QObject):
-    """The element that is pointed at and the one to be pressed (-1: none), and a chosen shape.
+    """The element under the mouse, the one to be pressed (-1: none), and a mode that is shown.
 
-    `chosen` tells of an element that was clicked on a map, `over` and `clicked` of a place (x, y)
-    in m of the skin that the mouse is over (None: of none) or has clicked. `mode` (ny, nx) from -1
-    to 1 colours the skin instead of what is measured; `mode_words` say what it is.
+    `chosen` brings an element that was clicked on a map, `over` and `clicked` a position (x, y) in
+    m on the skin under the mouse (None: none) or clicked. `mode` (ny, nx) from -1 to 1 colours the
+    skin instead of the estimate; `mode_words` describe it.
     """
 
     pointed = Signal(int)
@@ -43,17 +43,17 @@ class Selection(QObject):
         self.mode_words = ""
 
     def point(self, element: int) -> None:
-        """Point at an element in every view; -1 at none."""
+        """Highlight an element in every view; -1 none."""
         if element != self.element:
             self.element = element
             self.pointed.emit(element)
 
     def ask_for(self, element: int) -> None:
-        """Show which element is to be pressed; -1 for none."""
+        """Mark the element to be pressed; -1 none."""
         self.asked_for = element
         self.asked.emit(element)
 
     def show_mode(self, mode: Any, words: str = "") -> None:
-        """Colour the skin by a shape instead of what is measured; by what is measured if None."""
+        """Colour the skin by a mode, or by the estimate if None."""
         self.mode, self.mode_words = mode, words if mode is not None else ""
         self.mode_changed.emit()

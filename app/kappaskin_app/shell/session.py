@@ -39,16 +39,16 @@ from kappaskin_app.shell.simulation import (
     scene_or_why,
 )
 
-_MAKING = "Making the scene; Ctrl+Z takes it back"
+_MAKING = "Computing the scene; Ctrl+Z undoes it"
 
 _Slow: TypeAlias = Written | tuple[Plate, str]
 _Answer: TypeAlias = tuple[str, tuple[object, ...], Any]
 
-_MEMOS: dict[str, Memo[..., Any]] = {"skin": tried, "scene": scene_or_why, "plan": played}
+_CACHES: dict[str, Memo[..., Any]] = {"skin": tried, "scene": scene_or_why, "plan": played}
 
 
 def _answers(slow: _Slow) -> Generator[_Answer]:
-    """What takes long of a scene: which memo is to learn it, the question and the answer."""
+    """The slow parts of a scene: the name of a cache, the arguments and the result."""
     if not isinstance(slow, Written):
         yield "skin", slow, tried(*slow)
         return
@@ -58,24 +58,24 @@ def _answers(slow: _Slow) -> Generator[_Answer]:
         yield "plan", (scene,), played(scene)
 
 
-class Ahead:
-    """Makes scenes once, in a process, so that they can be made at once thereafter; then `ended`.
+class ScenePreparation:
+    """Computes slow scenes in a process and caches their parts; then calls `ended`.
 
-    Those are the written ones, which are read and planned, and those of unusual skins. In a thread
-    of this one they took ten times as long, each step of theirs waiting for a drawing to end.
+    These are scenes from files, and those of skins whose modes are computed. In a thread they
+    took ten times as long, since each step waited for a drawing to end.
     """
 
     def __init__(self, tasks: Tasks, ended: Callable[[], object]) -> None:
-        # Where it is refused the process has died: the scene is made here.
+        # Refused only where the process died: the scene is computed here then.
         self._task = BackgroundTask(tasks, _MAKING, self._learn, lambda _: None, ended)
         self._slow: _Slow | None = None
         self._begun: set[_Slow] = set()
 
     def ready(self, settings: Settings) -> bool:
-        """Whether the scene of `settings` can be made, or refused, at once; if not, it is begun."""
+        """Whether the scene of `settings` is available at once; if not, start computing it."""
         slow = _slow(settings)
         if self.busy and slow != self._slow:
-            self._begun.discard(self._slow)  # nobody waits for it any more
+            self._begun.discard(self._slow)  # it is not needed any more
             self._task.stop()
         if not self.busy and slow is not None and slow not in self._begun:
             self._begun.add(slow)
@@ -89,11 +89,11 @@ class Ahead:
 
     def _learn(self, found: _Answer) -> None:
         memo, question, answer = found
-        _MEMOS[memo].learn(question, answer)
+        _CACHES[memo].learn(question, answer)
 
 
 def _slow(settings: Settings) -> _Slow | None:
-    """What of a scene takes long to make, the first time."""
+    """The part of a scene that is slow to compute the first time."""
     if settings.written is not None:
         return settings.written
     try:
@@ -105,21 +105,21 @@ def _slow(settings: Settings) -> _Slow | None:
 
 
 RECORDED = "replay:"
-"""What the name of a source begins with that is a recording."""
-_TICK = 4  # ms between two looks for a new estimate
-_ARRIVES = 0.3  # s after which what was asked of the engine shows in its status
-_LATE = 1.2  # times as long as the lists take, for what comes late
-_NEWS = 60.0  # s for which another device in the last one's place is told
-_STATUS = 0.05  # s between two looks at the status
+"""The prefix of a source that is a recording."""
+_TICK = 4  # ms between two polls for a new estimate
+_ARRIVES = 0.3  # s after which a request to the engine shows in its status
+_LATE = 1.2  # margin over the time of the scan lists
+_NOTICE = 60.0  # s for which a replaced device is reported
+_STATUS = 0.05  # s between two polls of the status
 
 
 _BASE = Setup()
 
 
 def _setup_of(settings: Settings, sensor: Sensor | None = None, base: Setup = _BASE) -> Setup:
-    """The setup asked for, with calibration and tare if they are of `sensor`.
+    """The setup of the settings, with calibration and tare if they are of `sensor`.
 
-    What no setting asks for is as in `base`.
+    What no setting determines is as in `base`.
     """
     chosen = setup_values(settings, EstimatorSettings)
     setup = replace(base, **chosen, calibration=None, tare=None)
@@ -133,9 +133,9 @@ def _setup_of(settings: Settings, sensor: Sensor | None = None, base: Setup = _B
 
 
 def _turn(region: Region) -> float:
-    """For how many s a device on a line leaves elements out that take turns; 0 if it leaves none.
+    """How long in s elements scanned in turn stay without a reading; 0 if none do.
 
-    Were readings held for less, too few would be there to decide the shape.
+    With a shorter hold there are too few readings to determine the shape.
     """
     if region.around not in ("elements", "skin") or not region.share:
         return 0.0
@@ -145,22 +145,21 @@ def _turn(region: Region) -> float:
 class Session(QObject):
     """Owns the engine. `estimated` brings each new estimate, `reported` the status, in one tick.
 
-    `scene` is the one that is simulated, `running` whether it goes on; `playing` says when it
-    becomes another one, `refused` and `refusal` why it is not the one the settings describe now,
-    with nothing to say when it is, and `preparing` whether that takes a while to be computed.
-    `unsent` says why nothing is published, with nothing to say when it is.
-    `turning` tells that another source is about to be taken, or none, `source_changed` which one
-    is taken; a recording that is one is computed as `base` says, but for what the settings do.
-    `pausing` tells that a person pauses what is played, or lets it go on.
+    `scene` is the simulated one, `running` whether it is not paused. `playing` reports another
+    scene, `refused` and `refusal` why it is not that of the settings (empty when it is), and
+    `preparing` whether it is still computed. `publish_refused` reports why nothing is published
+    (empty when it is). `source_changing` precedes another source or a disconnection,
+    `source_changed` brings the new one. `base` is the setup of a recording, for what no setting
+    determines. `pause_requested` requests that a scene or recording be paused or continued.
     """
 
     refused = Signal(str)
     preparing = Signal(bool)
-    turning = Signal()
+    source_changing = Signal()
     source_changed = Signal(str)
-    pausing = Signal()
+    pause_requested = Signal()
     playing = Signal(Scene)
-    unsent = Signal(str)
+    publish_refused = Signal(str)
     estimated = Signal(Estimate)
     reported = Signal(Status)
 
@@ -173,26 +172,26 @@ class Session(QObject):
         self.engine = engine
         self.scene = self._planned = scene_of(replace(history.settings, written=None))
         self.refusal = ""
-        self._anew, self.running = False, True
-        self._sought: float | None = None
-        self._sought_at = 0.0
-        self._ahead = Ahead(tasks, self._play)
+        self._restarts, self.running = False, True
+        self._seek_target: float | None = None
+        self._seek_time = 0.0
+        self._preparation = ScenePreparation(tasks, self._play)
         self.base: Setup | None = None
         if engine.resumed is None:
-            self.asked = _setup_of(history.settings)
-            engine.set_up(self.asked)
+            self.requested_setup = _setup_of(history.settings)
+            engine.set_up(self.requested_setup)
             engine.scan(region_of(history.settings))
         else:
-            self.asked = engine.resumed.requested.setup
-        self._laid: CylinderStep | None = None
+            self.requested_setup = engine.resumed.requested.setup
+        self._cylinder: CylinderStep | None = None
         self.status = Status()
         self._lost_since, self._turned_at = math.inf, 0.0
         self.estimate: Estimate | None = None
         self.source = ""
-        self.takers: list[Callable[[str], bool]] = []
-        """Who is asked first whether they take a source that is requested."""
+        self.source_handlers: list[Callable[[str], bool]] = []
+        """Functions that may open a requested source instead, and return whether they do."""
         self.may_close: list[Callable[[], bool]] = []
-        """Who is asked, when a person closes the window, whether it may be."""
+        """Functions that return whether the window may be closed."""
         self._next_status, self.closed = 0.0, False
         self._shown: tuple[int, int] = (0, -1)
         history.changed.connect(guarded(self._follow))
@@ -202,57 +201,57 @@ class Session(QObject):
 
     @property
     def inside(self) -> bool:
-        """Whether the simulation inside the app is what is read."""
+        """Whether the source is the simulation of the app."""
         return self.source.startswith("sim:")
 
     @property
     def simulating(self) -> bool:
-        """Whether the loads and the noise are the panels' to choose: not in a written scene."""
+        """Whether the panels determine the scene: not one from a file."""
         return self.inside and self._history.settings.written is None
 
     @property
     def making(self) -> bool:
-        """Whether the scene that is asked for is still being made."""
-        return self._ahead.busy
+        """Whether the requested scene is still being computed."""
+        return self._preparation.busy
 
     @property
     def replaying(self) -> bool:
-        """Whether a recording is what is read."""
+        """Whether the source is a recording."""
         return self.source.startswith(RECORDED)
 
     def request_source(self, source: str) -> None:
-        """Read from `source` from now on, as a person asks."""
-        if not any(takes(source) for takes in self.takers):
+        """Change the source, on request of the user."""
+        if not any(handles(source) for handles in self.source_handlers):
             self.connect_to(source)
 
     def simulate(self) -> None:
-        """Simulate the panels' skin, whatever was read or written."""
+        """Simulate the scene of the panels, whatever the source was."""
         self._history.change("Simulated skin", -1, written=None)
         self.request_source("sim:")
 
     def pause(self) -> None:
-        """Let what is played stand, or go on."""
-        self.pausing.emit()
+        """Pause or continue the scene or recording."""
+        self.pause_requested.emit()
 
     def connect_to(self, source: str, already: bool = False) -> None:
         """Take frames from `source`, unless the engine does `already`.
 
-        A scene named there becomes the load case, or the one that is written; without a name, what
-        was simulated last is simulated again.
+        A scene named there becomes the load case or the scene from a file; without a name the
+        last simulation continues.
         """
-        self.turning.emit()
+        self.source_changing.emit()
         self.source, self.estimate = source.strip(), None
         self._turned_at = time.monotonic()
         self.source_changed.emit(self.source)
         if not already:
             self.engine.connect(self.source)
         if self.inside:
-            self._anew = True
+            self._restarts = True
             self._history.change("Simulated skin", -1, **named(self.source))
             self._play()
 
     def go_on(self, left: ResumeInfo) -> None:
-        """Go on with what the engine was left with, whose settings are the history's."""
+        """Resume what another window left; its settings are already those of the history."""
         self.source, self.running = left.requested.source or "", bool(left.requested.speed)
         self.source_changed.emit(self.source)
         self.engine.compare(None)
@@ -260,15 +259,15 @@ class Session(QObject):
             self._play()
 
     def begin(self, written: Written) -> None:
-        """Play a scene that is written from its beginning, whatever was read before."""
+        """Play a scene from a file, from its beginning, whatever the source was."""
         if not self.inside or self.status.state in ("off", "lost"):
             self.connect_to("sim:")
-        self._anew = True
+        self._restarts = True
         self._history.change(f"Play {written.file.stem}", -1, written=written)
         self._play()
 
     def disconnect_from(self) -> None:
-        self.turning.emit()
+        self.source_changing.emit()
         self._turned_at = time.monotonic()
         self.engine.disconnect()
 
@@ -283,40 +282,40 @@ class Session(QObject):
             self._publish()
 
     def _set_up(self) -> None:
-        """Have the engine compute with what is asked for now, if that is something else."""
+        """Request the setup of the settings, if it has changed."""
         setup = _setup_of(self._settings, self.status.sensor, self.base or _BASE)
-        if self._laid is not None:
+        if self._cylinder is not None:
             setup = replace(setup, calibration=None, tare=None)
         if not self.inside and self.base is None:
             setup = replace(setup, hold=max(setup.hold, _turn(region_of(self._settings))))
-        if setup != self.asked:
-            if self.inside and setup.calibration and not self.asked.calibration:
-                # A calibration follows the loops of a skin from rest on: these effects start anew.
+        if setup != self.requested_setup:
+            if self.inside and setup.calibration and not self.requested_setup.calibration:
+                # A calibration tracks hysteresis from rest: these effects restart.
                 self.engine.restart_effects()
-            self.asked = setup
+            self.requested_setup = setup
             self.engine.set_up(setup)
 
     def _scan(self) -> None:
-        """Scan the region asked for, or everything while the skin lies on cylinders."""
-        self.engine.scan(Region() if self._laid else region_of(self._settings))
+        """Scan the requested region, or everything while the skin lies on a cylinder."""
+        self.engine.scan(Region() if self._cylinder else region_of(self._settings))
 
     def _publish(self) -> None:
-        """Send to whom it is asked for, or to nobody and say why."""
+        """Publish to the requested targets, or to none and report why."""
         why = ""
         try:
             self.engine.publish(self._settings.targets)
         except Refusal as refusal:
             why = str(refusal)
             self.engine.publish([])
-        self.unsent.emit(why)
+        self.publish_refused.emit(why)
 
     def lay(self, step: CylinderStep | None) -> None:
         """Lay the simulated skin on the cylinder of `step`.
 
         Until None, readings are nominal and every frame has all of them.
         """
-        begins_or_ends = (step is None) != (self._laid is None)
-        self._laid = step
+        begins_or_ends = (step is None) != (self._cylinder is None)
+        self._cylinder = step
         self._set_up()
         if begins_or_ends:
             self._scan()
@@ -324,74 +323,74 @@ class Session(QObject):
             self._play()
 
     def run(self, running: bool) -> None:
-        """Let the scene go on, or stand still."""
+        """Continue or pause the scene."""
         self.running = running
         self.engine.seek(None, float(running))
 
     def seek(self, at: float, held: bool = False) -> None:
-        """Go to the scene's time `at` in s, and stand there while it is `held`."""
-        self._sought, self._sought_at = at, time.monotonic()
+        """Go to the scene's time `at` in s, and pause there while it is `held`."""
+        self._seek_target, self._seek_time = at, time.monotonic()
         self.engine.seek(at, float(self.running and not held))
 
     @property
     def time(self) -> float:
         """The time in s at which the scene is, as the newest estimate shows it, or will be."""
-        if self._sought is not None:
-            return self._sought
+        if self._seek_target is not None:
+            return self._seek_target
         device_time = self.estimate.device_time if self.estimate else 0.0
         return self.status.playing.time(device_time)
 
     def move(self, scene: Scene) -> None:
-        """Play `scene`, in which a touch is elsewhere, for as long as it is dragged.
+        """Play `scene`, whose load is being dragged.
 
-        Its plan stays: what a scene calls for is told once the touch is let go.
+        Its plan of effects stays until the load is released.
         """
         self.scene = scene
         self.engine.play(replace(self._planned, stimuli=scene.stimuli))
 
     def _play(self) -> None:
-        """Simulate what the settings describe, or go on as before and say why."""
+        """Simulate the scene of the settings, or keep the last one and report why."""
         settings = self._history.settings
-        if not self._ahead.ready(settings):
+        if not self._preparation.ready(settings):
             self.refused.emit("")
             self.preparing.emit(True)
             return
         why = ""
         try:
             scene = scene_of(settings)
-            laid = self._laid and Presentation((self._laid,), 1.0)
-            self.scene = scene.laid_on(laid) if laid else scene
+            presentation = self._cylinder and Presentation((self._cylinder,), 1.0)
+            self.scene = scene.laid_on(presentation) if presentation else scene
         except Refusal as refusal:
             why = str(refusal)
         self._planned, self.refusal = played(self.scene), why
         self.engine.play(self._planned)
-        if self._anew and not why:
-            self._anew, self.running = False, True
+        if self._restarts and not why:
+            self._restarts, self.running = False, True
             self.engine.seek(0.0)
         self.playing.emit(self.scene)
         self.refused.emit(why)
         self.preparing.emit(False)
 
-    def bargain(self) -> ScanTradeoff | None:
-        """What scanning the region in use buys and costs, while a contact tells where it is."""
+    def scan_tradeoff(self) -> ScanTradeoff | None:
+        """The trade-off of the region in use, None without a contact."""
         region, estimate, sensor = self.status.region, self.estimate, self.status.sensor
         if region.around == "off" or estimate is None or sensor is None:
             return None
-        touch = estimate.contact
-        if not (touch.present and math.isfinite(estimate.noise)):
+        found = estimate.contact
+        if not (found.present and math.isfinite(estimate.noise)):
             return None
         try:
-            x, y = (float(place) for place in touch.position)
-            contact = PointLoad(x, y, touch.force)
+            x, y = (float(place) for place in found.position)
+            contact = PointLoad(x, y, found.force)
             return ScanTradeoff.of(sensor, region, contact, estimate.noise)
         except Refusal:  # elements chosen on another skin: the status says so
             return None
 
     @guarded
     def tick(self) -> None:
-        """Look for news; everything that shows it hangs on the two signals."""
+        """Poll the engine, and emit new estimates and the status."""
         if self.closed:
-            return  # asked for by a picture drawn while closing
+            return  # called by a picture drawn while closing
         now = time.monotonic()
         if now >= self._next_status:
             self._next_status = now + _STATUS
@@ -399,11 +398,11 @@ class Session(QObject):
             was, self.status = self.status, self.engine.status()
             self._lost_since = min(self._lost_since, now) if self._lost else math.inf
             if self.status.connections != was.connections:
-                self.estimate = None  # what the last sensor showed is not this one's
+                self.estimate = None  # the estimate was of the last sensor
                 self._set_up()
-            told = self.status.reported > self._sought_at + _ARRIVES
-            if told or self._sought == self.status.playing.at:
-                self._sought = None
+            arrived = self.status.reported > self._seek_time + _ARRIVES
+            if arrived or self._seek_target == self.status.playing.at:
+                self._seek_target = None
             self.reported.emit(self.status)
         estimate = self.engine.latest(self.status)
         if estimate is not None and (estimate.generation, estimate.sequence) != self._shown:
@@ -416,20 +415,20 @@ class Session(QObject):
         return self.status.state == "lost"
 
     def alarm(self) -> str:
-        """Since when nothing comes in any more, and why; empty while something does."""
+        """For how long the connection is lost, and why; empty while it is not."""
         if not self._lost:
             return ""
         seconds = max(0.0, time.monotonic() - self._lost_since)
         return f"LOST {seconds:.0f} s\n{self.status.message}"
 
-    def stranger(self) -> str:
-        """Which device took another's place on this source, for as long as that is news."""
-        since = max(time.monotonic() - _NEWS, self._turned_at)
+    def other_device(self) -> str:
+        """The report of another device on this source, for a minute."""
+        since = max(time.monotonic() - _NOTICE, self._turned_at)
         others = [e.text for e in self.status.events if e.kind == "other" and e.time > since]
         return others[-1][:1].upper() + others[-1][1:] if others else ""
 
     def badge(self) -> str:
-        """The word that is true now, and the gravest of what is true besides."""
+        """The state shown by the badge."""
         computed = None if self.estimate is None else self.estimate.host_time
         paused = self.inside and not self.running
         return state_of(self.status, computed, time.monotonic(), paused)

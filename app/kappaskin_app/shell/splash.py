@@ -1,4 +1,4 @@
-"""What is being loaded, in words, until the skin is drawn."""
+"""The splash screen, until the skin is drawn."""
 
 from typing import TYPE_CHECKING
 
@@ -12,19 +12,19 @@ if TYPE_CHECKING:
     from kappaskin_app.shell.parts import Parts
 
 _WIDTH = 66  # letters wide
-_MOST = 2500  # ms that it stands before a window into which nothing comes
+_MOST = 2500  # ms that it is shown without a reading
 _READING = "Waiting for the first reading"
 _DOTS = "\N{HORIZONTAL ELLIPSIS}"
 
 
 class Splash(QWidget):
-    """Says what is loaded; goes when the first estimate is drawn, at a click, or after a while."""
+    """Shows what is loaded; closes with the first estimate, at a click, or after 2.5 s."""
 
     def __init__(self) -> None:
         super().__init__(None, Qt.WindowType.SplashScreen | Qt.WindowType.FramelessWindowHint)
         self.setObjectName("splash")
         self.setAccessibleName("Kappaskin is starting")
-        # Put away before there is a window, it would be the last one and end the program.
+        # Closed before there is a window, it would end the program.
         self.setAttribute(Qt.WidgetAttribute.WA_QuitOnClose, False)
         self._watching: QMetaObject.Connection | None = None
         self.words = QLabel()
@@ -38,15 +38,15 @@ class Splash(QWidget):
         self.move(QGuiApplication.primaryScreen().geometry().center() - self.rect().center())
 
     def say(self, words: str) -> None:
-        """Say this at once: nothing else is drawn while something is loaded."""
+        """Show this at once: nothing else is drawn while modules are loaded."""
         self.words.setText(words + _DOTS)
         self.words.setAccessibleName(self.words.text())
         QApplication.processEvents()
 
     def finish(self, window: "Parts") -> None:
-        """Wait for the first reading to be drawn in a `window`, and go."""
+        """Wait for the first estimate drawn in a `window`, and close."""
         self.say(_READING)
-        # The connection holds this splash, which nothing else does, until it goes.
+        # The connection holds the only reference to this splash.
         self._watching = window.display.drawn.connect(
             lambda: self._go() if window.display.estimate_shown() is not None else None
         )

@@ -1,4 +1,4 @@
-"""The status bar: messages and warnings, what touches the skin, and background tasks."""
+"""The status bar: messages, warnings, the object in contact, background tasks."""
 
 import numpy as np
 from PySide6.QtCore import Signal
@@ -11,11 +11,11 @@ from kappaskin_app.theme import ALERT
 from kappaskin_app.widgets.layout import row
 from kappaskin_app.widgets.line import Line
 
-_ACTIVITY_TIP = "What takes longer than a moment. The window goes on meanwhile."
+_ACTIVITY_TIP = "Background tasks."
 
 
 class Activity(QWidget):
-    """Shows what is done, or hides; `cancel_wanted` asks that it be ended."""
+    """Shows the background task, or hides; `cancel_wanted` requests its end."""
 
     cancel_wanted = Signal()
 
@@ -24,7 +24,7 @@ class Activity(QWidget):
         self.words, self.cancel = QLabel(), QToolButton()
         self.words.setToolTip(_ACTIVITY_TIP)
         self.cancel.setText("Cancel")
-        self.cancel.setToolTip("End it, and keep what was there before.")
+        self.cancel.setToolTip("Cancel this task.")
         self.cancel.clicked.connect(self.cancel_wanted)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(4, 0, 4, 0)
@@ -33,7 +33,7 @@ class Activity(QWidget):
         self.hide()
 
     def show_work(self, words: str, may_cancel: bool) -> None:
-        """Show what is done, and whether it can be ended; nothing when there are no `words`."""
+        """Show a task, and whether it can be cancelled; hide when there are no `words`."""
         self.words.setText(words)
         self.cancel.setVisible(may_cancel)
         self.cancel.setAccessibleName(f"Cancel: {words}")
@@ -41,11 +41,11 @@ class Activity(QWidget):
 
 
 _TIP = (
-    "Near the rim: no force moves the skin where it is held, so that a light touch further inside "
-    "and a hard one at the rim read alike; an edge that gives may be assumed instead (Basis). "
-    "Strain: beyond 1 % a metal gage is not elastic any more; these elements are crossed out in "
-    "the heatmaps. Left out: elements, counted from 0, that the others contradict, or of which "
-    "channels were found wanting: Health (F3) lists these, and letters in the heatmaps say why."
+    "Near the rim: a held edge does not move, so a light touch inside and a hard one at the rim "
+    "give the same readings; select an elastic edge if the edge is elastic (Basis). "
+    "Strain: beyond 1 % a metal gage is not elastic; these elements are crossed out in the "
+    "heatmaps. Excluded: elements, counted from 0, that are inconsistent with the others, or have "
+    "faulty channels: Health (F3) lists these, and letters in the heatmaps give the reason."
 )
 
 
@@ -53,32 +53,32 @@ _NAMED = 4  # elements that are named one by one
 
 
 def _left_out(estimate: Estimate) -> str:
-    """Which elements are left out and why."""
+    """Which elements are excluded and why."""
     out = np.flatnonzero(estimate.suspect)
     if not len(out):
         return ""
     if len(out) > _NAMED:
         kinds = [FAULTS[kind] for kind in np.unique(estimate.suspect[out])]
-        return f"{len(out)} elements left out ({', '.join(kinds)})"
+        return f"{len(out)} elements excluded ({', '.join(kinds)})"
     named = ", ".join(f"{element} ({FAULTS[estimate.suspect[element]]})" for element in out)
-    return f"element{'s' if len(out) > 1 else ''} {named} left out"
+    return f"element{'s' if len(out) > 1 else ''} {named} excluded"
 
 
 def warnings(estimate: Estimate, strained: int) -> str:
-    """What is doubtful of an estimate in words; so many elements are `strained` too far."""
-    told = [_left_out(estimate)] if estimate.suspect.any() else []
+    """Warnings of an estimate; `strained` is the number of elements over their strain limit."""
+    parts = [_left_out(estimate)] if estimate.suspect.any() else []
     if not estimate.converged:
-        told.append("the iteration gave up, least squares shown")
+        parts.append("no convergence; least squares shown")
     if strained:
-        told.append(f"{strained} element{'s' if strained > 1 else ''} over 1 % strain")
+        parts.append(f"{strained} element{'s' if strained > 1 else ''} over 1 % strain")
     if estimate.contact.near_rim:
-        told.append("contact too near the rim to trust")
-    words = "; ".join(told)
+        parts.append("contact near the rim: unreliable")
+    words = "; ".join(parts)
     return words[:1].upper() + words[1:]
 
 
 class Notice(QLabel):
-    """Shows a hint, or in the colour of alarms what there is to warn of."""
+    """Shows a hint, or a warning in the colour of alarms."""
 
     def __init__(self, hint: str, parent: QWidget | None = None) -> None:
         super().__init__(hint, parent)
@@ -87,13 +87,13 @@ class Notice(QLabel):
         self.setMinimumWidth(self.sizeHint().width())  # or what stands beside it would jump
 
     def show_hint(self, hint: str) -> None:
-        """Hint at this while there is nothing to warn of."""
+        """Show this hint while there is no warning."""
         if hint != self._hint:
             self._hint = hint
             self.setText(self.warning or hint)
 
     def show_warning(self, text: str) -> None:
-        """Warn of `text`, or of nothing."""
+        """Show a warning; none when `text` is empty."""
         if text != self.warning:
             self.warning = text
             self.setText(text or self._hint)
@@ -102,7 +102,7 @@ class Notice(QLabel):
 
 
 class StatusBar(QStatusBar):
-    """Shows a `notice`, the `object` that touches, and background tasks (`activity`)."""
+    """Shows a `notice`, the `object` in contact, and background tasks (`activity`)."""
 
     def __init__(self, notice: Notice) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""Welcome: what one may begin with, offered above the skin when a window opens."""
+"""The welcome banner: where to start, above the skin when a window opens."""
 
 from collections.abc import Callable
 
@@ -6,24 +6,24 @@ from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QMenu
 
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.banner import Offer, Offered
+from kappaskin_app.shell.centre import ActionBanner, BannerAction
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.requests import Requests
 from kappaskin_app.shell.session import Session
 
-_LASTS = 60.0  # s, unless somebody is at it
+_LASTS = 60.0  # s, unless it is in use
 _TIP = (
-    "What moves below is a simulated skin: drag the red arrow. All of this is in the menus "
-    "too, and Help > Welcome shows it again."
+    "The skin below is simulated: drag the red arrow. These actions are in the menus too; "
+    "Help > Welcome shows this again."
 )
 
 
 class Welcome(QObject):
-    """Offers in a banner what features added, until something is begun."""
+    """Shows the actions that features added in a banner, until one is used."""
 
     def __init__(
         self,
-        offer: Offer,
+        offer: ActionBanner,
         history: History,
         session: Session,
         requests: Requests,
@@ -33,12 +33,12 @@ class Welcome(QObject):
         super().__init__(parent)
         self._offer, self._history, self._session = offer, history, session
         self._offering = False
-        self._ways: dict[int, Offered] = {}
+        self._ways: dict[int, BannerAction] = {}
         self._last = [
-            Offered("Recentl&y opened", "What was opened or recorded last.", recent),
-            Offered(
+            BannerAction("Recentl&y opened", "Files opened or recorded last.", recent),
+            BannerAction(
                 "Do not sho&w again",
-                "Begin without this line from now on; Welcome, under View, brings it back.",
+                "Open without this line from now on; Settings > View turns it on again.",
                 lambda: requests.set("show_start", False),
             ),
         ]
@@ -46,21 +46,21 @@ class Welcome(QObject):
         history.stack.indexChanged.connect(guarded(lambda *_: self._end()))
 
     def add(self, place: int, words: str, tip: str, act: Callable[[], object]) -> None:
-        """Offer this too, at this `place` among all."""
-        self._ways[place] = Offered(words, tip, act)
+        """Add an action at this `place` in the order."""
+        self._ways[place] = BannerAction(words, tip, act)
 
     def begin(self) -> None:
-        """Offer all where a person wants it, and has not begun with something already."""
+        """Show it where the settings ask for it and nothing else is open."""
         begun = not self._session.inside or self._session.engine.resumed is not None
         if self._history.settings.show_start and not begun:
             self.offer()
 
     def offer(self) -> None:
-        """Offer all, unless something else is offered."""
+        """Show it, unless the banner shows something else."""
         if not self._offer.isVisible():
             self._offering = True
             ways = [self._ways[place] for place in sorted(self._ways)]
-            self._offer.show_offer("To begin:", _TIP, [*ways, *self._last], _LASTS)
+            self._offer.show_actions("Start with:", _TIP, [*ways, *self._last], _LASTS)
 
     def _end(self) -> None:
         if self._offering:

@@ -9,26 +9,26 @@ from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent
 
 from kappaskin.live import Engine, ResumeInfo, Status
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.layouts.keeping import Keeping
 from kappaskin_app.shell.menus import Menus
 from kappaskin_app.shell.parts import Parts
 from kappaskin_app.shell.recovery import settings_left
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.simulation import settings_for
+from kappaskin_app.shell.window_file import WindowSaver
 from kappaskin_app.theme import THEMES, apply_look
 from kappaskin_app.widgets.layout import widen
 
-_SETTINGS = "What a person chooses: connection, load, basis, view, skin, sensor, calibration"
+_SETTINGS = "Settings: connection, load, basis, view, skin, sensor, calibration"
 _PACKED = 80  # of a picture: packs a fifth less well than Qt does, in half the time
 
 
 class Feature(Protocol):
-    """One thing that a person does; its parts are its attributes."""
+    """A feature of the app; its parts are its attributes."""
 
     name: str
 
     def install(self, shell: "MainWindow") -> None:
-        """Put its docks, panels, views and actions into the shell, and listen to it."""
+        """Add its docks, panels, views and actions to the shell, and connect to it."""
         ...
 
 
@@ -42,14 +42,14 @@ class MainWindow(Parts):
         engine: Engine | None = None,
     ) -> None:
         handed = engine.resumed if engine else None
-        if handed and source == "sim:":  # nothing else was asked for
+        if handed and source == "sim:":  # no other source was requested
             source = handed.requested.source or source
         super().__init__(settings_left(handed) if handed else settings_for(source), engine)
         self.setObjectName("kappaskin")
         self.setWindowTitle("Kappaskin")
         self.menus = Menus(self)
-        self.keeping = Keeping(self, self.menus)
-        self.menus.quit_wanted.connect(guarded(self.quit))
+        self.saver = WindowSaver(self, self.menus)
+        self.menus.quit_requested.connect(guarded(self.quit))
         self.features: dict[str, Feature] = {}
         self._lay_out()
         self._wire()
@@ -60,23 +60,23 @@ class MainWindow(Parts):
 
     def _lay_out(self) -> None:
         self.setCentralWidget(self.display.centre)
-        self.setStatusBar(self.display.foot)
+        self.setStatusBar(self.display.status_bar)
         self.addToolBar(self.display.header)
         self.docks.put_left("settings", "Settings", self.panels, _SETTINGS, share=0.25)
 
     def _wire(self) -> None:
-        session, tasks, activity = self.session, self.tasks, self.display.foot.activity
+        session, tasks, activity = self.session, self.tasks, self.display.status_bar.activity
         self.panels.requested.connect(guarded(self.requests.set))
         self.panels.reset_requested.connect(guarded(self.requests.reset_panel))
-        self.panels.read_wanted.connect(self.read_wanted)
+        self.panels.guide_requested.connect(self.guide_requested)
         self.history.changed.connect(guarded(self._show_settings))
         session.reported.connect(guarded(self._show_status))
-        session.reported.connect(guarded(tasks.tell))
-        tasks.told.connect(guarded(lambda words: activity.show_work(words, tasks.may_cancel)))
-        tasks.refused.connect(guarded(self.tell))
+        session.reported.connect(guarded(tasks.report))
+        tasks.notified.connect(guarded(lambda words: activity.show_work(words, tasks.may_cancel)))
+        tasks.refused.connect(guarded(self.notify))
         activity.cancel_wanted.connect(guarded(tasks.cancel))
         for part in (self.opening, self.layouts):
-            part.told.connect(guarded(self.tell))
+            part.notified.connect(guarded(self.notify))
 
     def _finish(self, source: str, handed: ResumeInfo | None, already: bool) -> None:
         # After features, who may use a file then.
@@ -84,7 +84,7 @@ class MainWindow(Parts):
         self.panels.build()
         self.menus.finish()
         self.layouts.begin()
-        self.display.centre.offer.offered.connect(guarded(self.actions_by_name.retell))
+        self.display.centre.banner.shown.connect(guarded(self.actions_by_name.update_tips))
         self._show_settings(self.history.settings, anew=True)
         self.resize(1280, 800)
         if handed:
@@ -105,18 +105,18 @@ class MainWindow(Parts):
     def _show_status(self, status: Status) -> None:
         self.panels.show_status(status, self.session.simulating and status.state == "streaming")
 
-    # What features ask of the window.
+    # Called by features.
 
     def picture(self, path: Path) -> bool:
         """Save the window, 3-D picture included, as a PNG; whether it could be written."""
         return self.grab().save(str(path), "PNG", _PACKED)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        offer = self.display.centre.offer
+        banner = self.display.centre.banner
         if event.key() == Qt.Key.Key_Escape and self.layouts.filled:
             self.layouts.leave_full_screen()
-        elif event.key() == Qt.Key.Key_Escape and offer.isVisible():
-            offer.hide()
+        elif event.key() == Qt.Key.Key_Escape and banner.isVisible():
+            banner.hide()
         else:
             super().keyPressEvent(event)
 
@@ -126,7 +126,7 @@ class MainWindow(Parts):
             widen(self, dock, event)
 
     def quit(self) -> None:
-        """Close, unless something is to go on."""
+        """Close, unless a feature keeps the window open."""
         if self.may_close():
             self.close()
 
@@ -140,8 +140,8 @@ class MainWindow(Parts):
             event.ignore()
             return
         if not self.session.closed:
-            self.keeping.write()
-            self.history.stack.blockSignals(True)  # it tells even while all is taken apart
+            self.saver.write()
+            self.history.stack.blockSignals(True)  # it emits even during destruction
             self.closing.emit()
             self.tasks.close()
             self.session.close()

@@ -1,4 +1,4 @@
-"""What dialogs have in common whose work goes on beside the window: a bar, words, an end."""
+"""Dialogs of background tasks: a form, a progress bar, a result."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -23,11 +23,11 @@ _WIDTH = 560  # px
 
 
 class WorkDialog(QDialog):
-    """Asks in a `form`, begins the `work` made of it, and shows how far that is.
+    """A `form` that starts `work` in the background and shows its progress.
 
-    `work` tells the shares that are done and something else at its end, which `said` puts into
-    words; it raises a `Refusal` where it cannot begin. It can be cancelled, and is, when it closes.
-    `doing` says at the foot of the window what goes on.
+    `work` yields shares from 0 to 1 and at last a result, which `result_text` describes; it
+    raises a `Refusal` where it cannot start. Closing the dialog cancels it. `task` is its name
+    in the status bar.
     """
 
     def __init__(
@@ -35,15 +35,15 @@ class WorkDialog(QDialog):
         tasks: Tasks,
         title: str,
         verb: str,
-        doing: str,
+        task: str,
         work: Callable[[], Work],
-        said: Callable[[object], str],
+        result_text: Callable[[object], str],
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self._work, self._said = work, said
+        self._work, self._result_text = work, result_text
         cancelled = "Cancelled; nothing was written."
-        self.task = BackgroundTask(tasks, doing, self._take, self._refuse, cancelled=cancelled)
+        self.task = BackgroundTask(tasks, task, self._take, self._refuse, cancelled=cancelled)
         self.setWindowTitle(title)
         self.setMinimumWidth(_WIDTH)
         self.form, self.bar, self.words = QFormLayout(), QProgressBar(), QLabel()
@@ -51,16 +51,16 @@ class WorkDialog(QDialog):
         keeping = self.bar.sizePolicy()
         keeping.setRetainSizeWhenHidden(True)
         self.bar.setSizePolicy(keeping)
-        self.bar.hide()  # while there is nothing to tell, or what was told came to nothing
+        self.bar.hide()  # while there is no progress to show
         self.words.setWordWrap(True)
         self.begin_button, self.cancel_button = QPushButton(verb), QPushButton("&Cancel")
         self.cancel_button.setAutoDefault(False)
-        self.begin_button.setToolTip("Begin, beside the window; what is in the way is told below.")
-        self.begin_button.clicked.connect(guarded(lambda *_: self._begin()))
+        self.begin_button.setToolTip("Start in the background; an error is shown below.")
+        self.begin_button.clicked.connect(guarded(lambda *_: self._start()))
         self.cancel_button.clicked.connect(guarded(lambda *_: self.cancel()))
 
     def _add_buttons(self) -> None:
-        """Lay out what is below the form, once that is there: Tab goes from above to below."""
+        """Lay out the form and what is below it, in the order of Tab."""
         layout, buttons = QVBoxLayout(self), QHBoxLayout()
         buttons.addStretch()
         for button in (self.begin_button, self.cancel_button):
@@ -71,9 +71,9 @@ class WorkDialog(QDialog):
         layout.addLayout(buttons)
 
     def _allow(self) -> None:
-        """Ask only for what makes sense."""
+        """Enable what can be used now."""
         self.cancel_button.setText("&Cancel" if self.busy else "C&lose")
-        tip = "End it; nothing half done is left." if self.busy else "Put this away (Esc)."
+        tip = "Cancel; no partial file is left." if self.busy else "Close (Esc)."
         self.cancel_button.setToolTip(tip)
 
     @property
@@ -81,37 +81,37 @@ class WorkDialog(QDialog):
         return self.task.running
 
     def ask(self) -> None:
-        """Show it, as new unless it is at work."""
+        """Show it, without the last result unless it is running."""
         if not self.busy:
             self.words.clear()
             self.bar.hide()
         self.show()
         self.raise_()
 
-    def _begin(self) -> None:
+    def _start(self) -> None:
         self.words.setText("Writing\N{HORIZONTAL ELLIPSIS}")
         self.bar.setValue(0)
         self.bar.show()
         self.task.begin(self._work)
         self._allow()
 
-    def _take(self, told: object) -> None:
-        if isinstance(told, float):
-            self.bar.setValue(round(self.bar.maximum() * told))
+    def _take(self, item: object) -> None:
+        if isinstance(item, float):
+            self.bar.setValue(round(self.bar.maximum() * item))
         else:
             self.bar.setValue(self.bar.maximum())
-            self._end(self._said(told))
+            self._end(self._result_text(item))
 
     def _refuse(self, error: Exception) -> None:
         self.bar.hide()
         self._end(str(error) or type(error).__name__)
 
     def cancel(self) -> None:
-        """End what is at work, or close."""
+        """Cancel the task, or close."""
         self.task.cancel() if self.busy else self.reject()
 
     def _end(self, words: str) -> None:
-        """Be done, in `words`."""
+        """End the task, and show `words`."""
         self.task.stop()
         self.words.setText(words)
         high = self.heightForWidth(self.width())
@@ -125,48 +125,48 @@ class WorkDialog(QDialog):
 
 
 def path_in(line: QLineEdit) -> Path:
-    """The file that is named in a line."""
+    """The path in a line."""
     return Path(line.text().strip())
 
 
-def says_kind(path: Path) -> bool:
-    """Whether a file's name ends in what could say its kind: `force 0.5 N` does not."""
+def has_suffix(path: Path) -> bool:
+    """Whether a file's name has a suffix of letters: `force 0.5 N` has none."""
     return path.suffix[1:2].isalpha()
 
 
-def ended(name: str, ending: str) -> Path:
-    """The file called `name`, with an `ending` if that lacks it: `force 0.5 N` has none."""
+def with_suffix(name: str, ending: str) -> Path:
+    """The path `name`, with `ending` added if it lacks it: `force 0.5 N` has none."""
     path = Path(name)
     return path if path.suffix.lower() == ending else path.with_name(path.name + ending)
 
 
 def with_ending(name: str, ending: str) -> Path:
-    """The file that a person chose by its `name`, with an `ending` if that lacks it.
+    """The selected path `name`, with `ending` added if it lacks it.
 
-    Refused where that is another one, which is there: nobody was asked whether to write over it.
+    Refused where that is another file, which exists: nobody confirmed that it be overwritten.
     """
-    path = ended(name, ending)
+    path = with_suffix(name, ending)
     if path != Path(name) and path.exists():
-        raise Refusal(f"{path} is there already: choose it by its whole name to write over it")
+        raise Refusal(f"{path} exists already: select it by its full name to overwrite it")
     return path
 
 
-def named(words: str, line: QLineEdit) -> QLabel:
+def label_for(words: str, line: QLineEdit) -> QLabel:
     label = QLabel(words)
     label.setBuddy(line)
     return label
 
 
-def choosing(choose: Callable[[], None]) -> QPushButton:
-    """A button that lets one choose a file."""
+def browse_button(choose: Callable[[], None]) -> QPushButton:
+    """A button that opens a file dialog."""
     button = QPushButton("Choose\N{HORIZONTAL ELLIPSIS}")
-    button.setToolTip("Look for the file, instead of typing its name.")
+    button.setToolTip("Select the file in a dialog.")
     button.setAutoDefault(False)  # or Enter in a line would press the first of them
     button.clicked.connect(guarded(lambda *_: choose()))
     return button
 
 
-def beside(line: QLineEdit, button: QPushButton) -> QHBoxLayout:
+def with_button(line: QLineEdit, button: QPushButton) -> QHBoxLayout:
     layout = QHBoxLayout()
     layout.addWidget(line, 1)
     layout.addWidget(button)

@@ -1,4 +1,4 @@
-"""What the colours mean: a scale with its limits and unit, which may be locked."""
+"""Colour bars: a scale with its limits and unit, and a lock."""
 
 import numpy as np
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
@@ -16,9 +16,9 @@ _SWATCH = 10  # px of a colour in the legend
 
 
 class ColourBar(QWidget):
-    """A vertical scale of colours with its limits and unit, over colours that mean something else.
+    """A vertical scale of colours with its limits and unit, above a legend of other colours.
 
-    Of kinds, which have no scale, there is the legend only.
+    Kinds, which have no scale, have the legend only.
     """
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -38,7 +38,7 @@ class ColourBar(QWidget):
             self.widen()
 
     def widen(self) -> None:
-        """Have room for numbers and legend in the letters of now."""
+        """Set the width for numbers and legend in the present font."""
         wide = self.fontMetrics().horizontalAdvance
         legend = max((_SWATCH + wide(words) for _, words in self.legend), default=0)
         numbers = max(map(wide, (_WIDEST, *self._numbers.values())))
@@ -46,7 +46,7 @@ class ColourBar(QWidget):
 
     @property
     def _numbers(self) -> dict[float, str]:
-        """What is written at which shares of the scale."""
+        """The numbers by their shares of the scale."""
         low, high = self.limits
         span = (high - low) / 2
         return {share: in_digits(low + share * (high - low), span) for share in (0.0, 0.5, 1.0)}
@@ -57,7 +57,7 @@ class ColourBar(QWidget):
 
     @property
     def reach(self) -> float:
-        """How far the colours reach, as a range is locked to it."""
+        """The limit of the colours, to which a range is locked."""
         return self._tint.limit
 
     @property
@@ -69,7 +69,7 @@ class ColourBar(QWidget):
         self.show_tint(Tint(colours, limits, unit))
 
     def show_tint(self, tint: Tint, legend: tuple[tuple[str, str], ...] = ()) -> None:
-        """Show a scale, and a `legend` of other colours that are seen, (#rrggbb, words)."""
+        """Show a scale, and a `legend` of other visible colours, (#rrggbb, words)."""
         was = self._tint
         if (was.limits, was.unit, self.legend) != (tint.limits, tint.unit, legend) or (
             was.colours is not tint.colours
@@ -109,14 +109,14 @@ class ColourBar(QWidget):
 
 
 class LockButton(QToolButton):
-    """Says whether a range of colours is locked; `wanted` says that it should be, or not."""
+    """A button that locks a range of colours; `wanted` requests it."""
 
     wanted = Signal(bool)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setCheckable(True)
-        self.setToolTip("Keep the colours' range as it is now; else it follows what is shown.")
+        self.setToolTip("Fix the range of the colours; else it follows the values shown.")
         self.clicked.connect(self._ask)
         self.show_locked(False)
 
@@ -130,7 +130,7 @@ class LockButton(QToolButton):
 
 
 class SkinScale(QWidget):
-    """What colours the skin, on which scale, its lock, and how many times larger it is drawn."""
+    """The scale of the skin: quantity, colour bar, lock, and vertical exaggeration."""
 
     lock_wanted = Signal(bool)
 
@@ -143,8 +143,7 @@ class SkinScale(QWidget):
         self._symbol = ""
         self.times = QLabel(alignment=Qt.AlignmentFlag.AlignHCenter)  # pyright: ignore[reportCallIssue]
         self.times.setToolTip(
-            "How many times the displacement is drawn larger: what Height asks for, or as much of "
-            "it as fits into the picture."
+            "Vertical exaggeration: that set as Height, or as much of it as fits the view."
         )
         around = QVBoxLayout(self)
         around.setContentsMargins(0, 4, 0, 4)
@@ -154,20 +153,20 @@ class SkinScale(QWidget):
         around.addWidget(self.times)
 
     def show_unit(self, unit: float) -> None:
-        """Be read from afar where a unit is so many px, and ask nothing then; else as usual."""
+        """Use large letters without controls where a unit is so many px; 0: the usual ones."""
         for part in (self.lock, self.times):
             part.setVisible(not unit)
         self.setFont(read_from_afar(unit))
 
     def show_what(self, symbol: str, tip: str) -> None:
-        """Say by its `symbol` in HTML what colours the skin; the `tip` explains it."""
+        """Show the `symbol` in HTML of the quantity that colours the skin, with its tooltip."""
         if symbol != self._symbol:
             self._symbol = symbol
             self.what.setText(f"<b>{symbol}</b>")
             self.what.setToolTip(tip)
 
     def show_times(self, times: float) -> None:
-        """Say how many `times` higher the skin is drawn."""
+        """Show the vertical exaggeration."""
         text = f"height\n\N{MULTIPLICATION SIGN} {times:.3g}"
         if text != self.times.text():
             self.times.setText(text)

@@ -1,4 +1,4 @@
-"""Layouts of widgets: in columns, in rows, flowing, and rows of a table."""
+"""Layouts of widgets: rows, scrolled columns, flow, table rows."""
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QSize, Qt
 from PySide6.QtGui import QResizeEvent, QShowEvent
@@ -19,7 +19,7 @@ _HIGHEST = 0.5  # of the window's height, of what is below the skin and asks for
 
 
 def row(*widgets: QWidget) -> QWidget:
-    """The widgets beside each other, as wide as they like to be."""
+    """The widgets in a row, with their preferred widths."""
     whole = QWidget()
     beside = QHBoxLayout(whole)
     beside.setContentsMargins(0, 0, 0, 0)
@@ -29,7 +29,7 @@ def row(*widgets: QWidget) -> QWidget:
 
 
 def scrolled(*widgets: QWidget) -> QScrollArea:
-    """The widgets as tall as they like to be, scrolled where the window is too low for them."""
+    """The widgets in a column with their preferred heights, scrolled where it does not fit."""
     whole, stack = QWidget(), QVBoxLayout()
     for widget in widgets:
         stack.addWidget(widget)
@@ -37,7 +37,7 @@ def scrolled(*widgets: QWidget) -> QScrollArea:
     whole.setLayout(stack)
     area = _Scrolled()
     area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # a stop on the way of Tab that nobody sees
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # else an invisible stop of Tab
     area.setFrameShape(QScrollArea.Shape.NoFrame)
     area.setWidget(whole)
     area.widen()
@@ -45,7 +45,7 @@ def scrolled(*widgets: QWidget) -> QScrollArea:
 
 
 class _Scrolled(QScrollArea):
-    """As wide as what is in it needs with the letters of now."""
+    """A scroll area as wide as its widget in the present font."""
 
     def __init__(self) -> None:
         super().__init__(widgetResizable=True)  # pyright: ignore[reportCallIssue]
@@ -77,7 +77,7 @@ class _Scrolled(QScrollArea):
 
 
 def scroll_to(widget: QWidget) -> None:
-    """Bring a widget in sight, where it is on a page that is scrolled."""
+    """Scroll to a widget, where it is on a scrolled page."""
     area = widget.parentWidget()
     while area is not None and not isinstance(area, QScrollArea):
         area = area.parentWidget()
@@ -103,7 +103,7 @@ _GAP = 6  # px between two widgets, and between two lines
 
 
 class Flow(QLayout):
-    """Lays its widgets out like words; as narrow as the widest of them at least."""
+    """A layout of widgets in lines, like words; at least as wide as the widest."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -163,7 +163,7 @@ class Flow(QLayout):
 
 
 def _put(line: list[QLayoutItem], at: QPoint, high: int) -> None:
-    """Put what stands in one line beside each other, each in the middle of its height."""
+    """Put the items of a line beside each other, vertically centred."""
     x = at.x()
     for item in line:
         size = item.sizeHint()
@@ -175,7 +175,7 @@ _ROOM = 5  # px above and below a line together
 
 
 def fit_rows(table: QTableWidget) -> None:
-    """Make every row of a `table` as high as a line of its letters of now."""
+    """Set the row height of a `table` to a line of its present font."""
     header, line = table.verticalHeader(), table.fontMetrics().height()
     if header.defaultSectionSize() != line + _ROOM:
         header.setMinimumSectionSize(line)

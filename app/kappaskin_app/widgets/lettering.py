@@ -1,4 +1,4 @@
-"""A height in pixels to letters of that height, and words to where they are painted."""
+"""Fonts of a given capital height, and texts painted in rectangles."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,7 @@ def letters(font: QFont, capital: float, bold: bool = False) -> QFont:
 
 
 def read_from_afar(unit: float) -> QFont:
-    """The letters of captions where a unit of the picture is so many px; as usual where it is 0."""
+    """The font of captions where a unit of the picture is so many px; the default one where 0."""
     return letters(QFont(), CAPTION * unit) if unit else QFont()
 
 
@@ -62,7 +62,7 @@ def width_of(font: QFont, text: str) -> float:
 
 
 def shrunk(words: Words) -> Words:
-    """The words as large as they fit; what cannot be foreseen is smaller rather than cut off."""
+    """The words in the largest font in which they fit."""
     font = QFont(words.font)
     while not words.fits and font.pixelSize() > 8:
         font.setPixelSize(max(8, round(0.92 * font.pixelSize())))

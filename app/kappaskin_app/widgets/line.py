@@ -1,4 +1,4 @@
-"""One line of text that changes many times a second."""
+"""A line of text that changes many times a second."""
 
 from PySide6.QtCore import QEvent, QSize, Qt
 from PySide6.QtGui import QFontMetrics, QHelpEvent, QPainter, QPaintEvent
@@ -6,10 +6,10 @@ from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
 
 class Line(QWidget):
-    """Draws its text where it stands; a QLabel would have the whole window laid out anew.
+    """A line of text drawn in place; a QLabel would lay out the whole window again.
 
-    Where there is no room for all of it, it does without what it begins with, if that may be
-    left out; where there is none for that either, the tooltip begins with the text.
+    Where the text does not fit, its head is left out; where the rest does not fit either, the
+    tooltip begins with the text.
     """
 
     def __init__(self, text: str = "", parent: QWidget | None = None) -> None:

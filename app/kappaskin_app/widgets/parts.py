@@ -1,4 +1,4 @@
-"""What the pages of a calibration have in common: words, numbers and small widgets."""
+"""Small widgets and texts: labels, headings, buttons, numbers with errors."""
 
 import numpy as np
 from PySide6.QtCore import QEvent, Qt
@@ -42,11 +42,11 @@ def number(value: float, how: str) -> str:
 
 def with_error(value: float, sd: float, digits: int, unit: str = "", sign: str = "") -> str:
     """A number with its error bar, as far as that is known; a dash for what is not known."""
-    told = number(value, f"{sign}.{digits}f")
+    text = number(value, f"{sign}.{digits}f")
     if not np.isfinite(value):
-        return told
+        return text
     bar = f" \N{PLUS-MINUS SIGN} {sd:.{digits}f}" if np.isfinite(sd) else ""
-    return f"{told}{bar} {unit}".rstrip()
+    return f"{text}{bar} {unit}".rstrip()
 
 
 def sentence(text: str) -> str:

@@ -82,7 +82,7 @@ class Curve:
 
 
 class CurvePlot(QWidget):
-    """Curves over the same places `x`; `pointed` tells the element whose curve is pointed at."""
+    """Curves over the same axis `x`; `pointed` brings the element of the curve under the mouse."""
 
     pointed = Signal(int)
 
@@ -157,7 +157,7 @@ class CurvePlot(QWidget):
         pieces = (as_seen(x[begin:end], y[begin:end]) for begin, end in ends.tolist())
         return [[QPointF(*p) for p in zip(u.tolist(), v.tolist(), strict=True)] for u, v in pieces]
 
-    # What a person does.
+    # Mouse.
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         at = event.position()

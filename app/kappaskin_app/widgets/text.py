@@ -1,4 +1,4 @@
-"""Numbers, lengths, times and dates as people read them."""
+"""Numbers, lengths, times and dates as text."""
 
 import math
 import re
@@ -6,22 +6,22 @@ from datetime import datetime
 
 NONE = "\N{EN DASH}"
 COMMAND = re.compile("`([^`]+)`")
-"""What a message tells to type."""
+"""A command in a message."""
 _LENGTHS = ((1e-6, 1e-3, "mm"), (1e-9, 1e-6, "\N{MICRO SIGN}m"), (0.0, 1e-9, "nm"))
 _TIMES = ((1.0, 1.0, "s"), (1e-3, 1e-3, "ms"), (0.0, 1e-6, "\N{MICRO SIGN}s"))
 
 
 def length(metres: float) -> str:
     """Two digits and the unit; a dash for what is not known."""
-    return _said(metres, _LENGTHS)
+    return _with_unit(metres, _LENGTHS)
 
 
 def duration(seconds: float) -> str:
     """Two digits and the unit; a dash for what is not known."""
-    return _said(seconds, _TIMES)
+    return _with_unit(seconds, _TIMES)
 
 
-def _said(value: float, units: tuple[tuple[float, float, str], ...]) -> str:
+def _with_unit(value: float, units: tuple[tuple[float, float, str], ...]) -> str:
     if not math.isfinite(value):
         return NONE
     # As it will be rounded: 999.7 us are 1 ms.

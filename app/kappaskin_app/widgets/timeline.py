@@ -1,4 +1,4 @@
-"""A timeline: its course under a handle, its buttons and its clock."""
+"""Timelines: a slider, buttons and a clock."""
 
 import math
 from collections.abc import Callable
@@ -35,7 +35,7 @@ def _whole_ms(seconds: float) -> int:
 class Course(QAbstractSlider):
     """The handle over `paint_course`; its value is the time in ms, for those who do not see it.
 
-    `sought` asks for a time in s, from 0 to `last`.
+    `sought` requests a time in s, from 0 to `last`.
     """
 
     sought = Signal(float)
@@ -75,7 +75,7 @@ class Course(QAbstractSlider):
         self.show_time(min(max(seconds, 0.0), self.last))
         self.sought.emit(self.time)
 
-    # What a person does.
+    # Mouse and keys.
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
@@ -255,7 +255,7 @@ class Clock(QWidget):
             self.update()
 
     def show_unit(self, unit: float) -> None:
-        """Be read from afar where a unit is so many px; else as usual."""
+        """Use large letters where a unit is so many px; 0: the usual ones."""
         self.setFont(read_from_afar(unit))
 
     def changeEvent(self, event: QEvent) -> None:

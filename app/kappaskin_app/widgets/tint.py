@@ -1,4 +1,4 @@
-"""Numbers to colours: a colour map between limits, or a colour for each whole number."""
+"""Colours of numbers: a colour map between limits, or a colour for each whole number."""
 
 from dataclasses import dataclass
 

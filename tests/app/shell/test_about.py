@@ -35,7 +35,7 @@ def test_it_leads_on_to_a_page_of_the_guide(panels) -> None:
     asked: list[str] = []
     for panel in panels.all():
         (link,) = re.findall(r'href="(\w+)"', panel.about.text())
-        panel.read_wanted.connect(asked.append)
+        panel.guide_requested.connect(asked.append)
         panel.about.linkActivated.emit(link)
         assert page_called(asked[-1]).headings
     assert len(asked) == len(panels.all())

@@ -215,7 +215,7 @@ class Bench:
             name: BackgroundTask[object](self.tasks, name, self.told.append, cancelled="Cancelled.")
             for name in ("Counting", "Sorting")
         }
-        self.tasks.told.connect(self.told.append)
+        self.tasks.notified.connect(self.told.append)
 
     @property
     def going(self) -> set[str]:
@@ -228,7 +228,7 @@ class Bench:
                 task.stop()
             elif not task.running:
                 task.begin(Counting)
-        self.tasks.tell(Status(computing=computing))
+        self.tasks.report(Status(computing=computing))
 
 
 @pytest.fixture
@@ -267,7 +267,7 @@ def test_cancel_ends_the_one_that_is_told_and_no_other(bench: Bench) -> None:
 def test_what_the_engine_computes_is_told_and_cannot_be_cancelled(bench: Bench) -> None:
     bench.at(0.0, computing=True)
     bench.at(1.0, computing=True)
-    assert bench.told == ["Computing the new settings; Ctrl+Z takes them back: 1 s"]
+    assert bench.told == ["Computing the new settings; Ctrl+Z undoes them: 1 s"]
     assert not bench.tasks.may_cancel
 
 
@@ -286,11 +286,11 @@ def test_what_is_told_at_the_foot_of_the_window_can_be_cancelled_there(
 ) -> None:
     window.costing.watch(True)
     until(lambda: window.costing.running)
-    until(lambda: "accuracy" in window.display.foot.activity.words.text())
-    window.display.foot.activity.cancel.click()
+    until(lambda: "accuracy" in window.display.status_bar.activity.words.text())
+    window.display.status_bar.activity.cancel.click()
     assert not window.costing.running
     assert window.costing.refusal.startswith("Cancelled")
-    until(lambda: "accuracy" not in window.display.foot.activity.words.text())
+    until(lambda: "accuracy" not in window.display.status_bar.activity.words.text())
     window.costing.measure()
     assert not window.costing.refusal
 

@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin_app.shell.layouts.layout import layout_of, words_of
+from kappaskin_app.shell.arrangement import layout_of, words_of
 from kappaskin_app.shell.window import MainWindow
 
 _SPARED = ("quit", "undo", "redo")  # the window would be gone; and what the others are tried with

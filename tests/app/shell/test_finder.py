@@ -8,8 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
 from kappaskin.scenes import scene_file
-from kappaskin_app.shell.finder.finder import Finder, score
-from kappaskin_app.shell.finder.things import FinderEntry, things_in
+from kappaskin_app.shell.finder import Finder, FinderEntry, entries_in, score
 from kappaskin_app.shell.window import MainWindow
 
 WORDS = st.text("abc- ", min_size=1, max_size=12)
@@ -138,15 +137,17 @@ def test_ctrl_k_finds_every_kind_of_thing_in_the_window(
     window.opening.note(tmp_path / "gone.mcap")
     window.opening.note(file)
     (gone,) = [
-        thing for thing in things_in(window, window.menus.things) if thing.title == "Open gone.mcap"
+        thing
+        for thing in entries_in(window, window.menus.entry_sources)
+        if thing.title == "Open gone.mcap"
     ]
-    assert gone.why_not == "not there any more: moved or deleted"
+    assert gone.why_not == "moved or deleted"
     do("own fing")
     until(lambda: getattr(window.history.settings.written, "file", None) == file)
     do("play scene coin")
     until(lambda: window.session.source == "sim:" and window.display.badge.state == "SIM")
     assert window.history.settings.written.file.stem == "coin"
-    names = [thing.name for thing in things_in(window, window.menus.things)]
+    names = [thing.name for thing in entries_in(window, window.menus.entry_sources)]
     assert len(set(names)) == len(names)
     entries = window.actions_by_name.entries.values()
     asked = {f"action:{entry.name}" for entry in entries if entry.action.menu() is None}

@@ -61,7 +61,7 @@ def test_wishes_in_a_row_are_one_step_that_tells_the_first_and_the_last_value(
 ) -> None:
     history = History(Settings())
     for creep in (0.02, 0.03, 0.05):
-        history.wish("creep", creep=creep)
+        history.request("creep", creep=creep)
     assert history.stack.undoText() == "creep 0 \N{RIGHTWARDS ARROW} 5 %"
     history.stack.undo()
     assert history.settings == Settings()
@@ -69,18 +69,18 @@ def test_wishes_in_a_row_are_one_step_that_tells_the_first_and_the_last_value(
 
 def test_a_wish_after_an_undo_is_no_part_of_what_was_before(qapp: QApplication) -> None:
     history = History(Settings())
-    history.wish("creep", creep=0.02)
+    history.request("creep", creep=0.02)
     history.stack.undo()
     history.stack.redo()
-    history.wish("creep", creep=0.03)
+    history.request("creep", creep=0.03)
     history.stack.undo()
     assert history.settings.creep == 0.02
 
 
 def test_wishes_that_end_where_they_began_are_no_step(qapp: QApplication) -> None:
     history = History(Settings())
-    history.wish("show_band", show_band=True)
-    history.wish("show_band", show_band=False)
+    history.request("show_band", show_band=True)
+    history.request("show_band", show_band=False)
     assert (history.stack.count(), history.settings) == (0, Settings())
 
 

@@ -29,7 +29,7 @@ def shared(qapp: QApplication, until, window_class) -> Iterator[MainWindow]:
     qapp.setStyle("Fusion")
     window = window_class("sim:")
     window.show()
-    until(lambda: bool(window.display.foot.object.text()))
+    until(lambda: bool(window.display.status_bar.object.text()))
     window.requests.set("letters", 200.0)
     yield window
     window.history.stack.setIndex(0)
@@ -112,10 +112,10 @@ def test_ways_to_begin_stand_whole_above_a_dock(large: MainWindow) -> None:
     large.docks.reveal("design")
     large.menus.welcome.offer()
     _settle()
-    wrong, size = cut(large.display.centre.offer), (large.width(), large.height())
-    low = max(button.geometry().bottom() for button in large.display.centre.offer.buttons)
-    inside = low < large.display.centre.offer.height()
-    large.display.centre.offer.hide()
+    wrong, size = cut(large.display.centre.banner), (large.width(), large.height())
+    low = max(button.geometry().bottom() for button in large.display.centre.banner.buttons)
+    inside = low < large.display.centre.banner.height()
+    large.display.centre.banner.hide()
     large.docks["design"].hide()
     assert (wrong, inside, size) == ([], True, (1280, 800))
 

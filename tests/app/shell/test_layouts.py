@@ -9,10 +9,7 @@ from PySide6.QtCore import QRect
 from PySide6.QtWidgets import QLabel, QMainWindow, QTabWidget
 
 from kappaskin import Refusal
-from kappaskin_app.shell.docks import Docks
-from kappaskin_app.shell.layouts.keeping import clamped
-from kappaskin_app.shell.layouts.kept import Kept, from_text, to_text
-from kappaskin_app.shell.layouts.layout import (
+from kappaskin_app.shell.arrangement import (
     AREAS,
     FLOATING,
     Layout,
@@ -21,7 +18,9 @@ from kappaskin_app.shell.layouts.layout import (
     layout_of,
     ready_layout,
 )
+from kappaskin_app.shell.docks import Docks
 from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.shell.window_file import WindowState, clamped, from_text, to_text
 
 BELOW = (
     *("cost", "stability", "scene", "health", "compare", "design"),
@@ -56,7 +55,7 @@ LAYOUTS = st.builds(
 )
 NAMES = st.text(min_size=1, max_size=20)
 KEPT = st.builds(
-    Kept,
+    WindowState,
     st.sampled_from(["", "light", "dark"]),
     st.none() | RECTANGLES,
     st.booleans(),
@@ -69,7 +68,7 @@ KEPT = st.builds(
 
 
 @given(KEPT)
-def test_whatever_is_kept_comes_back_from_its_text(kept: Kept) -> None:
+def test_whatever_is_kept_comes_back_from_its_text(kept: WindowState) -> None:
     assert from_text(to_text(kept)) == kept
 
 
@@ -110,7 +109,7 @@ def test_any_layout_goes_through_text_and_window_and_back(bare, qapp, layout: La
     assert once.page == layout.page
     arrange(window, docks.by_name(), pages, ready_layout(docks, "Live", 0))
     qapp.processEvents()
-    again = from_text(to_text(Kept(now=once))).now
+    again = from_text(to_text(WindowState(now=once))).now
     arrange(window, docks.by_name(), pages, again)
     qapp.processEvents()
     twice = layout_of(window, docks.by_name(), pages)
@@ -153,7 +152,7 @@ def test_tabs_keep_their_order_and_docks_that_share_a_column_their_sizes(bare, q
 def test_docks_that_there_are_not_are_passed_over(bare, qapp) -> None:
     window, docks, pages = bare
     window.show()
-    text = to_text(Kept(now=ready_layout(docks, "Study", 0))).replace(
+    text = to_text(WindowState(now=ready_layout(docks, "Study", 0))).replace(
         "curvature = ", "holograms = "
     )
     arrange(window, docks.by_name(), pages, from_text(text).now)
@@ -185,7 +184,7 @@ def test_a_window_comes_back_on_a_screen_that_is_there(place, seen) -> None:
 def test_a_window_is_kept_and_comes_back(opened, until, tmp_path: Path, qapp) -> None:
     path = tmp_path / "deep" / "window.toml"
     window = opened("sim:")
-    window.keeping.begin(path)
+    window.saver.begin(path)
     window.requests.set("theme", "light")
     window.layouts.choose("Study")
     assert window.cost.isVisible()
@@ -204,7 +203,7 @@ def test_a_window_is_kept_and_comes_back(opened, until, tmp_path: Path, qapp) ->
     window.close()
     other = opened("sim:")
     qapp.processEvents()
-    other.keeping.begin(path)
+    other.saver.begin(path)
     for _ in range(3):
         qapp.processEvents()
     assert other.history.stack.count() == 0  # nobody did what is as it was
@@ -236,7 +235,7 @@ def test_a_dock_of_another_version_is_passed_over(bare) -> None:
 
 def test_a_window_that_was_not_asked_to_keeps_nothing(window: MainWindow, tmp_path: Path) -> None:
     window.layouts.save("Mine")
-    window.keeping.write()
+    window.saver.write()
     assert list(tmp_path.iterdir()) == []
 
 

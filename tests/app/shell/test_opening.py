@@ -68,7 +68,7 @@ def test_scenes_and_meshes_dropped_are_played_and_listed_until_cleared(
     menu.aboutToShow.emit()
     first, second = menu.actions()[:2]
     assert (first.text(), first.isEnabled()) == ("tip && edge.obj", True)
-    assert (second.text(), second.isEnabled()) == ("own.toml  (not there)", False)
+    assert (second.text(), second.isEnabled()) == ("own.toml  (missing)", False)
     assert "moved or deleted" in second.toolTip()
     menu.actions()[-1].trigger()
     assert window.opening.recent == []

@@ -12,11 +12,11 @@ from kappaskin.live.requests import Requested
 from kappaskin.recording import RecordingStatus
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.recovery import (
-    WindowStateStore,
+    SettingsHandover,
+    resume_text,
     settings_in,
     settings_left,
     settings_text,
-    words,
 )
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.window import MainWindow
@@ -44,7 +44,7 @@ def test_the_next_window_goes_on_as_the_last_one_was(
     alone = abandoned(folder, tmp_path / "press.mcap", window_state=settings_text(BEFORE).encode())
     until(lambda: bool(list(folder.glob("*.note"))))
     window: MainWindow = opened("/dev/ttyABSENT7", Engine(resume_from=folder))
-    until(lambda: window.display.badge.state == "SIM" and window.taping.recording)
+    until(lambda: window.display.badge.state == "SIM" and window.recorder.recording)
     status = window.session.status
     assert (status.generation, status.setup) == (alone.generation, Setup(6, 7))
     assert window.history.settings == BEFORE
@@ -52,13 +52,13 @@ def test_the_next_window_goes_on_as_the_last_one_was(
     text = window.recording.message.text()
     assert text.startswith("The recording press.mcap of the simulated skin continued for ")
     assert text.endswith(
-        "You asked for /dev/ttyABSENT7: Connect goes there, and the recording goes on with it."
+        "You requested /dev/ttyABSENT7: Connect opens it, and the recording continues with it."
     )
     assert window.connection.source() == "/dev/ttyABSENT7"
     until(lambda: window.session.estimate.true_contact.tolist() == [0.03, 0.07])
     assert window.session.scene.loads[0].centre().tolist() == [0.03, 0.07]
     window.actions_by_name["record"].trigger()
-    until(lambda: not window.taping.recording)
+    until(lambda: not window.recorder.recording)
     assert window.session.status.recording.trouble == ""
     window.close()
     until(lambda: alone.gone)
@@ -73,11 +73,11 @@ def test_settings_that_cannot_be_read_are_those_of_the_source(data: bytes) -> No
 
 def test_what_is_said_names_file_and_source_and_what_was_asked_for_if_it_is_another() -> None:
     told = f"The recording press.mcap of the simulated skin {left('').lasted}."
-    assert words(left("sim:"), "sim:") == told
-    assert "press.mcap of COM7 continued" in words(left("COM7"), "COM7")
-    assert words(left(None), "sim:") == f"The recording press.mcap {left('').lasted}."
-    assert words(left("sim:"), "COM3") == (
-        f"{told} You asked for COM3: Connect goes there, and the recording goes on with it."
+    assert resume_text(left("sim:"), "sim:") == told
+    assert "press.mcap of COM7 continued" in resume_text(left("COM7"), "COM7")
+    assert resume_text(left(None), "sim:") == f"The recording press.mcap {left('').lasted}."
+    assert resume_text(left("sim:"), "COM3") == (
+        f"{told} You requested COM3: Connect opens it, and the recording continues with it."
     )
 
 
@@ -93,12 +93,12 @@ class Trusted:
 
 def test_settings_are_stored_once_each_and_only_while_it_records(qapp) -> None:
     history, engine = History(Settings()), Trusted()
-    storing = WindowStateStore(history, engine)
+    handover = SettingsHandover(history, engine)
     recording = Status(recording=RecordingStatus("x.mcap", active=True))
-    storing.follow(Status())
+    handover.follow(Status())
     assert engine.data == []
     for status in (recording, recording, Status()):
-        storing.follow(status)
+        handover.follow(status)
     history.change("x", -1, functions_x=6)
-    storing.follow(recording)
+    handover.follow(recording)
     assert [settings_in(data.decode()).functions_x for data in engine.data] == [8, 6]

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from kappaskin_app.shell.recovery import Last, Recovering, Running, crashed, settings_text
+from kappaskin_app.shell.recovery import LastSession, OpenWindow, Recovery, crashed, settings_text
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.window import MainWindow
 
-LAST = Last(Settings(functions_x=5), "sim:circle", "there.mcap")
+LAST = LastSession(Settings(functions_x=5), "sim:circle", "there.mcap")
 
 
-def leave(folder: Path, last: Last = LAST) -> None:
+def leave(folder: Path, last: LastSession = LAST) -> None:
     """As a window does that dies."""
     folder.mkdir(exist_ok=True)
     said = {"settings": json.loads(settings_text(last.settings)), "source": last.source}
@@ -24,7 +24,7 @@ def leave(folder: Path, last: Last = LAST) -> None:
 def test_a_window_that_is_killed_leaves_what_it_was_at_once(tmp_path: Path) -> None:
     lines = (
         "import os, pathlib; from kappaskin_app.shell.recovery import *;"
-        f"Running(pathlib.Path({str(tmp_path)!r})).keep(Last(Settings(functions_x=5),"
+        f"OpenWindow(pathlib.Path({str(tmp_path)!r})).keep(LastSession(Settings(functions_x=5),"
         " 'sim:circle', 'there.mcap')); os.kill(os.getpid(), 9)"
     )
     env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
@@ -36,7 +36,7 @@ def test_a_window_that_is_killed_leaves_what_it_was_at_once(tmp_path: Path) -> N
 
 
 def test_a_window_that_is_open_or_was_closed_has_not_crashed(tmp_path: Path) -> None:
-    running = Running(tmp_path)
+    running = OpenWindow(tmp_path)
     running.keep(LAST)
     assert crashed(tmp_path) is None
     running.close()
@@ -54,12 +54,12 @@ def test_after_a_crash_its_settings_are_offered_and_can_be_undone(
     window: MainWindow, tmp_path: Path, until
 ) -> None:
     leave(tmp_path)
-    recovering = Recovering(window, tmp_path)
-    assert window.display.centre.offer.isVisible()
-    texts = [button.text().replace("&", "") for button in window.display.centre.offer.buttons]
+    recovering = Recovery(window, tmp_path)
+    assert window.display.centre.banner.isVisible()
+    texts = [button.text().replace("&", "") for button in window.display.centre.banner.buttons]
     assert texts == ["Its settings", "Report\N{HORIZONTAL ELLIPSIS}"]  # the recording is gone
-    window.display.centre.offer.buttons[0].click()
-    assert not window.display.centre.offer.isVisible()
+    window.display.centre.banner.buttons[0].click()
+    assert not window.display.centre.banner.isVisible()
     assert window.history.settings.functions_x == 5
     window.history.stack.undo()
     assert window.history.settings.functions_x == 8
@@ -68,8 +68,8 @@ def test_after_a_crash_its_settings_are_offered_and_can_be_undone(
 
 
 def test_after_an_orderly_end_nothing_is_offered(window: MainWindow, tmp_path: Path) -> None:
-    recovering = Recovering(window, tmp_path)
-    assert not window.display.centre.offer.isVisible()
+    recovering = Recovery(window, tmp_path)
+    assert not window.display.centre.banner.isVisible()
     recovering.close()
 
 
@@ -79,10 +79,10 @@ def test_a_recording_that_is_left_is_offered(
 ) -> None:
     there = tmp_path / "there.mcap"
     Path(f"{there}{suffix}").write_bytes(recording.read_bytes())
-    leave(tmp_path / "open", Last(Settings(), "", str(there)))
-    recovering = Recovering(window, tmp_path / "open")
+    leave(tmp_path / "open", LastSession(Settings(), "", str(there)))
+    recovering = Recovery(window, tmp_path / "open")
     take = next(
-        b for b in window.display.centre.offer.buttons if "recording" in b.text().replace("&", "")
+        b for b in window.display.centre.banner.buttons if "recording" in b.text().replace("&", "")
     )
     take.click()
     until(lambda: window.display.badge.state.startswith("REPLAY"))

@@ -10,7 +10,7 @@ from kappaskin import Refusal, read_scene
 from kappaskin.scenes import scene_file
 from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.loads import Memo, tried
-from kappaskin_app.shell.session import Ahead
+from kappaskin_app.shell.session import ScenePreparation
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.simulation import (
     plate_of,
@@ -24,12 +24,12 @@ from kappaskin_app.shell.simulation import (
 @pytest.fixture
 def ahead(qapp):
     tasks = Tasks()
-    yield Ahead(tasks, lambda: None)
+    yield ScenePreparation(tasks, lambda: None)
     tasks.close()
 
 
 @pytest.fixture
-def finish(ahead: Ahead, until):
+def finish(ahead: ScenePreparation, until):
     return lambda: until(lambda: not ahead.busy)
 
 
@@ -39,7 +39,9 @@ def shaped(name: str, rim_radius: float) -> Settings:
     return replace(settings, **changed | {"rim_radius": rim_radius})
 
 
-def test_a_skin_is_computed_beside_and_as_it_would_be_here(ahead: Ahead, finish, monkeypatch):
+def test_a_skin_is_computed_beside_and_as_it_would_be_here(
+    ahead: ScenePreparation, finish, monkeypatch
+):
     settings = shaped("disk", 0.047)
     skin = plate_of(settings), settings.edge
 
@@ -53,7 +55,7 @@ def test_a_skin_is_computed_beside_and_as_it_would_be_here(ahead: Ahead, finish,
 
 
 def test_a_written_scene_is_read_beside_or_refused_in_the_same_words(
-    ahead: Ahead, finish, monkeypatch
+    ahead: ScenePreparation, finish, monkeypatch
 ):
     good = replace(Settings(), written=written(scene_file("coin")))
     text = "[skin]\nside = 'wide'\n"
@@ -73,7 +75,7 @@ def test_a_written_scene_is_read_beside_or_refused_in_the_same_words(
     assert str(beside.value) == str(here.value).replace(str(good.written.file), "coin.toml")
 
 
-def test_another_skin_is_not_kept_waiting_by_the_one_before(ahead: Ahead, finish):
+def test_another_skin_is_not_kept_waiting_by_the_one_before(ahead: ScenePreparation, finish):
     assert not ahead.ready(shaped("hexagon", 0.0461))
 
     assert not ahead.ready(shaped("disk", 0.0462))
@@ -83,7 +85,7 @@ def test_another_skin_is_not_kept_waiting_by_the_one_before(ahead: Ahead, finish
     assert not ahead.ready(shaped("hexagon", 0.0461))  # begun anew
 
 
-def test_a_scene_is_made_here_when_the_process_dies(ahead: Ahead, finish):
+def test_a_scene_is_made_here_when_the_process_dies(ahead: ScenePreparation, finish):
     settings = shaped("disk", 0.0463)
     ahead.ready(settings)
 

@@ -6,10 +6,10 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QApplication, QLabel, QMainWindow
 
 from kappaskin import Refusal
-from kappaskin_app.shell.actions import WITHIN, Actions, in_words
-from kappaskin_app.shell.finder.sheet import CheatSheet
+from kappaskin_app.shell.actions import WITHIN, Actions, with_keys
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.shortcuts import ShortcutDialog
 from kappaskin_app.theme import DARK, LIGHT, palette
 
 CONTROL = Qt.KeyboardModifier.ControlModifier
@@ -27,14 +27,14 @@ def actions(qtbot) -> Actions:
 
 
 @pytest.fixture
-def sheet(actions: Actions) -> Iterator[CheatSheet]:
-    sheet = CheatSheet(actions, History(Settings(), actions.window), actions.window)
+def sheet(actions: Actions) -> Iterator[ShortcutDialog]:
+    sheet = ShortcutDialog(actions, History(Settings(), actions.window), actions.window)
     sheet.open_all()
     yield sheet
     sheet.close()
 
 
-def _shown(sheet: CheatSheet) -> list[str]:
+def _shown(sheet: ShortcutDialog) -> list[str]:
     rows = (sheet.list.topLevelItem(row) for row in range(sheet.list.topLevelItemCount()))
     return [row.text(2) for row in rows]
 
@@ -69,7 +69,7 @@ def test_of_two_that_want_one_key_the_second_is_told_and_has_none(actions: Actio
 
 
 def test_a_shortcut_is_found_changed_and_reset_with_the_keyboard(
-    sheet: CheatSheet, actions: Actions, qtbot, until
+    sheet: ShortcutDialog, actions: Actions, qtbot, until
 ) -> None:
     qtbot.keyClicks(sheet.line, "them")
     assert _shown(sheet) == ["Ctrl+T"]
@@ -86,7 +86,7 @@ def test_a_shortcut_is_found_changed_and_reset_with_the_keyboard(
     assert not sheet.reset.isEnabled()
 
 
-def test_all_are_reset_at_once(sheet: CheatSheet, actions: Actions) -> None:
+def test_all_are_reset_at_once(sheet: ShortcutDialog, actions: Actions) -> None:
     actions.take_keys({"picture": "Ctrl+T", "theme": "Ctrl+S"})
     sheet.open_all()
     sheet.reset_all.click()
@@ -95,7 +95,7 @@ def test_all_are_reset_at_once(sheet: CheatSheet, actions: Actions) -> None:
 
 
 def test_a_changed_shortcut_and_all_that_were_reset_come_back(
-    sheet: CheatSheet, actions: Actions, qtbot, until
+    sheet: ShortcutDialog, actions: Actions, qtbot, until
 ) -> None:
     stack, told = sheet.history.stack, []
     sheet.changed.connect(lambda: told.append(actions.changed_keys()))
@@ -122,7 +122,7 @@ def test_a_changed_shortcut_and_all_that_were_reset_come_back(
     ],
 )
 def test_a_text_names_the_keys_of_now(text: str, told: str) -> None:
-    assert in_words(text, {"Ctrl+S": "Ctrl+T", "Ctrl+T": "Ctrl+S", "F1": "", "": "Ctrl+J"}) == told
+    assert with_keys(text, {"Ctrl+S": "Ctrl+T", "Ctrl+T": "Ctrl+S", "F1": "", "": "Ctrl+J"}) == told
 
 
 def test_tooltips_follow_a_changed_shortcut_and_one_that_is_set_meanwhile(actions: Actions) -> None:
@@ -154,14 +154,14 @@ def test_a_tip_that_is_set_after_a_change_names_the_key_of_now(actions: Actions)
     assert label.toolTip() == "Not now; later with Ctrl+J"
     late = QLabel("y", actions.window)
     late.setToolTip("Ctrl+T")
-    actions.retell()
+    actions.update_tips()
     assert late.toolTip() == "Ctrl+J"
     actions.take_keys({})
     assert (label.toolTip(), late.toolTip()) == ("Not now; later with Ctrl+T", "Ctrl+T")
 
 
 def test_menus_beside_shortcuts_have_the_ink_of_the_theme_of_now(
-    sheet: CheatSheet, qapp: QApplication
+    sheet: ShortcutDialog, qapp: QApplication
 ) -> None:
     before = qapp.palette()
     for theme in (DARK, LIGHT):

@@ -9,9 +9,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from kappaskin_app.launch import _all_stays, _theme_in
-from kappaskin_app.shell.layouts.kept import Kept, KeptFile
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.splash import Splash
+from kappaskin_app.shell.window_file import WindowFile, WindowState
 from kappaskin_app.theme import DARK, LIGHT, THEMES, Theme, apply_look
 
 
@@ -37,8 +37,8 @@ def splash(qapp: QApplication) -> Iterator[Splash]:
 
 
 def test_it_says_at_once_what_is_loaded_and_all_of_it(splash: Splash) -> None:
-    splash.say("Loading the drawing in three dimensions (VTK)")
-    assert splash.words.text().startswith("Loading the drawing in three dimensions (VTK)")
+    splash.say("Loading 3-D graphics (VTK)")
+    assert splash.words.text().startswith("Loading 3-D graphics (VTK)")
     assert splash.words.width() >= splash.words.sizeHint().width()
     screen = QGuiApplication.primaryScreen().geometry()
     assert (splash.geometry().center() - screen.center()).manhattanLength() <= 2
@@ -82,7 +82,7 @@ def test_the_theme_that_is_kept_is_told_and_the_file_left_alone(tmp_path: Path) 
     path = tmp_path / "window.toml"
     first = THEMES[Settings().theme]
     assert _theme_in(path) is first
-    KeptFile(path).write(Kept(theme="light"))
+    WindowFile(path).write(WindowState(theme="light"))
     assert _theme_in(path) is LIGHT
     path.write_text("no TOML")
     assert _theme_in(path) is first

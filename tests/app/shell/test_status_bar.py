@@ -18,7 +18,7 @@ ESTIMATE = Pipeline(SCENE.sensor(), Setup())(Simulator(SCENE).frame(0, lambda: 0
 
 
 def suspecting(**why: int) -> np.ndarray:
-    """Codes (100,) that call so many elements, from the first on, by what they are left out for."""
+    """Codes (100,) that call so many elements, from the first on, by what they are excluded for."""
     codes = [FAULTS.index(kind) for kind, count in why.items() for _ in range(count)]
     return np.array(codes + [0] * (100 - len(codes)), np.uint8)
 
@@ -27,9 +27,9 @@ def suspecting(**why: int) -> np.ndarray:
     ("contact", "strained", "words"),
     [
         (INSIDE, 0, ""),
-        (NEAR, 0, "Contact too near the rim to trust"),
+        (NEAR, 0, "Contact near the rim: unreliable"),
         (INSIDE, 1, "1 element over 1 % strain"),
-        (NEAR, 12, "12 elements over 1 % strain; contact too near the rim to trust"),
+        (NEAR, 12, "12 elements over 1 % strain; contact near the rim: unreliable"),
     ],
 )
 def test_what_is_doubtful_is_told_in_words(contact: Contact, strained: int, words: str) -> None:
@@ -39,9 +39,9 @@ def test_what_is_doubtful_is_told_in_words(contact: Contact, strained: int, word
 @pytest.mark.parametrize(
     ("suspect", "words"),
     [
-        (suspecting(stuck=1), "Element 0 (stuck) left out"),
-        (suspecting(spike=1, swapped=2), "Elements 0 (spike), 1 (swapped), 2 (swapped) left out"),
-        (suspecting(noisy=3, stuck=2), "5 elements left out (stuck, noisy)"),
+        (suspecting(stuck=1), "Element 0 (stuck) excluded"),
+        (suspecting(spike=1, swapped=2), "Elements 0 (spike), 1 (swapped), 2 (swapped) excluded"),
+        (suspecting(noisy=3, stuck=2), "5 elements excluded (stuck, noisy)"),
     ],
 )
 def test_elements_that_are_left_out_are_named(suspect: np.ndarray, words: str) -> None:
@@ -49,7 +49,7 @@ def test_elements_that_are_left_out_are_named(suspect: np.ndarray, words: str) -
 
 
 def test_an_iteration_that_gave_up_is_told() -> None:
-    words = "The iteration gave up, least squares shown"
+    words = "No convergence; least squares shown"
     assert warnings(replace(ESTIMATE, converged=False), 0) == words
 
 

@@ -19,7 +19,7 @@ def shared(qapp: QApplication, until, window_class) -> Iterator[MainWindow]:
     qapp.setStyle("Fusion")
     window = window_class("sim:")
     window.show()
-    until(lambda: bool(window.display.foot.object.text()))
+    until(lambda: bool(window.display.status_bar.object.text()))
     window.heatmaps["xx"].chosen.emit(0)
     window.history.stack.undo()
     window.docks["element"].hide()

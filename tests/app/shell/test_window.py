@@ -74,15 +74,15 @@ def test_every_number_is_whole_beside_the_mark_of_a_recording(
     window: MainWindow, tmp_path: Path, until
 ) -> None:
     wide = window.readouts.width()
-    window.taping.begin(tmp_path / "a.mcap")
+    window.recorder.begin(tmp_path / "a.mcap")
     until(lambda: window.readouts.width() < wide - 50)
     until(lambda: window.readouts.text("error").endswith(" mm"))
     for line in window.readouts.findChildren(Line):  # each has its place once it has its text
         advance = line.fontMetrics().horizontalAdvance
         until(lambda line=line, advance=advance: advance(line.text()) < line.width() - 5)
     assert window.width() == 1280
-    window.taping.turn()
-    until(lambda: not window.taping.recording)
+    window.recorder.toggle()
+    until(lambda: not window.recorder.recording)
 
 
 def test_every_action_is_in_a_menu_and_no_shortcut_is_used_twice(window: MainWindow) -> None:
@@ -103,7 +103,7 @@ def test_every_action_is_in_a_menu_and_no_shortcut_is_used_twice(window: MainWin
 
 def test_every_shortcut_is_read_on_a_small_screen_under_its_menu(window: MainWindow, until) -> None:
     window.actions_by_name["shortcuts"].trigger()
-    sheet = window.menus.sheet
+    sheet = window.menus.shortcuts
     until(lambda: sheet.height() > 100)
     assert sheet.height() < 700
     assert sheet.width() < 1000

@@ -177,7 +177,7 @@ def test_a_round_skin_is_made_beside_the_window_and_drawn_round(
     until(lambda: window.session.estimate is not None and not message.text())
     until(lambda: colours_in(window, window.membrane) > 300)
     assert window.session.estimate.curvature.shape == (3, 80)
-    until(lambda: "principal curvatures" in window.display.foot.object.text())
+    until(lambda: "principal curvatures" in window.display.status_bar.object.text())
     window.requests.set("edge", "elastic")
     until(lambda: "elastic" in message.text())
     assert window.session.scene.edge == "hinged"

@@ -7,7 +7,7 @@ import pytest
 
 from kappaskin import Refusal
 from kappaskin_app.shell.background import Tasks
-from kappaskin_app.shell.work_dialog import WorkDialog, ended, with_ending
+from kappaskin_app.shell.work_dialog import WorkDialog, with_ending, with_suffix
 
 
 class Failing:
@@ -41,11 +41,11 @@ def test_only_a_file_chosen_by_its_whole_name_is_written_over(tmp_path: Path) ->
     assert with_ending(str(tmp_path / "mine"), ".toml") == file
     file.touch()
     assert with_ending(str(file), ".toml") == file
-    with pytest.raises(Refusal, match=r"mine\.toml is there already"):
+    with pytest.raises(Refusal, match=r"mine\.toml exists already"):
         with_ending(str(tmp_path / "mine"), ".toml")
 
 
 @pytest.mark.parametrize("name", ["mine", "mine.v2", "force 0.5 N"])
 def test_a_name_that_has_a_point_in_it_is_kept_whole(name: str) -> None:
     assert with_ending(name, ".toml") == Path(f"{name}.toml")
-    assert ended(name, ".mcap") == Path(f"{name}.mcap")
+    assert with_suffix(name, ".mcap") == Path(f"{name}.mcap")

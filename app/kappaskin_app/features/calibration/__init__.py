@@ -60,7 +60,7 @@ class CalibrationFeature:
             guarded(lambda: taring.stand_aside(calibrating.procedure is not None))
         )
         self.tare.attend(taring)
-        taring.told.connect(guarded(shell.tell))
+        taring.told.connect(guarded(shell.notify))
 
     def _add_actions(self, shell: MainWindow) -> None:
         add, take = shell.actions_by_name.add, self.calibrating.take
@@ -72,7 +72,7 @@ class CalibrationFeature:
 
     def _use(self, file: Path) -> None:
         self.calibrating.load(file)
-        self._shell.tell(self.calibrating.file_refused or f"Using the calibration {file.name}")
+        self._shell.notify(self.calibrating.file_refused or f"Using the calibration {file.name}")
 
 
 def is_calibration(file: Path) -> bool:

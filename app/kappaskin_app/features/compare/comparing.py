@@ -83,7 +83,7 @@ class Comparing(QObject):
     def _ask(self) -> None:
         wanted = None
         if self._watched:
-            wanted = other_setup(self._history.settings, self._session.asked)
+            wanted = other_setup(self._history.settings, self._session.requested_setup)
         if wanted != self._asked:
             self._asked = wanted
             self._session.engine.compare(wanted)

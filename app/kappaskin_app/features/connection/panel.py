@@ -20,7 +20,7 @@ from kappaskin.sensing import Sensor
 from kappaskin.sources import Port
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import BackgroundTask, Tasks
-from kappaskin_app.shell.form import well_behaved
+from kappaskin_app.shell.form import pass_window_keys
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.widgets.parts import said
 from kappaskin_app.widgets.text import COMMAND, day
@@ -116,7 +116,7 @@ class ConnectionPanel(Panel):
         self.body.addWidget(self.device)
         self.body.addWidget(self.losses)
         self._around.addWidget(self.copy_button, alignment=Qt.AlignmentFlag.AlignRight)
-        well_behaved(self.sources)
+        pass_window_keys(self.sources)
         self._list()
 
     def source(self) -> str:

@@ -31,13 +31,13 @@ class ContactFeature:
         self.naming = Naming(shell.tasks, shell)
         display.header.add(self.readouts)
         shell.docks.put_below("numbers", "Numbers", self.numbers, "Ctrl+Shift+T", _ABOUT)
-        display.foot.object.setToolTip(_OBJECT)
+        display.status_bar.object.setToolTip(_OBJECT)
         for name, parts in self.readouts.parts.items():
             display.places[f"readout-{name}"] = parts
         display.places["readouts"] = [self.readouts]
         display.numbers.connect(guarded(self._show))
         display.status_shown.connect(guarded(self._follow))
-        self.naming.named.connect(guarded(display.foot.object.show_text))
+        self.naming.named.connect(guarded(display.status_bar.object.show_text))
         self.naming.found.connect(display.object_found)
 
     def _follow(self, status: Status) -> None:
@@ -46,7 +46,7 @@ class ContactFeature:
         if now >= self._next:
             self._next = now + (_OFTEN if shell.layouts.filled else _SELDOM)
             self.naming.look(status, shown)
-        self.numbers.show_estimate(shown, status.sensor, shell.display.foot.object.text())
+        self.numbers.show_estimate(shown, status.sensor, shell.display.status_bar.object.text())
 
     def _show(self, estimate: Estimate | None) -> None:
         display, status = self._shell.display, self._shell.session.status

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
 from kappaskin.studies import Prospect
 from kappaskin_app.features.design.designing import Designing
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.form import Form, well_behaved
+from kappaskin_app.shell.form import Form, pass_window_keys
 from kappaskin_app.shell.settings import Settings, ask_of
 from kappaskin_app.shell.settings.asks import Range
 from kappaskin_app.shell.settings.designed import Designed
@@ -67,9 +67,9 @@ class DesignForm(Form):
         step = _FACTOR if _wide(how) else math.ceil(_STEPS * how.step / (how.most - how.least))
         slider.setSingleStep(step)
         slider.setPageStep(4 * step)
-        well_behaved(slider)
+        pass_window_keys(slider)
         slider.setMinimumWidth(70)
-        slider.valueChanged.connect(guarded(lambda at: self.wished.emit(name, _meant(at, how))))
+        slider.valueChanged.connect(guarded(lambda at: self.requested.emit(name, _meant(at, how))))
         return row(slider, editor)
 
     def show_settings(self, settings: Settings) -> None:

@@ -1,4 +1,4 @@
-"""Files for other programs: recordings as tables, pictures, films, figures, scripts."""
+"""Export: recordings as tables, pictures, films, figures, scripts."""
 
 import time
 from functools import partial
@@ -16,11 +16,11 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell import parts as menus
 from kappaskin_app.shell.window import MainWindow
 
-_PYTHON = "A script that does what the window does now: source, scene, setup; it prints the contact"
+_PYTHON = "Copy a Python script with the present source, scene and setup; it prints the contact"
 
 _WINDOW = "Save the whole window as a PNG in the folder the program was started in"
-_FIGURE = "This figure of the paper from a run of our own, in a window beside; to be saved there"
-_INITIAL = "Section 6.2 of the paper from a run of our own, in a window beside"
+_FIGURE = "Compute this figure of the paper, and show it in a window"
+_INITIAL = "Compute section 6.2 of the paper, and show it in a window"
 
 
 class ExportFeature:
@@ -36,11 +36,11 @@ class ExportFeature:
             tip = _INITIAL if name == "initial-curvature" else _FIGURE
             add(name, menus.FIGURES, TITLES.get(name, name), partial(self._draw, name), "", tip)
         self._register(shell)
-        self.exports.told.connect(guarded(shell.tell))
+        self.exports.notified.connect(guarded(shell.notify))
         shell.closing.connect(guarded(self.exports.close))
 
     def _register(self, shell: MainWindow) -> None:
-        """Have pictures of all views and docks that there are."""
+        """Register pictures of all views and docks."""
         solid = {"the window": shell, "the skin": shell.centralWidget()}
         docks = {
             dock.windowTitle(): shell.docks.widget(dock.objectName()) for dock in shell.docks.below
@@ -53,7 +53,7 @@ class ExportFeature:
         self.exports.save(self._shell.grab().toImage(), path)
 
     def _copy_python(self) -> None:
-        """Put a script on the clipboard, and what it reads into a folder."""
+        """Copy a script to the clipboard, and write the files it reads into a folder."""
         shell, folder = self._shell, TareStore.user_folder().parent / "scripts"
         try:
             script = script_of(shell.session, shell.history.settings, folder)
@@ -61,11 +61,11 @@ class ExportFeature:
                 folder.mkdir(parents=True, exist_ok=True)
                 (folder / name).write_bytes(content)
         except (Refusal, OSError) as error:
-            shell.tell(f"Nothing was copied: {error}")
+            shell.notify(f"Nothing was copied: {error}")
             return
         QGuiApplication.clipboard().setText(script.text)
-        shell.tell(f"Copied a script of {script.text.count(chr(10))} lines: paste it into a file")
+        shell.notify(f"Copied a script of {script.text.count(chr(10))} lines: paste it into a file")
 
     def _draw(self, name: str) -> None:
-        """Draw a figure of the paper from a run of its own, in a window beside this one."""
+        """Compute a figure of the paper, and show it in a window."""
         FigureWindow(name, self._shell.tasks, self._shell).show()

@@ -1,4 +1,4 @@
-"""What leaves the window as a file: recordings as tables, pictures of views, films."""
+"""Export of files: recordings as tables, pictures of views, films."""
 
 import math
 import time
@@ -22,12 +22,12 @@ from kappaskin_app.shell.pictures import caption_now, chosen_file, save_view, wr
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.work_dialog import (
     WorkDialog,
-    beside,
-    choosing,
-    ended,
-    named,
+    browse_button,
+    has_suffix,
+    label_for,
     path_in,
-    says_kind,
+    with_button,
+    with_suffix,
 )
 
 _LONGEST = 1e6  # s
@@ -38,22 +38,22 @@ _FORMATS = (
     "Surface for CAD (*.stl)"
 )
 _EXPLAINED = {
-    "recording": "The recording to write from; it is only read.",
-    "to": "The file to write; its ending says in which format.",
-    "settings": "Fit as it was recorded, or all of it with the settings in use now.",
+    "recording": "The recording to export; it is not changed.",
+    "to": "The file to write; its suffix determines the format.",
+    "settings": "Estimate with the recorded settings, or with the present ones.",
     "begin": "The first frame that is written, in s since the recording began.",
     "until": "The last frame that is written, in s since the recording began.",
     "every": "The time between two surfaces, or rows, in s; 0 writes every frame.",
-    "at": "The moment whose surface is written, in s since the recording began.",
+    "at": "The time of the surface that is written, in s since the recording began.",
 }
-"""What each field asks for."""
+"""Tooltips of the fields."""
 
 
 class ExportDialog(WorkDialog):
-    """Asks what of a recording is to be written where, and writes it."""
+    """Asks which part of a recording is to be exported to which file."""
 
     def __init__(self, tasks: Tasks, parent: QWidget | None = None) -> None:
-        how = "&Export", "Writing the export", self._begun, self._told
+        how = "&Export", "Writing the export", self._start_work, self._result_text
         super().__init__(tasks, "Export a recording", *how, parent)
         self.setObjectName("export")
         self.recording, self.to = QLineEdit(), QLineEdit()
@@ -62,8 +62,8 @@ class ExportDialog(WorkDialog):
         self.begin, self.until = _seconds("the beginning"), _seconds("the end")
         self.every, self.at = _seconds("every frame"), _seconds("")
         self.export_button = self.begin_button
-        self.choose_recording = choosing(self._choose_recording)
-        self.choose_file = choosing(self._choose_file)
+        self.choose_recording = browse_button(self._choose_recording)
+        self.choose_file = browse_button(self._choose_file)
         self._setup = Setup()
         self._files: tuple[Path, ...] = ()
         self._lay_out()
@@ -78,7 +78,7 @@ class ExportDialog(WorkDialog):
             ("&Recording", self.recording, self.choose_recording),
             ("&File", self.to, self.choose_file),
         ):
-            form.addRow(named(words, line), beside(line, button))
+            form.addRow(label_for(words, line), with_button(line, button))
         form.addRow("&Settings", self.settings)
         form.addRow("Fr&om", self.begin)
         form.addRow("&Until", self.until)
@@ -89,7 +89,7 @@ class ExportDialog(WorkDialog):
         self._add_buttons()
 
     def ask_of(self, source: str, at: float, setup: Setup) -> None:
-        """Ask what of the recording that is replayed, if one is, `at` s of it, is to be written."""
+        """Ask for an export of the recording that is played, if any, `at` s of it."""
         if not self.busy:
             self._setup = setup
             if source.startswith("replay:"):
@@ -107,11 +107,11 @@ class ExportDialog(WorkDialog):
         name, kind = QFileDialog.getSaveFileName(self, "Export to", "", _FORMATS)
         if name:
             path, ending = Path(name), kind.rpartition("*")[2].rstrip(")")
-            self.to.setText(str(path if says_kind(path) else ended(name, ending)))
+            self.to.setText(str(path if has_suffix(path) else with_suffix(name, ending)))
 
     @property
     def _at_once(self) -> bool:
-        """Whether one moment is wanted, and not a span."""
+        """Whether one time is exported, not a span."""
         suffix = Path(self.to.text()).suffix.lower()
         return suffix == ".vtp" or (suffix == ".stl" and not self.every.value())
 
@@ -131,7 +131,7 @@ class ExportDialog(WorkDialog):
 
     @property
     def wanted(self) -> ExportRequest:
-        """What is asked for; a `Refusal` where that makes no file."""
+        """The request; a `Refusal` where it is not valid."""
         setup = self._setup if self.settings.currentIndex() else None
         files = path_in(self.recording), path_in(self.to)
         if self._at_once:
@@ -139,18 +139,18 @@ class ExportDialog(WorkDialog):
         until = self.until.value() or math.inf
         return ExportRequest(*files, self.begin.value(), until, self.every.value(), setup=setup)
 
-    def _begun(self) -> ExportTask:
+    def _start_work(self) -> ExportTask:
         exporting = ExportTask(self.wanted)
         self._files = exporting.files
         return exporting
 
-    def _told(self, result: object) -> str:
+    def _result_text(self, result: object) -> str:
         words = result.words if isinstance(result, Exported) else ""
         return f"Written: {', '.join(map(str, self._files))} ({words})"
 
 
 def _seconds(nothing: str) -> QDoubleSpinBox:
-    """A field for s, whose least value is called `nothing`."""
+    """A field for a time in s, whose value 0 is shown as `nothing`."""
     field = QDoubleSpinBox()
     field.setRange(0.0, _LONGEST)
     field.setDecimals(3)
@@ -161,15 +161,15 @@ def _seconds(nothing: str) -> QDoubleSpinBox:
 
 _MENU = "E&xport"
 _EXPORT = "Write readings, estimates or surfaces of a recording as files for other programs"
-_FILMING = "Write what the skin looks like to an MP4 from now on, until this is chosen again"
-_PICTURE = "Write {what} as it is shown now, with time and settings below it; it must be visible"
+_FILMING = "Start or stop a film of the skin, as MP4"
+_PICTURE = "Save a picture of {what} with time and settings; it must be visible"
 _FILM = "Film (*.mp4)"
 
 
 class Exports(QObject):
-    """Writes files of what a `session` shows in a `window`; `told` says what came of it."""
+    """Writes files of what a `window` shows; `notified` brings the results."""
 
-    told = Signal(str)
+    notified = Signal(str)
 
     def __init__(self, session: Session, centre: Centre, tasks: Tasks, window: QWidget) -> None:
         super().__init__(window)
@@ -178,7 +178,7 @@ class Exports(QObject):
         self.filming: Filming | None = None
         if isinstance(centre.view, Filmed):
             self.filming = Filming(centre.view, self)
-            self.filming.told.connect(guarded(self.told.emit))
+            self.filming.notified.connect(guarded(self.notified.emit))
 
     def register(
         self,
@@ -193,7 +193,7 @@ class Exports(QObject):
         more = "\N{HORIZONTAL ELLIPSIS}"
         actions.add("export", _MENU, f"&Recording{more}", self.ask, "Ctrl+Shift+E", _EXPORT)
         if self.filming is not None:
-            words = "&Film of the skin, begin or end"
+            words = "&Film of the skin, start or stop"
             actions.add("film", _MENU, words, self.film, "Ctrl+Shift+F", _FILMING)
         menus = {_MENU: solid} | {f"{_MENU}{WITHIN}{title}": flat[title] for title in flat}
         for menu, views in menus.items():
@@ -203,33 +203,33 @@ class Exports(QObject):
                 actions.add(f"picture-of-{name.lower()}", menu, words, act, "", tip)
 
     def ask(self) -> None:
-        """Ask what of a recording is to be written where."""
+        """Show the export dialog."""
         session, replay = self._session, self._session.status.replay
         self.dialog.ask_of(session.source, replay.at if replay else 0.0, session.status.setup)
 
     def picture(self, view: QWidget, title: str, flat: bool) -> None:
         """Ask for a file, and write a picture of a view to it."""
         if not view.isVisible():
-            self.told.emit(f"Show {title} first: what is hidden has no picture")
+            self.notified.emit(f"Show {title} first: a hidden view has no picture")
             return
-        caption = caption_now(self._session)  # of now, and not of when the file is chosen
+        caption = caption_now(self._session)  # of now, not of when the file is selected
         try:
             path = chosen_file(self._window, title, flat)
             if path is None:
                 return
             save_view(view, path, title, caption, flat, self.save)
-            if path.suffix.lower() != ".png":  # which is told of once it is there
-                self.told.emit(f"Saved {path}")
+            if path.suffix.lower() != ".png":  # which is reported once it is written
+                self.notified.emit(f"Saved {path}")
         except Refusal as refusal:
-            self.told.emit(str(refusal))
+            self.notified.emit(str(refusal))
 
     def save(self, image: QImage, path: Path) -> None:
-        """Write a picture beside the window: to pack it takes longer than to draw all anew."""
-        task = BackgroundTask(self._tasks, "", lambda _: self.told.emit(f"Saved {path}"))
+        """Write a picture in the background: compressing takes longer than drawing."""
+        task = BackgroundTask(self._tasks, "", lambda _: self.notified.emit(f"Saved {path}"))
         task.run(write_png, image, path)
 
     def film(self) -> None:
-        """Ask for a file and film into it; or end the film that is made."""
+        """Ask for a file and start a film, or stop it."""
         if self.filming is None:
             return
         if self.filming.running:
@@ -239,12 +239,12 @@ class Exports(QObject):
         file, _ = QFileDialog.getSaveFileName(self._window, "Film the skin", proposed, _FILM)
         if file:
             try:
-                self.filming.begin(ended(file, ".mp4"), caption_now(self._session))
+                self.filming.begin(with_suffix(file, ".mp4"), caption_now(self._session))
             except Refusal as refusal:
-                self.told.emit(str(refusal))
+                self.notified.emit(str(refusal))
 
     def close(self) -> None:
-        """End what is being written: a film is whole, an export is not there."""
+        """Stop a film, which is complete, and cancel an export."""
         if self.filming is not None:
             self.filming.end()
         self.dialog.close()

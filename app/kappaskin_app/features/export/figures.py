@@ -1,4 +1,4 @@
-"""A figure of the paper, drawn anew in the background and then shown."""
+"""Figures of the paper, computed in the background and shown."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -22,7 +22,7 @@ _SIZE = QSize(1000, 620)
 
 
 class FigureWindow(QDialog):
-    """One figure, as large as the window; the files it came from are the window's own."""
+    """A window with one figure, computed in a temporary folder."""
 
     def __init__(self, name: str, tasks: Tasks, parent: QWidget) -> None:
         super().__init__(parent)
@@ -61,7 +61,7 @@ class FigureWindow(QDialog):
 
     @property
     def drawn(self) -> bool:
-        """Whether the figure is there."""
+        """Whether the figure is shown."""
         return not self._picture.isNull()
 
     def resizeEvent(self, event: QResizeEvent) -> None:

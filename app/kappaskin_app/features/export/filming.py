@@ -1,4 +1,4 @@
-"""The skin in three dimensions to a film, as it is seen until it is ended."""
+"""Films of the 3-D view."""
 
 import time
 from collections.abc import Generator
@@ -24,9 +24,9 @@ class Filmed(Protocol):
 
 
 class Filming(QObject):
-    """Films `view`; `told` says how long the film is, and what came of it."""
+    """Films `view`; `notified` brings the duration and the result."""
 
-    told = Signal(str)
+    notified = Signal(str)
 
     def __init__(self, view: Filmed, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -34,7 +34,7 @@ class Filming(QObject):
         self._film: Generator[None, Any, None] | None = None
         self._path, self._part = Path(), Path()
         self.pictures = 0
-        """How many the film has, that is made or was made last."""
+        """The number of pictures of the present or last film."""
         self._size, self._began = (0, 0), 0.0
         self._timer = QTimer(self)
         self._timer.setInterval(1000 // _RATE)
@@ -45,7 +45,7 @@ class Filming(QObject):
         return self._film is not None
 
     def begin(self, path: Path, caption: str) -> None:
-        """Film into `path`; a `Refusal` where that cannot be."""
+        """Start a film in `path`; a `Refusal` where that fails."""
         try:
             from imageio_ffmpeg import write_frames
         except ImportError as error:
@@ -53,7 +53,7 @@ class Filming(QObject):
         if path.suffix.lower() != ".mp4":
             raise Refusal(f"{path.name}: expected a file that ends in .mp4")
         if path.exists():
-            raise Refusal(f"{path}: is there already; choose another name")
+            raise Refusal(f"{path}: exists already; choose another name")
         self._path, self._part = path, path.with_name(f".{path.stem}.part.mp4")
         try:
             self._part.open("wb").close()
@@ -63,14 +63,14 @@ class Filming(QObject):
             ) from error
         picture = self._picture()
         self._size = picture.shape[1], picture.shape[0]
-        said = ["-metadata", "title=Kappaskin", "-metadata", f"comment={caption}"]
+        metadata = ["-metadata", "title=Kappaskin", "-metadata", f"comment={caption}"]
         film = write_frames(
             str(self._part),
             self._size,
             fps=_RATE,
             macro_block_size=_EVEN,
             ffmpeg_log_level="error",
-            output_params=said,
+            output_params=metadata,
         )
         try:
             film.send(None)  # until it waits for the first
@@ -87,27 +87,31 @@ class Filming(QObject):
         return np.ascontiguousarray(seen[:height, :width], np.uint8)
 
     def _take(self) -> None:
-        """Take a picture for each that is due by now."""
+        """Add the pictures that are due by now."""
         if self._film is None:
             return
         picture = self._picture()
         if (picture.shape[1], picture.shape[0]) != self._size:
             self.end()
-            self.told.emit(f"The view has another size now: the film {self._path} ends here")
+            self.notified.emit(f"The size of the view changed: the film {self._path} ends here")
             return
         due = int((time.monotonic() - self._began) * _RATE) + 1 - self.pictures
         try:
-            for _ in range(due):  # one stands for all that there was no time for
+            for _ in range(due):  # repeated for those that there was no time for
                 self._film.send(picture)
         except OSError as error:
             self._give_up()
-            self.told.emit(f"{self._path}: cannot be written ({error!s:.80}); choose another place")
+            self.notified.emit(
+                f"{self._path}: cannot be written ({error!s:.80}); choose another place"
+            )
             return
         self.pictures += max(due, 0)
-        self.told.emit(f"Filming: {time.monotonic() - self._began:.0f} s; again to end it")
+        self.notified.emit(
+            f"Filming: {time.monotonic() - self._began:.0f} s; the same command stops it"
+        )
 
     def end(self) -> None:
-        """End the film, and give it its name."""
+        """Stop the film, and give the file its name."""
         film, self._film = self._film, None
         self._timer.stop()
         if film is None:
@@ -116,9 +120,9 @@ class Filming(QObject):
         try:
             self._part.rename(self._path)
         except OSError as error:
-            self.told.emit(f"{self._path}: cannot be written ({error}); choose another place")
+            self.notified.emit(f"{self._path}: cannot be written ({error}); choose another place")
             return
-        self.told.emit(f"Filmed {self._path}")
+        self.notified.emit(f"Filmed {self._path}")
 
     def _give_up(self) -> None:
         film, self._film = self._film, None

@@ -1,4 +1,4 @@
-"""What the window does now, as a Python script that does the same."""
+"""Python scripts that do what the window does now."""
 
 import json
 from collections.abc import Mapping
@@ -24,12 +24,12 @@ import time
 $paths
 from kappaskin import $names
 
-$said
+$setup
 
 def estimates(seconds):
     """The newest estimate, ten times a second."""
     with Engine() as engine:
-        $asked
+        $requests
         end, last = time.monotonic() + seconds, -1
         while time.monotonic() < end:
             status = engine.status()
@@ -55,7 +55,7 @@ if __name__ == "__main__":  # the engine is a process of its own, which reads th
 
 @dataclass(frozen=True)
 class Script:
-    """The `text`, and the `files` that it reads, by the name that it looks for beside them."""
+    """The `text` of a script, and the `files` that it reads, by name."""
 
     text: str
     files: Mapping[str, bytes]
@@ -64,31 +64,31 @@ class Script:
 def script_of(session: Session, settings: Settings, folder: Path) -> Script:
     """The script for what `session` reads; the files of its setup are to be put into `folder`.
 
-    A `Refusal` while nothing is read, or where no text can say what is simulated.
+    A `Refusal` without a source, or where the simulation cannot be written as text.
     """
     if not session.source:
-        raise Refusal("expected a source that is read, got none; connect one, then copy again")
-    setup, files = _setup(session.asked, folder)
-    made, asked = [f"SETUP = {setup}"], ["engine.set_up(SETUP)"]
+        raise Refusal("expected an open source, got none; connect one, then copy again")
+    setup, files = _setup(session.requested_setup, folder)
+    made, requests = [f"SETUP = {setup}"], ["engine.set_up(SETUP)"]
     if (region := region_of(settings)) != Region():
-        made.append(f"REGION = {_made(region)}")
-        asked.append("engine.scan(REGION)")
+        made.append(f"REGION = {_constructor(region)}")
+        requests.append("engine.scan(REGION)")
     if settings.targets:
-        asked.append(f"engine.publish({settings.targets!r})")
-    asked.append(f"engine.connect({_said(_source(session))})")
+        requests.append(f"engine.publish({settings.targets!r})")
+    requests.append(f"engine.connect({_literal(_source(session))})")
     if session.inside:
         made.append(f"SCENE = {_scene(session, settings)}")
-        asked += ["engine.play(planned(SCENE))", "engine.seek(0.0)"]
-    return Script(_composed("\n".join(made), asked), files)
+        requests += ["engine.play(planned(SCENE))", "engine.seek(0.0)"]
+    return Script(_composed("\n".join(made), requests), files)
 
 
-def _composed(made: str, asked: list[str]) -> str:
-    used = f"{made}{asked}"
+def _composed(made: str, requests: list[str]) -> str:
+    used = f"{made}{requests}"
     names = ["Engine", *(name for name in _NAMES if f"{name}(" in used)]
     paths = "from pathlib import Path\n" if "Path(" in made else ""
     between = "\n        "
     return _SCRIPT.substitute(
-        paths=paths, names=", ".join(names), said=f"{made}\n", asked=between.join(asked)
+        paths=paths, names=", ".join(names), setup=f"{made}\n", requests=between.join(requests)
     )
 
 
@@ -102,23 +102,25 @@ def _source(session: Session) -> str:
     )
 
 
-def _said(value: Any) -> str:
+def _literal(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
 
 
-def _made(value: Any, always: tuple[str, ...] = ()) -> str:
+def _constructor(value: Any, always: tuple[str, ...] = ()) -> str:
     """A dataclass as it is made: what is not as it usually is of it, and those named `always`."""
-    usual, said = type(value)(), {f.name: getattr(value, f.name) for f in fields(value)}
-    told = (f"{n}={_said(v)}" for n, v in said.items() if n in always or v != getattr(usual, n))
-    return f"{type(value).__name__}({', '.join(told)})"
+    usual, values = type(value)(), {f.name: getattr(value, f.name) for f in fields(value)}
+    arguments = (
+        f"{n}={_literal(v)}" for n, v in values.items() if n in always or v != getattr(usual, n)
+    )
+    return f"{type(value).__name__}({', '.join(arguments)})"
 
 
 def _setup(setup: Setup, folder: Path) -> tuple[str, Mapping[str, bytes]]:
     """A setup as it is made, and the files that it has its calibration and its tare from."""
     text, files = setup_to_text(setup)
     if not files:
-        return _made(setup, ("Ni", "Nj", "method")), files
-    read = f"lambda name: Path({_said(str(folder))}, name).read_bytes()"
+        return _constructor(setup, ("Ni", "Nj", "method")), files
+    read = f"lambda name: Path({_literal(str(folder))}, name).read_bytes()"
     return f"setup_from_text(\n    {text!r},\n    {read},\n)", files
 
 
@@ -130,7 +132,7 @@ def _scene(session: Session, settings: Settings) -> str:
     if not _is_in_its_file(written):
         return _read(written.text, written.file.absolute())
     ready = written.file.stem in SCENES and scene_file(written.file.stem) == written.file
-    return f"load_scene({_said(written.file.stem if ready else str(written.file.absolute()))})"
+    return f"load_scene({_literal(written.file.stem if ready else str(written.file.absolute()))})"
 
 
 def _is_in_its_file(written: Written) -> bool:
@@ -143,4 +145,4 @@ def _is_in_its_file(written: Written) -> bool:
 def _read(text: str, file: Path) -> str:
     plain = "'''" not in text and "\\" not in text and not text.endswith("'")
     quoted = f"'''{text}'''" if plain else repr(text)
-    return f"read_scene({quoted}, Path({_said(str(file))}))"
+    return f"read_scene({quoted}, Path({_literal(str(file))}))"

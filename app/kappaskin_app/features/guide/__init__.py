@@ -1,15 +1,15 @@
-"""The guide, to read in the window."""
+"""The guide in the window."""
 
 from collections.abc import Iterator
 from functools import partial
 
 from kappaskin_app.features.guide.panel import GuidePanel, Page, page_called, pages
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.finder.things import FinderEntry
+from kappaskin_app.shell.finder import FinderEntry
 from kappaskin_app.shell.parts import HELP
 from kappaskin_app.shell.window import MainWindow
 
-_ABOUT = "How to begin, connect, calibrate and record, what every number means, what to mend"
+_ABOUT = "How to connect, calibrate and record; what the numbers mean; troubleshooting"
 
 
 class GuideFeature:
@@ -20,15 +20,15 @@ class GuideFeature:
         shell.docks.put_below(
             "guide", "Guide", self.guide, "Ctrl+F1", _ABOUT, menu=HELP, height=0.5
         )
-        shell.read_wanted.connect(guarded(lambda name: self.read(page_called(name))))
-        shell.menus.things.append(self._things)
+        shell.guide_requested.connect(guarded(lambda name: self.read(page_called(name))))
+        shell.menus.entry_sources.append(self._entries)
 
     def read(self, page: Page, heading: str = "") -> None:
         """Show a page of the guide, from a heading in it on."""
         self._shell.docks.reveal("guide")
         self.guide.read(page, heading)
 
-    def _things(self) -> Iterator[FinderEntry]:
+    def _entries(self) -> Iterator[FinderEntry]:
         for page in pages():
             for heading in ("", *page.headings):
                 name = f"guide:{page.file.stem}{'#' if heading else ''}{heading}"

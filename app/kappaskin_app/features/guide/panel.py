@@ -1,4 +1,4 @@
-"""The guide to read: its pages listed, the text of one, and the way back."""
+"""The guide panel: contents, the text of a page, back and forward."""
 
 import re
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ _HEADING = re.compile(r"^## (.+)$", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Page:
-    """A page of the guide, and the headings in it."""
+    """A page of the guide, and its headings."""
 
     title: str
     file: Path
@@ -44,13 +44,13 @@ class Page:
 
 
 def page_called(name: str) -> Page:
-    """The page in the file of this name, without its suffix."""
+    """The page whose file has this name, without the suffix."""
     return next(page for page in pages() if page.file.stem == name)
 
 
 @cache
 def pages() -> tuple[Page, ...]:
-    """The contents, and each page that they list."""
+    """The contents, and the pages that they list."""
     contents = FOLDER / "README.md"
     listed = _LISTED.findall(contents.read_text("utf-8"))
     return tuple(
@@ -65,16 +65,16 @@ _MARGIN, _CODE, _CELL, _ABOVE = 14, 10, 4, 8  # px
 
 
 class GuidePanel(QWidget):
-    """Shows one page after the other, as a person goes from link to link."""
+    """A browser of the pages of the guide."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.contents, self.text = QListWidget(), _Text()
         self.contents.setAccessibleName("Pages of the guide")
         self.contents.setToolTip("The pages of the guide; Ctrl+K finds every heading in them.")
-        self.back = button("\N{LEFTWARDS ARROW} &Back", "guide-back", "The page before (Alt+Left).")
+        self.back = button("\N{LEFTWARDS ARROW} &Back", "guide-back", "Previous page (Alt+Left).")
         self.forward = button(
-            "&Forward \N{RIGHTWARDS ARROW}", "guide-forward", "On again, after Back (Alt+Right)."
+            "&Forward \N{RIGHTWARDS ARROW}", "guide-forward", "Next page, after Back (Alt+Right)."
         )
         for page in pages():
             self.contents.addItem(page.title)
@@ -106,7 +106,7 @@ class GuidePanel(QWidget):
         self.read(pages()[row])
 
     def _show_where(self, url: QUrl) -> None:
-        """Mark the page in the contents; none for a file that is none of them."""
+        """Select the page in the contents; none for another file."""
         listed = [str(page.file) for page in pages()]
         row = listed.index(url.toLocalFile()) if url.toLocalFile() in listed else -1
         with QSignalBlocker(self.contents):
@@ -130,7 +130,7 @@ class GuidePanel(QWidget):
 
 
 class _Text(QTextBrowser):
-    """A page of Markdown, in lines that are not too long."""
+    """A page of Markdown, with a limited line length."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -140,7 +140,7 @@ class _Text(QTextBrowser):
         follow_look(self, self._dress_anew)
 
     def loadResource(self, kind: int, name: QUrl) -> object:
-        """What a page names; pictures no wider than its lines."""
+        """A resource of a page; pictures no wider than its lines."""
         found = super().loadResource(kind, name)
         if kind != QTextDocument.ResourceType.ImageResource:
             return found
@@ -150,7 +150,7 @@ class _Text(QTextBrowser):
         return picture.scaledToWidth(wide, Qt.TransformationMode.SmoothTransformation)
 
     def scroll_to(self, heading: str) -> None:
-        """Bring a heading to the top, if there is one of these words."""
+        """Scroll to a heading, if there is one of this text."""
         for block in _blocks(self.document()):
             if heading and block.blockFormat().headingLevel() and block.text() == heading:
                 top = self.document().documentLayout().blockBoundingRect(block).top()
@@ -164,7 +164,7 @@ class _Text(QTextBrowser):
         self.verticalScrollBar().setValue(at)
 
     def dress(self) -> None:
-        """Give code a ground and letters as large as others, and tables thin lines."""
+        """Format code, headings and tables."""
         document, theme = self.document(), current()
         document.setDocumentMargin(_MARGIN)
         for frame in document.rootFrame().childFrames():
@@ -209,12 +209,12 @@ def _is_code(block: QTextBlock) -> bool:
 
 
 def _kind(block: QTextBlock) -> str:
-    """What the fence around a line of code says; of no code nothing."""
+    """The language of the fence around a line of code; empty outside code."""
     return str(block.blockFormat().property(QTextFormat.Property.BlockCodeLanguage) or "")
 
 
 def _ground(block: QTextBlock, theme: Theme) -> None:
-    """A line of code; what a command prints is fainter than what is typed."""
+    """Format a line of code; output is fainter than input."""
     cursor, ground, letters = QTextCursor(block), QTextBlockFormat(), QTextCharFormat()
     ground.setBackground(QColor(theme.window))
     ground.setLeftMargin(_CODE)
@@ -231,7 +231,7 @@ def _ground(block: QTextBlock, theme: Theme) -> None:
 
 
 def _enlarge(block: QTextBlock, size: float) -> None:
-    """Let words of code be so many points large: they follow no change of the letters."""
+    """Set the size of code in points: it does not follow the font of the application."""
     larger, cursor, at = QTextCharFormat(), QTextCursor(block), block.begin()
     larger.setFontPointSize(size)
     while not at.atEnd():
@@ -244,7 +244,7 @@ def _enlarge(block: QTextBlock, size: float) -> None:
 
 
 def _space(block: QTextBlock) -> None:
-    """Room around a heading."""
+    """Set the margins of a heading."""
     room = QTextBlockFormat()
     room.setTopMargin(2 * _ABOVE)
     room.setBottomMargin(_ABOVE)

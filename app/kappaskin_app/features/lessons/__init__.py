@@ -1,19 +1,19 @@
-"""Lessons: read, taken on the window, judged by what it shows."""
+"""Lessons in the window, with questions judged by what it shows."""
 
 from functools import partial
 
 from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QWidget
 
+from kappaskin_app.features.lessons.lesson_file import DOCKS
 from kappaskin_app.features.lessons.panel import LessonPanel
 from kappaskin_app.features.lessons.pointing import ControlPointer
-from kappaskin_app.features.lessons.reading import DOCKS
 from kappaskin_app.features.lessons.teaching import Teaching
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.window import MainWindow
 
-_ABOUT = "Lessons of ten to fifteen minutes, from what a gage feels to mending a sensor"
+_ABOUT = "Lessons of ten to fifteen minutes, from the curvature gage to faults of a sensor"
 
 
 class LessonsFeature:
@@ -37,15 +37,15 @@ class LessonsFeature:
             *(session.request_source, self._seen),
         )
         self.pointing = ControlPointer(self._forms, self._places, docks.reveal, shell)
-        self.lesson.attend(self.teaching)
+        self.lesson.bind(self.teaching)
         docks["lesson"].closed.connect(guarded(self.teaching.leave))
         self.teaching.pointed.connect(guarded(self.pointing.point))
         self.teaching.taken_up.connect(guarded(partial(docks.reveal, "lesson")))
-        self.teaching.told.connect(guarded(shell.tell))
+        self.teaching.notified.connect(guarded(shell.notify))
         shell.menus.welcome.add(
             3,
             "&Begin a lesson",
-            "Eleven of ten to fifteen minutes: from what a gage feels to mending a sensor.",
+            "Eleven lessons, from the curvature gage to faults of a sensor.",
             lambda: docks.reveal("lesson"),
         )
 
@@ -58,7 +58,7 @@ class LessonsFeature:
         return {**shown, **self._shell.display.places}
 
     def _seen(self) -> list[QPixmap]:
-        """Pictures of the numbers, and of the skin with what is shown beside and below it."""
+        """Pictures of the numbers, and of the skin with the docks beside and below it."""
         shell = self._shell
         whole = shell.display.centre.geometry()
         for dock in [*shell.docks.right, *shell.docks.below]:

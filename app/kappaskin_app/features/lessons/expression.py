@@ -1,4 +1,4 @@
-"""A line of text to a question about named figures, which runs no code of whoever wrote it."""
+"""Expressions of named figures, parsed and evaluated without running code."""
 
 import ast
 import math
@@ -35,27 +35,27 @@ _ORDER = (ast.Lt, ast.LtE, ast.Gt, ast.GtE)
 
 @dataclass(frozen=True)
 class Expression:
-    """What `text` asks of figures: numbers, + - * /, comparisons, `and`, `or`, `not`."""
+    """A parsed expression of figures: numbers, + - * /, comparisons, `and`, `or`, `not`."""
 
     text: str
     kind: str
     _tree: ast.expr
 
     def __call__(self, figures: Figures) -> float | str | bool:
-        """What it comes to; NaN where a figure it needs is."""
+        """Its value; NaN where a figure it needs is NaN."""
         return _value(self._tree, figures)
 
 
 def expression(text: str, kinds: Mapping[str, str], wanted: str) -> Expression:
-    """The expression that `text` says, of figures that have `kinds` by their names.
+    """The expression in `text`, of figures with these `kinds` by name.
 
-    It comes to what is `wanted`; a `Refusal` where it does not.
+    Its kind is `wanted`; a `Refusal` where it is not.
     """
     if len(text) > LONGEST:
-        raise Refusal(f"expected at most {LONGEST} letters, got {len(text)}; ask for less at once")
+        raise Refusal(f"expected at most {LONGEST} letters, got {len(text)}; shorten it")
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of Python about what is refused below anyway
+            warnings.simplefilter("ignore")  # of Python about what is refused below
             tree = ast.parse(text.strip(), mode="eval").body
         kind = _kind(tree, kinds)
     except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
@@ -65,12 +65,14 @@ def expression(text: str, kinds: Mapping[str, str], wanted: str) -> Expression:
             f"expected something like 'force > 0.1 and functions_x == 8', got {text!r}"
         ) from error
     if kind != wanted:
-        raise Refusal(f"expected what comes to {wanted}, got {text!r}, which comes to {kind}")
+        raise Refusal(
+            f"expected an expression whose value is {wanted}, got {text!r}, whose value is {kind}"
+        )
     return Expression(text, kind, tree)
 
 
 def _kind(node: ast.expr, kinds: Mapping[str, str]) -> str:
-    """What a part of an expression comes to; a `Refusal` for anything that is not allowed."""
+    """The kind of a part of an expression; a `Refusal` for anything that is not allowed."""
     match node:
         case ast.Constant(value=bool()):
             pass

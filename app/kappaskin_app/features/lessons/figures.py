@@ -1,4 +1,4 @@
-"""What the window shows, as figures by name, for a lesson's questions."""
+"""Figures that the window shows, by name, for the questions of lessons."""
 
 import math
 from collections import deque
@@ -29,7 +29,7 @@ _GETTERS = getters()
 
 
 def _reported(name: str, part: int = 0) -> Callable[[Estimate], float]:
-    """What gets a number of the table of quantities; yes is 1."""
+    """A getter of a number of the table of quantities; yes is 1."""
     return lambda estimate: float(np.ravel(_GETTERS[name](Reported(estimate)))[part])
 
 
@@ -77,8 +77,8 @@ KINDS = dict.fromkeys((*OF_AN_ESTIMATE, *OF_THE_STATUS, *OF_FEATURES), NUMBER) |
 """Every name that an expression may have, with whether it is a number or a word."""
 
 
-class Watch:
-    """Keeps the last estimates of the present settings, for figures that stand still."""
+class RecentEstimates:
+    """The last estimates of the present settings, whose medians are steady figures."""
 
     def __init__(self) -> None:
         self._recent: deque[Estimate] = deque(maxlen=_RECENT)
@@ -87,7 +87,7 @@ class Watch:
         self._recent.append(estimate)
 
     def forget(self) -> None:
-        """What was seen before something changed."""
+        """Drop the estimates of the last settings."""
         self._recent.clear()
 
     def figures(

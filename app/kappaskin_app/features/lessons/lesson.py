@@ -1,4 +1,4 @@
-"""A lesson and its steps, as a file says them."""
+"""Lessons: steps, questions and answers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -56,7 +56,7 @@ class NumberAnswer:
 
 @dataclass(frozen=True)
 class LessonTask:
-    """Something to do, done when `check` holds of what the window shows; `solution` does it."""
+    """A task, done when `check` holds for what the window shows; `solution` does it."""
 
     check: Expression
     solution: Mapping[str, Any]
@@ -64,7 +64,7 @@ class LessonTask:
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked, with a `hint` after a wrong answer and an explanation at the end."""
+    """A question, with a `hint` after the first wrong answer and an explanation at the end."""
 
     text: str
     how: ChoiceAnswer | NumberAnswer | LessonTask
@@ -74,7 +74,7 @@ class Question:
 
 @dataclass(frozen=True)
 class Button:
-    """Something that breaks what is seen, or mends it: `sets` on top of the step's settings."""
+    """A button that changes settings: `sets` on top of the step's settings."""
 
     label: str
     sets: Mapping[str, Any]
@@ -84,8 +84,8 @@ class Button:
 class Step:
     """A `title`, a `text` in Markdown, and what it does to the window.
 
-    `sets` are the settings it begins with, None where it leaves all as it is; `point` names what
-    is pointed at.
+    `sets` are the settings it begins with, None where it changes none; `point` names the controls
+    that are pointed at.
     """
 
     title: str
@@ -98,7 +98,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Lesson:
-    """Some `minutes` in which one learns something, step by step."""
+    """A lesson of about so many `minutes`, in steps."""
 
     name: str
     title: str
@@ -107,7 +107,7 @@ class Lesson:
     steps: tuple[Step, ...]
 
     def begins(self, step: int) -> Mapping[str, Any] | None:
-        """The settings that `step` begins with, be it those of a step before it."""
+        """The settings that `step` begins with, from it or the last step that has any."""
         earlier = (one.sets for one in reversed(self.steps[: step + 1]))
         return next((sets for sets in earlier if sets is not None), None)
 
@@ -117,12 +117,12 @@ class Lesson:
 
 
 def whole(sets: Mapping[str, Any]) -> dict[str, Any]:
-    """All settings of a step that says `sets`: the others are plain, and a shape is of its size.
+    """All settings of a step with `sets`: the others are defaults, and a shape has its size.
 
     A "scene" among them is the ready scene that is played.
     """
-    said = dict(sets)
-    shape = SHAPES[said.get("shape", "flat")]
-    scene = said.pop("scene", "")
+    values = dict(sets)
+    shape = SHAPES[values.get("shape", "flat")]
+    scene = values.pop("scene", "")
     played = {"written": written(scene_file(scene))} if scene else {}
-    return _PLAIN | {**shape.asks, **shape.begins} | played | said
+    return _PLAIN | {**shape.asks, **shape.begins} | played | values

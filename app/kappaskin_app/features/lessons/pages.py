@@ -1,4 +1,4 @@
-"""Pages of lessons: the list, a step, its question, and the end."""
+"""Pages of lessons: the list, a step with its question, the end."""
 
 from collections.abc import Mapping
 from html import escape
@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 from kappaskin_app.features.lessons.lesson import ChoiceAnswer, LessonTask, NumberAnswer, Question
 from kappaskin_app.features.lessons.progress import DONE, Answer, Progress
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.form import well_behaved
+from kappaskin_app.shell.form import pass_window_keys
 from kappaskin_app.theme import ALERT, current, follow_look, series
 from kappaskin_app.widgets.layout import scrolled
 from kappaskin_app.widgets.parts import ELLIPSIS, button, in_a_row, text_label
@@ -30,7 +30,7 @@ _RIGHT = 3  # of the series: green, told apart from the colour of alarms
 
 
 class _Words(QLabel):
-    """The words of an option, which a click chooses; a button's own would not wrap."""
+    """The text of an option, which a click selects; a radio button's own does not wrap."""
 
     def __init__(self, text: str, radio: QRadioButton) -> None:
         super().__init__(text, wordWrap=True)  # pyright: ignore[reportCallIssue]
@@ -41,8 +41,8 @@ class _Words(QLabel):
         self._radio.click()
 
 
-class Asking(QWidget):
-    """Asks one question; `answered` brings what is given, `show_wanted` asks how it is done."""
+class QuestionView(QWidget):
+    """A question; `answered` brings the answer, `show_wanted` requests the solution."""
 
     answered = Signal(str)
     show_wanted = Signal()
@@ -57,10 +57,8 @@ class Asking(QWidget):
         self.text.setFont(bold)
         self.options = QButtonGroup(self)
         self.number = QLineEdit()
-        self.check = button("&Check", "check-answer", "Say whether it is right (Enter).")
-        self.show_how = button(
-            "S&how me", "show-how", "Set it as it is meant to be; Ctrl+Z takes that back."
-        )
+        self.check = button("&Check", "check-answer", "Check the answer (Enter).")
+        self.show_how = button("S&how me", "show-how", "Apply the solution; Ctrl+Z undoes it.")
         for label in (self.text, self.feedback):
             label.setTextFormat(Qt.TextFormat.PlainText)
         self._stack = QVBoxLayout(self)
@@ -72,7 +70,7 @@ class Asking(QWidget):
             case NumberAnswer(unit=unit):
                 self._add_number(unit)
             case LessonTask():
-                self.check.setToolTip("Look at what the window shows, and say whether it is so.")
+                self.check.setToolTip("Check what the window shows.")
         row = in_a_row(self.check, self.show_how)
         row.addStretch(1)
         self._stack.addLayout(row)
@@ -97,7 +95,7 @@ class Asking(QWidget):
         self.number.setAccessibleName(f"Answer in {unit}" if unit else "Answer")
         self.number.setMaximumWidth(12 * self.number.fontMetrics().averageCharWidth())
         self.number.setMaxLength(20)
-        well_behaved(self.number)
+        pass_window_keys(self.number)
         row = in_a_row(self.number, QLabel(unit))
         row.addStretch(1)
         self._stack.addLayout(row)
@@ -113,19 +111,19 @@ class Asking(QWidget):
                 self.answered.emit(DONE)
 
     def show_answer(self, answer: Answer, message: str) -> None:
-        """Say what came of the answer so far; `message` is why it could not be judged."""
+        """Show the result of the answer; `message` is why it could not be judged."""
         self._answer, self._message = answer, message
-        self.check.setEnabled(not answer.told)
-        self.number.setEnabled(not answer.told)
+        self.check.setEnabled(not answer.closed)
+        self.number.setEnabled(not answer.closed)
         for option in self.options.buttons():
-            option.setEnabled(not answer.told)
+            option.setEnabled(not answer.closed)
         task = isinstance(self._question.how, LessonTask)
-        self.show_how.setVisible(task and answer.told and not answer.right)
-        self.feedback.setText(self._said())
+        self.show_how.setVisible(task and answer.closed and not answer.right)
+        self.feedback.setText(self._feedback_text())
         self.feedback.setVisible(bool(self.feedback.text()))
         self._dress()
 
-    def _said(self) -> str:
+    def _feedback_text(self) -> str:
         answer, question = self._answer, self._question
         if self._message:
             return self._message
@@ -133,7 +131,7 @@ class Asking(QWidget):
             return ""
         if answer.right:
             return f"Right. {question.explain}"
-        return f"Not so. {question.explain if answer.told else question.hint}"
+        return f"Not right. {question.explain if answer.closed else question.hint}"
 
     def _dress(self) -> None:
         right = self._answer.right and not self._message
@@ -144,7 +142,7 @@ class Asking(QWidget):
 
 
 def _radio_style() -> str:
-    """A ring that is seen on a dark ground too, where Fusion's is lost."""
+    """A ring that is visible on a dark background too."""
     theme = current()
     return (
         f"QRadioButton::indicator {{ width: 11px; height: 11px; border-radius: 6px;"
@@ -155,7 +153,7 @@ def _radio_style() -> str:
 
 
 class StepPage(QWidget):
-    """Shows a step; `pressed` numbers the button of it that was pressed, from 0."""
+    """A step; `pressed` brings the index of the button that was pressed."""
 
     answered = Signal(str)
     show_wanted = Signal()
@@ -178,44 +176,44 @@ class StepPage(QWidget):
         whole = QVBoxLayout(self)
         whole.setContentsMargins(0, 0, 0, 0)
         whole.addWidget(self.area)
-        self.asking: Asking | None = None
+        self.question_view: QuestionView | None = None
         self._shown: tuple[str, int] | None = None
 
     def show_progress(self, progress: Progress, message: str) -> None:
-        """Show the step that a person is at, and what came of the answer."""
+        """Show the present step, and the result of the answer."""
         now = progress.lesson.name, progress.step
         if another := now != self._shown:
             self._shown = now
             self._make(progress)
-        if self.asking is not None:
-            self.asking.show_answer(progress.answer, message)
+        if self.question_view is not None:
+            self.question_view.show_answer(progress.answer, message)
             if not another:
-                # Once what is said has its place below the question.
-                QTimer.singleShot(0, self.asking, guarded(self._see_feedback))
+                # Once the feedback is laid out below the question.
+                QTimer.singleShot(0, self.question_view, guarded(self._see_feedback))
 
     def _see_feedback(self) -> None:
-        if self.asking is not None:
-            self.area.ensureWidgetVisible(self.asking.feedback)
+        if self.question_view is not None:
+            self.area.ensureWidgetVisible(self.question_view.feedback)
 
     def _make(self, progress: Progress) -> None:
         step = progress.lesson.steps[progress.step]
         self.title.setText(step.title)
         self.text.setText(step.text)
         _empty(self._below)
-        self.asking = None
+        self.question_view = None
         for number, one in enumerate(step.buttons):
-            made = button(one.label, f"lesson-button-{number}", "Ctrl+Z takes it back.")
+            made = button(one.label, f"lesson-button-{number}", "Ctrl+Z undoes it.")
             made.clicked.connect(guarded(lambda *_, number=number: self.pressed.emit(number)))
             self._below.addWidget(made)
         if step.question is not None:
-            self.asking = Asking(step.question)
-            self.asking.answered.connect(self.answered)
-            self.asking.show_wanted.connect(self.show_wanted)
-            self._below.addWidget(self.asking)
+            self.question_view = QuestionView(step.question)
+            self.question_view.answered.connect(self.answered)
+            self.question_view.show_wanted.connect(self.show_wanted)
+            self._below.addWidget(self.question_view)
         self.area.verticalScrollBar().setValue(0)
 
     def forget(self) -> None:
-        """Make the step anew the next time, for a lesson that was read anew."""
+        """Build the step again the next time, for a lesson that was read again."""
         self._shown = None
 
 
@@ -231,7 +229,7 @@ _DONE = "\N{CHECK MARK}"
 
 
 class _List(QListWidget):
-    """A list whose row Enter takes, as a double click does."""
+    """A list in which Enter selects a row, as a double click does."""
 
     taken = Signal()
 
@@ -243,7 +241,7 @@ class _List(QListWidget):
 
 
 class ListPage(QWidget):
-    """Lists the lessons; `taken` names the one to take, `open_wanted` asks for a file."""
+    """The list of lessons; `taken` brings the one to start, `open_wanted` requests a file."""
 
     taken = Signal(str)
     open_wanted = Signal()
@@ -262,14 +260,12 @@ class ListPage(QWidget):
         self.about.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.about.setMinimumHeight(5 * self.about.fontMetrics().lineSpacing())
         self.begin = button(
-            "&Take this lesson",
+            "S&tart lesson",
             "take-lesson",
-            "Begin it, or go on where you left it (Enter, or double-click). It changes the "
-            "settings; leaving it gives them back.",
+            "Start or continue the lesson (Enter, or double-click). It changes the settings; Leave "
+            "restores them.",
         )
-        self.open = button(
-            f"&Open file{ELLIPSIS}", "open-lesson", "Take a lesson from a file of your own."
-        )
+        self.open = button(f"&Open file{ELLIPSIS}", "open-lesson", "Open a lesson from a file.")
         stack = QVBoxLayout(self)
         stack.setContentsMargins(8, 6, 8, 8)
         stack.addWidget(self.list, 1)
@@ -284,7 +280,7 @@ class ListPage(QWidget):
         self.open.clicked.connect(guarded(lambda *_: self.open_wanted.emit()))
 
     def show_lessons(self, progress: Mapping[str, Progress], message: str) -> None:
-        """Show the lessons by file, how far each is, and why a file was no lesson."""
+        """Show the lessons by file, their progress, and why a file could not be read."""
         self._progress = progress
         self.message.setText(message)
         self.message.setVisible(bool(message))
@@ -311,7 +307,7 @@ class ListPage(QWidget):
             self.about.setText("")
             return
         far = one.describe()
-        self.begin.setText("&Go on" if far.startswith("step") else "&Take this lesson")
+        self.begin.setText("&Continue" if far.startswith("step") else "S&tart lesson")
         said = f"{one.lesson.minutes} min{', ' + far if far else ''}. {one.lesson.learn}"
         self.about.setText(said)
 
@@ -321,7 +317,7 @@ class ListPage(QWidget):
 
 
 class EndPage(QWidget):
-    """Tells what came of each question; `hand_in_wanted` brings the name of who hands it in."""
+    """The results of a lesson; `hand_in_wanted` brings the student's name."""
 
     hand_in_wanted = Signal(str)
 
@@ -329,23 +325,23 @@ class EndPage(QWidget):
         super().__init__(parent)
         self.text = text_label()
         self.text.setTextFormat(Qt.TextFormat.RichText)
-        asked = text_label("Your name, as it is to stand on the figure:")
+        prompt = text_label("Your name, for the figure:")
         self.name = QLineEdit()
         self.name.setObjectName("student")
         self.name.setMaxLength(80)
         self.name.setAccessibleName("Your name")
-        self.name.setToolTip("It stands below the figure, and is kept nowhere else.")
-        asked.setBuddy(self.name)
-        well_behaved(self.name)
+        self.name.setToolTip("It is written on the figure, and saved nowhere else.")
+        prompt.setBuddy(self.name)
+        pass_window_keys(self.name)
         self.save = button(
             f"&Save the figure{ELLIPSIS}",
             "hand-in",
-            "One picture to hand in: the window as it is now, your answers and the settings.",
+            "One picture to hand in: the present window, your answers and the settings.",
         )
         whole = QVBoxLayout(self)
         whole.setContentsMargins(0, 0, 0, 0)
         whole.addWidget(scrolled(self.text), 1)
-        for widget in (asked, self.name, self.save):
+        for widget in (prompt, self.name, self.save):
             whole.addWidget(widget)
         self.name.textChanged.connect(guarded(self._allow))
         self.name.returnPressed.connect(guarded(self.save.click))
@@ -360,6 +356,6 @@ class EndPage(QWidget):
             f"{escape(title)}: <b>{escape(outcome)}</b>" for title, _, _, outcome in progress.rows()
         )
         self.text.setText(
-            f"<p><b>The end.</b> {escape(progress.lesson.learn)}</p><p>{rows}</p><p>Bring the "
-            "window to what you would like to show, then save the figure to hand in.</p>"
+            f"<p><b>End of the lesson.</b> {escape(progress.lesson.learn)}</p><p>{rows}</p><p>Set "
+            "the window to what you want to show, then save the figure to hand in.</p>"
         )

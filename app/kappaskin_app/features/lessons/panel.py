@@ -1,4 +1,4 @@
-"""Lessons: the list of them, the step that is taken, and the figure at the end."""
+"""The lesson panel: the list, a step, the end."""
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QShowEvent
@@ -19,7 +19,7 @@ from kappaskin_app.widgets.parts import button
 
 
 class LessonPanel(QWidget):
-    """Shows what `Teaching` knows and passes on what the user requests; `seen` when it is shown."""
+    """Shows the lessons of `Teaching` and passes on requests; `seen` when it is shown."""
 
     seen = Signal()
 
@@ -61,8 +61,8 @@ class LessonPanel(QWidget):
         self._taking.hide()
         follow_look(self, self._dress)
 
-    def attend(self, teaching: Teaching) -> None:
-        """Show how `teaching` goes, and pass on what the user requests."""
+    def bind(self, teaching: Teaching) -> None:
+        """Show the state of `teaching`, and pass on requests."""
         self._teaching = teaching
         teaching.changed.connect(guarded(self._show))
         self.seen.connect(guarded(teaching.look))

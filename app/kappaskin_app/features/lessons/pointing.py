@@ -1,4 +1,4 @@
-"""Points at a control: opens its page and dock, scrolls to it, and draws a ring around it."""
+"""The control pointer: reveals a control and draws a ring around it."""
 
 from collections.abc import Callable, Iterator, Mapping
 
@@ -14,7 +14,7 @@ _AROUND, _THICK, _ABOUT = 3, 2, 60  # px: of a ring, and of what is seen around 
 
 
 class _Ring(QWidget):
-    """A ring around `targets`, which have one parent, wherever they go."""
+    """A ring around `targets`, which have one parent, that follows their geometry."""
 
     def __init__(self, targets: list[QWidget]) -> None:
         super().__init__(targets[0].parentWidget())
@@ -50,7 +50,7 @@ class _Ring(QWidget):
 
 
 class ControlPointer(QObject):
-    """Finds what a lesson points at among `forms` and `others`, and brings it to be seen.
+    """Finds the controls that a lesson points at among `forms` and `others`, and reveals them.
 
     `show_dock` brings a dock to the front, by its name.
     """
@@ -68,7 +68,7 @@ class ControlPointer(QObject):
         self._shown: list[QDockWidget] = []
 
     def targets(self, name: str) -> list[QWidget]:
-        """The widgets that `name` means: a control with its label, a dock or a number."""
+        """The widgets called `name`: a control with its label, a dock or a number."""
         if name in (others := self._others()):
             return others[name]
         for form in self._forms():
@@ -93,13 +93,13 @@ class ControlPointer(QObject):
         QTimer.singleShot(0, self, guarded(self._scroll))
 
     def _put_away(self, needed: list[QWidget]) -> None:
-        """Hide the docks that were shown for what is pointed at no more."""
+        """Hide docks that were shown for earlier controls."""
         for dock in [one for one in self._shown if one not in needed]:
             self._shown.remove(dock)
             dock.hide()
 
     def _scroll(self) -> None:
-        for ring in reversed(self.rings):  # the first one named is the one that is seen for sure
+        for ring in reversed(self.rings):  # last the first one named, which must be visible
             for area in _around(ring):
                 if isinstance(area, QScrollArea):
                     area.ensureWidgetVisible(ring, 0, _ABOUT)
@@ -117,7 +117,7 @@ class ControlPointer(QObject):
 
 
 def _around(widget: QWidget) -> Iterator[QWidget]:
-    """What `widget` lies in, from the inside to the window."""
+    """The ancestors of `widget`, up to the window."""
     parent = widget.parentWidget()
     while parent is not None:
         yield parent

@@ -1,4 +1,4 @@
-"""How far a person is in a lesson, and what came of each question."""
+"""Progress in a lesson: the present step, and the answers."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -15,33 +15,33 @@ from kappaskin_app.features.lessons.lesson import (
 )
 
 DONE = "done"
-"""What is given as the answer to a task: that it is done."""
+"""The answer to a task."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What was `given` last, after how many `tries`, and whether that was `right`."""
+    """The answer `given` last, the number of `tries`, and whether it was `right`."""
 
     given: str = ""
     tries: int = 0
     right: bool = False
 
     @property
-    def told(self) -> bool:
-        """Whether there is nothing left to try: it was right, or the explanation was given."""
+    def closed(self) -> bool:
+        """Whether it was right, or the explanation was shown."""
         return self.right or self.tries >= 2
 
     def outcome(self) -> str:
-        """What came of it, in words."""
+        """The result as text."""
         if not self.tries:
             return "not answered"
         if not self.right:
-            return "explained" if self.told else "not right yet"
+            return "explained" if self.closed else "not right yet"
         return "right" if self.tries == 1 else f"right at try {self.tries}"
 
 
 def judged(question: Question, given: str, figures: Figures, before: Answer) -> Answer:
-    """The answer that is `given` now; a `Refusal` where it is none that could be judged."""
+    """The next answer; a `Refusal` where `given` cannot be judged."""
     right = _right(question.how, given, figures)
     words = question.how.options[int(given)] if isinstance(question.how, ChoiceAnswer) else given
     if isinstance(question.how, NumberAnswer):
@@ -60,7 +60,7 @@ def _right(how: ChoiceAnswer | NumberAnswer | LessonTask, given: str, figures: F
         case NumberAnswer(expected=expected, tolerance=tolerance, unit=unit):
             there = float(expected(figures))
             if not math.isfinite(there):
-                raise Refusal("The window shows no such number yet: wait a moment.")
+                raise Refusal("The window does not show this number yet: wait a moment.")
             return abs(number_in(given) * UNITS[unit] - there) <= tolerance
 
 
@@ -77,7 +77,7 @@ def number_in(text: str) -> float:
 
 @dataclass
 class Progress:
-    """Where in a `lesson` a person is, by `step`, and the answers by step."""
+    """The present `step` of a `lesson`, and the answers by step."""
 
     lesson: Lesson
     step: int = 0
@@ -103,19 +103,19 @@ class Progress:
         return self.answers.get(self.step, Answer())
 
     def give(self, given: str, figures: Figures) -> None:
-        """Answer this step's question, once it is not told already."""
-        if self.question is not None and not self.answer.told:
+        """Answer this step's question, unless it is closed."""
+        if self.question is not None and not self.answer.closed:
             self.answers[self.step] = judged(self.question, given, figures, self.answer)
 
     def describe(self) -> str:
-        """How far it is, in a few words."""
+        """The progress as text."""
         right = sum(answer.right for answer in self.answers.values())
         if self.seen == len(self.lesson.steps):
             return f"done, {right} of {self.lesson.questions} right"
         return f"step {self.seen + 1} of {len(self.lesson.steps)}" if self.seen else ""
 
     def rows(self) -> list[tuple[str, str, str, str]]:
-        """Of each question: its step's title, what was asked, the answer, what came of it."""
+        """Of each question: its step's title, its text, the answer, the result."""
         found: list[tuple[str, str, str, str]] = []
         for number, step in enumerate(self.lesson.steps):
             if step.question is not None:

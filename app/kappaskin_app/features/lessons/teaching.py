@@ -1,4 +1,4 @@
-"""A lesson on the window: its steps as undoable settings, its questions judged by what is seen."""
+"""Teaching: the lesson in progress, its steps as undoable settings, its answers judged."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -12,11 +12,11 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate
-from kappaskin_app.features.lessons.figures import Watch
+from kappaskin_app.features.lessons.figures import RecentEstimates
+from kappaskin_app.features.lessons.hand_in import sheet
 from kappaskin_app.features.lessons.lesson import LessonTask, whole
+from kappaskin_app.features.lessons.lesson_file import READY, read_lesson
 from kappaskin_app.features.lessons.progress import Progress
-from kappaskin_app.features.lessons.reading import READY, read_lesson
-from kappaskin_app.features.lessons.sheet import sheet
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.history import History
@@ -29,9 +29,9 @@ _FILES = "Lesson (*.md)"
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a person is: at which `step` of which lesson, with which `settings`.
+    """A `step` of a lesson in progress, with its `settings`.
 
-    `before` are the settings, and the source, that were before the lesson.
+    `before` are the settings and the source from before the lesson.
     """
 
     progress: Progress | None
@@ -41,16 +41,16 @@ class _Place:
 
 
 class Teaching(QObject):
-    """Knows the lessons, by file, and how far each is; `changed` tells when that is another.
+    """The lessons by file, with their progress; `changed` reports a change.
 
-    `progress` is that of the lesson that is taken, None while none is; `message` says why an answer
-    could not be judged, or a file not be read. `told` reports what a request did, `pointed` at what
-    to point, `taken_up` that a lesson which was left is taken again. It is told how to `connect`
-    to a source, and gets pictures of what is seen.
+    `progress` is that of the present lesson, None without one; `message` says why an answer could
+    not be judged, or a file not be read. `notified` brings the result of a request, `pointed` the
+    controls to point at, `taken_up` reports that a lesson is resumed by undo. `connect` changes the
+    source, `views` returns pictures for the figure to hand in.
     """
 
     changed = Signal()
-    told = Signal(str)
+    notified = Signal(str)
     pointed = Signal(tuple)
     taken_up = Signal()
 
@@ -70,17 +70,17 @@ class Teaching(QObject):
         self.taken: dict[str, Progress] = {}
         self.progress: Progress | None = None
         self.message = ""
-        self._watch = Watch()
+        self._recent = RecentEstimates()
         self._before: tuple[Settings, str] | None = None
         session.estimated.connect(guarded(self._receive))
-        history.changed.connect(guarded(lambda *_: self._watch.forget()))
+        history.changed.connect(guarded(lambda *_: self._recent.forget()))
 
     def _receive(self, estimate: Estimate) -> None:
         if self.progress is not None:
-            self._watch.receive(estimate)
+            self._recent.receive(estimate)
 
     def look(self) -> None:
-        """Read the lessons that come with the program, the first time that somebody asks."""
+        """Read the lessons that come with the program, the first time."""
         if not self.taken:
             self.taken = {str(file): Progress(read_lesson(file)) for file in READY}
             self.changed.emit()
@@ -88,13 +88,13 @@ class Teaching(QObject):
     # Requests of the user.
 
     def open(self) -> None:
-        """Ask for a file, and take the lesson in it."""
+        """Ask for a file, and start the lesson in it."""
         file, _ = QFileDialog.getOpenFileName(self._window, "Open a lesson", "", _FILES)
         if file:
             self.open_file(Path(file))
 
     def open_file(self, file: Path) -> None:
-        """Take the lesson in a file of one's own, or say why there is none."""
+        """Start the lesson in a file, or report why it cannot be read."""
         self.look()
         try:
             self.taken[str(file)] = Progress(read_lesson(file))
@@ -105,12 +105,12 @@ class Teaching(QObject):
         self.take(str(file))
 
     def take(self, file: str) -> None:
-        """Begin the lesson in `file`, or go on where it was left."""
+        """Start the lesson in `file`, or continue it."""
         progress = self.taken[file]
         self._go(progress, 0 if progress.at_end else progress.step)
 
     def leave(self) -> None:
-        """Have the settings, and the source, from before the lesson."""
+        """Restore the settings and the source from before the lesson."""
         if self._before is None:
             return
         settings, source = self._before
@@ -138,7 +138,7 @@ class Teaching(QObject):
         if sets is not None:
             self._play(sets)
 
-    # Where it is, which can be undone.
+    # The place in the lesson, which can be undone.
 
     @property
     def _now(self) -> _Place:
@@ -147,10 +147,10 @@ class Teaching(QObject):
 
     def _step(self, text: str, after: _Place) -> None:
         if after != self._now:
-            self._history.step(text, self._have, self._now, after)
+            self._history.step(text, self._restore, self._now, after)
 
-    def _have(self, place: _Place) -> None:
-        """Be at a place, and have its settings."""
+    def _restore(self, place: _Place) -> None:
+        """Go to a place, and apply its settings."""
         left, progress = self.progress is None, place.progress
         self.progress, self._before, self.message = progress, place.before, ""
         if progress is not None:
@@ -165,7 +165,7 @@ class Teaching(QObject):
             self.taken_up.emit()
 
     def answer(self, given: str) -> None:
-        """Judge an answer by what the window shows now."""
+        """Judge an answer by the figures that the window shows now."""
         if self.progress is None:
             return
         try:
@@ -176,19 +176,19 @@ class Teaching(QObject):
         self.changed.emit()
 
     def press(self, number: int) -> None:
-        """Break something, or mend it, as the button of this step says."""
+        """Apply the settings of a button of this step."""
         if self.progress is not None and not self.progress.at_end:
             button = self.progress.lesson.steps[self.progress.step].buttons[number]
             self._put(button.label, button.sets)
 
     def show_how(self) -> None:
-        """Do what was to be done."""
+        """Apply the solution of a task."""
         question = None if self.progress is None else self.progress.question
         if question is not None and isinstance(question.how, LessonTask):
-            self._history.change("Show how it is done", -1, **question.how.solution)
+            self._history.change("Apply the solution", -1, **question.how.solution)
 
     def hand_in(self, student: str) -> None:
-        """Ask for a file, and write the figure of this lesson to it."""
+        """Ask for a file, and write the figure to hand in."""
         progress, now = self.progress, datetime.now()
         if progress is None:
             return
@@ -197,20 +197,20 @@ class Teaching(QObject):
         try:
             path = chosen_file(self._window, "the figure", flat=True)
         except Refusal as refusal:
-            self.told.emit(str(refusal))
+            self.notified.emit(str(refusal))
             return
         if path is None:
             return
         made = sheet(progress, student, views, settings, now)
         try:
             save_view(made, path, progress.lesson.title, f"{student.strip()}: {caption}")
-            self.told.emit(f"Saved {path}")
+            self.notified.emit(f"Saved {path}")
         except Refusal as refusal:
-            self.told.emit(str(refusal))
+            self.notified.emit(str(refusal))
         made.deleteLater()
 
     def _put(self, text: str, sets: Mapping[str, Any]) -> None:
-        """Have the settings that a button says, on the simulated skin."""
+        """Apply settings to the simulated skin."""
         self._simulate()
         self._history.change(text, -1, **whole(sets))
         self._play(sets)
@@ -227,9 +227,9 @@ class Teaching(QObject):
         if not session.running:
             session.run(True)
 
-    # What is so.
+    # State.
 
     def figures(self) -> dict[str, float | str]:
-        """What the window shows now, by name."""
+        """The figures that the window shows now, by name."""
         session = self._session
-        return self._watch.figures(self._history.settings, session.status, self._display.figures)
+        return self._recent.figures(self._history.settings, session.status, self._display.figures)

@@ -1,15 +1,15 @@
-"""Log, events on the line, errors and the report."""
+"""The log, the event log, errors and the report."""
 
 from kappaskin_app.features.log.errors import Errors
 from kappaskin_app.features.log.events import EventLog
-from kappaskin_app.features.log.panel import Logged, LogPanel
+from kappaskin_app.features.log.panel import LogBuffer, LogPanel
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.parts import HELP, SOURCE
 from kappaskin_app.shell.window import MainWindow
 
-_EVENTS = "When a device came, went, lost messages or began anew, newest first"
+_EVENTS = "Connections, lost messages and restarts, newest first"
 
-_ABOUT = "What was logged or said in passing since the window opened, newest first"
+_ABOUT = "Messages and errors since the window opened, newest first"
 
 
 class LogFeature:
@@ -17,17 +17,17 @@ class LogFeature:
 
     def install(self, shell: MainWindow) -> None:
         session, display = shell.session, shell.display
-        self.logged = Logged()
-        self.log, self.event_log = LogPanel(self.logged), EventLog(shell)
+        self.log_buffer = LogBuffer()
+        self.log, self.event_log = LogPanel(self.log_buffer), EventLog(shell)
         self.errors = Errors(shell, self.event_log)
         shell.docks.put_below("log", "Log", self.log, "Ctrl+Alt+G", _ABOUT)
-        display.foot.add(self.errors.count)
+        display.status_bar.add(self.errors.count)
         session.reported.connect(guarded(self.event_log.follow))
         session.reported.connect(guarded(lambda *_: self.log.look()))
         display.badge.clicked.connect(guarded(self.event_log.open_list))
-        self.event_log.told.connect(guarded(shell.tell))
+        self.event_log.notified.connect(guarded(shell.notify))
         show = self.event_log.open_list
         shell.actions_by_name.add("event_log", SOURCE, "E&vent log", show, "F4", _EVENTS)
         self.errors.add_actions(shell.actions_by_name, HELP)
         shell.closing.connect(guarded(self.errors.close))
-        shell.closed.connect(guarded(self.logged.close))
+        shell.closed.connect(guarded(self.log_buffer.close))

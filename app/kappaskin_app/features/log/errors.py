@@ -1,4 +1,4 @@
-"""Errors inside the program: counted, listed, and reported in one file."""
+"""Errors of the program, and the report file."""
 
 import io
 import json
@@ -22,9 +22,16 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions
 from kappaskin_app.shell.background import BackgroundThread, Tasks
 from kappaskin_app.shell.folders import recordings_folder
-from kappaskin_app.shell.logbook import CRASHES, LOG, log_folder
+from kappaskin_app.shell.log_files import CRASHES, LOG, log_folder
 from kappaskin_app.shell.recovery import settings_text
-from kappaskin_app.shell.work_dialog import WorkDialog, beside, choosing, ended, named, path_in
+from kappaskin_app.shell.work_dialog import (
+    WorkDialog,
+    browse_button,
+    label_for,
+    path_in,
+    with_button,
+    with_suffix,
+)
 from kappaskin_app.theme import current, follow_look
 
 if TYPE_CHECKING:
@@ -32,16 +39,16 @@ if TYPE_CHECKING:
 
 
 _CONTENTS = (
-    "Holds what went wrong (the log), what happened on the line, the settings, the versions of "
-    "what is installed and this machine's ports. Your home folder is written as ~. It is saved "
-    "here and sent to nobody."
+    "Contains the log, the event log, the settings, the versions of the installed packages and "
+    "the serial ports. Your home folder is written as ~. The file is saved on this computer and "
+    "not sent."
 )
 _SHOWN = ("curvature", "residual", "coefficients", "surface")
 
 
 @dataclass(frozen=True)
-class Told:
-    """What a window tells for a report: texts by their names, and what it shows, if wanted."""
+class ReportContents:
+    """The contents of a report from the window: texts by name, and an estimate if requested."""
 
     texts: Mapping[str, str]
     estimate: Estimate | None = None
@@ -49,29 +56,29 @@ class Told:
 
 def write_report(
     path: Path,
-    told: Told,
+    contents: ReportContents,
     logs: Path,
     doctor: Callable[[], Mapping[str, object]] = examine,
 ) -> Generator[float | str]:
-    """Write what is `told`, and the log files in `logs`, to the new file `path`.
+    """Write the `contents`, and the log files in `logs`, to the new file `path`.
 
-    The share that is done before each part, and at the end in words what was written. A `Refusal`
-    where `path` is no zip, is there already or cannot be written.
+    Yields the share done before each part, at last a text. A `Refusal` where `path` is no zip,
+    exists already or cannot be written.
     """
     if path.suffix.lower() != ".zip":
         raise Refusal(f"{path.name}: expected a file that ends in .zip")
     if path.exists():
-        raise Refusal(f"{path}: is there already; choose another name")
+        raise Refusal(f"{path}: exists already; choose another name")
     part = path.with_name(f".{path.name}.part")
-    parts = {name: text.encode() for name, text in told.texts.items()}
+    parts = {name: text.encode() for name, text in contents.texts.items()}
     parts["doctor.json"] = json.dumps(doctor(), indent=1).encode()
     for file in sorted([*logs.glob(f"{LOG}*"), *logs.glob(CRASHES)]):
-        parts[file.name] = _content(file)
+        parts[file.name] = _read_bytes(file)
     home = str(Path.home())
-    for written in (home, json.dumps(home)[1:-1]):  # as it is, and as JSON has it
+    for written in (home, json.dumps(home)[1:-1]):  # plain, and as in JSON
         parts = {name: text.replace(written.encode(), b"~") for name, text in parts.items()}
-    if told.estimate is not None:
-        parts["shown.npz"] = _readings(told.estimate)
+    if contents.estimate is not None:
+        parts["shown.npz"] = _readings(contents.estimate)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as packed:
@@ -83,12 +90,12 @@ def write_report(
     except OSError as error:
         why = error.strerror or error
         raise Refusal(f"{path}: cannot be written ({why}); choose another place") from error
-    finally:  # it was cancelled, maybe
+    finally:  # it may have been cancelled
         part.unlink(missing_ok=True)
     yield f"{path}: {', '.join(parts)}"
 
 
-def _content(file: Path) -> bytes:
+def _read_bytes(file: Path) -> bytes:
     try:
         return file.read_bytes()
     except OSError as error:
@@ -96,7 +103,7 @@ def _content(file: Path) -> bytes:
 
 
 def _readings(estimate: Estimate) -> bytes:
-    """The arrays of an estimate as a file for NumPy, in SI units."""
+    """The arrays of an estimate as an NPZ file, in SI units."""
     packed = io.BytesIO()
     np.savez_compressed(packed, **{name: getattr(estimate, name) for name in _SHOWN})
     return packed.getvalue()
@@ -105,24 +112,24 @@ def _readings(estimate: Estimate) -> bytes:
 class ReportDialog(WorkDialog):
     """Asks where a report is to be saved, and whether with readings.
 
-    `tell` tells what is so when it is written, with what is shown or without; `logs` holds the log.
+    `contents` returns the contents of now, with the estimate or without; `logs` is the log folder.
     """
 
     def __init__(
-        self, tell: Callable[[bool], Told], logs: Path, tasks: Tasks, parent: QWidget
+        self, contents: Callable[[bool], ReportContents], logs: Path, tasks: Tasks, parent: QWidget
     ) -> None:
-        how = "&Save", "Writing the report", self._begun, self._told
-        super().__init__(tasks, "Report what went wrong", *how, parent)
+        how = "&Save", "Writing the report", self._start_work, self._result_text
+        super().__init__(tasks, "Error report", *how, parent)
         self.setObjectName("report")
-        self._tell, self._logs = tell, logs
-        self.to, self.readings = QLineEdit(), QCheckBox("&With the readings that are shown")
-        self.choose_file = choosing(self._choose)
-        contents = QLabel(_CONTENTS)
-        contents.setWordWrap(True)
-        self.to.setToolTip("The zip to write; look into it before you send it.")
-        self.readings.setToolTip("What the elements read just now, as numbers: one frame.")
-        self.form.addRow(contents)
-        self.form.addRow(named("&File", self.to), beside(self.to, self.choose_file))
+        self._contents, self._logs = contents, logs
+        self.to, self.readings = QLineEdit(), QCheckBox("&With the present readings")
+        self.choose_file = browse_button(self._choose)
+        explanation = QLabel(_CONTENTS)
+        explanation.setWordWrap(True)
+        self.to.setToolTip("The zip file to write; check it before you send it.")
+        self.readings.setToolTip("The readings of one frame, as numbers.")
+        self.form.addRow(explanation)
+        self.form.addRow(label_for("&File", self.to), with_button(self.to, self.choose_file))
         self.form.addRow(self.readings)
         self._add_buttons()
         self.begin_button.setDefault(True)
@@ -140,7 +147,7 @@ class ReportDialog(WorkDialog):
             self, "Save the report to", self.to.text(), "Report (*.zip)"
         )
         if name:
-            self.to.setText(str(ended(name, ".zip")))
+            self.to.setText(str(with_suffix(name, ".zip")))
 
     def _allow(self) -> None:
         super()._allow()
@@ -148,23 +155,23 @@ class ReportDialog(WorkDialog):
             widget.setEnabled(not self.busy)
         self.begin_button.setEnabled(bool(self.to.text().strip()) and not self.busy)
 
-    def _begun(self) -> BackgroundThread:
-        told = self._tell(self.readings.isChecked())
-        return BackgroundThread(write_report, path_in(self.to), told, self._logs)
+    def _start_work(self) -> BackgroundThread:
+        contents = self._contents(self.readings.isChecked())
+        return BackgroundThread(write_report, path_in(self.to), contents, self._logs)
 
-    def _told(self, result: object) -> str:
+    def _result_text(self, result: object) -> str:
         return f"Saved {result}"
 
 
-REPORT_TIP = "Save what helps to find out what went wrong, in one file"
+REPORT_TIP = "Save the log, the settings and the versions in one file"
 _TIP = (
-    "Things that went wrong inside, while the rest goes on. Click to read them in the Log; "
-    "Help > Report saves what helps to find out why."
+    "Errors inside the program, which continues. Click to read them in the Log; Help > Report "
+    "saves a file for finding the cause."
 )
 
 
 class Errors(QObject):
-    """Counts what a `window` caught: `count` shows it, `report` saves what helps to mend it."""
+    """Counts the errors caught in a `window`: `count` shows them, `report` saves a report."""
 
     def __init__(self, window: "MainWindow", events: EventLog) -> None:
         super().__init__(window)
@@ -175,12 +182,12 @@ class Errors(QObject):
         self.count.setAccessibleName("No failures")
         self.count.clicked.connect(guarded(lambda *_: window.docks.reveal("log")))
         self.count.hide()
-        self.report = ReportDialog(self._tell, log_folder(), window.tasks, window)
+        self.report = ReportDialog(self._contents, log_folder(), window.tasks, window)
         guard.on_failure(self._take)
         follow_look(window, self._dress)
 
     def add_actions(self, actions: Actions, menu: str) -> None:
-        """Register what a person can do."""
+        """Register the action."""
         actions.add(
             "report", menu, "&Report\N{HORIZONTAL ELLIPSIS}", self.report.ask, "", REPORT_TIP
         )
@@ -191,12 +198,12 @@ class Errors(QObject):
         self.count.setAccessibleName(f"{self.count.text()}: read them")
         self.count.show()
         self.events.note("failure", words)
-        self._window.tell(words)
+        self._window.notify(words)
 
     def _dress(self) -> None:
         self.count.setStyleSheet(f"color: {current().alert};")
 
-    def _tell(self, with_readings: bool) -> Told:
+    def _contents(self, with_readings: bool) -> ReportContents:
         window, session = self._window, self._window.session
         sensor = session.status.sensor
         state = {
@@ -211,7 +218,7 @@ class Errors(QObject):
             "happened.txt": self.events.list.toPlainText(),
             "state.txt": "".join(f"{name}: {value}\n" for name, value in state.items()),
         }
-        return Told(texts, session.estimate if with_readings else None)
+        return ReportContents(texts, session.estimate if with_readings else None)
 
     def close(self) -> None:
         guard.forget(self._take)

@@ -1,4 +1,4 @@
-"""What happened on the line: each event in passing, and the last of them in a window."""
+"""The event log: connections, lost messages, restarts."""
 
 import time
 from collections import deque
@@ -19,31 +19,31 @@ from kappaskin.frames import Event
 from kappaskin.live import Status
 
 _KEPT = 64
-_NOTHING = "Nothing yet. Here stands when a device came, went, lost messages or began anew."
+_NOTHING = "No events. Connections, lost messages and restarts are listed here."
 
 
 class EventLog(QDialog):
-    """Lists the last events, newest first; `told` brings each new one in words."""
+    """Lists the last events, newest first; `notified` brings new ones as text."""
 
-    told = Signal(str)
+    notified = Signal(str)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("event_log")
-        self.setWindowTitle("What happened")
+        self.setWindowTitle("Event log")
         self.resize(720, 320)
-        self._event_count = 0
+        self._seen = 0
         self._lines: deque[str] = deque(maxlen=_KEPT)
         self.list = QPlainTextEdit(readOnly=True, placeholderText=_NOTHING)  # pyright: ignore[reportCallIssue]
         self.list.setLineWrapMode(QPlainTextEdit.LineWrapMode.WidgetWidth)
-        self.list.setAccessibleName("What happened, newest first")
-        self.list.setToolTip("Each with its time of day; the last 64 are kept.")
+        self.list.setAccessibleName("Event log, newest first")
+        self.list.setToolTip("The last 64 events, each with its time of day.")
         self.copy_button = QPushButton("&Copy all")
         self.copy_button.setToolTip("Copy the list as text.")
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
         for button in buttons.buttons():
             button.setIcon(QIcon())  # no other button has one
-            button.setToolTip("Put this away (Esc); F4 brings it back.")
+            button.setToolTip("Close (Esc); F4 opens it again.")
         buttons.addButton(self.copy_button, QDialogButtonBox.ButtonRole.ActionRole)
         buttons.rejected.connect(self.reject)
         self.copy_button.clicked.connect(
@@ -54,16 +54,16 @@ class EventLog(QDialog):
         layout.addWidget(buttons)
 
     def follow(self, status: Status) -> None:
-        """Take up what happened since the last time."""
-        new = status.events[max(0, len(status.events) - status.event_count + self._event_count) :]
-        if status.event_count == self._event_count or not new:
+        """Add the events since the last status."""
+        new = status.events[max(0, len(status.events) - status.event_count + self._seen) :]
+        if status.event_count == self._seen or not new:
             return
-        self._event_count = status.event_count
+        self._seen = status.event_count
         self._add(new)
-        self.told.emit("; ".join(dict.fromkeys(_sentence(event.text) for event in new[-2:])))
+        self.notified.emit("; ".join(dict.fromkeys(_sentence(event.text) for event in new[-2:])))
 
     def note(self, kind: str, text: str) -> None:
-        """Take up something that no device told."""
+        """Add an event of the app itself."""
         self._add([Event(time.monotonic(), kind, text)])
 
     def _add(self, events: Sequence[Event]) -> None:
@@ -77,7 +77,7 @@ class EventLog(QDialog):
 
 
 def _lines(events: Sequence[Event]) -> list[str]:
-    """Each event with the time of day at which it happened."""
+    """A line for each event, with its time of day."""
     off = time.time() - time.monotonic()
     return [
         f"{time.strftime('%H:%M:%S', time.localtime(off + event.time))}  {event.kind}:  "

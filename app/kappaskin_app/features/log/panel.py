@@ -1,4 +1,4 @@
-"""The log: what the program logged, filtered, copied, cleared."""
+"""The log panel: messages by level, to copy and clear."""
 
 import logging
 import time
@@ -28,7 +28,7 @@ _KEPT = 1000
 
 @dataclass(frozen=True)
 class LogLine:
-    """What was logged at `time` (s since 1970), how grave it is, its first line and all of it."""
+    """A log message: its `time` (s since 1970), its level, its first line and all of it."""
 
     time: float
     level: int
@@ -44,8 +44,8 @@ class LogLine:
         return logging.getLevelName(self.level).lower()
 
 
-class Logged(logging.Handler):
-    """Keeps the last `lines`, of which there were `count` ever, from any thread, until closed."""
+class LogBuffer(logging.Handler):
+    """Collects the last `lines`, `count` in all, from any thread, until closed."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -53,13 +53,13 @@ class Logged(logging.Handler):
         self.lines: deque[LogLine] = deque(maxlen=_KEPT)
         self.count = 0
         self._level = log.level
-        log.setLevel(logging.INFO)  # what is said in passing too
+        log.setLevel(logging.INFO)  # status messages too
         logging.getLogger().addHandler(self)
 
     def emit(self, record: logging.LogRecord) -> None:
         try:
             text, whole = record.getMessage().partition("\n")[0], self.format(record)
-        except Exception:  # what does not fit its own words; who logged it is to go on
+        except Exception:  # arguments that do not fit the format; the caller must go on
             self.handleError(record)
             return
         error = record.exc_info[1] if record.exc_info else None
@@ -70,7 +70,7 @@ class Logged(logging.Handler):
 
     def clear(self) -> None:
         self.lines.clear()
-        self.count += 1  # so that whoever looks sees that it is something else
+        self.count += 1  # so that the panel notices the change
 
     def close(self) -> None:
         logging.getLogger().removeHandler(self)
@@ -85,25 +85,25 @@ _LEVELS = (
     ("Warnings and errors", logging.WARNING),
     ("Errors", logging.ERROR),
 )
-_NOTHING = "Nothing of that kind was logged since the window was opened."
+_NOTHING = "No messages of this level since the window opened."
 
 
 class LogPanel(QWidget):
-    """Lists what a `logged` keeps, newest first."""
+    """Lists the messages of a `buffer`, newest first."""
 
-    def __init__(self, logged: Logged, parent: QWidget | None = None) -> None:
+    def __init__(self, buffer: LogBuffer, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._logged, self._seen = logged, -1
+        self._buffer, self._seen = buffer, -1
         self._lines: list[LogLine] = []
         self.level, self.nothing = QComboBox(), QLabel(_NOTHING)
         for words, level in _LEVELS:
             self.level.addItem(words, level)
-        self.level.setAccessibleName("What is listed")
-        self.level.setToolTip("How grave something must be to be listed.")
+        self.level.setAccessibleName("Level")
+        self.level.setToolTip("The least level of the messages listed.")
         self.level.currentIndexChanged.connect(guarded(lambda *_: self._fill()))
         self.copy, self.clear = QPushButton("&Copy these"), QPushButton("C&lear")
-        self.copy.setToolTip("Copy what is listed, each with all of its lines, as text.")
-        self.clear.setToolTip("Forget these lines here; the file that Report takes along has them.")
+        self.copy.setToolTip("Copy the listed messages with all their lines, as text.")
+        self.clear.setToolTip("Clear the list; the log file still has these messages.")
         self.copy.clicked.connect(guarded(lambda *_: self._copy()))
         self.clear.clicked.connect(guarded(lambda *_: self._clear()))
         self.table = _table()
@@ -117,14 +117,14 @@ class LogPanel(QWidget):
         follow_look(self, self._fill)
 
     def look(self) -> None:
-        """List what is new, while somebody looks."""
-        if self.isVisible() and self._seen != self._logged.count:
+        """List new messages, while it is visible."""
+        if self.isVisible() and self._seen != self._buffer.count:
             self._fill()
 
     def _fill(self) -> None:
-        self._seen = self._logged.count
+        self._seen = self._buffer.count
         least = self.level.currentData()
-        self._lines = [line for line in reversed(list(self._logged.lines)) if line.level >= least]
+        self._lines = [line for line in reversed(list(self._buffer.lines)) if line.level >= least]
         self.table.setRowCount(len(self._lines))
         self.table.verticalHeader().setDefaultSectionSize(self.fontMetrics().height() + _ROOM)
         for row, line in enumerate(self._lines):
@@ -147,18 +147,18 @@ class LogPanel(QWidget):
         QGuiApplication.clipboard().setText("\n".join(each))
 
     def _clear(self) -> None:
-        self._logged.clear()
+        self._buffer.clear()
         self._fill()
 
 
 def _table() -> QTableWidget:
     table = QTableWidget(0, len(_HEAD))
     table.setObjectName("log")
-    table.setAccessibleName("What was logged, newest first")
+    table.setAccessibleName("Log, newest first")
     table.setHorizontalHeaderLabels(list(_HEAD))
     table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
     table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-    table.setTabKeyNavigation(False)  # Tab leads on, the arrows go through the table
+    table.setTabKeyNavigation(False)  # Tab leaves the table, the arrow keys move in it
     table.setWordWrap(False)
     table.setTextElideMode(Qt.TextElideMode.ElideRight)
     table.verticalHeader().hide()

@@ -116,7 +116,7 @@ class Looking:
         if dragged:
             self._history.change("Turn the view", -1, camera=camera)
         else:
-            self._history.wish("camera", camera=camera)
+            self._history.request("camera", camera=camera)
 
     def lock(self, locked: bool) -> None:
         """Keep the range of the skin's colours as it is, or let it follow what is shown."""

@@ -48,5 +48,5 @@ class PresenterFeature:
             self._show_sound(sound.turn())
 
     def _show_sound(self, why_not: str) -> None:
-        self._shell.tell(why_not)
+        self._shell.notify(why_not)
         self._action.setChecked(self.presenting.sound.on)

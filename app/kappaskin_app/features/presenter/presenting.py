@@ -17,7 +17,7 @@ from kappaskin_app.features.presenter.sound import Sound
 from kappaskin_app.features.presenter.stage import Stage
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.badge import GAP, SIM, origin
-from kappaskin_app.shell.banner import Offer
+from kappaskin_app.shell.centre import ActionBanner
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.docks import drawn_once
 from kappaskin_app.shell.loads import may_choose, touches_at
@@ -117,7 +117,13 @@ class Presenting(QObject):
         window = self._window
         docks = window.findChildren(QDockWidget, options=Qt.FindChildOption.FindDirectChildrenOnly)
         bars = window.findChildren(QToolBar, options=Qt.FindChildOption.FindDirectChildrenOnly)
-        return [*docks, *bars, *window.findChildren(Offer), window.menuBar(), window.statusBar()]
+        return [
+            *docks,
+            *bars,
+            *window.findChildren(ActionBanner),
+            window.menuBar(),
+            window.statusBar(),
+        ]
 
     # What comes in.
 

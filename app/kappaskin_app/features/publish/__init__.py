@@ -1,4 +1,4 @@
-"""Estimates published to other programs: who receives them, and what each one gets."""
+"""Publishing of estimates to other programs: receivers and counts."""
 
 import math
 import time
@@ -14,12 +14,12 @@ from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.widgets.parts import ELLIPSIS, text_label
 
 _NAMES = ("send_udp", "udp_to", "serve_foxglove", "foxglove_at")
-_EVERY = 0.5  # s between two looks at the counts
+_EVERY = 0.5  # s between two updates of the counts
 _TIP = (
-    "Messages sent to each receiver, and those dropped because it did not take them at once or "
-    "nobody receives there. It never holds the readings up."
+    "Messages sent to each receiver, and those dropped because it was not ready or not there. "
+    "Publishing never delays the readings."
 )
-_LATE = "From the arrival of a frame's bytes until it was sent: what 99 of 100 take at most."
+_LATE = "Latency from the arrival of a frame's bytes until it was sent, 99th percentile."
 
 
 class PublishFeature:
@@ -27,15 +27,15 @@ class PublishFeature:
 
     def install(self, shell: MainWindow) -> None:
         self.publish = shell.panels.add(LIVE, PublishPanel())
-        shell.session.unsent.connect(guarded(self.publish.show_refusal))
+        shell.session.publish_refused.connect(guarded(self.publish.show_refusal))
 
 
 class PublishPanel(Form):
-    """Asks for receivers; says what each of them gets, and why one gets nothing."""
+    """Settings of receivers; shows what each gets, and errors."""
 
     purpose = (
         "Sends the contact with its error bars to other programs, as JSON by UDP or to Foxglove; "
-        "receivers of twenty lines come with the library."
+        "example receivers come with the library."
     )
     guide_page = "record"
 
@@ -48,8 +48,8 @@ class PublishPanel(Form):
         self._refusal, self._next = "", 0.0
 
     def show_refusal(self, refusal: str) -> None:
-        """Say why nothing is published as asked; nothing to say when it is."""
-        self._refusal = f"Nothing is sent: {refusal}" if refusal else ""
+        """Show why nothing is published; empty when it is."""
+        self._refusal = f"Not publishing: {refusal}" if refusal else ""
         self._next = 0.0
 
     def show_status(self, status: Status, simulating: bool) -> None:
@@ -59,8 +59,8 @@ class PublishPanel(Form):
         self._next = now + _EVERY
         late = news.latency.whole
         lines = [line for target in news.targets for line in _words(target)]
-        told = f"99 % within {1e3 * late:.1f} ms" if math.isfinite(late) else ""
-        for label, text in ((self.counts, "\n".join(lines)), (self.late, told)):
+        latency = f"99 % within {1e3 * late:.1f} ms" if math.isfinite(late) else ""
+        for label, text in ((self.counts, "\n".join(lines)), (self.late, latency)):
             if text != label.text():
                 label.setText(text)
             label.setVisible(bool(text))
@@ -69,11 +69,11 @@ class PublishPanel(Form):
 
 
 def _words(target: TargetStatus) -> list[str]:
-    """A target in words, and each of its clients; nothing where its refusal says it all."""
+    """Lines about a target and each of its clients; none where it is refused."""
     if target.refusal:
         return []
     if target.opening:
-        return [f"{target.target}: looking for it{ELLIPSIS}"]
+        return [f"{target.target}: connecting{ELLIPSIS}"]
     serving = target.target.startswith("foxglove")
     name = target.target.removeprefix("udp://").removeprefix("foxglove://")
     lines = [f"{name}, {len(target.receivers)} connected" if serving else name]

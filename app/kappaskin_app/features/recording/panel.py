@@ -1,31 +1,31 @@
-"""What is recorded, and which recording is played."""
+"""The recording panel: record, note, open, repair."""
 
 from pathlib import Path
 
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QWidget
 
-from kappaskin_app.features.recording.playback import Replaying
-from kappaskin_app.features.recording.recorder import Taping, duration_of, size_of
+from kappaskin_app.features.recording.playback import PlaybackControl
+from kappaskin_app.features.recording.recorder import RecordingControl, duration_of, size_of
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.widgets.line import Line
 from kappaskin_app.widgets.parts import button, in_a_row, sentence
 from kappaskin_app.widgets.text import COMMAND
 
-_RECORD = "Write all that comes in to a file, or end that (Ctrl+Shift+R)."
-_NOTE = "Write down what happened just now, in the recording too (Ctrl+Shift+N)."
-_OPEN = "Play a recording as if it were live (Ctrl+Shift+O); or drop one on the window."
-_REPAIR = "Save what is whole of the damaged recording to a new one beside it, and play that."
+_RECORD = "Start or stop recording to a file (Ctrl+Shift+R)."
+_NOTE = "Add a note to the event log and the recording (Ctrl+Shift+N)."
+_OPEN = "Play a recording (Ctrl+Shift+O); or drop one on the window."
+_REPAIR = "Save the readable part of the damaged recording to a new file, and play it."
 _DOTS = "\N{HORIZONTAL ELLIPSIS}"
 
 
 class RecordingPanel(Panel):
-    """Says how the recording does, and asks for another one."""
+    """Shows the state of recording and playback, and requests changes."""
 
     purpose = (
-        "Writes all that comes in, before anything is made of it, to a file that outlives a crash; "
-        "plays such a file again, with other settings if you like."
+        "Records all raw readings to a file that survives a crash; plays such a file, with its "
+        "settings or others."
     )
     guide_page = "record"
 
@@ -36,7 +36,7 @@ class RecordingPanel(Panel):
         self.open = button(f"Open{_DOTS}", "open-button", _OPEN)
         self.what = Line()
         self.copy_button = button(
-            "Copy the command", "copy-repair", "Copy what the message above says to type."
+            "Copy the command", "copy-repair", "Copy the command in the message above."
         )
         self.repair = button(f"Repair{_DOTS}", "repair-button", _REPAIR)
         self.offer = QWidget()
@@ -47,44 +47,44 @@ class RecordingPanel(Panel):
         self.body.addLayout(in_a_row(self.record, self.note, self.open))
         self.body.addWidget(self.what)
         self._around.addWidget(self.offer)
-        self._taping: Taping | None = None
-        self._replaying: Replaying | None = None
+        self._recorder: RecordingControl | None = None
+        self._playback: PlaybackControl | None = None
         self._damaged: Path | None = None
         self.copy_button.clicked.connect(guarded(self._copy))
         self.repair.clicked.connect(guarded(self._ask_for_repair))
 
-    def attend(self, taping: Taping, replaying: Replaying) -> None:
-        """Show how both go, and pass on what the user requests."""
-        self._taping, self._replaying = taping, replaying
-        self.record.clicked.connect(guarded(lambda *_: taping.turn()))
-        self.note.clicked.connect(guarded(lambda *_: taping.note()))
-        self.open.clicked.connect(guarded(lambda *_: replaying.open()))
-        taping.changed.connect(guarded(self._tell))
-        replaying.changed.connect(guarded(self._tell))
-        self._tell()
+    def bind(self, recorder: RecordingControl, playback: PlaybackControl) -> None:
+        """Show the state of both, and pass on requests."""
+        self._recorder, self._playback = recorder, playback
+        self.record.clicked.connect(guarded(lambda *_: recorder.toggle()))
+        self.note.clicked.connect(guarded(lambda *_: recorder.note()))
+        self.open.clicked.connect(guarded(lambda *_: playback.open()))
+        recorder.changed.connect(guarded(self._update))
+        playback.changed.connect(guarded(self._update))
+        self._update()
 
-    def _tell(self) -> None:
-        taping, replaying = self._taping, self._replaying
-        if taping is None or replaying is None:
+    def _update(self) -> None:
+        recorder, playback = self._recorder, self._playback
+        if recorder is None or playback is None:
             return
-        written = taping.written
-        self.record.setText("Stop" if taping.recording else f"Record{_DOTS}")
-        self.record.setEnabled(not taping.why_not)
-        self.record.setToolTip(taping.why_not or _RECORD)
+        written = recorder.written
+        self.record.setText("Stop" if recorder.recording else f"Record{_DOTS}")
+        self.record.setEnabled(not recorder.why_not)
+        self.record.setToolTip(recorder.why_not or _RECORD)
         how = f"{duration_of(written.seconds)}, {size_of(written.size)}"
         self.what.show_text(f"{how}: {Path(written.path).name}" if written.messages else "")
         self.what.setToolTip(written.path)
         self.what.setVisible(bool(written.messages))
-        message = replaying.message or taping.message
-        alarm = bool(replaying.alarming if replaying.message else taping.alarming)
+        message = playback.message or recorder.message
+        alarm = bool(playback.alarming if playback.message else recorder.alarming)
         self.show_message(sentence(message), hint=not alarm)
-        self._damaged = replaying.damaged if replaying.message else taping.damaged
+        self._damaged = playback.damaged if playback.message else recorder.damaged
         self.offer.setVisible(self._damaged is not None)
         self.copy_button.setVisible("`kappaskin repair " in message)
 
     def _ask_for_repair(self) -> None:
-        if self._taping is not None and self._damaged is not None:
-            self._taping.repairs.ask_of(self._damaged)
+        if self._recorder is not None and self._damaged is not None:
+            self._recorder.repairs.ask_of(self._damaged)
 
     def _copy(self) -> None:
         if command := COMMAND.search(self.message.text()):

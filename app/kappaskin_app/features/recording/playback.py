@@ -1,4 +1,4 @@
-"""Recordings as a person opens, plays and scrubs them, with the settings recorded in them."""
+"""Playback of recordings: opening, seeking, speed, recorded settings."""
 
 import time
 from functools import partial
@@ -26,30 +26,30 @@ from kappaskin_app.widgets.text import day
 FILES = "Recording (*.mcap *.mcap.part)"
 _MENU = "&Recording"
 _TIPS = {
-    "forward": "Pause, and show the next frame of the recording",
-    "back": "Pause, and show the frame before in the recording",
-    "next": "Go to the next note, gap or change of settings in the recording",
-    "previous": "Go to the note, gap or change of settings before in the recording",
+    "forward": "Pause, and show the next frame",
+    "back": "Pause, and show the previous frame",
+    "next": "Go to the next note, gap or change of settings",
+    "previous": "Go to the previous note, gap or change of settings",
     "faster": "Play the recording at the next higher speed",
     "slower": "Play the recording at the next lower speed",
-    "loop": "Play the recording again and again, or once",
+    "loop": "Play the recording in a loop, or once",
     "settings": "Fit with the settings that were in use when this frame was recorded",
 }
-_ARRIVES = 0.4  # s after which what was asked of the engine shows in its status
+_ARRIVES = 0.4  # s after which a request to the engine shows in its status
 _HERE = 1e-4  # s: an event so near is where the replay is
 _DOTS = "\N{HORIZONTAL ELLIPSIS}"
 
 
-class Replaying(QObject):
-    """Opens recordings, and has the engine play them as `transport` asks.
+class PlaybackControl(QObject):
+    """Opens recordings, and plays them as `transport` requests.
 
-    `opened` names the source that is played, `told` reports the result of a request, `changed` that
-    `message` did: what a person should know about the recording, `alarming` where it is bad news;
-    `damaged` is the one that a repair may help then, and `offered` tells that there is one.
+    `opened` brings the source that is played, `notified` the result of a request, `changed` reports
+    another `message` about the recording, an alarm where it is `alarming`; `damaged` is a
+    recording that can be repaired, and `offered` reports one.
     """
 
     opened = Signal(str)
-    told = Signal(str)
+    notified = Signal(str)
     changed = Signal()
     offered = Signal()
 
@@ -64,14 +64,14 @@ class Replaying(QObject):
         super().__init__(window)
         self._history, self._session, self._transport = history, session, transport
         self._window = window
-        self.seen: RecordingSummary | None = None
+        self.summary: RecordingSummary | None = None
         self.message, self.alarming = "", False
         self.damaged: Path | None = None
         self.speed, self._looped, self._goes = 1.0, False, True
         self._replay: Replay | None = None
         self._sought: float | None = None
         self._sought_at, self._steps = 0.0, 0
-        self._begins = False  # once the settings are in use, from the beginning on
+        self._begins = False  # from the beginning, once the settings are in use
         self._before: dict[str, object] = {}
         self._changes: list[Event] = []
         self._asked, self._connects = Path(), True
@@ -90,19 +90,19 @@ class Replaying(QObject):
     def _wire(self) -> None:
         transport, session = self._transport, self._session
         transport.sought.connect(guarded(self.seek))
-        transport.course.sliderReleased.connect(guarded(self._let_go))
+        transport.course.sliderReleased.connect(guarded(self._release_handle))
         transport.step_wanted.connect(guarded(self.step))
         transport.jump_wanted.connect(guarded(self.jump))
         transport.play_wanted.connect(guarded(self.go))
         transport.speed_wanted.connect(guarded(self.play_at))
         transport.loop_wanted.connect(guarded(self.loop))
-        session.turning.connect(guarded(self._leave))
+        session.source_changing.connect(guarded(self._leave))
         session.reported.connect(guarded(self.follow))
 
     def add_actions(self, actions: Actions) -> None:
-        """Register what a person can do."""
+        """Register the actions."""
         self._actions = actions
-        tip = "Play a recording as if it were live; one may also be dropped on the window"
+        tip = "Play a recording; it can also be dropped on the window"
         add = partial(actions.add, menu=_MENU)
         add("open-recording", text=f"&Open{_DOTS}", act=self.open, shortcut="Ctrl+Shift+O", tip=tip)
         for name, text, act, shortcut in (
@@ -111,8 +111,8 @@ class Replaying(QObject):
             ("next", "Ne&xt event", partial(self.jump, 1), "Ctrl+]"),
             ("previous", "&Previous event", partial(self.jump, -1), "Ctrl+["),
             ("faster", "F&aster", partial(self._faster, 1), "Ctrl+Shift+Up"),
-            ("slower", "S&lower", partial(self._faster, -1), "Ctrl+Shift+Down"),
-            ("loop", "Begin ane&w at the end", self._turn_loop, "Ctrl+Shift+L"),
+            ("slower", "Slo&wer", partial(self._faster, -1), "Ctrl+Shift+Down"),
+            ("loop", "&Loop", self._turn_loop, "Ctrl+Shift+L"),
             ("settings", "Settings as recorded &here", self.use_recorded, ""),
         ):
             add(f"replay-{name}", text=text, act=act, shortcut=shortcut, tip=_TIPS[name])
@@ -121,43 +121,43 @@ class Replaying(QObject):
     # Opening.
 
     def open(self) -> None:
-        """Ask for a file, and play it."""
+        """Ask for a recording, and play it."""
         folder = str(self._folder)
         file, _ = QFileDialog.getOpenFileName(self._window, "Open a recording", folder, FILES)
         if file:
             self.open_file(Path(file))
 
     def open_file(self, path: Path) -> None:
-        """Look into the file at `path`, beside the window, and play it if it is a recording."""
-        self._look(path.absolute(), connects=True)
+        """Read the file at `path` in the background, and play it if it is a recording."""
+        self._read(path.absolute(), connects=True)
 
     def takes(self, source: str) -> bool:
-        """Open what `source` names, if that is a recording; whether it is."""
+        """Open `source` if it is a recording; whether it is."""
         if source.startswith(RECORDED):
             self.open_file(Path(source.removeprefix(RECORDED).strip()))
         return source.startswith(RECORDED)
 
-    def adopt(self, source: str) -> None:
-        """Take over a recording that the engine plays already."""
+    def resume(self, source: str) -> None:
+        """Resume a recording that the engine plays already."""
         if source.startswith(RECORDED):
-            self._look(Path(source.removeprefix(RECORDED).strip()), connects=False)
+            self._read(Path(source.removeprefix(RECORDED).strip()), connects=False)
 
-    def _look(self, path: Path, connects: bool) -> None:
-        self.told.emit(f"Reading {path.name}{_DOTS}")
+    def _read(self, path: Path, connects: bool) -> None:
+        self.notified.emit(f"Reading {path.name}{_DOTS}")
         self._asked, self._connects = path, connects
         self._reading.compute(summary_of, path)
 
     def _refuse(self, error: Exception) -> None:
         if not isinstance(error, Cancelled):
             damaged = self._asked if isinstance(error, Damaged) else None
-            self._say(str(error), alarming=True, damaged=damaged)
-        self.told.emit(str(error))
+            self._set_message(str(error), alarming=True, damaged=damaged)
+        self.notified.emit(str(error))
 
     def _play(self, found: RecordingSummary) -> None:
         source = f"{RECORDED}{found.path}"
         if self._connects:
             self._session.connect_to(source)
-        self.seen, self._changes = found, _changes(found)
+        self.summary, self._changes = found, _changes(found)
         self._goes, self._begins, self._sought = True, True, None
         self.speed, self._looped = 1.0, False
         self._folder = found.path.parent
@@ -165,17 +165,17 @@ class Replaying(QObject):
         now = self._history.settings
         self._before = {"calibration": now.calibration, "tare": now.tare}
         self._use(found.setup_at(0.0))
-        self._say(_told_of(found), damaged=None if found.whole else found.path)
+        self._set_message(_opening_message(found), damaged=None if found.whole else found.path)
         self.opened.emit(source)
-        self.told.emit(self.message or f"Playing {found.path.name}, with the settings recorded")
+        self.notified.emit(self.message or f"Playing {found.path.name}, with the settings recorded")
 
     def _use(self, setup: Setup | None) -> None:
-        """Compute as recorded, as one change that may be undone."""
-        if setup is None or self.seen is None:
+        """Use a recorded setup, as one change that can be undone."""
+        if setup is None or self.summary is None:
             return
         self._session.base = setup
         self._history.change(
-            f"Settings of {self.seen.path.name}",
+            f"Settings of {self.summary.path.name}",
             -1,
             **settings_from(vars(setup), EstimatorSettings),
             calibration=setup.calibration,
@@ -183,31 +183,31 @@ class Replaying(QObject):
         )
 
     def use_recorded(self) -> None:
-        """Compute with the settings that were in use where the replay is."""
-        if self.seen is not None:
-            self._use(self.seen.setup_at(self.time))
+        """Use the settings that were in use at this time of the recording."""
+        if self.summary is not None:
+            self._use(self.summary.setup_at(self.time))
 
     def _leave(self) -> None:
-        """Before another source: calibration and tare are the live sensor's again."""
-        if self.seen is None:
+        """Restore calibration and tare before another source is opened."""
+        if self.summary is None:
             return
-        self.seen, self._changes, self._session.base = None, [], None
+        self.summary, self._changes, self._session.base = None, [], None
         self._send.forget()
-        self._say("")
+        self._set_message("")
         self._history.change("Calibration and tare as before", -1, **self._before)
 
     # Playing.
 
     @property
     def time(self) -> float:
-        """Where the replay is in s, or will be once what was asked for is done."""
+        """The time of the playback in s, or the requested one."""
         if self._sought is not None:
             return self._sought
         return self._replay.at if self._replay else 0.0
 
     @property
     def playing(self) -> bool:
-        """Whether it goes on: not at the end."""
+        """Whether it is neither paused nor at the end."""
         return self._goes and not self._over
 
     @property
@@ -217,16 +217,16 @@ class Replaying(QObject):
 
     @property
     def events(self) -> list[Event]:
-        """What happened in the recording, with its changes of settings, in order."""
-        told = list(self._replay.events) if self._replay else []
-        return sorted(told + self._changes, key=lambda event: event.time)
+        """The events of the recording, with its changes of settings, in order."""
+        events = list(self._replay.events) if self._replay else []
+        return sorted(events + self._changes, key=lambda event: event.time)
 
     def toggle(self) -> None:
-        """Go on, or stand."""
+        """Play or pause."""
         self.go(not self.playing)
 
     def go(self, on: bool) -> None:
-        """Go on, from the beginning where it is over, or stand."""
+        """Play, from the beginning where it is at the end, or pause."""
         if self._replay is None:
             return
         anew = on and self._over
@@ -234,45 +234,45 @@ class Replaying(QObject):
         if anew:
             self.seek(0.0)
         else:
-            self._manner()
+            self._send_speed()
 
     def play_at(self, speed: float) -> None:
-        """Be so many times as fast as it was."""
+        """Play at a multiple of the recorded speed."""
         self.speed = speed
-        self._manner()
+        self._send_speed()
 
     def _faster(self, by: int) -> None:
         index = SPEEDS.index(self.speed) + by
         self.play_at(SPEEDS[min(max(index, 0), len(SPEEDS) - 1)])
 
     def loop(self, looped: bool) -> None:
-        """Begin anew at the end, or end there."""
+        """Play in a loop, or once."""
         self._looped = looped
-        self._manner()
+        self._send_speed()
 
     def _turn_loop(self) -> None:
         self.loop(not self._looped)
 
     @property
-    def _pace(self) -> float:
+    def _speed_now(self) -> float:
         held = self._transport.course.isSliderDown()
         return self.speed if self._goes and not held else 0.0
 
-    def _manner(self) -> None:
-        """Let the engine go on from where it is, as is chosen now."""
+    def _send_speed(self) -> None:
+        """Request the present speed and loop from the engine."""
         if self._replay is None:
             return
         if self._sought is not None:
             self._send(self._go_there)
         else:
-            self._session.engine.seek(None, self._pace, self._looped)
+            self._session.engine.seek(None, self._speed_now, self._looped)
         self._show()
 
     def seek(self, at: float) -> None:
-        """Go to `at` s, and stand there while the mouse holds the handle."""
+        """Go to `at` s, and pause there while the mouse holds the handle."""
         if self._replay is None:
             return
-        self._begins = False  # or what the user requests meanwhile would be overruled
+        self._begins = False  # else a request of the user would be overruled
         self._sought, self._sought_at, self._steps = at, time.monotonic(), 0
         self._send(self._go_there)
         self._show()
@@ -280,14 +280,14 @@ class Replaying(QObject):
     def _go_there(self) -> None:
         if self._sought is not None:
             self._sought_at = time.monotonic()
-            self._session.engine.seek(self._sought, self._pace, self._looped)
+            self._session.engine.seek(self._sought, self._speed_now, self._looped)
 
-    def _let_go(self) -> None:
-        """Go on from where the handle was let go."""
+    def _release_handle(self) -> None:
+        """Play from where the handle was released."""
         self.seek(self._transport.course.time)
 
     def step(self, frames: int) -> None:
-        """Stand so many frames further on, or back."""
+        """Pause, and step by so many frames."""
         if self._replay is None:
             return
         self._goes, self._begins, self._sought = False, False, None
@@ -301,24 +301,24 @@ class Replaying(QObject):
             self._session.engine.step(steps)
 
     def jump(self, way: int) -> None:
-        """Go to the event after, or before, where the replay is."""
+        """Go to the next or the previous event."""
         here, times = self.time, [event.time for event in self.events]
         ahead = [at for at in times if at > here + _HERE]
-        behind = [at for at in times if at < here - max(_HERE, 0.5 * self._pace)]
+        behind = [at for at in times if at < here - max(_HERE, 0.5 * self._speed_now)]
         found = ahead[:1] if way > 0 else behind[-1:]
         if found and self._replay is not None:
             self.seek(min(max(found[0], 0.0), self._replay.length))
 
-    # News.
+    # Status.
 
     def follow(self, status: Status) -> None:
-        """Take note of where the engine is in the recording."""
+        """Take the engine's place in the recording from its status."""
         self._replay = replay = status.replay if self._session.replaying else None
         if replay is not None and self._begins and not status.computing:
             self.seek(0.0)
         if replay is not None and self._sought is not None:
-            passed = status.reported - self._sought_at  # by what the engine told, however slow
-            there = 0 <= replay.at - self._sought <= passed * self._pace + 1e-6
+            passed = status.reported - self._sought_at  # by the engine's own times
+            there = 0 <= replay.at - self._sought <= passed * self._speed_now + 1e-6
             if there or passed > _ARRIVES:
                 self._sought = None
         self._look_for_damage(status)
@@ -328,17 +328,17 @@ class Replaying(QObject):
         self._show_title(replay)
 
     def _look_for_damage(self, status: Status) -> None:
-        """Take note of why the engine let go of the recording."""
-        why, found = status.message, self.seen
+        """Report why the engine closed the recording."""
+        why, found = status.message, self.summary
         if status.state != "lost" or found is None or why == self.message:
             return
         if str(found.path) in why:
             helps = "`kappaskin repair`" in why and found.path.exists()
-            self._say(why, alarming=True, damaged=found.path if helps else None)
+            self._set_message(why, alarming=True, damaged=found.path if helps else None)
 
     def _show(self) -> None:
         self._transport.show_time(self.time, self.playing)
-        self._transport.show_manner(self.speed, self._looped)
+        self._transport.show_speed(self.speed, self._looped)
 
     def _show_actions(self) -> None:
         if self._actions is not None:
@@ -349,12 +349,14 @@ class Replaying(QObject):
 
     def _show_title(self, replay: Replay | None) -> None:
         title = "Kappaskin"
-        if replay is not None and self.seen is not None:
-            title = f"{self.seen.path.name}, recorded {day(replay.begun)} \N{EN DASH} Kappaskin"
+        if replay is not None and self.summary is not None:
+            title = f"{self.summary.path.name}, recorded {day(replay.begun)} \N{EN DASH} Kappaskin"
         if title != self._window.windowTitle():
             self._window.setWindowTitle(title)
 
-    def _say(self, message: str, alarming: bool = False, damaged: Path | None = None) -> None:
+    def _set_message(
+        self, message: str, alarming: bool = False, damaged: Path | None = None
+    ) -> None:
         self.message, self.alarming, self.damaged = message, alarming, damaged
         self.changed.emit()
         if damaged is not None:
@@ -365,7 +367,7 @@ class Replaying(QObject):
 
 
 def _changes(found: RecordingSummary) -> list[Event]:
-    """Where another setup came into use, in words."""
+    """The changes of the setup, as events."""
     return [
         Event(since, "settings", f"{now.Ni} x {now.Nj} functions, {now.method}")
         for (_, was), (since, now) in zip(found.setups, found.setups[1:], strict=False)
@@ -373,15 +375,15 @@ def _changes(found: RecordingSummary) -> list[Event]:
     ]
 
 
-def _told_of(found: RecordingSummary) -> str:
-    """What a person should know of a recording that is opened, or nothing."""
-    told: list[str] = []
+def _opening_message(found: RecordingSummary) -> str:
+    """The message about an opened recording; empty where there is none."""
+    texts: list[str] = []
     if not found.whole:
-        told.append(
-            f"The recording {found.path.name} was never ended: it is played up to "
-            f"{minutes(found.length)}, where it breaks off. To make it whole: "
+        texts.append(
+            f"The recording {found.path.name} is unfinished: it is played up to "
+            f"{minutes(found.length)}, where it ends. To repair it: "
             f"`{repairing(found.path)}`."
         )
     if found.trouble:
-        told.append(f"The settings recorded cannot be used: {found.trouble}")
-    return " ".join(told)
+        texts.append(f"The settings recorded cannot be used: {found.trouble}")
+    return " ".join(texts)

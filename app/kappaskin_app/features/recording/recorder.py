@@ -1,4 +1,4 @@
-"""Recordings as a person makes, annotates, ends and repairs them."""
+"""Recording: start, notes, stop, repair."""
 
 from datetime import datetime
 from pathlib import Path
@@ -20,8 +20,15 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions
 from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.folders import proposed, recordings_folder, repaired, repairing, unfinished
-from kappaskin_app.shell.recovery import words
-from kappaskin_app.shell.work_dialog import WorkDialog, beside, choosing, ended, named, path_in
+from kappaskin_app.shell.recovery import resume_text
+from kappaskin_app.shell.work_dialog import (
+    WorkDialog,
+    browse_button,
+    label_for,
+    path_in,
+    with_button,
+    with_suffix,
+)
 from kappaskin_app.theme import current
 
 _WIDTH, _TEXT = 92, 22  # px: of all, and to where the words begin
@@ -46,7 +53,7 @@ def duration_of(seconds: float) -> str:
 
 
 class RecordingMark(QWidget):
-    """Shows how a recording does, and that it ended by itself until `clicked`."""
+    """The mark of a recording; after one that ended by itself, until `clicked`."""
 
     clicked = Signal()
 
@@ -61,18 +68,18 @@ class RecordingMark(QWidget):
     minimumSizeHint = sizeHint
 
     def show_written(self, written: RecordingStatus, trouble: str) -> None:
-        """Show what is being written, or why it ended by itself."""
+        """Show the recording, or why it ended by itself."""
         if written.active:
             head, size = duration_of(written.seconds), size_of(written.size)
             head = head if written.seconds >= _HOUR else f"REC {head}"
             self._show(head, f"{written.lost} lost" if written.lost else size, written.lost > 0)
             self.setToolTip(
                 f"Recording to {written.path}: {size}, {written.lost} messages lost.\n"
-                "Lost is what found too much waiting for the disk."
+                "Messages are lost when the disk is too slow."
             )
         else:
             self._show("REC ended", "by itself", True)
-            self.setToolTip(f"{trouble}\n\nClick to take this mark away.")
+            self.setToolTip(f"{trouble}\n\nClick to remove this mark.")
         self.setAccessibleName(f"{self.head}, {self.below}")
 
     def _show(self, head: str, below: str, bad: bool) -> None:
@@ -104,28 +111,28 @@ class RecordingMark(QWidget):
 
 
 class RepairDialog(WorkDialog):
-    """Asks where what is whole of a recording is to be saved; `saved` brings the new one."""
+    """Asks where a repaired recording is to be saved; `saved` brings its path."""
 
     saved = Signal(Path)
 
     def __init__(self, tasks: Tasks, parent: QWidget | None = None) -> None:
-        how = "&Repair", "Repairing the recording", self._begun, self._told
+        how = "Re&pair", "Repairing the recording", self._start_work, self._result_text
         super().__init__(tasks, "Repair a recording", *how, parent)
         self.setObjectName("repair")
         self.recording, self.to = QLineEdit(), QLineEdit()
         self.recording.setReadOnly(True)
-        self.recording.setToolTip("The file that its writer did not finish; it is left as it is.")
-        self.to.setToolTip("The file to write: all that can be read of the damaged one.")
-        self.form.addRow(named("&Damaged", self.recording), self.recording)
-        self.choose_file = choosing(self._choose)
-        self.form.addRow(named("&Whole one", self.to), beside(self.to, self.choose_file))
+        self.recording.setToolTip("The damaged recording; it is not changed.")
+        self.to.setToolTip("The file to write, with all that can be read of the damaged one.")
+        self.form.addRow(label_for("&Damaged", self.recording), self.recording)
+        self.choose_file = browse_button(self._choose)
+        self.form.addRow(label_for("&Repaired", self.to), with_button(self.to, self.choose_file))
         self._add_buttons()
         self.begin_button.setDefault(True)
         self.to.textChanged.connect(guarded(lambda *_: self._allow()))
         self._allow()
 
     def ask_of(self, recording: Path) -> None:
-        """Ask where the repaired `recording` is to be: beside it, if no other place is chosen."""
+        """Ask for the path of the repaired `recording`, by default beside it."""
         if not self.busy:
             self.recording.setText(str(recording))
             self.to.setText(str(repaired(recording)))
@@ -133,12 +140,12 @@ class RepairDialog(WorkDialog):
         self._allow()
 
     def _choose(self) -> None:
-        option = QFileDialog.Option.DontConfirmOverwrite  # never done: it is refused
+        option = QFileDialog.Option.DontConfirmOverwrite  # existing files are refused
         name, _ = QFileDialog.getSaveFileName(
-            self, "Save what is whole to", self.to.text(), "Recording (*.mcap)", "", option
+            self, "Save the repaired recording to", self.to.text(), "Recording (*.mcap)", "", option
         )
         if name:
-            self.to.setText(str(ended(name, ".mcap")))
+            self.to.setText(str(with_suffix(name, ".mcap")))
 
     def _allow(self) -> None:
         super()._allow()
@@ -146,16 +153,16 @@ class RepairDialog(WorkDialog):
             widget.setEnabled(not self.busy)
         self.begin_button.setEnabled(bool(self.to.text().strip()) and not self.busy)
 
-    def _begun(self) -> RepairTask:
+    def _start_work(self) -> RepairTask:
         return RepairTask(path_in(self.recording), path_in(self.to))
 
-    def _told(self, result: object) -> str:
+    def _result_text(self, result: object) -> str:
         if not isinstance(result, Repaired):
             return ""
         if not (result.total or result.attachments):
             return f"Nothing was written: {result.words}."
         self.saved.emit(path_in(self.to))
-        return f"Saved {result.words}. The damaged recording is as it was; this one is played."
+        return f"Saved {result.words}. The damaged recording is unchanged; this one is played."
 
 
 FILES = "Recording (*.mcap)"
@@ -163,14 +170,14 @@ _MENU = "&Recording"
 _RECORD, _STOP = "&Record\N{HORIZONTAL ELLIPSIS}", "&Stop recording"
 
 
-class Taping(QObject):
-    """Has the engine record, and tells how that does: `told` once, `changed` whenever it is so.
+class RecordingControl(QObject):
+    """Controls the engine's recorder; `notified` brings messages, `changed` reports its state.
 
-    `message` says what a person should know or do about recordings, and `alarming` whether it is
-    bad news; `damaged` is the one that a repair may help then.
+    `message` is the present message about recordings, an alarm where it is `alarming`; `damaged`
+    is a recording that can be repaired.
     """
 
-    told = Signal(str)
+    notified = Signal(str)
     changed = Signal()
 
     def __init__(self, engine: Engine, tasks: Tasks, window: QWidget) -> None:
@@ -178,7 +185,7 @@ class Taping(QObject):
         self._engine, self._window = engine, window
         self._replays = False
         self.written, self.ended = RecordingStatus(), ""
-        """How it does, and why it ended by itself."""
+        """The state of the recording, and why it ended by itself."""
         self.message, self.alarming = "", False
         self.damaged: Path | None = None
         self.repairs = RepairDialog(tasks, window)
@@ -191,55 +198,55 @@ class Taping(QObject):
 
     @property
     def why_not(self) -> str:
-        """Why nothing can be recorded now, or nothing."""
+        """Why nothing can be recorded now; empty where it can."""
         if self._replays and not self.recording:
             return "This is a recording: to copy it, copy its file."
         return ""
 
     def add_actions(self, actions: Actions) -> None:
-        """Register what a person can do."""
+        """Register the actions."""
         self._actions = actions
-        tip = "Write all that comes in to a file, or end that; it goes on when the source changes"
-        actions.add("record", _MENU, _RECORD, self.turn, "Ctrl+Shift+R", tip)
-        tip = "Write down what happened just now, in the recording too"
+        tip = "Start or stop recording to a file; it continues when the source changes"
+        actions.add("record", _MENU, _RECORD, self.toggle, "Ctrl+Shift+R", tip)
+        tip = "Add a note to the event log and the recording"
         actions.add("note", _MENU, "&Note\N{HORIZONTAL ELLIPSIS}", self.note, "Ctrl+Shift+N", tip)
 
     # Requests of the user.
 
-    def turn(self) -> None:
-        """Ask for a file and record to it, or end that."""
+    def toggle(self) -> None:
+        """Ask for a file and record to it, or stop."""
         if self.recording:
             self._engine.record(None)
         elif self.why_not:
-            self.told.emit(self.why_not)
-        elif (path := self._asked()) is not None:
+            self.notified.emit(self.why_not)
+        elif (path := self._ask_path()) is not None:
             self.begin(path)
 
-    def _asked(self) -> Path | None:
-        """The file to record to, as a person names it."""
+    def _ask_path(self) -> Path | None:
+        """Ask for the file to record to; None if cancelled."""
         path = proposed(recordings_folder(), datetime.now())
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            self.told.emit(f"{path.parent}: cannot be made ({error.strerror}); choose another")
+            self.notified.emit(f"{path.parent}: cannot be made ({error.strerror}); choose another")
             path = Path(path.name)
-        option = QFileDialog.Option.DontConfirmOverwrite  # never done: the engine refuses
+        option = QFileDialog.Option.DontConfirmOverwrite  # the engine refuses existing files
         chosen, _ = QFileDialog.getSaveFileName(
             self._window, "Record to", str(path), FILES, "", option
         )
-        return ended(chosen, ".mcap") if chosen else None
+        return with_suffix(chosen, ".mcap") if chosen else None
 
     def begin(self, path: Path) -> None:
         """Record to `path`."""
         self.dismiss()
-        self._say("")
+        self._set_message("")
         self._engine.record(path)
 
     def note(self) -> None:
-        """Ask for a text, and let it be among what happened."""
+        """Ask for a note, and add it to the events."""
         dialog = QInputDialog(self._window)
         dialog.setWindowTitle("Note")
-        dialog.setLabelText("What happened just now, for the list and for the recording:")
+        dialog.setLabelText("Note for the event log and the recording:")
         dialog.setMinimumWidth(420)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.textValueSelected.connect(guarded(self.write_down))
@@ -248,29 +255,29 @@ class Taping(QObject):
             line.setMaxLength(LONGEST_NOTE)
 
     def write_down(self, text: str) -> None:
-        """Let `text` be among what happened, unless there is none."""
+        """Add `text` to the events, unless it is empty."""
         if text.strip():
             self._engine.note(text.strip())
 
     def may_close(self) -> bool:
-        """Whether the window may close now; asks, where that would end a recording."""
+        """Whether the window may close; asks first while recording."""
         if not self.recording:
             return True
         if self._question is None:
-            self._question = self._asking()
+            self._question = self._close_question()
         self._question.open()
         self._question.activateWindow()
         return False
 
-    def _asking(self) -> QMessageBox:
+    def _close_question(self) -> QMessageBox:
         box = QMessageBox(self._window)
         box.setIcon(QMessageBox.Icon.Question)
         box.setWindowTitle("Close while recording")
         box.setText(f"{Path(self.written.path).name} is being recorded.")
-        box.setInformativeText("Closing the window ends the recording; the file is whole then.")
+        box.setInformativeText("Closing the window ends the recording; the file is complete.")
         roles = QMessageBox.ButtonRole
         end = box.addButton("&End the recording and close", roles.AcceptRole)
-        keep = box.addButton("&Keep the window", roles.RejectRole)
+        keep = box.addButton("&Continue recording", roles.RejectRole)
         box.setDefaultButton(keep)
         box.setEscapeButton(keep)
         box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -283,33 +290,35 @@ class Taping(QObject):
             self._window.close()
 
     def dismiss(self) -> None:
-        """Show no more that a recording ended by itself."""
+        """Remove the mark of a recording that ended by itself."""
         if self.ended:
             self.ended = ""
             self.changed.emit()
 
     def offer_repair(self) -> None:
-        """Say which recordings were never ended, and how to repair them."""
+        """Report unfinished recordings, and how to repair them."""
         left = unfinished(recordings_folder())
         if not left:
             return
         file, more = left[0], f" There are {len(left)} in all." if len(left) > 1 else ""
-        self._say(
-            f"The recording {file.name} was never ended. What is in it can be opened as it is, or "
+        self._set_message(
+            f"The recording {file.name} is unfinished. It can be opened as it is, or "
             f"repaired: `{repairing(file)}`.{more}",
             alarming=False,
             damaged=file,
         )
-        self.told.emit(f"The recording {file.name} was never ended: see Recording on the page Live")
+        self.notified.emit(
+            f"The recording {file.name} is unfinished: see Recording on the page Live"
+        )
 
     def go_on(self, left: ResumeInfo, wanted: str) -> None:
-        """Say what went on without a window, to one who `wanted` this source."""
-        self._say(words(left, wanted), alarming=False)
+        """Report a resumed recording to a user who requested the source `wanted`."""
+        self._set_message(resume_text(left, wanted), alarming=False)
 
-    # News.
+    # Status.
 
     def follow(self, status: Status) -> None:
-        """Take note of how the engine is doing."""
+        """Take the state of the recording from the status."""
         was, self.written = self.written, status.recording
         turned, self._replays = self._replays, status.replay is not None
         self._show_actions()
@@ -319,10 +328,12 @@ class Taping(QObject):
             return
         if now.trouble and now.trouble != was.trouble:
             self.ended = now.trouble if was.active else ""
-            self._say(now.trouble)
-            self.told.emit(now.trouble)
+            self._set_message(now.trouble)
+            self.notified.emit(now.trouble)
         elif was.active and not now.active:
-            self.told.emit(f"Recorded {now.path}: {duration_of(now.seconds)}, {size_of(now.size)}")
+            self.notified.emit(
+                f"Recorded {now.path}: {duration_of(now.seconds)}, {size_of(now.size)}"
+            )
         self.changed.emit()
 
     def _show_actions(self) -> None:
@@ -331,11 +342,13 @@ class Taping(QObject):
             self._actions.allow("record", self.why_not)
 
     def close(self) -> None:
-        """End what is being repaired: it is not there then; and ask no more."""
+        """Cancel a repair, and close the question."""
         self.repairs.close()
         if self._question is not None:
             self._question.close()
 
-    def _say(self, message: str, alarming: bool = True, damaged: Path | None = None) -> None:
+    def _set_message(
+        self, message: str, alarming: bool = True, damaged: Path | None = None
+    ) -> None:
         self.message, self.alarming, self.damaged = message, alarming, damaged
         self.changed.emit()

@@ -1,4 +1,4 @@
-"""The transport of a recording: its course with gaps and events, and its buttons."""
+"""The transport bar: timeline with gaps and events, and buttons."""
 
 import math
 from collections.abc import Sequence
@@ -12,19 +12,18 @@ from PySide6.QtWidgets import QHBoxLayout, QToolTip, QWidget
 from kappaskin.frames import Event
 from kappaskin.recording import Replay
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.form import ChoiceBox, well_behaved
+from kappaskin_app.shell.form import ChoiceBox, pass_window_keys
 from kappaskin_app.theme import current, follow_look, series
 from kappaskin_app.widgets.timeline import Clock, Course, glyph_button, icon
 
 _NEAR = 6.0  # px from a flag within which it is meant
 _HATCH = 6.0  # px between two lines of a gap
 _STEP = 1e-3  # s, for those who do not see it
-_NAMED = 3  # of flags at one place, those that are told
+_NAMED = 3  # of flags at one place, those in the tooltip
 _TIP = (
-    "The recording: flags where something happened (point at one to read it), hatched where "
-    "nothing came. Press or drag to go to another time; Left and Right, or comma and period, go "
-    "by one frame, Page Up and Page Down by a tenth, Home and End to the ends; Space plays or "
-    "pauses."
+    "The recording: flags are events (point at one to read it), hatched spans are gaps. Press or "
+    "drag to go to another time; Left and Right, or comma and period, step by one frame, Page Up "
+    "and Page Down by a tenth, Home and End go to the ends; Space plays or pauses."
 )
 
 
@@ -43,32 +42,32 @@ class Landmarks(Course):
         self.events: tuple[Event, ...] = ()
 
     def show_replay(self, replay: Replay, events: Sequence[Event]) -> None:
-        """Show what is in a recording, with these `events`, each at its time in s."""
+        """Show a recording with these `events`, each at its time in s."""
         self.gaps, self.events = replay.gaps, tuple(events)
         length = max(replay.length, _STEP)
         self.show_duration(length, _STEP, replay.length)
 
-    # What is told of a place.
+    # The tooltip.
 
     def event(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.ToolTip and isinstance(event, QHelpEvent):
-            tip = escape(self.tip_at(event.pos().x()))  # a note may have anything in it
+            tip = escape(self.tip_at(event.pos().x()))  # a note may contain markup
             written = f"<p style='white-space: pre-wrap'>{tip}</p>"
             QToolTip.showText(event.globalPos(), written, self)
             return True
         return super().event(event)
 
     def tip_at(self, x: float) -> str:
-        """What there is to read x px from the left."""
+        """The tooltip x px from the left."""
         near = [event for event in self.events if abs(self.at(event.time) - x) <= _NEAR]
         near.sort(key=lambda event: abs(self.at(event.time) - x))
         if near:
-            told = [f"{minutes(e.time)}  {e.kind}: {e.text}" for e in near[:_NAMED]]
-            return "\n".join(told + [f"and {len(near) - _NAMED} more"] * (len(near) > _NAMED))
+            lines = [f"{minutes(e.time)}  {e.kind}: {e.text}" for e in near[:_NAMED]]
+            return "\n".join(lines + [f"and {len(near) - _NAMED} more"] * (len(near) > _NAMED))
         time = self.time_at(x)
         for begin, end in self.gaps:
             if begin <= time <= end:
-                return f"Nothing came for {end - begin:.2f} s, from {minutes(begin)} on."
+                return f"Gap of {end - begin:.2f} s from {minutes(begin)}."
         return f"{minutes(min(max(time, 0.0), self.duration))}\n\n{_TIP}"
 
     # How it is drawn.
@@ -110,24 +109,24 @@ class Landmarks(Course):
 
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
-"""How many times as fast as it was a recording may be played."""
+"""Playback speeds, relative to the recorded one."""
 
 _TIPS = {
-    "previous": "Go to the event before (Ctrl+[)",
+    "previous": "Previous event (Ctrl+[)",
     "back": "One frame back (comma, Left)",
-    "play": "Let the recording go on from here (Space)",
-    "pause": "Let the recording stand (Space)",
-    "forward": "One frame on (period, Right)",
-    "next": "Go to the next event (Ctrl+])",
-    "loop": "Begin anew at the end (Ctrl+Shift+L)",
+    "play": "Play (Space)",
+    "pause": "Pause (Space)",
+    "forward": "One frame forward (period, Right)",
+    "next": "Next event (Ctrl+])",
+    "loop": "Loop (Ctrl+Shift+L)",
 }
-_SPEED = "How many times as fast as it was (Ctrl+Shift+Up, Ctrl+Shift+Down)"
+_SPEED = "Playback speed (Ctrl+Shift+Up, Ctrl+Shift+Down)"
 
 
 class Transport(QWidget):
-    """Shows a replay; `sought` asks for another time in s, `step_wanted` for so many frames.
+    """Shows a replay; `sought` requests a time in s, `step_wanted` a number of frames.
 
-    `jump_wanted` asks for the event after (1) or before (-1), `play_wanted` to go on or to stand.
+    `jump_wanted` requests the next (1) or previous (-1) event, `play_wanted` play or pause.
     """
 
     sought = Signal(float)
@@ -144,7 +143,7 @@ class Transport(QWidget):
         self.play, self.loop = self.buttons["play"], self.buttons["loop"]
         self.loop.setCheckable(True)
         self.course = Landmarks()
-        self.clock = Clock("Time in the recording, and how long it is.")
+        self.clock = Clock("Time in the recording, and its duration.")
         self.speed = self._made_speed()
         self.setFocusProxy(self.course)
         row = QHBoxLayout(self)
@@ -168,7 +167,7 @@ class Transport(QWidget):
         for speed in SPEEDS:
             box.addItem(f"\N{MULTIPLICATION SIGN} {speed:g}", speed)
         box.setToolTip(_SPEED)
-        well_behaved(box)
+        pass_window_keys(box)
         return box
 
     def _wire(self) -> None:
@@ -195,10 +194,10 @@ class Transport(QWidget):
         self._show_clock(seconds)
         self.sought.emit(seconds)
 
-    # What is so.
+    # State.
 
     def show_recording(self, replay: Replay | None, events: Sequence[Event] = ()) -> None:
-        """Show a recording in which these `events` happened, or none."""
+        """Show a recording with these `events`, or none."""
         there = replay is not None
         if there != self.there:
             self.there = there
@@ -216,7 +215,7 @@ class Transport(QWidget):
                 self.buttons[name].setEnabled(bool(events))
 
     def show_time(self, seconds: float, playing: bool) -> None:
-        """Show where it is, in s, and whether it goes on."""
+        """Show the time in s, and whether it is playing."""
         if playing != self._playing:
             self._playing = playing
             self._show_playing()
@@ -224,8 +223,8 @@ class Transport(QWidget):
             self.course.show_time(seconds)
             self._show_clock(seconds)
 
-    def show_manner(self, speed: float, looped: bool) -> None:
-        """Show how fast it is played, and whether it begins anew at its end."""
+    def show_speed(self, speed: float, looped: bool) -> None:
+        """Show the speed, and whether it is looped."""
         self.loop.setChecked(looped)
         with QSignalBlocker(self.speed):
             self.speed.setCurrentIndex(self.speed.findData(speed))
@@ -250,7 +249,7 @@ class Transport(QWidget):
     # Keys.
 
     def take_key(self, event: QKeyEvent) -> bool:
-        """Do what a key asks for; whether it asks for anything."""
+        """Handle a key; whether it was one of the transport."""
         plain = Qt.KeyboardModifier.KeypadModifier
         if not self.there or event.modifiers() & ~plain:
             return False

@@ -14,7 +14,7 @@ from kappaskin_app.features.scene.staging import Staging
 from kappaskin_app.features.scene.timeline import Timeline
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import plain
-from kappaskin_app.shell.finder.things import FinderEntry, enter
+from kappaskin_app.shell.finder import FinderEntry, enter
 from kappaskin_app.shell.loads import may_choose, touches_at
 from kappaskin_app.shell.menus import DOTS
 from kappaskin_app.shell.opening import Kind
@@ -52,13 +52,13 @@ class SceneFeature:
     def _wire(self, shell: MainWindow) -> None:
         session = shell.session
         session.refused.connect(guarded(self.load.show_refusal))
-        session.pausing.connect(guarded(self._pause))
-        self.staging.told.connect(guarded(shell.tell))
+        session.pause_requested.connect(guarded(self._pause))
+        self.staging.told.connect(guarded(shell.notify))
         shell.settings_shown.connect(guarded(self.staging.show_settings))
         shell.display.unit_changed.connect(guarded(self.timeline.clock.show_unit))
         shell.opening.add(Kind("scene", (".toml",), self.staging.play))
         shell.opening.add(Kind("mesh", (".stl", ".ply", ".obj"), self._touch_with))
-        shell.menus.things.append(self._things)
+        shell.menus.entry_sources.append(self._things)
 
     def _add_actions(self, shell: MainWindow) -> None:
         add, staging = shell.actions_by_name.add, self.staging
@@ -89,7 +89,7 @@ class SceneFeature:
         said = {"what": "mesh", "file": str(file.absolute()), "unit": _MILLIMETRE}
         self.editing.touch_with(said, x, y, load.force)
         self._shell.opening.note(file)
-        self._shell.tell(f"{file.name} touches the skin, its numbers taken as millimetres")
+        self._shell.notify(f"{file.name} touches the skin, its numbers taken as millimetres")
 
     def _things(self) -> Iterator[FinderEntry]:
         """The pages of the panel, and the ready scenes, to be found."""

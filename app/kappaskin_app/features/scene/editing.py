@@ -44,7 +44,7 @@ class SceneEditing:
     def write(self, text: str) -> None:
         """Play what was written instead of the scene so far; a row of keys is one step to undo."""
         if (written := self._written_anew(text)) is not None:
-            self._history.wish("written", written=written)
+            self._history.request("written", written=written)
 
     def _written_anew(self, text: str) -> Written | None:
         """The scene with another text; None where it has this one."""

@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
 from kappaskin._schema import Key, Unit
 from kappaskin_app.features.scene.sections import MOST, MOST_WHOLE, Row
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.form import ChoiceBox, RealBox, WholeBox, well_behaved
+from kappaskin_app.shell.form import ChoiceBox, RealBox, WholeBox, pass_window_keys
 
 _DIGITS = 6  # of a number that are shown
 
@@ -143,7 +143,7 @@ def editor_for(row: Row, report: Report, small: bool = False) -> Editor:
         editor = _spin(row, kind, row.usual, report, small)
     tip = row.key.explained + (" Pairs stand with ; in between." if kind == "pairs" else "")
     for widget in editor.stops:
-        well_behaved(widget)
+        pass_window_keys(widget)
         widget.setToolTip(tip)
     editor.widget.setObjectName(".".join(map(str, row.place)))
     editor.show(row.value)

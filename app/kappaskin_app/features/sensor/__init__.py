@@ -37,7 +37,7 @@ class SensorFeature:
         now = time.monotonic()
         if now >= self._next:
             self._next = now + _EACH
-            self.region.show_bargain(self._shell.session.bargain())
+            self.region.show_bargain(self._shell.session.scan_tradeoff())
 
     def _choose(self, element: int) -> None:
         """Take an element into the region of those chosen, or out of it."""

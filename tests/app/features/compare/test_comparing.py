@@ -102,10 +102,10 @@ def test_ending_it_leaves_the_window_as_it_was_and_the_engine_to_a_alone(
 def test_it_works_on_a_recording_that_stands(
     window: MainWindow, recording: Path, pairs: list[Pair], until
 ) -> None:
-    window.replaying.open_file(recording)
+    window.playback.open_file(recording)
     until(lambda: window.display.badge.state.startswith("REPLAY"))
-    window.replaying.go(False)
-    window.replaying.seek(0.4)
+    window.playback.go(False)
+    window.playback.seek(0.4)
     until(lambda: abs(pairs[-1].a.device_time - 0.4) < 0.02)
     window.history.change("B", -1, other_x=3)
     until(lambda: pairs[-1].b.coefficients.shape == (3, 6))

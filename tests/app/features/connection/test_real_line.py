@@ -80,7 +80,7 @@ def test_a_line_may_fail_at_any_moment(plug, opened, until, qtbot, colours_in) -
     alarm, message = window.membrane.alarm, window.connection.message
     assert alarm.text.startswith("LOST ")
     assert "connection lost" in window.statusBar().currentMessage()
-    assert not window.display.foot.object.isVisible()  # or the message would have no room
+    assert not window.display.status_bar.object.isVisible()  # or the message would have no room
     assert colours_in(window, window.membrane) > 300
     heights = window.membrane.skin.height.copy()
     until(lambda: int(alarm.text.split()[1]) >= 2)

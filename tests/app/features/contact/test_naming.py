@@ -32,34 +32,34 @@ def test_the_window_says_what_touches_the_skin(window, until):
     window.history.change("Blade", -1, load_case="two-points", force=0.2, **ends)
     assert len(window.session.scene.loads) == 2
 
-    until(lambda: window.display.foot.object.text().startswith("edge, 20 mm long, axis "))
-    assert "principal curvatures" in window.display.foot.object.text()
+    until(lambda: window.display.status_bar.object.text().startswith("edge, 20 mm long, axis "))
+    assert "principal curvatures" in window.display.status_bar.object.text()
 
     window.session.disconnect_from()
-    until(lambda: not window.display.foot.object.text())
+    until(lambda: not window.display.status_bar.object.text())
 
 
 def test_what_is_not_yet_known_of_a_skin_is_said_to_be_computed(window, until, monkeypatch):
-    until(lambda: "curvatures" in window.display.foot.object.text())
+    until(lambda: "curvatures" in window.display.status_bar.object.text())
     made, seen = naming.ObjectFinder, threading.Event()
     monkeypatch.setattr(naming, "ObjectFinder", lambda *of: seen.wait(60) and made(*of))
     window.requests.set("shape", "cylinder")
-    until(lambda: "computing what objects read like" in window.display.foot.object.text())
+    until(lambda: "computing what objects read like" in window.display.status_bar.object.text())
     seen.set()
-    until(lambda: "curvatures" in window.display.foot.object.text())
+    until(lambda: "curvatures" in window.display.status_bar.object.text())
 
 
 def test_a_skin_that_objects_cannot_be_told_on_says_so(window, until):
     window.history.change("Elements", -1, elements_x=50, elements_y=50)
 
-    until(lambda: "at most 2000 elements" in window.display.foot.object.text())
+    until(lambda: "at most 2000 elements" in window.display.status_bar.object.text())
 
 
 @pytest.mark.fails_inside
 def test_what_fails_once_is_told_once_and_the_next_estimate_is_named(
     window, until, monkeypatch
 ) -> None:
-    until(lambda: "curvatures" in window.display.foot.object.text())
+    until(lambda: "curvatures" in window.display.status_bar.object.text())
     told: list[str] = []
     window.statusBar().messageChanged.connect(lambda text: text and told.append(text))
 

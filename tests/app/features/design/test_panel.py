@@ -50,10 +50,10 @@ def test_every_outline_is_a_scene_that_opens_however_slow_its_converter_is(name:
 def test_an_arrow_key_moves_every_slider_to_another_value_both_ways(name, qtbot):
     form, how = DesignForm(), ask_of(name)
     qtbot.addWidget(form)
-    form.wished.connect(lambda n, v: form.show_settings(replace(Settings(), **{n: v})))
+    form.requested.connect(lambda n, v: form.show_settings(replace(Settings(), **{n: v})))
     form.show_settings(Settings())
     slider, said = form.sliders[name], []
-    form.wished.connect(lambda _, value: said.append(value))
+    form.requested.connect(lambda _, value: said.append(value))
 
     for key in (Qt.Key.Key_Right, Qt.Key.Key_Left, Qt.Key.Key_Left):
         qtbot.keyClick(slider, key)

@@ -65,7 +65,7 @@ class Asked:
             estimate is not None
             and bool(status.events)
             and estimate.host_time > status.events[-1].time
-            and status.setup == session.asked
+            and status.setup == session.requested_setup
             and estimate.generation == status.generation
             and math.isfinite(estimate.contact.force)
         )
@@ -215,7 +215,7 @@ def test_a_port_is_named_and_no_scene_with_it(asked: Asked) -> None:
 
 def test_without_a_source_there_is_nothing_to_copy(asked: Asked) -> None:
     asked.session.source = ""
-    with pytest.raises(Refusal, match="expected a source that is read"):
+    with pytest.raises(Refusal, match="expected an open source"):
         asked.text(Path("nowhere"))
 
 
@@ -228,10 +228,10 @@ def test_a_tare_in_use_is_in_a_file_that_the_script_reads(
     now = datetime(2026, 11, 22, tzinfo=UTC)
     of = (sensor.name, sensor.serial_number, fingerprint(sensor.layout))
     asked.history.change("Tare", -1, tare=Tare(*of, now, None, 100, 0.2, zero, 0.1 * zero))
-    assert asked.session.asked.tare is not None
+    assert asked.session.requested_setup.tare is not None
     made: dict[str, Any] = {}
     exec(asked.text(tmp_path), made)
-    assert made["SETUP"] == asked.session.asked
+    assert made["SETUP"] == asked.session.requested_setup
 
 
 def test_the_action_puts_a_script_on_the_clipboard(window: MainWindow) -> None:

@@ -10,11 +10,17 @@ from hypothesis import strategies as st
 
 from kappaskin import Refusal
 from kappaskin_app.features.lessons.expression import NUMBER, TRUTH, WORD, expression
-from kappaskin_app.features.lessons.figures import KINDS, SETTINGS, Watch
+from kappaskin_app.features.lessons.figures import KINDS, SETTINGS, RecentEstimates
 from kappaskin_app.features.lessons.lesson import UNITS, LessonTask, NumberAnswer, whole
+from kappaskin_app.features.lessons.lesson_file import (
+    DOCKS,
+    READY,
+    SETTABLE,
+    checked_setting,
+    lesson_of,
+    read_lesson,
+)
 from kappaskin_app.features.lessons.progress import Answer, Progress, judged, number_in
-from kappaskin_app.features.lessons.reading import DOCKS, READY, lesson_of, read_lesson
-from kappaskin_app.features.lessons.setting import SETTABLE, checked_setting
 from kappaskin_app.shell.settings import Settings, ask_of
 from kappaskin_app.shell.settings.asks import Range
 
@@ -139,7 +145,7 @@ def test_no_text_is_an_expression_that_breaks(text: str) -> None:
         ("scene = '../secret'", 10, "one of bolt"),
         ("point = ['nowhere']", 10, "settings by their names"),
         (f"{ASK}number = 1\ntolerance = 0", 14, "a number above zero"),
-        (f"{ASK}number = 'method'\ntolerance = 1", 13, "which comes to a word"),
+        (f"{ASK}number = 'method'\ntolerance = 1", 13, "whose value is a word"),
         (f"{ASK}number = 1\ntolerance = 1\nunit = 'furlong'", 15, "one of m, mm"),
         (f"{ASK}choices = ['a']\nright = 1", 13, "2 to 6 answers"),
         (f"{ASK}choices = ['a', 'b']\nright = 3", 14, "from 1 to 2"),
@@ -235,7 +241,7 @@ def test_two_wrong_answers_are_explained_and_then_nothing_is_judged_any_more() -
     assert progress.rows() == [("One", "Q?", "", "not answered")]
     for told in (False, True, True):
         progress.give("0", FIGURES)
-        assert progress.answer.told is told
+        assert progress.answer.closed is told
     progress.give("1", FIGURES)
     assert progress.rows() == [("One", "Q?", "a", "explained")]
     progress.go(5)
@@ -268,7 +274,7 @@ def test_windows_line_ends_are_read_too() -> None:
 def test_figures_without_an_estimate_are_settings_and_nothing_else() -> None:
     from kappaskin import Status
 
-    found = Watch().figures(Settings(), Status(), {})
+    found = RecentEstimates().figures(Settings(), Status(), {})
     assert set(found) == set(KINDS)
     assert found["functions_x"] == 8.0
     assert math.isnan(found["error_rms"])

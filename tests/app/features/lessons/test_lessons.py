@@ -16,9 +16,8 @@ from kappaskin_app.features.lessons.lesson import (
     NumberAnswer,
     Question,
 )
+from kappaskin_app.features.lessons.lesson_file import DOCKS, READOUTS, SETTABLE
 from kappaskin_app.features.lessons.progress import DONE
-from kappaskin_app.features.lessons.reading import DOCKS, READOUTS
-from kappaskin_app.features.lessons.setting import SETTABLE
 from kappaskin_app.shell.window import MainWindow
 
 
@@ -44,7 +43,7 @@ def given(window: MainWindow, how: ChoiceAnswer | NumberAnswer | LessonTask, rig
 
 def answer_wrongly_then_rightly(window: MainWindow, question: Question, until) -> None:
     teaching, how = window.teaching, question.how
-    feedback = window.lesson.step.asking.feedback
+    feedback = window.lesson.step.question_view.feedback
     if isinstance(how, NumberAnswer):
         until(lambda: math.isfinite(number_seen(window, how)))
     if isinstance(how, LessonTask):
@@ -146,7 +145,7 @@ def test_a_lesson_is_taken_answered_and_left_with_the_keyboard(window: MainWindo
     qtbot.keyClick(lessons, Qt.Key.Key_Return)
     window.lesson.next.setFocus()
     qtbot.keyClick(window.lesson.next, Qt.Key.Key_Space)
-    asking = window.lesson.step.asking
+    asking = window.lesson.step.question_view
     for typed, said in (("much", "Type a number"), ("2", "Not so."), ("20", "Right.")):
         asking.number.clear()
         qtbot.keyClicks(asking.number, typed)
@@ -159,7 +158,7 @@ def test_a_lesson_is_taken_answered_and_left_with_the_keyboard(window: MainWindo
 def test_twice_wrong_is_explained_and_shown_and_progress_is_kept(window: MainWindow, until) -> None:
     take(window, "04-how-many-functions")
     until(lambda: window.teaching.figures()["error_rms"] > 1e-5)
-    asking = window.lesson.step.asking
+    asking = window.lesson.step.question_view
     for _ in range(2):
         asking.check.click()
     assert "each way make the dent sharper" in asking.feedback.text()
@@ -173,14 +172,14 @@ def test_twice_wrong_is_explained_and_shown_and_progress_is_kept(window: MainWin
     window.lesson.list.begin.click()
     assert window.teaching.progress.step == 3
     window.teaching.go(0)
-    assert "each way make the dent sharper" in window.lesson.step.asking.feedback.text()
+    assert "each way make the dent sharper" in window.lesson.step.question_view.feedback.text()
 
 
 def test_what_is_said_to_an_answer_is_scrolled_to(window: MainWindow, until) -> None:
     take(window, "07-silent-mode")
     window.teaching.go(4)
     until(lambda: window.teaching.figures()["silent"] == 0)
-    asking = window.lesson.step.asking
+    asking = window.lesson.step.question_view
     assert asking.feedback.visibleRegion().isEmpty()
     window.teaching.answer("5")
     until(lambda: not asking.feedback.visibleRegion().isEmpty())

@@ -14,8 +14,8 @@ from PySide6.QtWidgets import QApplication
 
 from kappaskin import Refusal
 from kappaskin_app import guard
-from kappaskin_app.features.log.errors import Told, write_report
-from kappaskin_app.shell.logbook import CRASHES, LOG, Logbook
+from kappaskin_app.features.log.errors import ReportContents, write_report
+from kappaskin_app.shell.log_files import CRASHES, LOG, LogFiles
 from kappaskin_app.shell.window import MainWindow
 
 
@@ -28,14 +28,14 @@ def test_what_goes_wrong_is_in_the_log_whoever_missed_it(tmp_path: Path, monkeyp
     monkeypatch.setattr(guard, "_listeners", [told.append])
     hooks = sys.excepthook, threading.excepthook
     was_on = faulthandler.is_enabled()
-    logbook = Logbook(tmp_path / "log")
+    log_files = LogFiles(tmp_path / "log")
     guard.guarded(fail)()
     sys.excepthook(ValueError, ValueError("in a slot"), None)
     thread = threading.Thread(target=fail, name="beside")
     thread.start()
     thread.join()
     qWarning("a warning of Qt's")
-    logbook.close()
+    log_files.close()
     logged = (tmp_path / "log" / LOG).read_text()
     for words in ("in fail", "no such thing", "in a slot", "in beside", "a warning of Qt's"):
         assert words in logged
@@ -47,12 +47,12 @@ def test_what_goes_wrong_is_in_the_log_whoever_missed_it(tmp_path: Path, monkeyp
 
 
 def test_the_log_never_grows_beyond_its_files(tmp_path: Path) -> None:
-    logbook = Logbook(tmp_path)
+    log_files = LogFiles(tmp_path)
     for handler in logging.getLogger().handlers[-1:]:
         logging.getLogger().removeHandler(handler)  # not on the screen too
     for _ in range(60):
         logging.getLogger("kappaskin").error("x" * 100_000)
-    logbook.close()
+    log_files.close()
     sizes = [file.stat().st_size for file in tmp_path.glob(f"{LOG}*")]
     assert len(sizes) == 4
     assert max(sizes) <= 1_000_000
@@ -67,8 +67,8 @@ def test_a_failure_is_counted_and_listed_while_the_session_goes_on(
     window.plugs.found.emit([])
     assert window.errors.count.text() == "2 failures"
     assert window.errors.count.isVisible()
-    window.tell("in passing")
-    window.display.foot.activity.show_work("Counting: 1 s", True)
+    window.notify("in passing")
+    window.display.status_bar.activity.show_work("Counting: 1 s", True)
     for _ in range(5):
         QApplication.processEvents()
     assert not window.display.notice.isVisible()  # or the two would stand over each other
@@ -109,7 +109,7 @@ def test_a_report_names_no_home_folder_and_takes_the_log_along(tmp_path: Path) -
     logs.mkdir()
     (logs / LOG).write_text(f"in {Path.home()}/secret")
     (logs / f"{LOG}.1").write_text("older")
-    told = Told({"happened.txt": f"{Path.home()} it was"})
+    told = ReportContents({"happened.txt": f"{Path.home()} it was"})
     list(write_report(path, told, logs, dict))
     with zipfile.ZipFile(path) as report:
         assert set(report.namelist()) == {"happened.txt", "doctor.json", LOG, f"{LOG}.1"}
@@ -122,20 +122,20 @@ def test_a_home_folder_is_not_named_where_a_text_has_to_escape_it(tmp_path, monk
     monkeypatch.setattr(Path, "home", lambda: home)
     path = tmp_path / "report.zip"
     doctor = {"python": str(home / "bin" / "python")}
-    list(write_report(path, Told({}), tmp_path, lambda: doctor))
+    list(write_report(path, ReportContents({}), tmp_path, lambda: doctor))
     with zipfile.ZipFile(path) as report:
         assert json.loads(report.read("doctor.json")) == {"python": "~/bin/python"}
 
 
 def test_a_log_that_cannot_be_read_is_told_in_the_report(tmp_path: Path) -> None:
     (tmp_path / LOG).mkdir()
-    list(write_report(tmp_path / "report.zip", Told({}), tmp_path, dict))
+    list(write_report(tmp_path / "report.zip", ReportContents({}), tmp_path, dict))
     with zipfile.ZipFile(tmp_path / "report.zip") as report:
         assert report.read(LOG) == b"cannot be read (Is a directory)"
 
 
 def test_a_report_that_is_cancelled_leaves_nothing(tmp_path: Path) -> None:
-    writing = write_report(tmp_path / "report.zip", Told({}), tmp_path, dict)
+    writing = write_report(tmp_path / "report.zip", ReportContents({}), tmp_path, dict)
     assert next(writing) == 0.0
     assert list(tmp_path.iterdir()) != []
     writing.close()
@@ -144,7 +144,7 @@ def test_a_report_that_is_cancelled_leaves_nothing(tmp_path: Path) -> None:
 
 def test_a_report_is_written_over_nothing(tmp_path: Path) -> None:
     (tmp_path / "report.zip").write_bytes(b"mine")
-    with pytest.raises(Refusal, match="is there already"):
-        list(write_report(tmp_path / "report.zip", Told({}), tmp_path))
+    with pytest.raises(Refusal, match="exists already"):
+        list(write_report(tmp_path / "report.zip", ReportContents({}), tmp_path))
     with pytest.raises(Refusal, match="ends in"):
-        list(write_report(tmp_path / "report.txt", Told({}), tmp_path))
+        list(write_report(tmp_path / "report.txt", ReportContents({}), tmp_path))

@@ -6,19 +6,19 @@ import pytest
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
-from kappaskin_app.features.log.panel import Logged, LogPanel
+from kappaskin_app.features.log.panel import LogBuffer, LogPanel
 from kappaskin_app.guard import log
 
 
 @pytest.fixture
 def panel(qapp: QApplication) -> Iterator[LogPanel]:
-    logged = Logged()
-    made = LogPanel(logged)
+    log_buffer = LogBuffer()
+    made = LogPanel(log_buffer)
     made.show()
     yield made
     made.close()
     made.deleteLater()
-    logged.close()
+    log_buffer.close()
 
 
 def listed(panel: LogPanel) -> list[tuple[str, str]]:
@@ -96,10 +96,10 @@ def test_lines_of_other_threads_and_libraries_are_listed_and_only_the_last_are_k
 
 def test_once_closed_nothing_is_kept_and_logging_is_as_before() -> None:
     handlers, level = list(logging.getLogger().handlers), log.level
-    logged = Logged()
-    logged.close()
+    log_buffer = LogBuffer()
+    log_buffer.close()
     log.warning("afterwards")
-    assert not logged.lines
+    assert not log_buffer.lines
     assert (logging.getLogger().handlers, log.level) == (handlers, level)
 
 

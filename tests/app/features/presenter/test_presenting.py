@@ -174,14 +174,14 @@ def test_a_lost_line_says_what_to_do_and_what_is_felt_comes_back(demo, until) ->
 def test_a_recording_that_stands_is_felt_where_it_stands(opened, recording, until) -> None:
     window = opened(f"replay:{recording}")
     until(lambda: window.display.badge.state.startswith("REPLAY"))
-    window.replaying.go(False)
-    window.replaying.seek(0.3)
+    window.playback.go(False)
+    window.playback.seek(0.3)
     until(lambda: window.session.status.replay.at == 0.3)
     until(lambda: window.session.estimate and 28 < window.session.estimate.sequence < 33)
     window.presenting.enter()
     stage = window.presenting.stage
     until(lambda: stage.force.value.endswith(" N"))
-    window.replaying.seek(1.4)
+    window.playback.seek(1.4)
     until(lambda: stage.strip.state == GAP)
     until(lambda: (stage.force.value, stage.force.note) == ("\N{EN DASH}", "no reading"))
     assert (stage.strip.age, stage.radius.name) == ("", "Radius of what touches")

@@ -61,7 +61,7 @@ def test_every_receiver_is_told_with_what_it_got(panel: PublishPanel) -> None:
 
 def test_what_is_looked_for_or_refused_says_so(panel: PublishPanel) -> None:
     text = told(panel, TargetStatus("udp://robot:1", opening=True))
-    assert text.startswith("udp://robot:1: looking for it")
+    assert text.startswith("udp://robot:1: connecting")
     text = told(panel, FINE, TargetStatus("udp://a:1", refusal="udp://a:1: not known"))
     assert "udp://a:1" not in text
     assert panel.message.text() == "udp://a:1: not known."
@@ -69,7 +69,7 @@ def test_what_is_looked_for_or_refused_says_so(panel: PublishPanel) -> None:
 
 def test_an_address_is_wished_once_it_is_typed(panel: PublishPanel, qtbot) -> None:
     wishes: list[tuple[str, object]] = []
-    panel.wished.connect(lambda *wish: wishes.append(wish))
+    panel.requested.connect(lambda *wish: wishes.append(wish))
     line = panel.editor("udp_to")
     assert isinstance(line, QLineEdit)
     line.selectAll()
@@ -124,7 +124,7 @@ def test_what_is_no_address_is_refused_in_the_panel_and_nothing_is_sent(window, 
     window.requests.set("send_udp", True)
     until(lambda: window.session.status.publishing.targets)
     window.requests.set("udp_to", "robot:70000")
-    until(lambda: "Nothing is sent: expected a port" in panel.message.text())
+    until(lambda: "Not publishing: expected a port" in panel.message.text())
     until(lambda: window.session.status.publishing.targets == ())
     window.requests.set("udp_to", "nowhere.invalid:1")
     until(lambda: "nowhere.invalid is not known" in panel.message.text())

@@ -29,20 +29,20 @@ def documents(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def player(opened: Callable[[str], MainWindow], recording: Path, until) -> MainWindow:
     """The window on the recording, playing."""
     window = opened(f"replay:{recording}")
-    until(lambda: window.replaying.seen is not None)
+    until(lambda: window.playback.summary is not None)
     until(lambda: window.display.badge.state.startswith("REPLAY"))
-    until(lambda: window.replaying.time > 0)
+    until(lambda: window.playback.time > 0)
     return window
 
 
 @pytest.fixture
 def standing(player: MainWindow, until) -> MainWindow:
     """The window on the recording, which stands at 0.3 s."""
-    player.replaying.go(False)
-    player.replaying.seek(0.1)  # or it may have stood near 0.3 s already
+    player.playback.go(False)
+    player.playback.seek(0.1)  # or it may have stood near 0.3 s already
     until(lambda: player.session.status.replay.at == 0.1)
     until(lambda: player.session.estimate.sequence < 20)
-    player.replaying.seek(0.3)
+    player.playback.seek(0.3)
     until(lambda: player.session.status.replay.at == 0.3)
     until(lambda: 28 < player.session.estimate.sequence < 33)
     return player
@@ -69,7 +69,7 @@ def test_one_that_stands_is_paused_and_not_stale(standing: MainWindow, qtbot, un
 
 
 def test_where_nothing_came_it_is_grey(standing: MainWindow, until) -> None:
-    standing.replaying.seek(1.4)
+    standing.playback.seek(1.4)
     until(lambda: standing.display.badge.state == "REPLAY \N{MIDDLE DOT} gap")
     until(lambda: standing.membrane.greyed)
     standing.presenting.enter()
@@ -82,7 +82,7 @@ def test_the_settings_recorded_are_used_and_can_be_undone(
     window: MainWindow, recording: Path, until
 ) -> None:
     window.history.change("Other", -1, functions_x=3, method="bayes")
-    window.replaying.open_file(recording)
+    window.playback.open_file(recording)
     until(lambda: window.display.badge.state.startswith("REPLAY"))
     settings = window.history.settings
     assert (settings.functions_x, settings.functions_y, settings.method) == (8, 8, "least-squares")
@@ -94,8 +94,8 @@ def test_the_settings_recorded_are_used_and_can_be_undone(
 def test_settings_changed_in_the_recording_are_marked_and_may_be_used(
     standing: MainWindow, until
 ) -> None:
-    assert [event.kind for event in standing.replaying.events] == ["note", "settings"]
-    standing.replaying.seek(0.9)
+    assert [event.kind for event in standing.playback.events] == ["note", "settings"]
+    standing.playback.seek(0.9)
     standing.actions_by_name["replay-settings"].trigger()
     assert standing.history.settings.functions_y == 7
     until(lambda: standing.session.estimate.coefficients.shape == (6, 7))
@@ -119,7 +119,7 @@ def test_keys_left_over_go_to_the_transport(standing: MainWindow, qtbot, until) 
     until(lambda: _at(standing) == standing.session.status.replay.length)
     qtbot.keyClick(view, KEYS.Key_Home)
     until(lambda: _at(standing) == 0.0)
-    standing.replaying.play_at(0.25)  # or it may be over before anybody looks
+    standing.playback.play_at(0.25)  # or it may be over before anybody looks
     qtbot.keyClick(view, KEYS.Key_Space)
     until(lambda: standing.display.badge.state == "REPLAY" and _at(standing) > 0.1)
     qtbot.keyClick(view, KEYS.Key_Space)
@@ -129,10 +129,10 @@ def test_keys_left_over_go_to_the_transport(standing: MainWindow, qtbot, until) 
 def test_every_step_asked_for_is_taken(standing: MainWindow, until) -> None:
     sequence = standing.session.estimate.sequence
     for _ in range(20):
-        standing.replaying.step(1)
+        standing.playback.step(1)
     until(lambda: standing.session.estimate.sequence == sequence + 20)
     for _ in range(5):
-        standing.replaying.step(-1)
+        standing.playback.step(-1)
     until(lambda: standing.session.estimate.sequence == sequence + 15)
 
 
@@ -153,19 +153,19 @@ def test_scrubbing_ends_where_the_mouse_let_go(standing: MainWindow, qtbot, unti
 
 
 def test_it_ends_paused_and_plays_again_from_the_beginning(player: MainWindow, until) -> None:
-    player.replaying.seek(2.3)
+    player.playback.seek(2.3)
     # It stands at its beginning too, until the settings recorded are in use.
     until(lambda: player.display.badge.state.endswith("paused") and _at(player) > 0)
     assert _at(player) == player.session.status.replay.length
-    player.replaying.play_at(0.1)  # or it may be over again before anybody looks
+    player.playback.play_at(0.1)  # or it may be over again before anybody looks
     player.actions_by_name["pause"].trigger()
     until(lambda: player.display.badge.state == "REPLAY" and _at(player) < 1.0)
 
 
 def test_one_that_loops_begins_anew(player: MainWindow, until) -> None:
     player.actions_by_name["replay-loop"].trigger()
-    player.replaying.play_at(10.0)
-    player.replaying.seek(2.0)
+    player.playback.play_at(10.0)
+    player.playback.seek(2.0)
     until(lambda: 0 < _at(player) < 1.0)
     assert player.display.badge.state != "REPLAY \N{MIDDLE DOT} paused"
 
@@ -173,7 +173,7 @@ def test_one_that_loops_begins_anew(player: MainWindow, until) -> None:
 def test_events_are_jumped_to(standing: MainWindow, until) -> None:
     for name, at in (("next", 0.5), ("next", 0.7), ("next", 0.7), ("previous", 0.5)):
         standing.actions_by_name[f"replay-{name}"].trigger()
-        assert standing.replaying.time == pytest.approx(at, abs=0.02)
+        assert standing.playback.time == pytest.approx(at, abs=0.02)
         until(lambda at=at: _at(standing) == pytest.approx(at, abs=0.02))
 
 
@@ -185,7 +185,7 @@ def test_where_it_is_to_go_is_told_until_a_slow_engine_is_there(
     standing.actions_by_name["replay-next"].trigger()
     qtbot.wait(700)
     standing.actions_by_name["replay-next"].trigger()
-    assert standing.replaying.time == pytest.approx(0.7, abs=0.02)
+    assert standing.playback.time == pytest.approx(0.7, abs=0.02)
     os.kill(pid, signal.SIGCONT)
     until(lambda: _at(standing) == pytest.approx(0.7, abs=0.02))
 
@@ -193,8 +193,8 @@ def test_where_it_is_to_go_is_told_until_a_slow_engine_is_there(
 def test_speeds_are_asked_for_by_keys(standing: MainWindow, until) -> None:
     for _ in range(8):
         standing.actions_by_name["replay-slower"].trigger()
-    assert standing.replaying.speed == 0.1
-    standing.replaying.go(True)
+    assert standing.playback.speed == 0.1
+    standing.playback.go(True)
     until(lambda: standing.session.status.replay.speed == 0.1)
     standing.actions_by_name["replay-faster"].trigger()
     until(lambda: standing.session.status.replay.speed == 0.25)
@@ -219,7 +219,7 @@ def test_calibration_and_tare_are_the_live_ones_again(
     day = datetime.now(UTC)
     mine = Tare(sensor.name, "other", "layout", day, 20.0, 500, 1.0, offset, offset)
     window.history.change("Mine", -1, tare=mine)
-    window.replaying.open_file(recording)
+    window.playback.open_file(recording)
     until(lambda: window.display.badge.state.startswith("REPLAY"))
     assert window.history.settings.tare is None  # recorded without
     window.actions_by_name["simulate"].trigger()
@@ -298,7 +298,7 @@ def test_what_is_no_recording_is_refused_and_the_session_goes_on(
     file = tmp_path / "foreign.mcap"
     if content is not None:
         file.write_bytes(content)
-    window.replaying.open_file(file)
+    window.playback.open_file(file)
     panel = window.recording
     until(lambda: why in panel.message.text())
     assert "foreign.mcap" in panel.message.text()
@@ -313,7 +313,7 @@ def test_one_of_a_later_version_is_refused(
     later.write_bytes(
         recording.read_bytes().replace(b"format\x01\0\0\x001", b"format\x01\0\0\x009")
     )
-    window.replaying.open_file(later)
+    window.playback.open_file(later)
     until(lambda: "update this program" in window.recording.message.text())
     until(lambda: window.display.badge.state == "SIM")
 
@@ -325,9 +325,9 @@ def test_one_never_ended_is_played_up_to_where_it_breaks_off(
         within_the_last = whole.chunks[-1].at + 100
     part = tmp_path / "broken.mcap.part"
     part.write_bytes(recording.read_bytes()[:within_the_last])
-    window.replaying.open_file(part)
+    window.playback.open_file(part)
     until(lambda: window.display.badge.state.startswith("REPLAY"))
-    assert "was never ended" in window.recording.message.text()
+    assert "is unfinished" in window.recording.message.text()
     assert window.recording.copy_button.isVisibleTo(window.recording)
     until(lambda: "never ended" in window.connection.device.text())
 
@@ -337,10 +337,10 @@ def test_one_that_goes_while_it_is_played_leaves_the_session(
 ) -> None:
     copy = tmp_path / "copy.mcap"
     copy.write_bytes(recording.read_bytes())
-    window.replaying.open_file(copy)
+    window.playback.open_file(copy)
     until(lambda: window.display.badge.state.startswith("REPLAY"))
     os.truncate(copy, 100)
-    window.replaying.seek(2.2)
+    window.playback.seek(2.2)
     until(lambda: window.display.badge.state == "LOST")
     assert "copy.mcap" in window.session.alarm()
     assert not window.transport.isVisible()

@@ -52,7 +52,7 @@ def test_a_recording_is_begun_shown_and_ended(
     action = window.actions_by_name["record"]
     assert not _mark(window).isVisible()
     action.trigger()
-    until(lambda: window.taping.recording)
+    until(lambda: window.recorder.recording)
     assert asked[0].parent == folder
     until(lambda: _mark(window).isVisible() and _mark(window).head.startswith("REC 0:0"))
     until(lambda: action.text() == "&Stop recording")
@@ -67,14 +67,14 @@ def test_a_recording_is_begun_shown_and_ended(
 
 def test_it_goes_on_when_the_source_changes(window: MainWindow, asked: list[Path], until) -> None:
     window.actions_by_name["record"].trigger()
-    until(lambda: window.taping.written.messages > 0)
+    until(lambda: window.recorder.written.messages > 0)
     window.actions_by_name["disconnect"].trigger()
     until(lambda: window.display.badge.state == "OFF")
-    assert window.taping.recording
+    assert window.recorder.recording
     window.actions_by_name["simulate"].trigger()
     until(lambda: window.display.badge.state == "SIM")
-    messages = window.taping.written.messages
-    until(lambda: window.taping.written.messages > messages + 50)
+    messages = window.recorder.written.messages
+    until(lambda: window.recorder.written.messages > messages + 50)
     assert _mark(window).isVisible()
 
 
@@ -82,28 +82,28 @@ def test_a_note_goes_into_the_recording_and_the_list(
     window: MainWindow, asked: list[Path], until
 ) -> None:
     window.actions_by_name["record"].trigger()
-    until(lambda: window.taping.recording)
+    until(lambda: window.recorder.recording)
     window.actions_by_name["note"].trigger()
     (dialog,) = window.findChildren(QInputDialog)
     assert dialog.findChild(QLineEdit).maxLength() == LONGEST_NOTE
     dialog.setTextValue("  another object  ")
     dialog.accept()
     until(lambda: "note:  another object" in window.event_log.list.toPlainText())
-    window.taping.write_down("   ")
+    window.recorder.write_down("   ")
     window.actions_by_name["record"].trigger()
-    until(lambda: not window.taping.recording)
-    window.replaying.open_file(asked[0])
+    until(lambda: not window.recorder.recording)
+    window.playback.open_file(asked[0])
     until(lambda: window.display.badge.state.startswith("REPLAY"))
-    assert [event.text for event in window.replaying.events] == ["another object"]
+    assert [event.text for event in window.playback.events] == ["another object"]
 
 
 def test_one_that_ends_by_itself_says_so_until_it_is_seen(
     window: MainWindow, asked: list[Path], until
 ) -> None:
     window.actions_by_name["record"].trigger()
-    until(lambda: window.taping.written.messages > 0)
+    until(lambda: window.recorder.written.messages > 0)
     Path(f"{asked[0]}.part").rename(f"{asked[0]}.elsewhere")
-    until(lambda: bool(window.taping.ended))
+    until(lambda: bool(window.recorder.ended))
     assert "moved or removed" in window.recording.message.text()
     assert _mark(window).isVisible()
     assert _mark(window).head == "REC ended"
@@ -115,10 +115,10 @@ def test_one_that_ends_by_itself_says_so_until_it_is_seen(
 def test_nothing_is_ever_written_over(window: MainWindow, tmp_path: Path, until) -> None:
     there = tmp_path / "there.mcap"
     there.write_bytes(b"mine")
-    window.taping.begin(there)
+    window.recorder.begin(there)
     until(lambda: "already exists" in window.recording.message.text())
     assert there.read_bytes() == b"mine"
-    assert not window.taping.recording
+    assert not window.recorder.recording
     assert not _mark(window).isVisible()  # it never began
 
 
@@ -128,7 +128,7 @@ def test_nothing_is_ever_written_over(window: MainWindow, tmp_path: Path, until)
 def test_a_place_that_cannot_be_written_to_is_refused(
     window: MainWindow, until, place: str
 ) -> None:
-    window.taping.begin(Path(place))
+    window.recorder.begin(Path(place))
     until(lambda: "cannot be written" in window.recording.message.text())
     until(lambda: window.display.badge.state == "SIM")
 
@@ -154,7 +154,7 @@ def test_what_was_never_ended_is_offered_to_be_repaired(opened, until, folder: P
     window = opened("sim:")
     until(lambda: window.display.badge.state == "SIM")
     text = window.recording.message.text()
-    assert "it's mine.mcap.part was never ended" in text
+    assert "it's mine.mcap.part is unfinished" in text
     window.recording.copy_button.click()
     command = QGuiApplication.clipboard().text()
     assert command.startswith("kappaskin repair ")
@@ -187,8 +187,8 @@ class _Clicked(QCloseEvent):
 @pytest.fixture
 def taped(window: MainWindow, tmp_path: Path, until) -> MainWindow:
     """The window, recording to `taped.mcap`."""
-    window.taping.begin(tmp_path / "taped.mcap")
-    until(lambda: window.taping.recording)
+    window.recorder.begin(tmp_path / "taped.mcap")
+    until(lambda: window.recorder.recording)
     return window
 
 
@@ -208,7 +208,7 @@ def test_closing_while_recording_asks_once_by_mouse_and_keyboard(
     qtbot.keyClick(box, Qt.Key.Key_Escape)
     until(lambda: not _boxes(taped))
     assert taped.isVisible()
-    assert taped.taping.recording
+    assert taped.recorder.recording
     taped.actions_by_name["quit"].trigger()
     [box] = _boxes(taped)
     qtbot.keyClick(box, Qt.Key.Key_Return)  # nothing is ended by a key that slips

@@ -41,10 +41,10 @@ def test_one_that_breaks_off_is_repaired_beside_it_and_played(
 ) -> None:
     was, panel = broken.read_bytes(), window.recording
     window.panels.turn(1)
-    window.replaying.open_file(broken)
+    window.playback.open_file(broken)
     until(panel.repair.isVisible)  # on its page
     panel.repair.click()
-    dialog = window.taping.repairs
+    dialog = window.recorder.repairs
     assert dialog.to.text() == str(broken.with_name("broken-repaired.mcap"))
     dialog.begin_button.click()
     until(lambda: window.windowTitle().startswith("broken-repaired.mcap"))
@@ -61,13 +61,13 @@ def test_damage_found_while_it_is_played_is_offered_to_be_repaired(
 ) -> None:
     copy, panel = tmp_path / "copy.mcap", window.recording
     copy.write_bytes(recording.read_bytes())
-    window.replaying.open_file(copy)
+    window.playback.open_file(copy)
     until(lambda: window.display.badge.state.startswith("REPLAY"))
     assert not panel.offer.isVisibleTo(panel)
     with Recording(copy) as whole:
         third = whole.chunks[2].at
     os.truncate(copy, third + 50)
-    window.replaying.seek(2.2)
+    window.playback.seek(2.2)
     until(panel.repair.isVisible)
     assert "is damaged at byte" in panel.message.text()
 
@@ -75,7 +75,7 @@ def test_damage_found_while_it_is_played_is_offered_to_be_repaired(
 def test_a_file_of_another_kind_is_not_offered(window: MainWindow, tmp_path: Path, until) -> None:
     path, panel = tmp_path / "picture.mcap", window.recording
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(500))
-    window.replaying.open_file(path)
+    window.playback.open_file(path)
     until(lambda: "expected a recording" in panel.message.text())
     assert not panel.offer.isVisibleTo(panel)
 
@@ -84,7 +84,7 @@ def test_one_without_readings_is_not_offered(window: MainWindow, tmp_path: Path,
     path, panel = tmp_path / "empty.mcap", window.recording
     with closing(Recorder(path, 0.0)) as recorder:
         recorder.add_event(Event(0.0, "note", "nothing else"))
-    window.replaying.open_file(path)
+    window.playback.open_file(path)
     until(lambda: "expected bytes of a device" in panel.message.text())
     assert not panel.offer.isVisibleTo(panel)
 

@@ -32,7 +32,7 @@ def row(qtbot) -> Iterator[Transport]:
     row.speed_wanted.connect(lambda speed: row.asked.append(("speed", speed)))
     row.loop_wanted.connect(lambda on: row.asked.append(("loop", on)))
     row.show_recording(REPLAY, EVENTS)
-    row.show_manner(1.0, False)
+    row.show_speed(1.0, False)
     yield row
     row.close()
 
@@ -55,7 +55,7 @@ def test_times_are_minutes_seconds_and_milliseconds() -> None:
 
 def test_what_is_shown_is_not_asked_for(row: Transport) -> None:
     row.show_time(3.25, True)
-    row.show_manner(0.1, True)
+    row.show_speed(0.1, True)
     assert row.clock.text == "0:03.250 of 0:10.000"
     assert row.speed.currentData() == 0.1
     assert row.loop.isChecked()
@@ -129,7 +129,7 @@ def test_the_handle_follows_the_mouse_and_not_the_replay_while_it_is_held(
 def test_flags_and_gaps_say_what_they_are(row: Transport) -> None:
     course = row.course
     assert course.tip_at(course.at(2.0)) == "0:02.000  note: here\n0:02.010  tare: taken"
-    assert course.tip_at(course.at(4.7)) == "Nothing came for 1.50 s, from 0:04.000 on."
+    assert course.tip_at(course.at(4.7)) == "Gap of 1.50 s from 0:04.000."
     assert course.tip_at(course.at(9.0)).startswith("0:09.000")
 
 

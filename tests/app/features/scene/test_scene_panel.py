@@ -195,7 +195,7 @@ def test_scenes_are_opened_from_files_and_saved_into_them(
     (tmp_path / "out.toml").write_text("another's")
     window.actions_by_name["save-scene"].trigger()  # nobody asked whether to write over it
     assert (tmp_path / "out.toml").read_text() == "another's"
-    assert "is there already" in window.statusBar().currentMessage()
+    assert "exists already" in window.statusBar().currentMessage()
     nothing = tmp_path / "nothing.toml"
     nothing.write_bytes(b"\xff\xfe\x00")
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(nothing), ""))

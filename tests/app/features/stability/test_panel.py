@@ -266,10 +266,10 @@ def test_everything_below_the_skin_explains_itself(window: MainWindow) -> None:
 
 def test_the_shortcuts_are_on_the_cheat_sheet_and_meant_once(window: MainWindow) -> None:
     window.actions_by_name["shortcuts"].trigger()
-    listed = window.menus.sheet.list
+    listed = window.menus.shortcuts.list
     shown = [listed.topLevelItem(row).text(2) for row in range(listed.topLevelItemCount())]
     assert {"F9", "F10"} <= set(shown)
-    window.menus.sheet.close()
+    window.menus.shortcuts.close()
     keys = [entry.action.shortcut().toString() for entry in window.actions_by_name.entries.values()]
     keys = [key for key in keys if key]
     assert len(set(keys)) == len(keys)

@@ -1,4 +1,4 @@
-"""The figure to hand in: the window's views, a person's answers and the settings, on one sheet."""
+"""The figure to hand in: views of the window, the answers and the settings."""
 
 from collections.abc import Iterator
 from datetime import datetime
@@ -8,8 +8,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
+from kappaskin_app.features.lessons.lesson_file import SETTABLE
 from kappaskin_app.features.lessons.progress import Progress
-from kappaskin_app.features.lessons.setting import SETTABLE
 from kappaskin_app.shell.settings import Settings, ask_of
 from kappaskin_app.shell.settings.asks import Choice, Range, Several, Switch
 from kappaskin_app.theme import LIGHT, palette
@@ -18,21 +18,21 @@ _WIDTH, _MARGIN = 1000, 24  # px
 
 
 def changed(settings: Settings) -> Iterator[str]:
-    """Each setting that is not as usual, in words."""
+    """Each setting that is not the default, as text."""
     usual = Settings()
     for name in (one for one in vars(usual) if one in SETTABLE):
         value, how = getattr(settings, name), ask_of(name)
         if value == getattr(usual, name):
             continue
-        said = name.replace("_", " ")
+        text = name.replace("_", " ")
         if isinstance(how, Range):
-            yield f"{said} {value * how.scale:.6g} {how.unit}".strip()
+            yield f"{text} {value * how.scale:.6g} {how.unit}".strip()
         elif isinstance(how, Choice):
-            yield f"{said} {dict(how.options)[value].lower()}"
+            yield f"{text} {dict(how.options)[value].lower()}"
         elif isinstance(how, Several):
-            yield f"{said} {', '.join(dict(how.options)[one] for one in value)}"
+            yield f"{text} {', '.join(dict(how.options)[one] for one in value)}"
         elif isinstance(how, Switch):
-            yield f"{said} {'on' if value else 'off'}"
+            yield f"{text} {'on' if value else 'off'}"
     if settings.written is not None:
         yield f"scene {settings.written.file.stem}"
     if settings.dead_elements:
@@ -42,7 +42,7 @@ def changed(settings: Settings) -> Iterator[str]:
 def sheet(
     progress: Progress, student: str, views: list[QPixmap], settings: Settings, now: datetime
 ) -> QWidget:
-    """The figure, to be saved as a picture: `views` one below the other, words around them."""
+    """The figure, to be saved as a picture: `views` one below the other, with texts."""
     made = QWidget()
     made.setPalette(palette(LIGHT))  # it is for paper
     made.setAutoFillBackground(True)
@@ -54,8 +54,8 @@ def sheet(
     for view in views:
         stack.addWidget(_picture(view))
     stack.addWidget(_words(_answers(progress)))
-    said = "; ".join(changed(settings)) or "as the program begins with"
-    stack.addWidget(_words(f"<b>Settings:</b> {escape(said)}."))
+    text = "; ".join(changed(settings)) or "defaults"
+    stack.addWidget(_words(f"<b>Settings:</b> {escape(text)}."))
     made.resize(_WIDTH, stack.totalHeightForWidth(_WIDTH))
     stack.activate()
     return made

@@ -1,19 +1,23 @@
-"""What the window keeps for its next start, in a text file."""
+"""The window file: shortcuts, layouts, last files and place of the window."""
 
 import itertools
 import os
 import tempfile
 import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 import tomlkit
-from PySide6.QtCore import QLockFile
+from PySide6.QtCore import QLockFile, QObject, QRect
+from PySide6.QtGui import QGuiApplication
 
 from kappaskin.errors import Refusal
-from kappaskin_app.shell.layouts.layout import AREAS, FLOATING, Layout, Place
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.arrangement import AREAS, FLOATING, Layout, Place
+from kappaskin_app.shell.menus import Menus
+from kappaskin_app.shell.parts import Parts
 from kappaskin_app.shell.settings import ask_of
 from kappaskin_app.shell.settings.asks import Range
 from kappaskin_app.theme import THEMES
@@ -21,19 +25,19 @@ from kappaskin_app.theme import THEMES
 FORMAT = 1
 _LONGEST = 200  # characters of a name
 _MOST = 100  # of anything that is listed
-_PX = 100_000  # px, more than any screen has
+_PX = 100_000  # px, larger than any screen
 _HEAD = "What the window of Kappaskin was like. It may be edited while no window is open."
 _WAYS, _SHARES = ("tabbed", "front", "beside"), ("share", "along")
 _Some = TypeVar("_Some")
 
 
 @dataclass(frozen=True)
-class Kept:
-    """What a person chose of the window; all but the theme begins as if nothing ever was.
+class WindowState:
+    """The state of a window in its file; the defaults are those of a first start.
 
-    `place` is (x, y, width, height) in px, `keys` are the shortcuts changed, `done` and `files`
-    what was done and opened last, `own` the layouts saved under a name, `now` the last one,
-    `start` whether ways to begin are offered, and `letters` how large they are, in percent.
+    `place` is (x, y, width, height) in px, `keys` are the changed shortcuts, `done` and `files`
+    the recent commands and files, `own` the saved layouts, `now` the present one, `start` whether
+    the welcome banner is shown, and `letters` the size of the font in percent.
     """
 
     theme: str = ""
@@ -48,12 +52,13 @@ class Kept:
     letters: float = 100.0
 
 
-def merged(mine: Kept, before: Kept, theirs: Kept) -> Kept:
-    """What another window keeps, `theirs`, but for what was changed in `mine` since `before`."""
+def merged(mine: WindowState, before: WindowState, theirs: WindowState) -> WindowState:
+    """The state `theirs` of another window with what changed in `mine` since `before`."""
     three = [
-        {f.name: getattr(kept, f.name) for f in fields(Kept)} for kept in (mine, before, theirs)
+        {f.name: getattr(state, f.name) for f in fields(WindowState)}
+        for state in (mine, before, theirs)
     ]
-    return Kept(**_merged(*three))
+    return WindowState(**_merged(*three))
 
 
 def _merged(
@@ -72,48 +77,48 @@ def _merged(
 # To text.
 
 
-def to_text(kept: Kept) -> str:
+def to_text(state: WindowState) -> str:
     """The file's text."""
     document = tomlkit.document()
     document.add(tomlkit.comment(_HEAD))
     document["format"] = FORMAT
-    document["window"] = _window(kept)
-    document["shortcuts"] = dict(kept.keys)
-    if kept.now is not None:
-        document["layout"] = _said(kept.now)
-    document["layouts"] = {name: _said(layout) for name, layout in kept.own.items()}
+    document["window"] = _window(state)
+    document["shortcuts"] = dict(state.keys)
+    if state.now is not None:
+        document["layout"] = _layout_table(state.now)
+    document["layouts"] = {name: _layout_table(layout) for name, layout in state.own.items()}
     return tomlkit.dumps(document)
 
 
-def _window(kept: Kept) -> dict[str, Any]:
-    said: dict[str, Any] = {"theme": kept.theme, "start": kept.start, "full": kept.full}
-    said["letters"] = kept.letters
-    said |= {"done": list(kept.done), "files": list(kept.files)}
-    return said | ({"place": list(kept.place)} if kept.place else {})
+def _window(state: WindowState) -> dict[str, Any]:
+    table: dict[str, Any] = {"theme": state.theme, "start": state.start, "full": state.full}
+    table["letters"] = state.letters
+    table |= {"done": list(state.done), "files": list(state.files)}
+    return table | ({"place": list(state.place)} if state.place else {})
 
 
-def _said(layout: Layout) -> Any:
+def _layout_table(layout: Layout) -> Any:
     table = tomlkit.table()
     table["page"] = layout.page
     for name, place in layout.docks:
         line = tomlkit.inline_table()
-        line.update(_said_of(place))
+        line.update(_place_table(place))
         table[name] = line
     return table
 
 
-def _said_of(place: Place) -> dict[str, Any]:
-    said: dict[str, Any] = {"area": place.area, "shown": place.shown}
-    said |= {name: True for name in _WAYS if getattr(place, name)}
-    said |= {name: share for name in _SHARES if (share := getattr(place, name))}
-    return said | ({"at": list(place.at)} if place.at else {})
+def _place_table(place: Place) -> dict[str, Any]:
+    table: dict[str, Any] = {"area": place.area, "shown": place.shown}
+    table |= {name: True for name in _WAYS if getattr(place, name)}
+    table |= {name: share for name in _SHARES if (share := getattr(place, name))}
+    return table | ({"at": list(place.at)} if place.at else {})
 
 
 # From text.
 
 
-def from_text(text: str) -> Kept:
-    """What the file tells; refused where it is damaged, or of a later version."""
+def from_text(text: str) -> WindowState:
+    """The state in a text; refused where it is damaged, or of another version."""
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -121,7 +126,7 @@ def from_text(text: str) -> Kept:
     if (version := document.get("format")) != FORMAT:
         raise Refusal(f"expected format {FORMAT}, got {version!r}: another version wrote it")
     window = _part(document, "window", dict, {})
-    return Kept(
+    return WindowState(
         _one_of(_part(window, "theme", str, ""), ("", *THEMES)),
         _rectangle(window, "place"),
         _part(window, "full", bool, False),
@@ -217,52 +222,55 @@ _PATIENCE = 500  # ms that another window may take to write
 
 
 @dataclass(frozen=True)
-class KeptFile:
-    """What is kept at `path`; whatever is wrong with it is told, and never raised."""
+class WindowFile:
+    """The window file at `path`; errors are returned as text, never raised."""
 
     path: Path
 
-    def read(self) -> tuple[Kept, str]:
-        """What is kept, and what went wrong: then the file is put aside, and nothing is kept."""
+    def read(self) -> tuple[WindowState, str]:
+        """The state and an error text; a damaged file is renamed, and the state is the default."""
         try:
             if not self.path.exists():
-                return Kept(), ""
+                return WindowState(), ""
             return from_text(self._text()), ""
         except (OSError, UnicodeDecodeError, Refusal) as error:
-            return Kept(), f"{self.path}: {error}; {self._put_aside()}, the window begins anew"
+            return (
+                WindowState(),
+                f"{self.path}: {error}; {self._rename_damaged()}, the window starts with defaults",
+            )
 
     def _text(self) -> str:
         if self.path.stat().st_size > _LARGEST:
             raise Refusal(f"expected at most {_LARGEST} bytes")
         return self.path.read_text(encoding="utf-8")
 
-    def _put_aside(self) -> str:
-        """Give the file another name, so that it is not written over; what was done."""
+    def _rename_damaged(self) -> str:
+        """Rename the file, so that it is not overwritten; a text that reports it."""
         numbered = (self.path.with_suffix(f".toml.{n}.aside") for n in itertools.count(1))
         try:
             aside = next(path for path in numbered if not path.exists())
             os.replace(self.path, aside)
         except OSError as error:
-            return f"it cannot be put aside ({error.strerror})"
-        return f"it is {aside.name} now"
+            return f"it cannot be renamed ({error.strerror})"
+        return f"it was renamed to {aside.name}"
 
-    def write(self, kept: Kept) -> str:
-        """Write the file whole or not at all; what went wrong."""
+    def write(self, state: WindowState) -> str:
+        """Write the file whole or not at all; returns an error text."""
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._write(to_text(kept).encode())
+            self._write(to_text(state).encode())
         except (OSError, UnicodeEncodeError) as error:
-            return f"{self.path}: cannot be written ({error}); the window will not be as it is now"
+            return f"{self.path}: cannot be written ({error}); the window's state is not saved"
         return ""
 
-    def merge(self, kept: Kept, before: Kept) -> str:
-        """Write what was changed since `before`, and leave the rest as another window wrote it."""
+    def merge(self, state: WindowState, before: WindowState) -> str:
+        """Write what changed since `before`, the rest as another window wrote it."""
         if not self.path.exists():
-            return self.write(kept)
+            return self.write(state)
         lock = QLockFile(f"{self.path}.lock")
         lock.tryLock(_PATIENCE)  # or without: the file is whole at any time
         theirs, wrong = self.read()
-        wrong = self.write(kept if wrong else merged(kept, before, theirs)) or wrong
+        wrong = self.write(state if wrong else merged(state, before, theirs)) or wrong
         lock.unlock()
         return wrong
 
@@ -276,3 +284,85 @@ class KeptFile:
         except OSError:
             Path(name).unlink(missing_ok=True)
             raise
+
+
+class WindowSaver(QObject):
+    """Restores a `window` from its file and saves its changes, once `begin` was called."""
+
+    def __init__(self, window: Parts, menus: Menus) -> None:
+        super().__init__(window)
+        self._window, self._menus = window, menus
+        self._file: WindowFile | None = None
+        self._saved = WindowState()
+
+    def begin(self, path: Path) -> None:
+        """Restore the window from the file at `path`, and save it there from now on."""
+        file, window = WindowFile(path), self._window
+        state, wrong = file.read()
+        refused = self._restore(state)
+        self._file, self._saved = file, self._now()
+        for changed in (
+            self._menus.shortcuts.changed,
+            window.layouts.changed,
+            window.opening.changed,
+        ):
+            changed.connect(guarded(self.write))
+        if wrong or refused:
+            window.notify("; ".join([*([wrong] if wrong else []), *refused]))
+
+    def write(self) -> None:
+        """Save the state of the window."""
+        if self._file is None:
+            return
+        before, self._saved = self._saved, self._now()
+        if wrong := self._file.merge(self._saved, before):
+            self._window.notify(wrong)
+
+    def _restore(self, state: WindowState) -> list[str]:
+        """Restore a state; returns what was refused."""
+        window = self._window
+        if state.place is not None:
+            screens = [screen.availableGeometry() for screen in QGuiApplication.screens()]
+            window.setGeometry(clamped(QRect(*state.place), screens))
+        if state.full:
+            window.showMaximized()
+        chosen = {"show_start": state.start, "letters": state.letters}
+        chosen |= {"theme": state.theme} if state.theme else {}
+        window.history.apply(replace(window.history.settings, **chosen))
+        window.opening.recent = [Path(file) for file in state.files]
+        self._menus.finder.recent = list(state.done)
+        window.layouts.own = dict(state.own)
+        window.layouts.apply(state.now or window.layouts.ready())
+        return window.actions_by_name.take_keys(dict(state.keys))
+
+    def _now(self) -> WindowState:
+        window = self._window
+        layout, place = window.layouts.now, window.normalGeometry()
+        return WindowState(
+            theme=window.history.settings.theme,
+            start=window.history.settings.show_start,
+            letters=window.history.settings.letters,
+            place=(place.x(), place.y(), place.width(), place.height()),
+            full=window.isMaximized(),
+            keys=window.actions_by_name.changed_keys(),
+            done=tuple(self._menus.finder.recent),
+            files=tuple(str(file) for file in window.opening.recent),
+            now=layout,
+            own=dict(window.layouts.own),
+        )
+
+
+def clamped(place: QRect, screens: Sequence[QRect]) -> QRect:
+    """`place` moved and shrunk into the screen that shows most of it."""
+    if not screens:
+        return place
+
+    def seen(screen: QRect) -> int:
+        both = screen.intersected(place)
+        return both.width() * both.height()
+
+    screen = max(screens, key=seen)
+    wide, high = min(place.width(), screen.width()), min(place.height(), screen.height())
+    x = min(max(place.x(), screen.x()), screen.x() + screen.width() - wide)
+    y = min(max(place.y(), screen.y()), screen.y() + screen.height() - high)
+    return QRect(x, y, wide, high)

@@ -1,4 +1,4 @@
-"""Every shortcut, to look up and to change."""
+"""The shortcut dialog: all shortcuts, to look up and to change."""
 
 from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QKeySequence
@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 from kappaskin.errors import Refusal
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions, plain
-from kappaskin_app.shell.finder.finder import Listing, best, clearable, row, score
+from kappaskin_app.shell.finder import Listing, best, clearable, row, score
 from kappaskin_app.shell.history import History
 from kappaskin_app.widgets.parts import button, in_a_row
 
@@ -25,8 +25,8 @@ _SIZE = 620, 640  # px
 _MENU = 150  # px
 
 
-class CheatSheet(QDialog):
-    """Lists the shortcuts of `actions` and lets each be changed; `changed` tells that one was."""
+class ShortcutDialog(QDialog):
+    """Lists and changes the shortcuts of `actions`; `changed` reports a change."""
 
     changed = Signal()
 
@@ -36,29 +36,31 @@ class CheatSheet(QDialog):
         self.setWindowTitle("Shortcuts")
         self.resize(*_SIZE)
         self._actions, self.history = actions, history
-        self.line = QLineEdit(placeholderText="Look for a command, a menu or a key")  # pyright: ignore[reportCallIssue]
+        self.line = QLineEdit(placeholderText="Search for a command, a menu or a key")  # pyright: ignore[reportCallIssue]
         clearable(self.line)
-        self.line.setAccessibleName("Look for a shortcut")
-        self.line.setToolTip("A few letters of a command, of its menu, or its key.")
+        self.line.setAccessibleName("Search shortcuts")
+        self.line.setToolTip("A few letters of a command or its menu, or its key.")
         self.list = Listing(self.line)
         self.list.setAccessibleName("Shortcuts")
-        self.list.setToolTip("Each command with its menu and its shortcut; * where it is changed.")
+        self.list.setToolTip("Commands with their menus and shortcuts; * marks a changed one.")
         self.list.header().resizeSection(1, _MENU)
         self.edit = QKeySequenceEdit()
         self.edit.setMaximumSequenceLength(1)
         clearable(self.edit)
-        self.edit.setAccessibleName("Shortcut of the chosen command")
-        self.edit.setToolTip("Press the keys that the chosen command is to have.")
+        self.edit.setAccessibleName("Shortcut of the selected command")
+        self.edit.setToolTip("Press the new shortcut of the selected command.")
         self.name, self.message = QLabel(), QLabel(_MOUSE, wordWrap=True)  # pyright: ignore[reportCallIssue]
-        self.reset = button("&Reset this", "reset-key", "Give this command its own shortcut again.")
-        self.reset_all = button("Reset &all", "reset-keys", "Give every command its own shortcut.")
-        self.close_button = button("&Close", "close", "Leave the shortcuts as they are now (Esc).")
+        self.reset = button(
+            "&Reset this", "reset-key", "Restore the default shortcut of this command."
+        )
+        self.reset_all = button("Reset &all", "reset-keys", "Restore all default shortcuts.")
+        self.close_button = button("&Close", "close", "Close; the changes are saved (Esc).")
         self._lay_out()
         self.line.textChanged.connect(guarded(self._list))
         self.line.returnPressed.connect(self.edit.setFocus)
         self.list.itemActivated.connect(lambda *_: self.edit.setFocus())
         self.list.currentItemChanged.connect(guarded(self._show_chosen))
-        # Queued: it tells of being empty before each new key, and is not to change meanwhile.
+        # Queued: it reports an empty sequence before each new key, and must not change meanwhile.
         later = Qt.ConnectionType.QueuedConnection
         self.edit.keySequenceChanged.connect(guarded(self._change), later)
         self.reset.clicked.connect(guarded(self._reset))
@@ -77,7 +79,7 @@ class CheatSheet(QDialog):
         layout.addLayout(in_a_row(self.reset, self.reset_all, self.close_button))
 
     def open_all(self) -> None:
-        """Show every shortcut there is."""
+        """Show all shortcuts."""
         self.line.clear()
         self._list()
         self.message.setText(_MOUSE)
@@ -89,22 +91,24 @@ class CheatSheet(QDialog):
     def changeEvent(self, event: QEvent) -> None:
         super().changeEvent(event)
         if event.type() in (QEvent.Type.PaletteChange, QEvent.Type.FontChange) and self.isVisible():
-            self._list()  # its rows have colours and letters of before
+            self._list()  # its rows have the old colours and font
 
     def chosen(self) -> str:
-        """The name of the chosen action, or nothing."""
+        """The name of the selected action; empty where there is none."""
         return str(self.list.chosen() or "")
 
     def _list(self, *_: object) -> None:
         chosen, query = self.chosen(), self.line.text()
-        names = best({name: score(query, *self._said(name)) for name in self._actions.entries})
+        names = best(
+            {name: score(query, *self._search_text(name)) for name in self._actions.entries}
+        )
         rows = [self._row(name) for name in names]
         self.list.show_rows(rows)
         if chosen in names:
             self.list.setCurrentItem(rows[names.index(chosen)])
         self._show_chosen()
 
-    def _said(self, name: str) -> tuple[str, str]:
+    def _search_text(self, name: str) -> tuple[str, str]:
         entry = self._actions.entries[name]
         return f"{plain(entry.action.text())} {self._actions.key(name)}", plain(entry.menu)
 
@@ -131,12 +135,12 @@ class CheatSheet(QDialog):
     def _change(self, *_: object) -> None:
         name, key = self.chosen(), self.edit.keySequence().toString()
         if name and key != self._actions.key(name):
-            self._take(key)
+            self._set_key(key)
 
     def _reset(self) -> None:
-        self._take(self._actions.own_key(self.chosen()))
+        self._set_key(self._actions.own_key(self.chosen()))
 
-    def _take(self, key: str) -> None:
+    def _set_key(self, key: str) -> None:
         name, before = self.chosen(), self._actions.changed_keys()
         try:
             self._actions.change_key(name, key)
@@ -145,14 +149,14 @@ class CheatSheet(QDialog):
             self._show_key(self._actions.key(name))
             return
         words, after = plain(self._actions[name].text()), self._actions.changed_keys()
-        self.history.step(f"shortcut of {words}", self._have, before, after)
+        self.history.step(f"shortcut of {words}", self._apply_keys, before, after)
         self.message.setText(f"{words} is {key} now." if key else f"{words} has no shortcut now.")
 
     def _reset_all(self) -> None:
-        self.history.step("reset all shortcuts", self._have, self._actions.changed_keys(), {})
-        self.message.setText("Every command has its own shortcut again.")
+        self.history.step("reset all shortcuts", self._apply_keys, self._actions.changed_keys(), {})
+        self.message.setText("All shortcuts are the defaults again.")
 
-    def _have(self, changed: dict[str, str]) -> None:
+    def _apply_keys(self, changed: dict[str, str]) -> None:
         self._actions.take_keys(changed)
         self._list()
         self.changed.emit()

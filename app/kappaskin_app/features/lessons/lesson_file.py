@@ -1,10 +1,10 @@
-"""The text of a lesson to the lesson; whatever is wrong is refused with its file and line."""
+"""Lesson files: Markdown with TOML, read and checked."""
 
 import re
 import tomllib
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
@@ -24,7 +24,71 @@ from kappaskin_app.features.lessons.lesson import (
     Question,
     Step,
 )
-from kappaskin_app.features.lessons.setting import SETTABLE, checked_setting
+from kappaskin_app.shell.settings import SceneSettings, Settings, ask_of
+from kappaskin_app.shell.settings.asks import Ask, Choice, Range, Several, Switch
+from kappaskin_app.shell.settings.scene import Scanning
+from kappaskin_app.shell.settings.shown import EstimatorSettings, View
+
+_OWN = ("theme", "show_start")  # preferences
+_LISTS = ("dead_elements", "region_elements")
+_KINDS = (SceneSettings, EstimatorSettings, Scanning, View)
+SETTABLE = {
+    field.name
+    for kind in _KINDS
+    for field in fields(kind)
+    if "ask" in field.metadata and field.name not in _OWN
+}
+"""Settings that a lesson may set, besides lists of elements; none sends data."""
+
+
+def checked_setting(name: str, value: Any) -> Any:
+    """The `value` of the setting `name`; a `Refusal` for one that no form accepts."""
+    if name in _LISTS:
+        return _elements(name, value)
+    if name not in SETTABLE:
+        raise Refusal(f"expected the name of a setting, got {name!r}; the guide lists them")
+    how = ask_of(name)
+    if isinstance(how, Range):
+        return _checked_number(name, how, value)
+    if isinstance(how, Several):
+        return _several(name, how, value)
+    if not _is_one(how, value):
+        choices = [one for one, _ in how.options] if isinstance(how, Choice) else ["true", "false"]
+        raise Refusal(f"expected {name} to be one of {', '.join(choices)}; got {value!r}")
+    return value
+
+
+def _is_one(how: Ask, value: Any) -> bool:
+    if isinstance(how, Choice):
+        return value in [one for one, _ in how.options]
+    return isinstance(how, Switch) and isinstance(value, bool)
+
+
+def _checked_number(name: str, how: Range, value: Any) -> float | int:
+    kind = type(getattr(Settings(), name))
+    fits = isinstance(value, int | float) and not isinstance(value, bool)
+    if not fits or not how.least <= value <= how.most:
+        raise Refusal(f"expected {name} from {how.least:g} to {how.most:g}, got {value!r}")
+    if kind(value) != value:
+        raise Refusal(f"expected {name} to be a whole number, got {value!r}")
+    return kind(value)
+
+
+def _several(name: str, how: Several, value: Any) -> tuple[str, ...]:
+    known = [one for one, _ in how.options]
+    if not isinstance(value, list) or not all(one in known for one in value):
+        raise Refusal(f"expected {name} to be a list of {', '.join(known)}; got {value!r}")
+    return tuple(value)
+
+
+def _elements(name: str, value: Any) -> tuple[int, ...]:
+    most = 32 * 32
+    if not isinstance(value, list) or not all(
+        isinstance(one, int) and not isinstance(one, bool) and 0 <= one < most for one in value
+    ):
+        raise Refusal(f"expected {name} to be a list of elements, counted from 0; got {value!r}")
+    return tuple(value)
+
 
 _FOLDER = Path(str(files("kappaskin_resources"))) / "lessons"
 READY = tuple(sorted(_FOLDER.glob("[0-9]*.md")))
@@ -56,7 +120,7 @@ _Some = TypeVar("_Some")
 
 
 def read_lesson(file: Path) -> Lesson:
-    """The lesson in `file`; a `Refusal` says what is wrong where."""
+    """The lesson in `file`; a `Refusal` names the error and its line."""
     try:
         with file.open("rb") as opened:
             data = opened.read(_LARGEST + 1)
@@ -67,7 +131,7 @@ def read_lesson(file: Path) -> Lesson:
 
 
 def lesson_of(text: str, name: str) -> Lesson:
-    """The lesson that a `text` says, which is called `name`."""
+    """The lesson in a `text`, called `name`."""
     if len(text) > _LARGEST:
         raise Refusal(f"{name}: expected a lesson of at most {_LARGEST} letters, got more")
     text = text.replace("\r\n", "\n")
@@ -122,7 +186,7 @@ def _step(name: str, title: str, text: str, begin: int, end: int, usual: dict[st
     at = line if not blocks else _line(text, begin + blocks[0].start(1))
     table = _Table.parse(name, blocks[0][1] if blocks else "", at)
     table.only(_STEP_KEYS)
-    sets = usual | table.placed() if {"set", "scene"} & set(table.said) else None
+    sets = usual | table.placed() if {"set", "scene"} & set(table.values) else None
     buttons = table.get("button", list, [])
     return Step(
         title,
@@ -134,20 +198,20 @@ def _step(name: str, title: str, text: str, begin: int, end: int, usual: dict[st
     )
 
 
-def _button(table: "_Table", said: Any, on: Mapping[str, Any]) -> Button:
-    if not isinstance(said, dict):
+def _button(table: "_Table", values: Any, on: Mapping[str, Any]) -> Button:
+    if not isinstance(values, dict):
         raise table.refusal("button", "a table [[button]]")
-    inner = _Table(table.name, table.text, table.line, said)
+    inner = _Table(table.name, table.text, table.line, values)
     inner.only({"label", "set", "scene"})
     return Button(inner.words("label"), {**on, **inner.placed()})
 
 
 def _question_keys(table: "_Table") -> set[str]:
-    return set(table.said) & (_QUESTION_KEYS | set[str]().union(*_WAYS.values()))
+    return set(table.values) & (_QUESTION_KEYS | set[str]().union(*_WAYS.values()))
 
 
 def _question(table: "_Table") -> Question:
-    ways = [way for way in _WAYS if way in table.said]
+    ways = [way for way in _WAYS if way in table.values]
     if len(ways) != 1:
         raise table.refusal("question", "one of choices, number or check with a question")
     others = _question_keys(table) - _QUESTION_KEYS - _WAYS[ways[0]]
@@ -171,59 +235,59 @@ def _choice(table: "_Table") -> ChoiceAnswer:
 
 
 def _number(table: "_Table") -> NumberAnswer:
-    said = table.said["number"]
-    text = said if isinstance(said, str) else repr(table.real("number"))
+    values = table.values["number"]
+    text = values if isinstance(values, str) else repr(table.real("number"))
     unit = table.get("unit", str, "")
     if unit not in UNITS:
         raise table.refusal("unit", f"one of {', '.join(filter(None, UNITS))}, or none")
     tolerance = table.real("tolerance")
     if not tolerance > 0:
         raise table.refusal("tolerance", "a number above zero, in SI units")
-    return NumberAnswer(table.asked("number", text, NUMBER), tolerance, unit)
+    return NumberAnswer(table.expression_of("number", text, NUMBER), tolerance, unit)
 
 
 def _task(table: "_Table") -> LessonTask:
-    check = table.asked("check", table.get("check", str), TRUTH)
+    check = table.expression_of("check", table.get("check", str), TRUTH)
     return LessonTask(check, table.settings("solution"))
 
 
 @dataclass(frozen=True)
 class _Table:
-    """What a piece of TOML says, which begins at a `line` of the file called `name`."""
+    """A block of TOML that begins at a `line` of the file called `name`."""
 
     name: str
     text: str
     line: int
-    said: dict[str, Any]
+    values: dict[str, Any]
 
     @classmethod
     def parse(cls, name: str, text: str, line: int) -> "_Table":
         try:
-            said = tomllib.loads(text)
-            repr(said)  # refused here: a number in hexadecimal that is too long to be told
-            return cls(name, text, line, said)
-        except (ValueError, RecursionError) as error:  # also of a number too long to read
+            values = tomllib.loads(text)
+            repr(values)  # refused here: a number in hexadecimal that is too long to be shown
+            return cls(name, text, line, values)
+        except (ValueError, RecursionError) as error:  # also for a number too long to read
             at = _AT_LINE.search(str(error))
             where = line + int(at[1]) - 1 if at else line
             why = _AT_LINE.sub("", str(error)).strip()
             raise Refusal(f"{name}, line {where}: expected TOML, got a mistake: {why}") from error
 
     def refusal(self, key: str, expected: str) -> Refusal:
-        """What to say of the value of `key`, with the line it stands in."""
+        """The error of the value of `key`, with its line."""
         found = re.search(rf"^[ \t\[]*{re.escape(key)}\b", self.text, re.MULTILINE)
         line = self.line + (_line(self.text, found.start()) - 1 if found else 0)
-        got = repr(self.said[key]) if key in self.said else "nothing"
+        got = repr(self.values[key]) if key in self.values else "nothing"
         got = got if len(got) <= 80 else got[:77] + "..."
         return Refusal(f"{self.name}, line {line}: expected {key} to be {expected}; got {got}")
 
     def only(self, keys: set[str]) -> None:
-        for key in self.said:
+        for key in self.values:
             if key not in keys:
                 known = ", ".join(sorted(keys))
                 raise self.refusal(key, f"left out or spelt as one of {known}")
 
     def get(self, key: str, kind: type[_Some], usual: _Some | None = None) -> _Some:
-        value = self.said.get(key, usual)
+        value = self.values.get(key, usual)
         if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
             names = {str: "text in quotes", int: "a whole number", list: "a list", dict: "a table"}
             raise self.refusal(key, names.get(kind, kind.__name__))
@@ -236,7 +300,7 @@ class _Table:
         return text
 
     def real(self, key: str) -> float:
-        value = self.said.get(key)
+        value = self.values.get(key)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.refusal(key, "a number, in SI units")
         with suppress(OverflowError):
@@ -249,7 +313,7 @@ class _Table:
             raise self.refusal(key, f"from {least} to {most}")
         return value
 
-    def asked(self, key: str, text: str, wanted: str) -> Expression:
+    def expression_of(self, key: str, text: str, wanted: str) -> Expression:
         try:
             return expression(text, KINDS, wanted)
         except Refusal as refusal:
@@ -257,21 +321,21 @@ class _Table:
 
     def settings(self, key: str) -> dict[str, Any]:
         """The settings in the table `key`, by their names; none where there is none."""
-        said = self.get(key, dict, {})
+        values = self.get(key, dict, {})
         try:
-            return {str(name): checked_setting(str(name), one) for name, one in said.items()}
+            return {str(name): checked_setting(str(name), one) for name, one in values.items()}
         except Refusal as refusal:
             raise self.refusal(key, f"settings ({refusal})") from refusal
 
     def placed(self) -> dict[str, Any]:
         """The settings of a step or a button, and the ready scene among them."""
         scene = self.get("scene", str, "")
-        if "scene" in self.said and scene not in SCENES:
+        if "scene" in self.values and scene not in SCENES:
             raise self.refusal("scene", f"one of {', '.join(SCENES)}")
         return self.settings("set") | ({"scene": scene} if scene else {})
 
     def places(self) -> tuple[str, ...]:
-        """What is pointed at."""
+        """The controls that are pointed at."""
         places = self.get("point", list, [])
         for place in places:
             if place not in _PLACES:

@@ -1,4 +1,4 @@
-"""What goes wrong, to files in the user's log folder that a report takes along."""
+"""Log files in the user's log folder."""
 
 import faulthandler
 import logging
@@ -28,12 +28,12 @@ _LEVELS = {
 
 
 def log_folder() -> Path:
-    """Where this user's log files are."""
+    """The folder of this user's log files."""
     return platformdirs.user_log_path("kappaskin", appauthor=False)
 
 
-class Logbook:
-    """Writes warnings, exceptions that nobody caught, Qt's messages and crashes into a `folder`."""
+class LogFiles:
+    """Writes warnings, uncaught exceptions, Qt's messages and crashes into a `folder`."""
 
     def __init__(self, folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
@@ -42,7 +42,7 @@ class Logbook:
             RotatingFileHandler(
                 folder / LOG, maxBytes=_LARGEST, backupCount=_OLDER, encoding="utf-8"
             ),
-            logging.StreamHandler(),  # as without a log
+            logging.StreamHandler(),  # to the terminal, as without log files
         )
         for handler in self._handlers:
             handler.setLevel(logging.WARNING)
@@ -53,12 +53,12 @@ class Logbook:
         self._crashes.flush()
         faulthandler.enable(self._crashes)
         self._hooks = sys.excepthook, threading.excepthook
-        sys.excepthook = _missed
-        threading.excepthook = _missed_in_thread
-        self._qt = qInstallMessageHandler(_said_by_qt)
+        sys.excepthook = _log_exception
+        threading.excepthook = _log_thread_exception
+        self._qt = qInstallMessageHandler(_log_qt_message)
 
     def close(self) -> None:
-        """Write no more, and leave everything as it was."""
+        """Stop logging, and restore the handlers of before."""
         qInstallMessageHandler(self._qt)
         sys.excepthook, threading.excepthook = self._hooks
         faulthandler.disable()
@@ -68,19 +68,21 @@ class Logbook:
             handler.close()
 
 
-def _missed(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+def _log_exception(
+    kind: type[BaseException], error: BaseException, trace: TracebackType | None
+) -> None:
     if isinstance(error, Exception):
-        guard.failed(error, "what nothing guards")
+        guard.failed(error, "unguarded code")
     else:
         sys.__excepthook__(kind, error, trace)
 
 
-def _missed_in_thread(missed: threading.ExceptHookArgs) -> None:
-    # Only logged: a window is told of nothing from another thread.
+def _log_thread_exception(missed: threading.ExceptHookArgs) -> None:
+    # Only logged: another thread must not call a window.
     where = missed.thread.name if missed.thread else "a thread"
     error = missed.exc_value
     guard.log.error("in %s", where, exc_info=error if error is not None else False)
 
 
-def _said_by_qt(kind: QtMsgType, _: QMessageLogContext, text: str) -> None:
+def _log_qt_message(kind: QtMsgType, _: QMessageLogContext, text: str) -> None:
     logging.getLogger("qt").log(_LEVELS.get(kind, logging.WARNING), "%s", text)

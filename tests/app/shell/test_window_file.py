@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Refusal
-from kappaskin_app.shell.layouts.kept import Kept, KeptFile, from_text, to_text
-from kappaskin_app.shell.layouts.layout import Layout, Place
+from kappaskin_app.shell.arrangement import Layout, Place
+from kappaskin_app.shell.window_file import WindowFile, WindowState, from_text, to_text
 
 HOSTILE = (
     "",
@@ -53,8 +53,8 @@ TEACH = Layout(0, (("lesson", Place("left", share=0.25)), *STUDY.docks[1:]))
 def test_a_file_that_cannot_be_used_is_told_and_put_aside(tmp_path: Path, text: str) -> None:
     path = tmp_path / "window.toml"
     path.write_text(text)
-    kept, told = KeptFile(path).read()
-    assert kept == Kept()
+    kept, told = WindowFile(path).read()
+    assert kept == WindowState()
     assert "window.toml.1.aside" in told
     assert (tmp_path / "window.toml.1.aside").read_text() == text
     assert not path.exists()
@@ -65,65 +65,67 @@ def test_no_text_at_all_ends_the_start(tmp_path_factory, text: str | bytes) -> N
     path = tmp_path_factory.mktemp("kept") / "window.toml"
     data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
     path.write_bytes(data)
-    kept, told = KeptFile(path).read()
-    assert kept == Kept()
+    kept, told = WindowFile(path).read()
+    assert kept == WindowState()
     assert told
 
 
 def test_a_file_that_is_not_there_is_no_news_and_one_that_cannot_be_written_is(
     tmp_path: Path,
 ) -> None:
-    assert KeptFile(tmp_path / "none.toml").read() == (Kept(), "")
+    assert WindowFile(tmp_path / "none.toml").read() == (WindowState(), "")
     (tmp_path / "file").touch()
-    assert "cannot be written" in KeptFile(tmp_path / "file" / "window.toml").write(Kept())
+    assert "cannot be written" in WindowFile(tmp_path / "file" / "window.toml").write(WindowState())
 
 
 def test_an_earlier_one_put_aside_stays(tmp_path: Path) -> None:
     path = tmp_path / "window.toml"
     for text in ("first", "second"):
         path.write_text(text)
-        KeptFile(path).read()
+        WindowFile(path).read()
     aside = [(tmp_path / f"window.toml.{number}.aside").read_text() for number in (1, 2)]
     assert aside == ["first", "second"]
 
 
 def test_two_windows_that_write_at_once_leave_one_whole_file_and_no_other(tmp_path: Path) -> None:
     path = tmp_path / "window.toml"
-    kept = [Kept(theme="dark"), Kept(theme="light", files=("a",) * 50)]
+    kept = [WindowState(theme="dark"), WindowState(theme="light", files=("a",) * 50)]
 
-    def write(which: Kept) -> set[str]:
-        return {KeptFile(path).write(which) for _ in range(40)}
+    def write(which: WindowState) -> set[str]:
+        return {WindowFile(path).write(which) for _ in range(40)}
 
     with ThreadPoolExecutor(2) as windows:
         assert set().union(*windows.map(write, kept)) == {""}
-    assert KeptFile(path).read() in [(each, "") for each in kept]
+    assert WindowFile(path).read() in [(each, "") for each in kept]
     assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_file_that_was_cut_anywhere_is_read_or_told(tmp_path: Path) -> None:
-    text, path = to_text(Kept(theme="dark", now=STUDY)), tmp_path / "window.toml"
+    text, path = to_text(WindowState(theme="dark", now=STUDY)), tmp_path / "window.toml"
     for end in range(0, len(text), 97):
         path.write_text(text[:end])
-        kept, told = KeptFile(path).read()
-        assert told == "" or (kept == Kept() and not path.exists())
+        kept, told = WindowFile(path).read()
+        assert told == "" or (kept == WindowState() and not path.exists())
 
 
 def test_the_text_is_read_by_a_person() -> None:
-    text = to_text(Kept(theme="dark", keys={"picture": "F12"}, now=STUDY))
+    text = to_text(WindowState(theme="dark", keys={"picture": "F12"}, now=STUDY))
     assert 'theme = "dark"' in text
     assert 'picture = "F12"' in text
     assert 'settings = {area = "left", shown = true, share = 0.25}' in text
 
 
 def test_of_two_windows_each_keeps_what_it_changed_and_what_it_forgot(tmp_path: Path) -> None:
-    file, mine = KeptFile(tmp_path / "window.toml"), STUDY
-    begun = Kept(theme="light", keys={"picture": "F12", "tare": "F9"}, own={"A": mine, "B": mine})
-    assert file.merge(begun, Kept()) == ""
+    file, mine = WindowFile(tmp_path / "window.toml"), STUDY
+    begun = WindowState(
+        theme="light", keys={"picture": "F12", "tare": "F9"}, own={"A": mine, "B": mine}
+    )
+    assert file.merge(begun, WindowState()) == ""
     one = replace(begun, theme="dark", own={"A": mine, "B": mine, "One": mine})
     other = replace(begun, letters=150.0, keys={"picture": "F8"}, own={"B": TEACH})
     for window in (one, other):
         assert file.merge(window, begun) == ""
-    assert file.read()[0] == Kept(
+    assert file.read()[0] == WindowState(
         theme="dark",
         letters=150.0,
         keys={"picture": "F8"},
@@ -135,17 +137,17 @@ def test_of_two_windows_each_keeps_what_it_changed_and_what_it_forgot(tmp_path: 
 def test_what_a_window_did_not_touch_is_as_the_other_left_it_at_its_second_writing_too(
     tmp_path: Path,
 ) -> None:
-    file, begun = KeptFile(tmp_path / "window.toml"), Kept(theme="light")
-    file.merge(begun, Kept())
+    file, begun = WindowFile(tmp_path / "window.toml"), WindowState(theme="light")
+    file.merge(begun, WindowState())
     file.merge(replace(begun, theme="dark"), begun)
     mine = replace(begun, files=("a",))
     file.merge(mine, begun)
     file.merge(replace(mine, done=("theme",)), mine)
-    assert file.read()[0] == Kept(theme="dark", files=("a",), done=("theme",))
+    assert file.read()[0] == WindowState(theme="dark", files=("a",), done=("theme",))
 
 
 def test_letters_are_kept_and_those_that_no_form_offers_are_refused(tmp_path: Path) -> None:
-    assert from_text(to_text(Kept(letters=150.0))).letters == 150.0
+    assert from_text(to_text(WindowState(letters=150.0))).letters == 150.0
     for bad in ("1000", "nan", "true", "'large'"):
         with pytest.raises(Refusal, match="letters from 80 to 200"):
             from_text(f"format = 1\n[window]\nletters = {bad}")

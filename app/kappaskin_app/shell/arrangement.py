@@ -1,4 +1,4 @@
-"""Layouts: where the docks of a window are, read from it and put into it."""
+"""Arrangement of docks: read from a window and applied to it."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,12 +14,12 @@ AREAS = (LEFT, RIGHT, TOP, BOTTOM, FLOATING)
 
 @dataclass(frozen=True)
 class Place:
-    """Where a dock is.
+    """The place of a dock.
 
-    In an area the docks follow one another, are `tabbed` with the one before, or across the way
-    they follow: `beside` it in a column, below it in a row. Of tabs the one in `front` is seen.
-    Its `share` is that of the window's width, or height above and below the skin; `along` the
-    area its share of the other. One that floats is `at` (x, y, width, height) in px.
+    In an area the docks follow one another, are `tabbed` with the one before, or stand across:
+    `beside` it in a column, below it in a row. Of tabs the one in `front` is visible. `share` is
+    that of the window's width, or of its height above and below the skin; `along` its share of
+    the other dimension. A floating dock is `at` (x, y, width, height) in px.
     """
 
     area: str
@@ -34,7 +34,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Layout:
-    """The page of the panels, counted from 0, and the `docks` by name, in order within an area."""
+    """The page of settings, counted from 0, and the `docks` by name, in order within an area."""
 
     page: int
     docks: tuple[tuple[str, Place], ...]
@@ -57,7 +57,7 @@ Placed = Sequence[tuple[QDockWidget, Place]]
 
 
 def ready_layout(docks: Docks, name: str, page: int) -> Layout:
-    """The ready layout of this name: each dock where it began, shown if it was put there so."""
+    """The ready layout of this name, with each dock in its default place."""
     placed = [
         (dock, Place(_called(area), shown=share > 0, share=share))
         for dock, area, share in docks.at_first(name)
@@ -70,7 +70,7 @@ def ready_layout(docks: Docks, name: str, page: int) -> Layout:
 
 
 def layout_of(window: QMainWindow, docks: Named, panels: QTabWidget) -> Layout:
-    """How the docks of a window are arranged now."""
+    """The present layout of the docks of a window."""
     shown = [dock for dock in docks.values() if not dock.isHidden()]
     placed = [(d.objectName(), _floating(d)) for d in shown if d.isFloating()]
     for area, side in _SIDES.items():
@@ -100,7 +100,7 @@ def _floating(dock: QDockWidget) -> Place:
 
 
 def _along(window: QMainWindow, here: list[QDockWidget], area: str) -> Iterator[tuple[str, Place]]:
-    """The docks of an area one after the other, those of a line and tabs together."""
+    """The docks of an area in order, those of a line and of tabs together."""
     begins = -_ALIGNED
     for front, members in _lines(window, here, area):
         start = front.y() if area in _BESIDE else front.x()
@@ -125,7 +125,7 @@ def _along(window: QMainWindow, here: list[QDockWidget], area: str) -> Iterator[
 def _lines(
     window: QMainWindow, here: list[QDockWidget], area: str
 ) -> list[tuple[QDockWidget, list[QDockWidget]]]:
-    """The stacks of an area in their order, each with the one in front: it alone has its place."""
+    """The stacks of an area in order, each with its front dock, which alone has the geometry."""
     stacks = [(min(s, key=lambda d: d.visibleRegion().isEmpty()), s) for s in _stacks(window, here)]
     if area in _BESIDE:
         return sorted(stacks, key=lambda stack: (stack[0].y() // _ALIGNED, stack[0].x()))
@@ -133,7 +133,7 @@ def _lines(
 
 
 def _stacks(window: QMainWindow, here: list[QDockWidget]) -> list[list[QDockWidget]]:
-    """Docks that share a place, in the order of their tabs."""
+    """Stacks of tabbed docks, in the order of their tabs."""
     orders = [[bar.tabText(n) for n in range(bar.count())] for bar in _bars(window)]
     stacks: list[list[QDockWidget]] = []
     for dock in here:
@@ -147,7 +147,7 @@ def _stacks(window: QMainWindow, here: list[QDockWidget]) -> list[list[QDockWidg
 
 
 def _bars(window: QMainWindow) -> list[QTabBar]:
-    """The bars of tabs below docks."""
+    """The tab bars of docks."""
     only_its_own = Qt.FindChildOption.FindDirectChildrenOnly
     return window.findChildren(QTabBar, options=only_its_own)
 
@@ -156,7 +156,7 @@ def _bars(window: QMainWindow) -> list[QTabBar]:
 
 
 def arrange(window: QMainWindow, docks: Named, panels: QTabWidget, layout: Layout) -> None:
-    """Arrange the docks of a window so; one that the layout does not name is hidden."""
+    """Apply a layout to the docks of a window; docks that it does not name are hidden."""
     placed = [(docks[name], place) for name, place in layout.docks if name in docks]
     with drawn_once(window):
         if not _only_show(window, docks, panels, layout):
@@ -171,14 +171,14 @@ def arrange(window: QMainWindow, docks: Named, panels: QTabWidget, layout: Layou
 
 
 def words_of(layout: Layout) -> list[tuple[object, ...]]:
-    """What a layout says of each dock, but for how large it is."""
+    """A layout without the sizes of docks."""
     return [
         (name, p.area, p.shown, p.tabbed, p.beside, p.front and p.shown) for name, p in layout.docks
     ]
 
 
 def _only_show(window: QMainWindow, docks: Named, panels: QTabWidget, layout: Layout) -> bool:
-    """Show and hide docks, which is seen at once; whether all are as the layout has them then."""
+    """Show and hide docks only; whether that gives the layout."""
     for name, place in layout.docks:
         if name in docks and docks[name].isHidden() == place.shown:
             docks[name].setVisible(place.shown)
@@ -189,7 +189,7 @@ def _only_show(window: QMainWindow, docks: Named, panels: QTabWidget, layout: La
 
 @dataclass
 class _Plan:
-    """Which docks begin a line of their area, share the line of another, or its place."""
+    """Docks that begin a line of their area, split the line of another, or join its tabs."""
 
     begin: list[tuple[str, QDockWidget]] = field(default_factory=list)
     split: list[tuple[str, QDockWidget, QDockWidget]] = field(default_factory=list)
@@ -236,9 +236,9 @@ def _put(window: QMainWindow, placed: Placed) -> None:
 
 
 def _taken(dock: QDockWidget, place: Place) -> str:
-    """The area wished, or the first that the dock may be in."""
-    wished = [place.area] if place.area in _SIDES else []
-    return next(area for area in (*wished, *_SIDES) if dock.isAreaAllowed(_SIDES[area]))
+    """The area of `place`, or the first that the dock allows."""
+    preferred = [place.area] if place.area in _SIDES else []
+    return next(area for area in (*preferred, *_SIDES) if dock.isAreaAllowed(_SIDES[area]))
 
 
 def _float(dock: QDockWidget, place: Place) -> None:
@@ -263,7 +263,7 @@ def _size(window: QMainWindow, shown: Placed) -> None:
 
 
 def _tabs_of(window: QMainWindow, dock: QDockWidget) -> int:
-    """px that the tabs below a dock take of its height, where there are any."""
+    """The height in px of the tab bar below a dock; 0 without one."""
     if all(other.isHidden() for other in window.tabifiedDockWidgets(dock)):
         return 0
     return max((bar.sizeHint().height() for bar in _bars(window)), default=0)

@@ -1,4 +1,4 @@
-"""Layouts as a person chooses and changes them, as steps that can be undone."""
+"""Layouts: selected, saved, renamed and deleted, with undo."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,38 +17,37 @@ from PySide6.QtWidgets import (
 
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions, plain
-from kappaskin_app.shell.docks import Docks
-from kappaskin_app.shell.history import History
-from kappaskin_app.shell.layouts.layout import (
+from kappaskin_app.shell.arrangement import (
     Layout,
     arrange,
     layout_of,
     ready_layout,
     words_of,
 )
+from kappaskin_app.shell.docks import Docks
+from kappaskin_app.shell.history import History
 from kappaskin_app.shell.pages import LIVE, Pages
 
-_HELD = 50  # ms between two looks whether the mouse has let go
+_HELD = 50  # ms between two checks whether the mouse button is released
 
 
 @dataclass(frozen=True)
-class Seen:
-    """How the window is arranged, and which of its other `pages` are turned to."""
+class WindowArrangement:
+    """The layout of the window, and the current page of each of its other tab widgets."""
 
     layout: Layout
     pages: tuple[int, ...]
 
-    def differs(self, other: "Seen") -> bool:
-        """Whether it is another but for the sizes of docks."""
-        return _in_words(self) != _in_words(other)
+    def differs(self, other: "WindowArrangement") -> bool:
+        """Whether it differs in more than the sizes of docks."""
+        return _discrete_part(self) != _discrete_part(other)
 
 
-class Noting(QObject):
-    """Watches the docks and `tabs` of a `window`; `apply` brings back a layout that was.
+class LayoutTracker(QObject):
+    """Makes changes of the docks and `tabs` of a `window` steps that can be undone.
 
-    `filled` says whether a view fills the screen, which is no arrangement.
-
-    What docks do in the turn of another step belongs to that one.
+    `apply` restores a layout; `filled` says whether a view fills the screen, which is no layout.
+    What docks do within another step belongs to that one.
     """
 
     def __init__(
@@ -64,8 +63,8 @@ class Noting(QObject):
         self._window, self._docks, self._history = window, docks, history
         self._panels, *self._pages = tabs
         self._apply, self._filled = apply, filled
-        self._known: Seen | None = None
-        self._settles, self._sized = True, False
+        self._last: WindowArrangement | None = None
+        self._ignores, self._sized = True, False
         self._timer = QTimer(self, singleShot=True)  # pyright: ignore[reportCallIssue]
         self._timer.timeout.connect(guarded(self.note))
         for dock in self._docks.values():
@@ -77,49 +76,49 @@ class Noting(QObject):
         window.installEventFilter(self)
 
     def note(self) -> None:
-        """Make a step of what was done since the last look, if anything was."""
+        """Record what was changed since the last time as a step, if anything was."""
         window, held = self._window, bool(QApplication.mouseButtons().value)
         self._timer.stop()
         if held:
             self._timer.start(_HELD)
         elif window.isVisible() and not window.isMinimized() and not self._filled():
-            self._look()
+            self._record_step()
 
-    def _look(self) -> None:
-        before, now = self._known, self._now()
-        settles, sized = self._settles, self._sized
-        self._known, self._settles, self._sized = now, False, False
+    def _record_step(self) -> None:
+        before, now = self._last, self._now()
+        settles, sized = self._ignores, self._sized
+        self._last, self._ignores, self._sized = now, False, False
         # A page that cannot be seen any more is left without anybody's doing.
         if before is None or settles or not self._can_turn_to(before):
             return
         if now.differs(before) or (sized and now != before):
-            self._history.step(self._told(before, now), self._have, before, now)
+            self._history.step(self._step_text(before, now), self._restore, before, now)
 
-    def _can_turn_to(self, seen: Seen) -> bool:
-        """Whether the pages of then can be seen now."""
+    def _can_turn_to(self, seen: WindowArrangement) -> bool:
+        """Whether those pages are enabled now."""
         return all(
             tabs.isTabEnabled(page) for tabs, page in zip(self._pages, seen.pages, strict=True)
         )
 
-    def _now(self) -> Seen:
+    def _now(self) -> WindowArrangement:
         layout = layout_of(self._window, self._docks, self._panels)
-        return Seen(layout, tuple(tabs.currentIndex() for tabs in self._pages))
+        return WindowArrangement(layout, tuple(tabs.currentIndex() for tabs in self._pages))
 
-    def _have(self, seen: Seen) -> None:
-        """Have the window so, unless it is."""
-        if seen != self._known:
+    def _restore(self, seen: WindowArrangement) -> None:
+        """Restore an arrangement, unless it is the present one."""
+        if seen != self._last:
             for tabs, page in zip(self._pages, seen.pages, strict=True):
                 if tabs.isTabEnabled(page):
                     tabs.setCurrentIndex(page)
             self._apply(seen.layout)
-            self._known = seen
+            self._last = seen
 
     def _later(self, *_: object) -> None:
         self._timer.start(0)
 
     def settle(self, *_: object) -> None:
-        """Take the next look for what is so, as nobody's step."""
-        self._settles = True
+        """Take the next change as the present state, not as a step."""
+        self._ignores = True
         self._timer.start(0)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
@@ -127,14 +126,14 @@ class Noting(QObject):
         if kind == QEvent.Type.Resize:
             self._later()
         elif kind == QEvent.Type.MouseButtonPress:  # of the window itself: on an edge of docks
-            self._known = self._now()
+            self._last = self._now()
         elif kind == QEvent.Type.MouseButtonRelease:
             self._sized = True
             self._later()
         return False
 
-    def _told(self, before: Seen, after: Seen) -> str:
-        """What became of the window, in words."""
+    def _step_text(self, before: WindowArrangement, after: WindowArrangement) -> str:
+        """What was changed, as the text of a step."""
         if not after.differs(before):
             return "size of the panels"
         was, now = dict(before.layout.docks), dict(after.layout.docks)
@@ -153,7 +152,7 @@ class Noting(QObject):
         return "arrange the panels"
 
 
-def _in_words(seen: Seen) -> object:
+def _discrete_part(seen: WindowArrangement) -> object:
     return seen.pages, seen.layout.page, words_of(seen.layout)
 
 
@@ -161,11 +160,11 @@ _MENU = "Layo&ut"
 _DOTS = "\N{HORIZONTAL ELLIPSIS}"
 _LONGEST = 60  # characters of a name
 _LIVE = "Live"
-_LIVE_TIP = "Settings and curvature beside the skin: how the window begins"
+_LIVE_TIP = "Settings and curvature beside the skin: the default layout"
 
 
 class FullScreen(Protocol):
-    """A view that fills the screen while it is `on`."""
+    """A view that can fill the screen, and does while it is `on`."""
 
     @property
     def on(self) -> bool: ...
@@ -176,9 +175,9 @@ class FullScreen(Protocol):
 
 
 class Layouts(QObject):
-    """Arranges the docks of a `window`; `own` are those saved, `changed` tells that they did."""
+    """Arranges the docks of a `window`; `own` are the saved layouts, `changed` reports a change."""
 
-    told = Signal(str)
+    notified = Signal(str)
     changed = Signal()
 
     def __init__(self, window: QMainWindow, docks: Docks, panels: Pages, history: History) -> None:
@@ -189,8 +188,8 @@ class Layouts(QObject):
         """A view that may fill the screen, once a feature has one."""
         self._full = ""
         self.pages: list[QTabWidget] = []
-        """Pages elsewhere in the window, whose turning can be undone too."""
-        self._noting: Noting | None = None
+        """Other tab widgets of the window, whose changes can be undone too."""
+        self._tracker: LayoutTracker | None = None
         self._ready: dict[str, tuple[str, str]] = {}  # of each the tip and the page
         self.add(_LIVE, _LIVE_TIP)
         self.own: dict[str, Layout] = {}
@@ -198,9 +197,9 @@ class Layouts(QObject):
         self._menu.aboutToShow.connect(guarded(self._list))
 
     def add(self, name: str, tip: str, page: str = LIVE, full: FullScreen | None = None) -> None:
-        """Have a ready layout of this name, on a `page` of settings; a view may fill the screen.
+        """Add a ready layout on a `page` of settings; a view may fill the screen.
 
-        Which docks are shown in it, they say themselves.
+        Its docks are those put with this layout's name.
         """
         self._ready[name] = tip, page
         if full is not None:
@@ -212,24 +211,24 @@ class Layouts(QObject):
         return ready_layout(self._all, name, self._panels.place(page))
 
     def begin(self) -> None:
-        """Watch the docks and pages, once all are there."""
+        """Track the docks and pages, once all are installed."""
         pages = [self._panels, *self.pages]
-        self._noting = Noting(
+        self._tracker = LayoutTracker(
             *(self._window, self._docks, pages, self._history),
             *(self.apply, lambda: self.filled),
         )
 
     def note(self) -> None:
-        """Make a step of what a person did to the window, if anything was done."""
-        if self._noting is not None:
-            self._noting.note()
+        """Record pending changes of the window as a step, if there are any."""
+        if self._tracker is not None:
+            self._tracker.note()
 
     @property
     def _docks(self) -> dict[str, QDockWidget]:
         return self._all.by_name()
 
     def add_actions(self, actions: Actions) -> None:
-        """Register what a person can do."""
+        """Register the actions."""
         add = partial(actions.add, menu=_MENU)
         for name, (tip, _) in self._ready.items():
             act = partial(self.choose, name)
@@ -237,10 +236,10 @@ class Layouts(QObject):
         own = add("layout-own", text="Your &own", act=lambda: None, tip="Layouts you saved")
         own.setMenu(self._menu)
         for name, text, act, tip in (
-            ("save", f"Sa&ve this layout{_DOTS}", self.ask_name, "Keep it under a name"),
-            ("rename", f"Re&name a layout{_DOTS}", self.ask_rename, "Give it another name"),
-            ("delete", f"&Delete a layout{_DOTS}", self.ask_delete, "Forget one of your own"),
-            ("reset", "&Reset the layout", self.reset, "Every panel where it is at first"),
+            ("save", f"Sa&ve this layout{_DOTS}", self.ask_name, "Save this layout under a name"),
+            ("rename", f"Re&name a layout{_DOTS}", self.ask_rename, "Rename one of your layouts"),
+            ("delete", f"&Delete a layout{_DOTS}", self.ask_delete, "Delete one of your layouts"),
+            ("reset", "&Reset the layout", self.reset, "All panels to their default places"),
         ):
             add(f"layout-{name}", text=text, act=act, tip=tip)
 
@@ -253,25 +252,25 @@ class Layouts(QObject):
         if self.full_screen is not None:
             self.full_screen.leave()
 
-    # What is so.
+    # State.
 
     @property
     def now(self) -> Layout:
-        """How the window is arranged, or was before it was presented."""
+        """The layout of the window; a full-screen view is left first."""
         self.leave_full_screen()
         return layout_of(self._window, self._docks, self._panels)
 
     def apply(self, layout: Layout) -> None:
-        """Arrange the window so, which is no step by itself."""
-        if self._noting is not None:
-            self._noting.settle()
+        """Apply a layout, without a step."""
+        if self._tracker is not None:
+            self._tracker.settle()
         self.leave_full_screen()
         arrange(self._window, self._docks, self._panels, layout)
 
     # Requests of the user.
 
     def choose(self, name: str) -> None:
-        """Arrange the window as the layout of this name, as a step that can be undone."""
+        """Apply the layout of this name, as a step that can be undone."""
         layout = self.own[name] if name in self.own else self.ready(name)
         if (before := self.now) != layout:
             self._history.step(f"layout {name}", self.apply, before, layout)
@@ -279,66 +278,66 @@ class Layouts(QObject):
             self.full_screen.enter()
 
     def reset(self) -> None:
-        """Arrange the window as it is at first."""
+        """Apply the default layout."""
         self.choose(_LIVE)
 
     def save(self, name: str) -> None:
-        """Keep this layout under a name, in the place of another of that name."""
+        """Save this layout under a name; one of that name is replaced."""
         name = name.strip()
         if not name or len(name) > _LONGEST or name in self._ready:
             taken = ", ".join(self._ready)
-            self.told.emit(
+            self.notified.emit(
                 f"Expected a name of at most {_LONGEST} characters other than {taken}, got "
                 f"{name!r:.80}: choose another"
             )
             return
         self._step(f"save the layout {name}", self.own | {name: self.now})
-        self.told.emit(f"Saved the layout {name}")
+        self.notified.emit(f"Saved the layout {name}")
 
     def rename(self, old: str, new: str) -> None:
-        """Call a layout otherwise."""
+        """Rename a layout."""
         new = new.strip()
         if new in self.own or new in self._ready or not 0 < len(new) <= _LONGEST:
-            self.told.emit(f"{new!r:.80} cannot be its name or is another's: choose another")
+            self.notified.emit(f"{new!r:.80} cannot be its name, or is in use: choose another")
             return
         renamed = {new if name == old else name: each for name, each in self.own.items()}
-        self._step(f"call the layout {old} {new}", renamed)
+        self._step(f"rename the layout {old} to {new}", renamed)
 
     def delete(self, name: str) -> None:
-        """Forget a layout."""
-        kept = {other: each for other, each in self.own.items() if other != name}
-        self._step(f"delete the layout {name}", kept)
-        self.told.emit(f"Deleted the layout {name}")
+        """Delete a layout."""
+        rest = {other: each for other, each in self.own.items() if other != name}
+        self._step(f"delete the layout {name}", rest)
+        self.notified.emit(f"Deleted the layout {name}")
 
     def _step(self, text: str, own: Mapping[str, Layout]) -> None:
-        self._history.step(text, self._have, self.own, own)
+        self._history.step(text, self._restore, self.own, own)
 
-    def _have(self, own: Mapping[str, Layout]) -> None:
+    def _restore(self, own: Mapping[str, Layout]) -> None:
         self.own = dict(own)
         self.changed.emit()
 
-    # Asking.
+    # Dialogs.
 
     def ask_name(self) -> None:
-        """Ask for a name, and keep this layout under it."""
-        self._ask("Save this layout", "Its name:", self.save)
+        """Ask for a name, and save this layout under it."""
+        self._ask("Save this layout", "Name:", self.save)
 
     def ask_rename(self) -> None:
-        """Ask which is to be called how."""
+        """Ask which layout is to be renamed."""
         self._ask_which("Rename a layout", self._ask_other_name)
 
     def _ask_other_name(self, old: str) -> None:
-        self._ask("Rename a layout", f"{old} is to be called:", partial(self.rename, old), old)
+        self._ask("Rename a layout", f"New name of {old}:", partial(self.rename, old), old)
 
     def ask_delete(self) -> None:
-        """Ask which is to be forgotten."""
+        """Ask which layout is to be deleted."""
         self._ask_which("Delete a layout", self.delete)
 
     def _ask_which(self, title: str, act: Callable[[str], None]) -> None:
         if not self.own:
-            self.told.emit("There is no layout of your own yet: save one first")
+            self.notified.emit("No saved layout yet: save one first")
             return
-        dialog = self._ask(title, "Which one:", act)
+        dialog = self._ask(title, "Layout:", act)
         dialog.setComboBoxItems(list(self.own))
 
     def _ask(

@@ -1,1 +1,0 @@
-"""Whatever the window can do, found by a few letters of its name."""

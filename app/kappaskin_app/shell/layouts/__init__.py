@@ -1,1 +1,0 @@
-"""What is shown where in the window, in words: kept as text, put back, chosen by name."""
