@@ -35,8 +35,8 @@ from PySide6.QtWidgets import (
 
 from kappaskin.live import Status
 from kappaskin_app.shell.panel import Panel
-from kappaskin_app.shell.settings import Settings, ask_of
-from kappaskin_app.shell.settings.asks import Ask, Choice, Range, Several, Switch, Text
+from kappaskin_app.shell.settings import Settings, form_field
+from kappaskin_app.shell.settings.form_fields import Choice, FormField, Range, Several, Switch, Text
 
 _ITS = QKeySequence.StandardKey
 _LEFT = (_ITS.Undo, _ITS.Redo, _ITS.DeleteEndOfLine)  # the last is Ctrl+K to an editor
@@ -289,7 +289,7 @@ def _several(how: Several, said: Callable[[Any], None]) -> _Editor:
     return _Editor(button, button.show_chosen)
 
 
-def _switch(how: Ask, said: Callable[[Any], None]) -> _Editor:
+def _switch(how: FormField, said: Callable[[Any], None]) -> _Editor:
     box = QCheckBox(how.label)
     box.toggled.connect(said)
     return _Editor(box, box.setChecked)
@@ -302,7 +302,7 @@ def _text(said: Callable[[Any], None]) -> _Editor:
 
 
 def _editor(name: str, said: Callable[[Any], None]) -> _Editor:
-    how = ask_of(name)
+    how = form_field(name)
     if isinstance(how, Text):
         return _text(said)
     if isinstance(how, Range):
@@ -336,7 +336,7 @@ class Form(Panel):
         self._corner.insertWidget(0, self.reset)
 
     def _add(self, name: str) -> None:
-        how = ask_of(name)
+        how = form_field(name)
         editor = _editor(name, lambda value: self.wished.emit(name, value))
         if not isinstance(how, Range):
             editor.widget.setToolTip(how.tip)
@@ -387,7 +387,7 @@ class Form(Panel):
 
     def show_limit(self, name: str, most: float) -> None:
         """Let the number asked for as `name` be at most `most`, in SI units."""
-        how, box = ask_of(name), self.editor(name)
+        how, box = form_field(name), self.editor(name)
         if isinstance(how, Range) and isinstance(box, QDoubleSpinBox):
             with QSignalBlocker(box):
                 box.setMaximum(most * how.scale)

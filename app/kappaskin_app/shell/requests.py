@@ -7,7 +7,7 @@ from typing import Any
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings.publishing import Sending
+from kappaskin_app.shell.settings.publishing import PublishSettings
 from kappaskin_app.shell.simulation import with_consequences
 
 
@@ -32,7 +32,9 @@ class Requests:
         """Have all settings as they are at first, but for calibration, tare and publishing."""
         now = self._history.settings
         kept = Settings(calibration=now.calibration, tare=now.tare)  # no matter of taste
-        sending = {field.name: getattr(now, field.name) for field in fields(Sending)}  # nor this
+        sending = {
+            field.name: getattr(now, field.name) for field in fields(PublishSettings)
+        }  # nor this
         self._history.change("Reset settings", -1, **vars(kept) | sending)
 
     def reset_panel(self, title: str, names: Sequence[str]) -> None:

@@ -27,8 +27,8 @@ from kappaskin_app.shell.badge import state_of
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.loads import Memo, tried
 from kappaskin_app.shell.settings import EstimatorSettings, SceneSettings, Settings, part
-from kappaskin_app.shell.settings.asks import setup_values
-from kappaskin_app.shell.settings.publishing import Sending
+from kappaskin_app.shell.settings.form_fields import setup_values
+from kappaskin_app.shell.settings.publishing import PublishSettings
 from kappaskin_app.shell.settings.scene import Scanning, Written
 from kappaskin_app.shell.simulation import (
     named,
@@ -279,7 +279,7 @@ class Session(QObject):
             self._scan()
         if self.inside and part(settings, SceneSettings) != part(was, SceneSettings):
             self._play()
-        if part(settings, Sending) != part(was, Sending):
+        if part(settings, PublishSettings) != part(was, PublishSettings):
             self._publish()
 
     def _set_up(self) -> None:

@@ -98,7 +98,7 @@ def region_of(settings: Settings) -> Region:
 
 def patch_of(settings: Settings) -> Patch:
     shape = SHAPES[settings.shape]
-    return shape.make(*(getattr(settings, name) for name in shape.asks))
+    return shape.make(*(getattr(settings, name) for name in shape.lengths))
 
 
 def plate_of(settings: Settings) -> Plate:
@@ -243,9 +243,9 @@ def with_consequences(settings: Settings, scene: Scene, name: str, value: Any) -
     """
     changed: dict[str, Any] = {name: value}
     if name == "shape":
-        changed |= {**SHAPES[value].asks, **SHAPES[value].begins}
+        changed |= {**SHAPES[value].lengths, **SHAPES[value].defaults}
     if name == "design_shape":
-        changed |= {f"design_{length}": asked for length, asked in SHAPES[value].asks.items()}
+        changed |= {f"design_{length}": asked for length, asked in SHAPES[value].lengths.items()}
         changed |= {"design_place": "scene"} if value == "strip" else {}
     if name in ("shape", "rim_radius") and "side_x" not in changed:
         patch = patch_of(replace(settings, **changed))

@@ -173,7 +173,7 @@ def test_choosing_a_shape_brings_its_size_and_choosing_the_first_again_all_of_it
     settings, first = Settings(), Settings()
     for shape in ("cylinder", "flat"):
         settings = replace(settings, **with_consequences(settings, load_scene(), "shape", shape))
-        for name, value in {**SHAPES[shape].asks, **SHAPES[shape].begins}.items():
+        for name, value in {**SHAPES[shape].lengths, **SHAPES[shape].defaults}.items():
             assert getattr(settings, name) == value
     assert (settings.force, settings.exaggeration) == (first.force, first.exaggeration)
     assert scene_of(settings).plate == load_scene().plate

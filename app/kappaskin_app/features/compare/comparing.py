@@ -11,8 +11,8 @@ from kappaskin.live import PipelineStatus, Status
 from kappaskin.pipeline import REPORTED, Readout, Setup, readouts
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
-from kappaskin_app.shell.settings import Compared, EstimatorSettings, Settings
-from kappaskin_app.shell.settings.asks import settings_from, setup_values
+from kappaskin_app.shell.settings import ComparedSettings, EstimatorSettings, Settings
+from kappaskin_app.shell.settings.form_fields import settings_from, setup_values
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ def other_setup(settings: Settings, setup: Setup) -> Setup:
     """B: the `setup` in use, but for what `settings` say of it."""
     return replace(
         setup,
-        **setup_values(settings, Compared),
+        **setup_values(settings, ComparedSettings),
         calibration=setup.calibration if settings.other_calibrated else None,
         tare=setup.tare if settings.other_tared else None,
     )
@@ -76,8 +76,8 @@ class Comparing(QObject):
     def swap(self) -> None:
         """Let what is in use and B change places, as one change."""
         s = self._history.settings
-        a, b = setup_values(s, EstimatorSettings), setup_values(s, Compared)
-        swapped = settings_from(b, EstimatorSettings) | settings_from(a, Compared)
+        a, b = setup_values(s, EstimatorSettings), setup_values(s, ComparedSettings)
+        swapped = settings_from(b, EstimatorSettings) | settings_from(a, ComparedSettings)
         self._history.change("Swap A and B", -1, **swapped)
 
     def _ask(self) -> None:

@@ -20,14 +20,14 @@ from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.loads import ready, reference_on
 from kappaskin_app.shell.settings import Settings, part
-from kappaskin_app.shell.settings.designed import Designed
+from kappaskin_app.shell.settings.designed import DesignSettings
 from kappaskin_app.shell.settings.scene import SHAPES
 
 
 def patch_of(settings: Settings) -> Patch:
     """The skin that is designed."""
     shape = SHAPES[settings.design_shape]
-    return shape.make(*(getattr(settings, f"design_{name}") for name in shape.asks))
+    return shape.make(*(getattr(settings, f"design_{name}") for name in shape.lengths))
 
 
 def scene_of(settings: Settings) -> Scene:
@@ -49,7 +49,7 @@ def scene_of(settings: Settings) -> Scene:
         reference=reference_on(patch),
         edge=edge,
         title="A design",
-        text="Designed in the panel Design; a point presses in the middle.",
+        text="A design made in the panel Design, with a point load in the middle.",
     )
 
 
@@ -127,7 +127,7 @@ class Designing(QObject):
     def follow(self, _: Status) -> None:
         """Begin anew when something else is designed."""
         settings, asked = self._history.settings, self._asked
-        another = asked is None or part(settings, Designed) != part(asked, Designed)
+        another = asked is None or part(settings, DesignSettings) != part(asked, DesignSettings)
         if self._watched and another:
             self._begin(settings)
 
@@ -137,7 +137,7 @@ class Designing(QObject):
         self._stop()
         self._asked, self.check, self.refusal = settings, None, ""
         # Where elements are placed, and where modes are computed, it takes seconds.
-        plain = "rim_radius" not in SHAPES[settings.design_shape].asks
+        plain = "rim_radius" not in SHAPES[settings.design_shape].lengths
         self._quick = plain and settings.design_place in ("scene", "clustered")
         if self._quick:
             self.predicts.run(_prospect, settings)

@@ -15,9 +15,9 @@ from kappaskin.studies import Prospect
 from kappaskin_app.features.design.designing import Designing
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import Form, well_behaved
-from kappaskin_app.shell.settings import Settings, ask_of
-from kappaskin_app.shell.settings.asks import Range
-from kappaskin_app.shell.settings.designed import Designed
+from kappaskin_app.shell.settings import Settings, form_field
+from kappaskin_app.shell.settings.designed import DesignSettings
+from kappaskin_app.shell.settings.form_fields import Range
 from kappaskin_app.shell.settings.scene import SHAPES
 from kappaskin_app.theme import SEQUENTIAL
 from kappaskin_app.widgets.layout import row, scrolled
@@ -26,7 +26,7 @@ from kappaskin_app.widgets.plots import Curve, CurvePlot
 from kappaskin_app.widgets.surface_map import SurfaceMap
 from kappaskin_app.widgets.text import round_up
 
-_NAMES = tuple(field for field in Designed.__dataclass_fields__)
+_NAMES = tuple(field for field in DesignSettings.__dataclass_fields__)
 _LENGTHS = ("side_x", "side_y", "base_radius", "rim_radius")
 _STEPS = 200  # of a slider
 _FACTOR = 4  # steps of a slider that goes by factors, to the next number of two digits
@@ -55,7 +55,7 @@ class DesignForm(Form):
         super().__init__("To be built", _NAMES, parent)
 
     def field(self, name: str, editor: QWidget) -> QWidget:
-        how = ask_of(name)
+        how = form_field(name)
         if not isinstance(how, Range):
             return editor
         slider = self.sliders[name] = QSlider(Qt.Orientation.Horizontal)
@@ -75,11 +75,11 @@ class DesignForm(Form):
     def show_settings(self, settings: Settings) -> None:
         super().show_settings(settings)
         for name, slider in self.sliders.items():
-            how = ask_of(name)
+            how = form_field(name)
             if isinstance(how, Range):
                 with QSignalBlocker(slider):
                     slider.setValue(_place(getattr(settings, name), how))
-        asks = SHAPES[settings.design_shape].asks
+        asks = SHAPES[settings.design_shape].lengths
         for length in _LENGTHS:
             editor = self.editor(f"design_{length}").parentWidget()
             if editor is not None:

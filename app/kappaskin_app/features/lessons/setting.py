@@ -4,8 +4,8 @@ from dataclasses import fields
 from typing import Any
 
 from kappaskin.errors import Refusal
-from kappaskin_app.shell.settings import SceneSettings, Settings, ask_of
-from kappaskin_app.shell.settings.asks import Ask, Choice, Range, Several, Switch
+from kappaskin_app.shell.settings import SceneSettings, Settings, form_field
+from kappaskin_app.shell.settings.form_fields import Choice, FormField, Range, Several, Switch
 from kappaskin_app.shell.settings.scene import Scanning
 from kappaskin_app.shell.settings.shown import EstimatorSettings, View
 
@@ -16,7 +16,7 @@ SETTABLE = {
     field.name
     for kind in _KINDS
     for field in fields(kind)
-    if "ask" in field.metadata and field.name not in _OWN
+    if "form" in field.metadata and field.name not in _OWN
 }
 """What a lesson may set, besides lists of elements: nothing that leaves this machine."""
 
@@ -27,7 +27,7 @@ def checked_setting(name: str, value: Any) -> Any:
         return _elements(name, value)
     if name not in SETTABLE:
         raise Refusal(f"expected the name of a setting, got {name!r}; the guide lists them")
-    how = ask_of(name)
+    how = form_field(name)
     if isinstance(how, Range):
         return _number(name, how, value)
     if isinstance(how, Several):
@@ -38,7 +38,7 @@ def checked_setting(name: str, value: Any) -> Any:
     return value
 
 
-def _is_one(how: Ask, value: Any) -> bool:
+def _is_one(how: FormField, value: Any) -> bool:
     if isinstance(how, Choice):
         return value in [one for one, _ in how.options]
     return isinstance(how, Switch) and isinstance(value, bool)

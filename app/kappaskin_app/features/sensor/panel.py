@@ -40,7 +40,7 @@ class ShapePanel(SimulationForm):
 
     def show_settings(self, settings: Settings) -> None:
         super().show_settings(settings)
-        asked = set(SHAPES[settings.shape].asks)
+        asked = set(SHAPES[settings.shape].lengths)
         self.show_rows({"shape", "edge"} | asked)
         with suppress(Refusal):  # what cannot be is said below
             self.offer("edge", edges_of(patch_of(settings)))

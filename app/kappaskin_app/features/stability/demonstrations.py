@@ -40,12 +40,12 @@ class Demonstration:
 _WIDTH = 0.01  # m
 _FINGERTIP = {
     "shape": "strip",
-    **SHAPES["strip"].asks,
+    **SHAPES["strip"].lengths,
     "side_y": _WIDTH,
     "elements_y": 1,
     "load_case": "centre",
-    "force": SHAPES["strip"].begins["force"],
-    "x": SHAPES["strip"].asks["side_x"] / 2,
+    "force": SHAPES["strip"].defaults["force"],
+    "x": SHAPES["strip"].lengths["side_x"] / 2,
     "y": _WIDTH / 2,
 }
 _ROW = tuple(range(40, 50))

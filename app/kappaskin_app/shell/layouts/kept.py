@@ -14,8 +14,8 @@ from PySide6.QtCore import QLockFile
 
 from kappaskin.errors import Refusal
 from kappaskin_app.shell.layouts.layout import AREAS, FLOATING, Layout, Place
-from kappaskin_app.shell.settings import ask_of
-from kappaskin_app.shell.settings.asks import Range
+from kappaskin_app.shell.settings import form_field
+from kappaskin_app.shell.settings.form_fields import Range
 from kappaskin_app.theme import THEMES
 
 FORMAT = 1
@@ -143,7 +143,7 @@ def _part(table: Mapping[str, Any], key: str, kind: type[_Some], otherwise: _Som
 
 
 def _letters(window: Mapping[str, Any]) -> float:
-    how, percent = ask_of("letters"), window.get("letters", 100.0)
+    how, percent = form_field("letters"), window.get("letters", 100.0)
     if type(percent) not in (int, float) or not (
         isinstance(how, Range) and how.least <= percent <= how.most
     ):

@@ -14,16 +14,16 @@ from kappaskin.scenes import read_scene
 from kappaskin.studies import prospect
 from kappaskin_app.features.design.designing import design_of, scene_of
 from kappaskin_app.features.design.panel import DesignForm, _meant, _place
-from kappaskin_app.shell.settings import Settings, ask_of
-from kappaskin_app.shell.settings.asks import Range
-from kappaskin_app.shell.settings.designed import Designed
+from kappaskin_app.shell.settings import Settings, form_field
+from kappaskin_app.shell.settings.designed import DesignSettings
+from kappaskin_app.shell.settings.form_fields import Range
 from kappaskin_app.shell.settings.scene import SHAPES
 from kappaskin_app.shell.simulation import with_consequences
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import DARK, SEQUENTIAL, apply_look
 from kappaskin_app.widgets.surface_map import SurfaceMap
 
-RANGES = [n for n in Designed.__dataclass_fields__ if isinstance(ask_of(n), Range)]
+RANGES = [n for n in DesignSettings.__dataclass_fields__ if isinstance(form_field(n), Range)]
 
 
 def shaped(name: str) -> Settings:
@@ -41,14 +41,14 @@ def test_every_outline_is_designed_with_its_usual_lengths(name: str):
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_every_outline_is_a_scene_that_opens_however_slow_its_converter_is(name: str):
-    scene = scene_of(replace(shaped(name), design_conversion=ask_of("design_conversion").most))
+    scene = scene_of(replace(shaped(name), design_conversion=form_field("design_conversion").most))
 
     assert read_scene(write_scene(scene), Path("a.toml")).rate == scene.rate
 
 
 @pytest.mark.parametrize("name", RANGES)
 def test_an_arrow_key_moves_every_slider_to_another_value_both_ways(name, qtbot):
-    form, how = DesignForm(), ask_of(name)
+    form, how = DesignForm(), form_field(name)
     qtbot.addWidget(form)
     form.wished.connect(lambda n, v: form.show_settings(replace(Settings(), **{n: v})))
     form.show_settings(Settings())
@@ -63,7 +63,7 @@ def test_an_arrow_key_moves_every_slider_to_another_value_both_ways(name, qtbot)
 
 @pytest.mark.parametrize("name", RANGES)
 def test_a_slider_reaches_both_ends_and_stands_where_its_value_is(name):
-    how = ask_of(name)
+    how = form_field(name)
 
     assert _meant(0, how) == pytest.approx(how.least)
     assert _meant(200, how) == pytest.approx(how.most)

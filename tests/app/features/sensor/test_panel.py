@@ -119,7 +119,7 @@ def test_elements_bent_beyond_their_limit_are_crossed_out(window, until):
 
 
 def test_a_strip_tells_where_the_contact_is_along_it_alone(qapp) -> None:
-    sensor = scene_of(Settings(shape="strip", **SHAPES["strip"].asks)).sensor()
+    sensor = scene_of(Settings(shape="strip", **SHAPES["strip"].lengths)).sensor()
     region = Region(around="adaptive", share=0.2)
     panel = RegionPanel()
     panel.show_settings(Settings(region="adaptive"))
