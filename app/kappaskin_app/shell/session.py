@@ -25,18 +25,18 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.badge import state_of
 from kappaskin_app.shell.history import History
-from kappaskin_app.shell.loads import Memo, tried
+from kappaskin_app.shell.loads import Cache, compliance_or_refusal
 from kappaskin_app.shell.settings import EstimatorSettings, SceneSettings, Settings, part
 from kappaskin_app.shell.settings.form_fields import setup_values
 from kappaskin_app.shell.settings.publishing import PublishSettings
 from kappaskin_app.shell.settings.scene import Scanning, Written
 from kappaskin_app.shell.simulation import (
-    named,
+    planned_scene,
     plate_of,
-    played,
     region_of,
     scene_of,
-    scene_or_why,
+    scene_or_refusal,
+    source_settings,
 )
 
 _MAKING = "Making the scene; Ctrl+Z takes it back"
@@ -44,18 +44,22 @@ _MAKING = "Making the scene; Ctrl+Z takes it back"
 _Slow: TypeAlias = Written | tuple[Plate, str]
 _Answer: TypeAlias = tuple[str, tuple[object, ...], Any]
 
-_MEMOS: dict[str, Memo[..., Any]] = {"skin": tried, "scene": scene_or_why, "plan": played}
+_MEMOS: dict[str, Cache[..., Any]] = {
+    "skin": compliance_or_refusal,
+    "scene": scene_or_refusal,
+    "plan": planned_scene,
+}
 
 
 def _answers(slow: _Slow) -> Generator[_Answer]:
     """What takes long of a scene: which memo is to learn it, the question and the answer."""
     if not isinstance(slow, Written):
-        yield "skin", slow, tried(*slow)
+        yield "skin", slow, compliance_or_refusal(*slow)
         return
-    scene = scene_or_why(slow)
+    scene = scene_or_refusal(slow)
     yield "scene", (slow,), scene
     if isinstance(scene, Scene):
-        yield "plan", (scene,), played(scene)
+        yield "plan", (scene,), planned_scene(scene)
 
 
 class Ahead:
@@ -89,7 +93,7 @@ class Ahead:
 
     def _learn(self, found: _Answer) -> None:
         memo, question, answer = found
-        _MEMOS[memo].learn(question, answer)
+        _MEMOS[memo].store(question, answer)
 
 
 def _slow(settings: Settings) -> _Slow | None:
@@ -248,7 +252,7 @@ class Session(QObject):
             self.engine.connect(self.source)
         if self.inside:
             self._anew = True
-            self._history.change("Simulated skin", -1, **named(self.source))
+            self._history.change("Simulated skin", -1, **source_settings(self.source))
             self._play()
 
     def go_on(self, left: ResumeInfo) -> None:
@@ -363,7 +367,7 @@ class Session(QObject):
             self.scene = scene.laid_on(laid) if laid else scene
         except Refusal as refusal:
             why = str(refusal)
-        self._planned, self.refusal = played(self.scene), why
+        self._planned, self.refusal = planned_scene(self.scene), why
         self.engine.play(self._planned)
         if self._anew and not why:
             self._anew, self.running = False, True

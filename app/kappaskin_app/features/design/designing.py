@@ -18,7 +18,7 @@ from kappaskin.skin import Patch
 from kappaskin.studies import Check, Design, Prospect, check, prospect
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.history import History
-from kappaskin_app.shell.loads import ready, reference_on
+from kappaskin_app.shell.loads import load_case_stimuli, reference_on
 from kappaskin_app.shell.settings import Settings, part
 from kappaskin_app.shell.settings.designed import DesignSettings
 from kappaskin_app.shell.settings.scene import SHAPES
@@ -42,7 +42,7 @@ def scene_of(settings: Settings) -> Scene:
         "design",
         plate,
         layout,
-        ready("centre", plate, edge),
+        load_case_stimuli("centre", plate, edge),
         (GaussianNoise(s.design_noise),),
         electronics,
         rate=min(SHAPES[s.design_shape].rate, fastest if fastest < 1 else math.floor(fastest)),

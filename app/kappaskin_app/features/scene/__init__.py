@@ -15,7 +15,7 @@ from kappaskin_app.features.scene.timeline import Timeline
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import plain
 from kappaskin_app.shell.finder.things import FinderEntry, enter
-from kappaskin_app.shell.loads import may_choose, touches_at
+from kappaskin_app.shell.loads import loads_at, object_replaceable
 from kappaskin_app.shell.menus import DOTS
 from kappaskin_app.shell.opening import Kind
 from kappaskin_app.shell.pages import LIVE
@@ -78,8 +78,8 @@ class SceneFeature:
     def _touch_with(self, file: Path) -> None:
         """Let the object in a mesh file press where the load is, in millimetres as it is drawn."""
         session = self._shell.session
-        touches = touches_at(session.scene, session.time) if session.inside else []
-        if not touches or not may_choose(session.scene):
+        touches = loads_at(session.scene, session.time) if session.inside else []
+        if not touches or not object_replaceable(session.scene):
             raise Refusal(
                 f"{file}: expected a simulated skin that one object at rest touches, to take its "
                 "place; choose such a scene (F2), or run `kappaskin demo`"

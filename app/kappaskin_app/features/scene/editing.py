@@ -9,9 +9,9 @@ from typing import Any
 from kappaskin.mechanics import Load
 from kappaskin_app.features.scene.scene_text import forced, instead, pressed, shifted
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.effects import called
+from kappaskin_app.shell.effects import effect_name
 from kappaskin_app.shell.history import History
-from kappaskin_app.shell.loads import GrabbedStimulus, dragged, most_times
+from kappaskin_app.shell.loads import GrabbedStimulus, dragged, largest_factor
 from kappaskin_app.shell.selection import LoadHandle
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings.scene import Written
@@ -64,7 +64,7 @@ class SceneEditing:
         """Force an effect on or off, or leave it to the plan; refused where the text is no TOML."""
         written = self._written_anew(forced(text_of(self._history.settings), effect, how))
         if written is not None:
-            self._history.change(f"Force {called(effect).lower()}", -1, written=written)
+            self._history.change(f"Force {effect_name(effect).lower()}", -1, written=written)
 
     def touch_with(self, said: Mapping[str, Any], x: float, y: float, force: float) -> None:
         """Let the object that is `said` touch instead of what does, at its place, as hard."""
@@ -116,7 +116,7 @@ class SceneEditing:
         if self._held is not None:
             self._session.move(self._held.pressed(times))
         elif settings.written is None and self._grabbed_load is not None:
-            times = min(times, max(most_times(scene, self._grabbed_load), 1.0))
+            times = min(times, max(largest_factor(scene, self._grabbed_load), 1.0))
             moved = dragged(settings, scene, *self._place, self._grabbed_end)
             # Two points share their force.
             whole = self._grabbed_load.force * max(len(scene.loads), 1)

@@ -21,7 +21,7 @@ from kappaskin.scenes.effects import EFFECTS
 from kappaskin.studies import plan_updates
 from kappaskin_app.features.scene.scene_text import OFF, ON, PLANNED
 from kappaskin_app.shell.background import BackgroundTask, Tasks
-from kappaskin_app.shell.effects import called, explained
+from kappaskin_app.shell.effects import effect_description, effect_name
 from kappaskin_app.shell.session import Session
 from kappaskin_app.theme import current, follow_look
 from kappaskin_app.widgets.text import duration
@@ -166,7 +166,7 @@ class EffectsPanel(QWidget):
                 self.table.setItem(number, column, item)
             box = QComboBox()
             box.setObjectName(f"force-{name}")
-            box.setAccessibleName(f"{called(name)}, simulated")
+            box.setAccessibleName(f"{effect_name(name)}, simulated")
             for value, words in _HOWS:
                 box.addItem(words, value)
             box.activated.connect(lambda _, name=name: self._force(name))
@@ -181,7 +181,7 @@ class EffectsPanel(QWidget):
         self._show_force(name, there)
         size = f"Size: {row['formula']}."
         cells = {
-            _EFFECT: (called(name), explained(name)),
+            _EFFECT: (effect_name(name), effect_description(name)),
             _KEPT: ("kept" if row["kept"] else "left out" if there else "", ""),
             _SIZE: (f"{row['size']:.2g}" if there else "", size),
             _ERROR: (_share(row["error"]) if there else "", _TIPS[_ERROR]),

@@ -9,7 +9,7 @@ from kappaskin._schema import Key
 from kappaskin.scenes import PARTS
 from kappaskin_app.features.scene import scene_text
 from kappaskin_app.features.scene.scene_text import Place
-from kappaskin_app.shell.effects import called, explained
+from kappaskin_app.shell.effects import effect_description, effect_name
 
 MOST_WHOLE = 2**31 - 1  # that a box for whole numbers can hold
 MOST = 1e12  # of any number shown in a box
@@ -238,14 +238,14 @@ def _effects(values: Values) -> Section:
     there = [name for name, table in values.items() if isinstance(table, Mapping)]
     blocks = tuple(
         _section(
-            *(called(name), "effects", name, values[name], ("effects", name)),
+            *(effect_name(name), "effects", name, values[name], ("effects", name)),
             removable=True,
-            tip=explained(name),
+            tip=effect_description(name),
         )
         for name in there
     )
     more = tuple(
-        Addition(called(name), explained(name), _adding_effect(name))
+        Addition(effect_name(name), effect_description(name), _adding_effect(name))
         for name in PARTS["effects"].kinds
         if name not in there
     )
@@ -293,7 +293,11 @@ def _rows(part: str, kind: str, values: Values, place: Place) -> tuple[Row, ...]
 def _key(part: str, kind: str, name: str) -> Key:
     """What is declared of a key; that of an effect tells what the effect does, too."""
     key = PARTS[part].key(name, kind)
-    return replace(key, tip=f"{key.tip} {explained(kind)}".strip()) if part == "effects" else key
+    return (
+        replace(key, tip=f"{key.tip} {effect_description(kind)}".strip())
+        if part == "effects"
+        else key
+    )
 
 
 def _offers(part: str, kind: str, values: Values, place: Place) -> tuple[Addition, ...]:

@@ -9,7 +9,7 @@ from PySide6.QtCore import QPoint, Qt
 from kappaskin.studies import Cost, EffectCost, Refused, Setting
 from kappaskin_app.features.accuracy.cost_plot import CostPlot
 from kappaskin_app.features.accuracy.costing import in_words
-from kappaskin_app.shell.effects import called
+from kappaskin_app.shell.effects import effect_name
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.widgets.text import duration, length
@@ -151,7 +151,7 @@ def _rows(window: MainWindow) -> dict[str, list[str]]:
 
 def test_each_effect_of_the_scene_is_told_with_and_without_it(measured: MainWindow, until) -> None:
     until(lambda: "Uniform noise" in _rows(measured))
-    found = {called(cost.name): cost for cost in measured.costing.spoiling()}
+    found = {effect_name(cost.name): cost for cost in measured.costing.spoiling()}
     rows = _rows(measured)
     assert list(rows) == list(found)
     for name, (kept, time, with_it, without) in rows.items():
@@ -225,7 +225,7 @@ def test_every_row_and_column_of_effects_explains_itself(measured: MainWindow, u
     for column in range(table.columnCount()):
         assert table.horizontalHeaderItem(column).toolTip()
     tips = {table.item(row, 0).text(): table.item(row, 0).toolTip() for row in range(3)}
-    assert "% of the peak. It is left out." in tips["Finite slope"]
+    assert "% of the peak. It is omitted." in tips["Finite slope"]
 
 
 def test_measuring_anew_forgets_what_was_wanted_of_the_skin_before(
