@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from kappaskin.studies import Cost, Setting
-from kappaskin_app.features.accuracy import costing
+from kappaskin_app.features.accuracy import measurement
 from kappaskin_app.features.accuracy.measurement import setting_text
 from kappaskin_app.shell.window import MainWindow
 
@@ -15,9 +15,9 @@ from kappaskin_app.shell.window import MainWindow
 def few() -> Iterator[None]:
     """So few settings that measuring them takes no time."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(costing, "METHODS", ("least-squares", "bayes"))
-        patch.setattr(costing, "FUNCTIONS", (4, 8, 12))
-        patch.setattr(costing, "ELEMENTS", (6,))
+        patch.setattr(measurement, "METHODS", ("least-squares", "bayes"))
+        patch.setattr(measurement, "FUNCTIONS", (4, 8, 12))
+        patch.setattr(measurement, "ELEMENTS", (6,))
         yield
 
 
