@@ -296,9 +296,9 @@ def test_what_is_told_at_the_foot_of_the_window_can_be_cancelled_there(
 
 
 def test_a_plan_that_was_cancelled_is_made_at_the_next_look(window: MainWindow) -> None:
-    window.planning.watch(True)
-    assert window.planning.waiting
-    window.planning.task.cancel()
-    assert not window.planning.waiting
-    window.planning.watch(True)
-    assert window.planning.waiting
+    window.planner.set_active(True)
+    assert window.planner.waiting
+    window.planner.task.cancel()
+    assert not window.planner.waiting
+    window.planner.set_active(True)
+    assert window.planner.waiting

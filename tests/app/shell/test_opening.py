@@ -61,7 +61,7 @@ def test_scenes_and_meshes_dropped_are_played_and_listed_until_cleared(
     _drop(window, mesh)
     assert "tip & edge.obj" in window.history.settings.written.text
     until(lambda: "Mesh" in type(window.session.scene.stimuli[0].what.rigid).__name__)
-    window.staging.play(scene_file("coin"))
+    window.scene_control.play(scene_file("coin"))
     assert window.opening.recent == [mesh, own]
     own.unlink()
     menu = window.actions_by_name["recent"].menu()

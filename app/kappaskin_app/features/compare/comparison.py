@@ -26,7 +26,7 @@ class Pair:
 
     @property
     def difference(self) -> Array | None:
-        """The surface of B less that of A, (ny, nx) in m; None where they are of other points."""
+        """The surface of B minus that of A, (ny, nx) in m; None on different grids."""
         if self.a.surface.shape != self.b.surface.shape:
             return None
         return self.b.surface - self.a.surface

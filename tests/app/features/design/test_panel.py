@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QApplication, QFileDialog
 from kappaskin import load_scene, write_scene
 from kappaskin.scenes import read_scene
 from kappaskin.studies import prospect
-from kappaskin_app.features.design.panel import DesignForm, _meant, _place
+from kappaskin_app.features.design.panel import DesignForm, _place, _value_at
 from kappaskin_app.features.design.prediction import design_of, scene_of
 from kappaskin_app.shell.settings import Settings, form_field
 from kappaskin_app.shell.settings.designed import DesignSettings
@@ -65,10 +65,10 @@ def test_an_arrow_key_moves_every_slider_to_another_value_both_ways(name, qtbot)
 def test_a_slider_reaches_both_ends_and_stands_where_its_value_is(name):
     how = form_field(name)
 
-    assert _meant(0, how) == pytest.approx(how.least)
-    assert _meant(200, how) == pytest.approx(how.most)
+    assert _value_at(0, how) == pytest.approx(how.least)
+    assert _value_at(200, how) == pytest.approx(how.most)
     for at in range(0, 201, 20):
-        assert abs(_place(_meant(at, how), how) - at) <= max(
+        assert abs(_place(_value_at(at, how), how) - at) <= max(
             200 * how.step / (how.most - how.least), 4
         )
 

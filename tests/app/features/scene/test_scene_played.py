@@ -117,7 +117,7 @@ def test_what_is_played_is_neither_dragged_nor_forced_while_the_text_is_no_scene
     until(lambda: window.membrane.drag.handles.tolist() == [[x, y]])
     bad = good.replace("[skin]", "[skin")
     panel.editor.edited.emit(bad)
-    until(lambda: panel.tabText(EDIT) == "&Edit (not played)")
+    until(lambda: panel.tabText(EDIT) == "&Edit (refused)")
     assert not panel.effects.table.isEnabled()
     drag = window.membrane.drag
     drag.grabbed.emit(x, y)
