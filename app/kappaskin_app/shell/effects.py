@@ -33,7 +33,7 @@ def effect_description(effect: str) -> str:
 
 _COLUMNS = {
     "Effect": "An effect on the readings of the measured scene.",
-    "Simulated": "Whether the effect is simulated; negligible effects are omitted.",
+    "On": "Whether the effect is simulated; negligible effects are omitted.",
     "Frame": "Computing time that the effect adds to a simulated frame.",
     "With": "RMS error of the shape with the effect; bold where the effect is simulated.",
     "Without": "RMS error of the shape without the effect; bold where the effect is omitted.",

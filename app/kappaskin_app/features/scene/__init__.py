@@ -104,5 +104,5 @@ class SceneFeature:
         for name, card in pages.gallery.items.items():
             play = partial(self.scene_control.play, scene_file(name))
             yield FinderEntry(
-                f"scene:{name}", f"Simulate the scene {card.text()}", "Scene, Gallery", play
+                f"scene:{name}", f"Play the scene {card.text()}", "Scene, Gallery", play
             )

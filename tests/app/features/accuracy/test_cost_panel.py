@@ -135,7 +135,7 @@ def test_a_region_is_said_not_to_be_in_what_is_predicted(measured: MainWindow, u
     message = measured.cost.message
     assert not message.isVisible()
     measured.history.change("Region", -1, region="adaptive")
-    until(lambda: message.text().endswith("without the region."))
+    until(lambda: message.text().endswith("without the region of interest."))
     measured.history.stack.undo()
     until(lambda: not message.isVisible())
 
@@ -241,8 +241,10 @@ def test_measuring_anew_forgets_what_was_wanted_of_the_skin_before(
     assert panel.cheapest.text()
     panel.again.click()
     assert not panel.required.isEnabled()
-    assert (panel.wanted_words.text(), panel.cheapest.text()) == ("", "")
-    until(lambda: panel.wanted_words.text() == panel.figures["Predicted", "RMS error"].text(), 60.0)
+    assert (panel.required_text.text(), panel.cheapest.text()) == ("", "")
+    until(
+        lambda: panel.required_text.text() == panel.figures["Predicted", "RMS error"].text(), 60.0
+    )
 
 
 # The last on the shared window, which it leaves measured on another skin.
