@@ -20,7 +20,7 @@ _SIZE = 4.0  # px, radius of a point
 _NEAR = 10.0  # px, largest distance of the mouse from a point
 _LABEL_GAP = 10.0  # px between two time labels
 _LONGEST = "0.005 mm"  # label of the error axis
-_AXES = "RMS error (vertical), computing time per frame (horizontal)"
+_AXES = "RMS error (up), computing time"
 _ROWS = len(METHOD_SHORT) + 5  # of the legend
 
 Point = tuple[float, float]
@@ -261,11 +261,11 @@ def _tick(value: float, formatted: Callable[[float], str]) -> str:
 _METHODS = list(METHOD_SHORT)
 _SHORT = {
     **METHOD_SHORT,
-    "own": "filled: present elements",
+    "own": "filled: own elements",
     "other": "open: other elements",
     "present": "in use, predicted",
     "live": "in use, measured",
-    "best": "least error for its time",
+    "best": "best for its time",
 }
 
 
