@@ -1,4 +1,4 @@
-"""Effects of a scene in words, and a table of what they cost."""
+"""Names and descriptions of effects, and the table of their costs."""
 
 import inspect
 
@@ -19,31 +19,29 @@ from kappaskin_app.widgets.layout import fit_rows
 from kappaskin_app.widgets.text import NONE, duration, length
 
 
-def called(effect: str) -> str:
-    """What people call an effect, also one that is not known."""
+def effect_name(effect: str) -> str:
+    """The name of an effect, also of one that is unknown."""
     kind = EFFECTS.get(effect)
     return kind.called() if kind else effect.replace("-", " ").capitalize()
 
 
-def explained(effect: str) -> str:
-    """What an effect does, in sentences; nothing of one that is not known."""
+def effect_description(effect: str) -> str:
+    """The description of an effect; empty for one that is unknown."""
     kind = EFFECTS.get(effect)
     return " ".join(inspect.cleandoc(kind.__doc__ or "").split()).replace("`", "") if kind else ""
 
 
 _COLUMNS = {
-    "Effect": "What spoils the readings of the scene that was measured.",
-    "Kept": "Whether it is simulated; what changes readings too little is left out.",
-    "Frame": "What it adds to simulating a frame.",
-    "With": "RMS error of the shape with the effect, everything else as it is; bold where that is "
-    "what is simulated.",
-    "Without": "RMS error of the shape without the effect, everything else as it is; bold where "
-    "that is what is simulated.",
+    "Effect": "An effect on the readings of the measured scene.",
+    "On": "Whether the effect is simulated; negligible effects are omitted.",
+    "Frame": "Computing time that the effect adds to a simulated frame.",
+    "With": "RMS error of the shape with the effect; bold where the effect is simulated.",
+    "Without": "RMS error of the shape without the effect; bold where the effect is omitted.",
 }
 
 
 class EffectsTable(QTableWidget):
-    """One row for each effect; the error that is had now is bold, what is left out faint."""
+    """One row per effect; the present error is bold, an omitted effect faint."""
 
     def __init__(self) -> None:
         super().__init__(0, len(_COLUMNS))
@@ -58,17 +56,17 @@ class EffectsTable(QTableWidget):
         header.setHighlightSections(False)
         header.setMinimumSectionSize(20)
         self.verticalHeader().hide()
-        # As high as there is room: it scrolls by itself.
+        # As high as the space allows: the table scrolls.
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
         self.setShowGrid(False)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.setAccessibleName("What each effect costs")
+        self.setAccessibleName("Cost of each effect")
         follow_look(self, self._fill)
 
     def show_effects(self, effects: tuple[EffectCost, ...]) -> None:
-        """Show what was measured of `effects`."""
+        """Show the measured costs of `effects`."""
         if effects == self._shown:
             return
         self._shown = effects
@@ -79,7 +77,11 @@ class EffectsTable(QTableWidget):
         self.setRowCount(len(self._shown))
         for row, cost in enumerate(self._shown):
             errors = ((cost.rms_with, cost.kept), (cost.rms_without, not cost.kept))
-            texts = [called(cost.name), "yes" if cost.kept else "no", duration(cost.time_per_frame)]
+            texts = [
+                effect_name(cost.name),
+                "yes" if cost.kept else "no",
+                duration(cost.time_per_frame),
+            ]
             texts += [NONE if rms is None else length(rms) for rms, _ in errors]
             for column, text in enumerate(texts):
                 item = _cell(text, column)
@@ -101,9 +103,9 @@ def _cell(text: str, column: int) -> QTableWidgetItem:
 
 
 def _tip(cost: EffectCost) -> str:
-    """What a row says, in a sentence."""
+    """The tooltip of a row."""
     if cost.bound is None:
-        return "A failure that the scene asks for; never left out."
-    kept = "" if cost.kept else " It is left out."
+        return "A failure defined by the scene; it is never omitted."
+    omitted = "" if cost.kept else " It is omitted."
     share = f"{100 * cost.bound:.2g} % of the peak"
-    return f"Leaving it out changes a reading by at most {share}.{kept}"
+    return f"Omitting it changes a reading by at most {share}.{omitted}"

@@ -30,8 +30,8 @@ from kappaskin_app.shell.actions import plain
 from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.parts import Parts
-from kappaskin_app.shell.settings import ask_of
-from kappaskin_app.shell.settings.asks import Choice
+from kappaskin_app.shell.settings import form_field
+from kappaskin_app.shell.settings.form_fields import Choice
 from kappaskin_app.widgets.layout import scroll_to
 
 _NOT_NOW = "not available with the present settings"
@@ -137,7 +137,7 @@ def _settings(window: Parts) -> Iterator[FinderEntry]:
 def _setting(window: Parts, form: Form, editor: QWidget) -> Iterator[FinderEntry]:
     """The setting of `editor`, and each value of a choice."""
     name = editor.objectName()
-    how, place = ask_of(name), f"{_where(form)}, {form.title()}"
+    how, place = form_field(name), f"{_where(form)}, {form.title()}"
     why_not = "" if form.form.isRowVisible(editor) else _NOT_NOW
     if not editor.isEnabled():
         why_not = form.message.text() or _NOT_NOW

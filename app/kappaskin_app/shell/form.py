@@ -35,8 +35,8 @@ from PySide6.QtWidgets import (
 
 from kappaskin.live import Status
 from kappaskin_app.shell.panel import Panel
-from kappaskin_app.shell.settings import Settings, ask_of
-from kappaskin_app.shell.settings.asks import Ask, Choice, Range, Several, Switch, Text
+from kappaskin_app.shell.settings import Settings, form_field
+from kappaskin_app.shell.settings.form_fields import Choice, FormField, Range, Several, Switch, Text
 
 _ITS = QKeySequence.StandardKey
 _LEFT = (_ITS.Undo, _ITS.Redo, _ITS.DeleteEndOfLine)  # the last is Ctrl+K to an editor
@@ -289,7 +289,7 @@ def _several(how: Several, changed: Callable[[Any], None]) -> _Editor:
     return _Editor(button, button.show_chosen)
 
 
-def _switch(how: Ask, changed: Callable[[Any], None]) -> _Editor:
+def _switch(how: FormField, changed: Callable[[Any], None]) -> _Editor:
     box = QCheckBox(how.label)
     box.toggled.connect(changed)
     return _Editor(box, box.setChecked)
@@ -302,7 +302,7 @@ def _text(changed: Callable[[Any], None]) -> _Editor:
 
 
 def _editor(name: str, changed: Callable[[Any], None]) -> _Editor:
-    how = ask_of(name)
+    how = form_field(name)
     if isinstance(how, Text):
         return _text(changed)
     if isinstance(how, Range):
@@ -334,7 +334,7 @@ class Form(Panel):
         self._corner.insertWidget(0, self.reset)
 
     def _add(self, name: str) -> None:
-        how = ask_of(name)
+        how = form_field(name)
         editor = _editor(name, lambda value: self.requested.emit(name, value))
         if not isinstance(how, Range):
             editor.widget.setToolTip(how.tip)
@@ -385,7 +385,7 @@ class Form(Panel):
 
     def show_limit(self, name: str, most: float) -> None:
         """Limit the number called `name` to `most`, in SI units."""
-        how, box = ask_of(name), self.editor(name)
+        how, box = form_field(name), self.editor(name)
         if isinstance(how, Range) and isinstance(box, QDoubleSpinBox):
             with QSignalBlocker(box):
                 box.setMaximum(most * how.scale)

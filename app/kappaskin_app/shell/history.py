@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoCommand, QUndoStack
 
-from kappaskin_app.shell.settings import Settings, change_told
+from kappaskin_app.shell.settings import Settings, change_text
 
 _IN_A_ROW = 1.0  # s from one change of a setting to the next
 _MOST = 500  # steps that can be undone: a scene's text may be a megabyte
@@ -79,7 +79,7 @@ class History(QObject):
         now = time.monotonic()
         if name != self._requested or now - self._requested_at > _IN_A_ROW:
             self._request_gesture = self.new_gesture()
-        self._change(partial(change_told, name), self._request_gesture, values)
+        self._change(partial(change_text, name), self._request_gesture, values)
         self._requested, self._requested_at = name, now
 
     def new_gesture(self) -> int:

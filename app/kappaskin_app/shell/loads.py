@@ -1,4 +1,4 @@
-"""Loads on a simulated skin: ready ones, free ones, and those that are dragged."""
+"""Loads on a simulated skin: load cases, free loads and dragged loads."""
 
 import math
 from collections.abc import Callable
@@ -27,43 +27,43 @@ from kappaskin.skin import Patch
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.scene import FREE_CASES, LOAD_CASES, SPREAD_CASES, TWO_ENDED
 
-_Question = ParamSpec("_Question")
-_Answer = TypeVar("_Answer")
+_Arguments = ParamSpec("_Arguments")
+_Result = TypeVar("_Result")
 
 
-class Memo(Generic[_Question, _Answer]):
-    """Remembers what `answer` said to the last `most` questions; `learn` brings what it would say.
+class Cache(Generic[_Arguments, _Result]):
+    """Caches the last `size` results of `function`; `store` adds one computed elsewhere.
 
-    As `functools.lru_cache`, which learns from nobody.
+    `functools.lru_cache` cannot store the result of another process.
     """
 
-    def __init__(self, answer: Callable[_Question, _Answer], most: int) -> None:
-        self._answer, self._most = answer, most
-        self._known: dict[tuple[Any, ...], _Answer] = {}
+    def __init__(self, function: Callable[_Arguments, _Result], size: int) -> None:
+        self._function, self._size = function, size
+        self._results: dict[tuple[Any, ...], _Result] = {}
 
-    def __call__(self, *question: _Question.args, **_: _Question.kwargs) -> _Answer:
-        if question not in self._known:
-            self.learn(question, self._answer(*question, **_))
-        self._known[question] = self._known.pop(question)  # the latest comes last
-        return self._known[question]
+    def __call__(self, *arguments: _Arguments.args, **_: _Arguments.kwargs) -> _Result:
+        if arguments not in self._results:
+            self.store(arguments, self._function(*arguments, **_))
+        self._results[arguments] = self._results.pop(arguments)  # the latest comes last
+        return self._results[arguments]
 
-    def learn(self, question: tuple[Any, ...], answer: _Answer) -> None:
-        """Remember that `answer` is what there is to say to `question`."""
-        self._known[question] = answer
-        if len(self._known) > self._most:
-            del self._known[next(iter(self._known))]
+    def store(self, arguments: tuple[Any, ...], result: _Result) -> None:
+        """Store the `result` for these `arguments`."""
+        self._results[arguments] = result
+        if len(self._results) > self._size:
+            del self._results[next(iter(self._results))]
 
 
 Array = NDArray[np.float64]
 
 REFERENCE = (15, 15)
-"""Functions of the true shape, by which Table 1 defines its truth."""
-_MARGIN = 0.03  # share of the patch along each edge that a dragged load keeps out of
-_MOST_BENT = 27.0  # 1/m, under the load: a moving one bends more in places, and 38 is a rail
-_LEAST = 1e-12  # m/N that a skin gives where it is free to move
-_TAIL = 4.0  # standard deviations of a Gaussian that the skin is to hold
+"""Basis functions of the true shape, as in Table 1."""
+_MARGIN = 0.03  # of the patch along each edge, where no load can be dragged
+_HIGHEST_CURVATURE = 27.0  # 1/m, under the load: a moving one reaches more, and 38 saturates
+_LEAST_COMPLIANCE = 1e-12  # m/N, of a skin where it is free to move
+_TAIL = 4.0  # standard deviations of a Gaussian that must be on the skin
 _HALVINGS = 16
-_REMEMBERED = 8  # skins whose compliance need not be computed again
+_CACHED = 8  # skins whose compliance is cached
 
 
 def free_loads(settings: Settings) -> tuple[Load, ...]:
@@ -82,44 +82,44 @@ def free_loads(settings: Settings) -> tuple[Load, ...]:
 
 
 def reference_on(patch: Patch) -> tuple[int, int]:
-    """Functions of the true shape of `patch`; a strip is alike along y."""
+    """Basis functions of the true shape of `patch`; a strip is uniform along y."""
     return (REFERENCE[0], 1) if patch.strip else REFERENCE
 
 
-def _tried(plate: Plate, edge: str) -> Compliance | Refusal:
+def _compliance_or_refusal(plate: Plate, edge: str) -> Compliance | Refusal:
     try:
         return plate.compliance(basis_for(plate.patch, edge, *reference_on(plate.patch)))
     except Refusal as refusal:
         return refusal
 
 
-tried = Memo(_tried, _REMEMBERED)
-"""How the true shape gives, or why it cannot be told."""
+compliance_or_refusal = Cache(_compliance_or_refusal, _CACHED)
+"""The compliance of the true shape, or the refusal of a skin that has none."""
 
 
 def compliance_of(plate: Plate, edge: str) -> Compliance:
-    """How the true shape gives, remembered; raises `Refusal` for a skin that nothing holds."""
-    found = tried(plate, edge)
+    """The cached compliance of the true shape; raises `Refusal` for a skin without support."""
+    found = compliance_or_refusal(plate, edge)
     if isinstance(found, Refusal):
         raise found
     return found
 
 
-@lru_cache(_REMEMBERED)
-def yielding(plate: Plate, edge: str) -> float:
-    """How far in m the middle of the skin moves under a point load of 1 N there."""
+@lru_cache(_CACHED)
+def middle_compliance(plate: Plate, edge: str) -> float:
+    """Displacement in m of the middle of the skin under a point load of 1 N there."""
     patch = plate.patch
     basis = basis_for(patch, edge, *reference_on(patch))
     return abs(_moved(PointLoad(patch.a / 2, patch.b / 2), basis, compliance_of(plate, edge)))
 
 
 def _moved(load: Load, basis: Basis, compliance: Compliance) -> float:
-    """How far the skin moves in m where the load presses."""
+    """Displacement in m of the skin at the centre of the load."""
     return float(basis.at(load.centre()[None])[0] @ compliance(load.modal(basis)).ravel())
 
 
 def _placed(load: Load, was: Patch, patch: Patch) -> PointLoad | LineLoad:
-    """The load at the same shares of the sides of `patch`, or nearer to its middle."""
+    """The load at the same relative position on `patch`, or nearer to its middle."""
     ends = [[load.x0, load.y0], [load.x1, load.y1]] if isinstance(load, LineLoad) else load.centre()
     shares = np.reshape(ends, (-1, 2)) / (was.a, was.b) - 0.5
     places = [(0.5 + s * shares) * (patch.a, patch.b) for s in np.linspace(1.0, 0.0, 11)]
@@ -131,12 +131,12 @@ def _placed(load: Load, was: Patch, patch: Patch) -> PointLoad | LineLoad:
     )
 
 
-@lru_cache(len(LOAD_CASES) * _REMEMBERED)
-def ready(case: str, plate: Plate, edge: str) -> tuple[Stimulus, ...]:
-    """What touches the skin in a ready scene; on another skin, at the same shares of its sides.
+@lru_cache(len(LOAD_CASES) * _CACHED)
+def load_case_stimuli(case: str, plate: Plate, edge: str) -> tuple[Stimulus, ...]:
+    """The stimuli of a load case; on another skin than Table 1's, at the same relative positions.
 
-    What moves by W on the patch of side L moves by W s there, whose shorter side is s L: the slopes
-    stay as they are. It moves less where it would bend so much that elements stand on a rail.
+    A displacement W on the patch of side L becomes W s on a skin whose shorter side is s L, which
+    has the same slopes. It is smaller where elements would saturate.
     """
     paper = load_scene(case)
     compliance, patch = compliance_of(plate, edge), plate.patch
@@ -148,10 +148,10 @@ def ready(case: str, plate: Plate, edge: str) -> tuple[Stimulus, ...]:
     load = _placed(paper.loads[0], was, patch)
     basis = basis_for(patch, edge, *reference_on(patch))
     gives = abs(_moved(load, basis, compliance))
-    if not gives > _LEAST:
+    if not gives > _LEAST_COMPLIANCE:
         raise Refusal(
-            f"the skin does not move where the load presses, at {load.centre()} m: expected it "
-            "further inside; choose a free load and drag it there"
+            f"the skin does not move at the load, {load.centre()} m: expected a position "
+            "further inside; select a free load and drag it there"
         )
     load = load.scaled(size * moved / gives)
     bent = SensorLayout.regular(patch, 21, 21).curvature_operator(basis)
@@ -159,7 +159,7 @@ def ready(case: str, plate: Plate, edge: str) -> tuple[Stimulus, ...]:
     motion = paper.stimuli[0].motion
     if isinstance(motion, Orbit):
         motion = replace(motion, radius=motion.radius * size)
-    return (Stimulus(load.scaled(min(1.0, _MOST_BENT / most)), motion),)
+    return (Stimulus(load.scaled(min(1.0, _HIGHEST_CURVATURE / most)), motion),)
 
 
 def dragged(
@@ -167,39 +167,39 @@ def dragged(
 ) -> dict[str, Any]:
     """The settings that change when a load of `scene` is dragged to (x, y) in m.
 
-    It becomes a free one of the same force. A line moves as a whole, a spread load as far as all of
-    it stays on the skin, of two points the one that was grabbed.
+    It becomes a free load of the same force. A line moves as a whole, a distributed load while it
+    is completely on the skin, and of two points the grabbed one.
     """
     if not scene.loads:
-        return {}  # it lies on a cylinder
+        return {}  # the skin is on a cylinder
     patch, load = scene.plate.patch, scene.loads[0]
     x, y = _inside(patch, x, y)
     if settings.load_case == "two-points":
         return {"x_end": x, "y_end": y} if grabbed_end else {"x": x, "y": y}
-    kept = {} if settings.load_case in FREE_CASES else {"force": load.force}
+    force = {} if settings.load_case in FREE_CASES else {"force": load.force}
     if settings.load_case in SPREAD_CASES:
-        return {"x": x, "y": y} | whole_on(replace(settings, x=x, y=y), patch)
+        return {"x": x, "y": y} | inside_rim(replace(settings, x=x, y=y), patch)
     if not isinstance(load, LineLoad):
-        return {"load_case": "point", "x": x, "y": y, **kept}
+        return {"load_case": "point", "x": x, "y": y, **force}
     half_x, half_y = (load.x1 - load.x0) / 2, (load.y1 - load.y0) / 2
     x = min(max(x, abs(half_x)), patch.a - abs(half_x))
     y = min(max(y, abs(half_y)), patch.b - abs(half_y))
     ends = {"x": x - half_x, "y": y - half_y, "x_end": x + half_x, "y_end": y + half_y}
     if not patch.contains(np.reshape(list(ends.values()), (2, 2))).all():
         return {}
-    return {"load_case": "free-line", **ends, **kept}
+    return {"load_case": "free-line", **ends, **force}
 
 
-def whole_on(settings: Settings, patch: Patch) -> dict[str, float]:
-    """Where a free load is to be so that all of it is on `patch`; nothing where it is already.
+def inside_rim(settings: Settings, patch: Patch) -> dict[str, float]:
+    """The position at which a free load is completely on `patch`; empty where it already is.
 
-    As near as can be to where it is asked for, and in the middle where even there it is too large.
+    It is the nearest to the present one, and the middle for a load that is too large.
     """
     s = settings
     if s.load_case in TWO_ENDED:
-        end = whole_on(replace(s, load_case="point", x=s.x_end, y=s.y_end), patch)
+        end = inside_rim(replace(s, load_case="point", x=s.x_end, y=s.y_end), patch)
         moved = {f"{name}_end": value for name, value in end.items()}
-        return whole_on(replace(s, load_case="point"), patch) | moved
+        return inside_rim(replace(s, load_case="point"), patch) | moved
     place, middle = np.array([s.x, s.y]), np.array([patch.a, patch.b]) / 2
     if _lies_on(s, patch, place):
         return {}
@@ -212,7 +212,7 @@ def whole_on(settings: Settings, patch: Patch) -> dict[str, float]:
 
 
 def _reach(settings: Settings) -> tuple[float, float]:
-    """How far a free load of one place presses from it along x and y, in m."""
+    """Half the extent of a free load along x and y, in m."""
     s = settings
     if s.load_case == "rectangle":
         return s.size / 2, s.size_y / 2
@@ -221,7 +221,7 @@ def _reach(settings: Settings) -> tuple[float, float]:
 
 
 def _share_on(settings: Settings, patch: Patch, middle: Array, away: Array) -> float:
-    """The share of the way from the middle that still has all of the load on `patch`."""
+    """The fraction of `away` from the middle at which the load is still completely on `patch`."""
     least, most = 0.0, 1.0
     for _ in range(_HALVINGS):
         share = (least + most) / 2
@@ -231,7 +231,7 @@ def _share_on(settings: Settings, patch: Patch, middle: Array, away: Array) -> f
 
 
 def _lies_on(settings: Settings, patch: Patch, place: Array) -> bool:
-    """Whether all of the free load is on `patch` when it is at `place` (2,) in m."""
+    """Whether the free load at `place` (2,) in m is completely on `patch`."""
     x, y = place.tolist()
     try:
         for load in free_loads(replace(settings, x=x, y=y)):
@@ -242,7 +242,7 @@ def _lies_on(settings: Settings, patch: Patch, place: Array) -> bool:
 
 
 def _inside(patch: Patch, x: float, y: float) -> tuple[float, float]:
-    """The place nearest to (x, y) in m a little inside the rim."""
+    """The point inside the margin of the rim that is nearest to (x, y) in m."""
     middle = np.array([patch.a, patch.b]) / 2
     x, y = np.clip([x, y], 2 * _MARGIN * middle, 2 * (1 - _MARGIN) * middle)
     if patch.depth(np.array([[x, y]]))[0] < 0.99 * _MARGIN * min(patch.a, patch.b):
@@ -250,14 +250,14 @@ def _inside(patch: Patch, x: float, y: float) -> tuple[float, float]:
     return float(x), float(y)
 
 
-_POINTS = 41  # of every footprint, so that one line on the skin can be any of them
+_POINTS = 41  # of every footprint, so that one polyline can show each of them
 _CORNERS = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)]) / 2
 
 
 def footprint(load: Load) -> Array | None:
-    """Positions (41, 2) in m along a line load, or round a spread one; None of a point.
+    """Points (41, 2) in m along a line load, or on the outline of a distributed one; else None.
 
-    A Gaussian is drawn two standard deviations wide: 86 % of its force press inside.
+    The outline of a Gaussian is at two standard deviations, which includes 86 % of its force.
     """
     along = np.linspace(0, 1, _POINTS)
     if isinstance(load, LineLoad):
@@ -274,24 +274,24 @@ def footprint(load: Load) -> Array | None:
 
 
 def _between(at: Array, corners: Array) -> Array:
-    """Where the line through `corners` (k, 2) is when the corners are passed at 0, 1, 2, ..."""
+    """Points on the polyline through `corners` (k, 2), interpolated at the corner numbers `at`."""
     passed = np.arange(len(corners))
     return np.column_stack([np.interp(at, passed, corners[:, axis]) for axis in (0, 1)])
 
 
 _DEEPEST = 0.2  # of the skin's shorter side
-_LEAST_FORCE = 0.01  # of the hardest press that a hand can do: lighter is no touch
+_LEAST_FORCE = 0.01  # of the largest force of the mouse: a smaller one is no contact
 
 
 class DrawnStimulus(NamedTuple):
-    """The `number` of a stimulus of the scene, and the `load` that it is drawn as."""
+    """The `number` of a stimulus of the scene, and the `load` that represents it."""
 
     number: int
     load: Load
 
 
-def touches_at(scene: Scene, time: float) -> list[DrawnStimulus]:
-    """What presses at `time` in s; a rigid object as a point that has its force, or 1 N."""
+def loads_at(scene: Scene, time: float) -> list[DrawnStimulus]:
+    """The loads at `time` in s; a rigid object is a point load of its force, or of 1 N."""
     found = list[DrawnStimulus]()
     for number, stimulus in enumerate(scene.stimuli):
         pose, what = stimulus.pose_at(time), stimulus.what
@@ -305,9 +305,9 @@ def touches_at(scene: Scene, time: float) -> list[DrawnStimulus]:
 
 @dataclass
 class GrabbedStimulus:
-    """A touch of a `scene` that was grabbed `at` (x, y) in m; so far it moved `by` so much.
+    """A stimulus of a `scene` that was grabbed `at` (x, y) in m and has moved `by` (dx, dy) in m.
 
-    And presses so many `times` as hard, between limits that keep the skin in the picture.
+    Its force is `times` that at the start, within limits that keep the skin in the view.
     """
 
     scene: Scene
@@ -318,8 +318,8 @@ class GrabbedStimulus:
 
     @classmethod
     def at_place(cls, scene: Scene, time: float, x: float, y: float) -> "GrabbedStimulus | None":
-        """The touch nearest to (x, y) in m at `time` in s, if there is one."""
-        there = touches_at(scene, time)
+        """The stimulus nearest to (x, y) in m at `time` in s, if there is one."""
+        there = loads_at(scene, time)
         if not there:
             return None
         near = min(there, key=lambda touch: math.dist(touch.load.centre(), (x, y)))
@@ -330,7 +330,7 @@ class GrabbedStimulus:
         return self.by != (0.0, 0.0) or self.times != 1.0
 
     def moved_to(self, x: float, y: float) -> Scene:
-        """The scene with the touch moved to (x, y) in m, or as near as it was last allowed."""
+        """The scene with the stimulus moved to (x, y) in m, or to its last valid position."""
         by = x - self.at[0], y - self.at[1]
         try:
             scene = self._moved(by)
@@ -340,15 +340,15 @@ class GrabbedStimulus:
         return scene
 
     def pressed(self, times: float) -> Scene:
-        """The scene with the touch pressing so many `times` as hard as when it was grabbed."""
+        """The scene with `times` the force that the stimulus had when it was grabbed."""
         what = self.scene.stimuli[self.number].what
-        most = most_times(self.scene, what)
+        most = largest_factor(self.scene, what)
         self.times = min(max(times, min(_LEAST_FORCE * most, 1.0)), max(most, 1.0))
         return self._moved(self.by)
 
     def _moved(self, by: tuple[float, float]) -> Scene:
         stimuli = list(self.scene.stimuli)
-        stimuli[self.number] = harder(_shifted(stimuli[self.number], *by), self.times)
+        stimuli[self.number] = scaled(_shifted(stimuli[self.number], *by), self.times)
         moved = replace(self.scene, stimuli=tuple(stimuli))
         if moved.indenter is not None:
             _check_inside(moved, moved.indenter)
@@ -362,8 +362,8 @@ def _shifted(stimulus: Stimulus, dx: float, dy: float) -> Stimulus:
     return replace(stimulus, what=what.shifted(dx, dy))
 
 
-def harder(stimulus: Stimulus, times: float) -> Stimulus:
-    """The stimulus with its force or depth so many `times` as large."""
+def scaled(stimulus: Stimulus, times: float) -> Stimulus:
+    """The stimulus with `times` the force or depth."""
     what = stimulus.what
     if not isinstance(what, Indenter):
         return replace(stimulus, what=what.scaled(times))
@@ -372,21 +372,21 @@ def harder(stimulus: Stimulus, times: float) -> Stimulus:
     return replace(stimulus, what=replace(what, depth=(what.depth or 0.0) * times))
 
 
-def most_times(scene: Scene, what: Load | Indenter) -> float:
-    """How many times as hard `what` may press until the skin's middle would be a fifth deep.
+def largest_factor(scene: Scene, what: Load | Indenter) -> float:
+    """Largest factor of the force or depth of `what`.
 
-    A fifth of its shorter side, under a point load.
+    At that force, as a point load, the middle of the skin moves by a fifth of its shorter side.
     """
     patch = scene.plate.patch
     deepest = _DEEPEST * min(patch.a, patch.b)
     if isinstance(what, Indenter) and what.force is None:
         return deepest / (what.depth or deepest)
-    gives = yielding(scene.plate, scene.edge)
+    gives = middle_compliance(scene.plate, scene.edge)
     return deepest / (abs(what.force or 1.0) * gives) if gives > 0 else 1.0
 
 
 def _check_inside(scene: Scene, stimulus: Stimulus) -> None:
-    """Refuse a rigid object whose middle leaves the skin on its way."""
+    """Refuse a rigid object whose middle leaves the skin during its motion."""
     moments = stimulus.motion.moments if stimulus.motion else [0.0]
     for time in moments:
         pose, what = stimulus.pose_at(time), stimulus.what
@@ -394,10 +394,10 @@ def _check_inside(scene: Scene, stimulus: Stimulus) -> None:
             PointLoad(what.x + pose.dx, what.y + pose.dy, 1.0).check(scene.plate.patch)
 
 
-def may_choose(scene: Scene) -> bool:
-    """Whether another object can take the place of what touches: one alone, and at rest.
+def object_replaceable(scene: Scene) -> bool:
+    """Whether another object can replace the present one, which must be single and at rest.
 
-    A strip is alike along y, as only a load can be.
+    Not on a strip, which is uniform along y and has loads only.
     """
     alone = len(scene.stimuli) == 1 and not scene.moves
     return alone and not scene.plate.patch.strip

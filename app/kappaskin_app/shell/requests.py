@@ -7,7 +7,7 @@ from typing import Any
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings.publishing import Sending
+from kappaskin_app.shell.settings.publishing import PublishSettings
 from kappaskin_app.shell.simulation import with_consequences
 
 
@@ -32,7 +32,7 @@ class Requests:
         """Reset all settings except calibration, tare and publishing."""
         now = self._history.settings
         rest = Settings(calibration=now.calibration, tare=now.tare)
-        sending = {field.name: getattr(now, field.name) for field in fields(Sending)}
+        sending = {field.name: getattr(now, field.name) for field in fields(PublishSettings)}
         self._history.change("Reset settings", -1, **vars(rest) | sending)
 
     def reset_panel(self, title: str, names: Sequence[str]) -> None:

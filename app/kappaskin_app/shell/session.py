@@ -25,18 +25,18 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.badge import state_of
 from kappaskin_app.shell.history import History
-from kappaskin_app.shell.loads import Memo, tried
+from kappaskin_app.shell.loads import Cache, compliance_or_refusal
 from kappaskin_app.shell.settings import EstimatorSettings, SceneSettings, Settings, part
-from kappaskin_app.shell.settings.asks import setup_values
-from kappaskin_app.shell.settings.publishing import Sending
+from kappaskin_app.shell.settings.form_fields import setup_values
+from kappaskin_app.shell.settings.publishing import PublishSettings
 from kappaskin_app.shell.settings.scene import Scanning, Written
 from kappaskin_app.shell.simulation import (
-    named,
+    planned_scene,
     plate_of,
-    played,
     region_of,
     scene_of,
-    scene_or_why,
+    scene_or_refusal,
+    source_settings,
 )
 
 _MAKING = "Computing the scene; Ctrl+Z undoes it"
@@ -44,18 +44,22 @@ _MAKING = "Computing the scene; Ctrl+Z undoes it"
 _Slow: TypeAlias = Written | tuple[Plate, str]
 _Answer: TypeAlias = tuple[str, tuple[object, ...], Any]
 
-_CACHES: dict[str, Memo[..., Any]] = {"skin": tried, "scene": scene_or_why, "plan": played}
+_CACHES: dict[str, Cache[..., Any]] = {
+    "skin": compliance_or_refusal,
+    "scene": scene_or_refusal,
+    "plan": planned_scene,
+}
 
 
 def _answers(slow: _Slow) -> Generator[_Answer]:
     """The slow parts of a scene: the name of a cache, the arguments and the result."""
     if not isinstance(slow, Written):
-        yield "skin", slow, tried(*slow)
+        yield "skin", slow, compliance_or_refusal(*slow)
         return
-    scene = scene_or_why(slow)
+    scene = scene_or_refusal(slow)
     yield "scene", (slow,), scene
     if isinstance(scene, Scene):
-        yield "plan", (scene,), played(scene)
+        yield "plan", (scene,), planned_scene(scene)
 
 
 class ScenePreparation:
@@ -89,7 +93,7 @@ class ScenePreparation:
 
     def _learn(self, found: _Answer) -> None:
         memo, question, answer = found
-        _CACHES[memo].learn(question, answer)
+        _CACHES[memo].store(question, answer)
 
 
 def _slow(settings: Settings) -> _Slow | None:
@@ -247,7 +251,7 @@ class Session(QObject):
             self.engine.connect(self.source)
         if self.inside:
             self._restarts = True
-            self._history.change("Simulated skin", -1, **named(self.source))
+            self._history.change("Simulated skin", -1, **source_settings(self.source))
             self._play()
 
     def go_on(self, left: ResumeInfo) -> None:
@@ -278,7 +282,7 @@ class Session(QObject):
             self._scan()
         if self.inside and part(settings, SceneSettings) != part(was, SceneSettings):
             self._play()
-        if part(settings, Sending) != part(was, Sending):
+        if part(settings, PublishSettings) != part(was, PublishSettings):
             self._publish()
 
     def _set_up(self) -> None:
@@ -362,7 +366,7 @@ class Session(QObject):
             self.scene = scene.laid_on(presentation) if presentation else scene
         except Refusal as refusal:
             why = str(refusal)
-        self._planned, self.refusal = played(self.scene), why
+        self._planned, self.refusal = planned_scene(self.scene), why
         self.engine.play(self._planned)
         if self._restarts and not why:
             self._restarts, self.running = False, True

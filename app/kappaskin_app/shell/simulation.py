@@ -1,4 +1,4 @@
-"""What a person chose, as a scene to simulate."""
+"""Simulated scenes, made from the settings."""
 
 import math
 from contextlib import suppress
@@ -36,15 +36,22 @@ from kappaskin.sensing import (
     Transduction,
 )
 from kappaskin.skin import Patch
-from kappaskin_app.shell.loads import Memo, compliance_of, free_loads, ready, reference_on, whole_on
+from kappaskin_app.shell.loads import (
+    Cache,
+    compliance_of,
+    free_loads,
+    inside_rim,
+    load_case_stimuli,
+    reference_on,
+)
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.scene import FREE_CASES, READY_CASES, SHAPES, Written
 
 _PLACING = ("load_case", "size", "size_y", "shape", "side_x", "side_y", "rim_radius")
-"""What, when it changes, may leave a free load over the rim."""
+"""Settings whose change can move a free load over the rim."""
 _TABLE_1 = ("shape", "side_x", "side_y", "edge", "tension", "foam", "fluid")
 NO_ELEMENTS: dict[str, Any] = {"region_elements": (), "dead_elements": ()}
-"""What follows from other elements: those chosen by number were chosen among the last ones."""
+"""Selections of elements by number, cleared when the elements change."""
 
 _CHAINS = {
     "modern": Transduction(),
@@ -52,26 +59,26 @@ _CHAINS = {
     "first": FIRST_GENERATION,
 }
 _LOOPS = {"second": SECOND_GENERATION_LOOPS, "first": FIRST_GENERATION_LOOPS}
-_LEAST_SCANNED = 0.05  # of the channels, where they are scanned as they tell most
-_CREEPING = 5.0  # s, the time constant of the creep
+_LEAST_SCANNED = 0.05  # of the channels, where the most informative are scanned
+_CREEP_TIME = 5.0  # s, the time constant of the creep
 _OFFSET = 10.0  # 1/m of offset for a gain that is off by 1
 
 OWN = Path("own.scene.toml")
-"""What a scene is called that was begun from the panels' own."""
-_LARGEST = 1_000_000  # bytes of a scene: a longer text would hold up the editor
-_REMEMBERED = 64  # scenes, so that undoing is quick
+"""The file name of a scene written from the panels."""
+_LARGEST = 1_000_000  # bytes of a scene: a longer text would block the editor
+_CACHED = 64  # scenes, so that undo is quick
 
 _Effect = UniformNoise | GaussianNoise | Hysteresis | Creep | Tolerance
 
 
 def _effects(settings: Settings) -> tuple[_Effect, ...]:
-    """What spoils a reading, in the order in which it comes about: gage, bridge, noise."""
+    """The effects on a reading, in physical order: gage, bridge, noise."""
     s, kinds = settings, {"uniform": UniformNoise, "gaussian": GaussianNoise}
     found: list[_Effect] = []
     if s.loops in _LOOPS:
         found.append(_LOOPS[s.loops])
     if s.creep:
-        found.append(Creep(s.creep, _CREEPING))
+        found.append(Creep(s.creep, _CREEP_TIME))
     if s.tolerance:
         found.append(Tolerance(s.tolerance, _OFFSET * s.tolerance))
     if s.noise_kind in kinds and s.noise_rms:
@@ -88,7 +95,7 @@ def _transduction(settings: Settings) -> Transduction:
 
 
 def region_of(settings: Settings) -> Region:
-    """Which elements every frame scans; all of them until some are chosen."""
+    """The elements scanned in each frame; all of them while none is selected."""
     s = settings
     if s.region == "elements" and not s.region_elements:
         return Region()
@@ -98,40 +105,40 @@ def region_of(settings: Settings) -> Region:
 
 def patch_of(settings: Settings) -> Patch:
     shape = SHAPES[settings.shape]
-    return shape.make(*(getattr(settings, name) for name in shape.asks))
+    return shape.make(*(getattr(settings, name) for name in shape.lengths))
 
 
 def plate_of(settings: Settings) -> Plate:
-    """The skin that `settings` describe, without its elements."""
+    """The plate of the `settings`, without elements."""
     s = settings
     return Plate(patch_of(s), tension=s.tension, foundation=s.foam, fluid=s.fluid)
 
 
 def elements_of(settings: Settings) -> tuple[int, int]:
-    """The m x n elements asked for."""
+    """The numbers m and n of elements along x and y."""
     return settings.elements_x, settings.elements_y
 
 
 def is_table_1(settings: Settings) -> bool:
-    """Whether the skin is that of Table 1, where its cases are what they are called."""
+    """Whether the skin is that of Table 1."""
     paper = Settings()
     return all(getattr(settings, name) == getattr(paper, name) for name in _TABLE_1)
 
 
 def scene_of(settings: Settings) -> Scene:
-    """The scene that `settings` describe; raises `Refusal` for one that cannot be."""
+    """The scene of the `settings`; raises `Refusal` for an invalid one."""
     if settings.written is not None:
         return _read(settings.written)
     plate = plate_of(settings)
     layout = SensorLayout.regular(plate.patch, *elements_of(settings))
     layout = layout.without(settings.dead_elements)
     if settings.load_case in FREE_CASES:
-        compliance_of(plate, settings.edge)  # for its refusal
+        compliance_of(plate, settings.edge)  # raises the refusal
         loads = free_loads(settings)
         _check_on(loads, plate)
         stimuli = tuple(map(Stimulus, loads))
     else:
-        stimuli = ready(settings.load_case, plate, settings.edge)
+        stimuli = load_case_stimuli(settings.load_case, plate, settings.edge)
     scene = Scene(
         settings.load_case,
         plate,
@@ -148,36 +155,36 @@ def scene_of(settings: Settings) -> Scene:
 
 
 def _read(written: Written) -> Scene:
-    """The scene that is written, read and planned once."""
-    scene = scene_or_why(written)
+    """The scene of a text, read and planned once."""
+    scene = scene_or_refusal(written)
     if isinstance(scene, str):
         raise Refusal(scene)
     return scene
 
 
-def _scene_or_why(written: Written) -> Scene | str:
+def _scene_or_refusal(written: Written) -> Scene | str:
     try:
         scene = read_scene(written.text, written.file)
-        played(scene)
+        planned_scene(scene)
     except Refusal as refusal:
         return str(refusal).replace(str(written.file), written.file.name)
     return scene
 
 
-scene_or_why = Memo(_scene_or_why, _REMEMBERED)
-"""The scene that is written and can be planned, or why there is none."""
-played = Memo(planned, _REMEMBERED)
-"""The scene as it is played: what its effects are is decided, here and not in the engine."""
+scene_or_refusal = Cache(_scene_or_refusal, _CACHED)
+"""The scene of a text, if it can be read and planned; else the message of the refusal."""
+planned_scene = Cache(planned, _CACHED)
+"""The scene with its effects selected, in the window's process instead of the engine's."""
 
 
 def scene_of_sensor(sensor: Sensor, noise: float) -> Scene:
-    """A scene on a real `sensor`: a point load in its middle, and `noise` in 1/m as it has."""
+    """A scene on a real `sensor` with a point load in its middle and its `noise` in 1/m."""
     plate, edge = sensor.plate, sensor.edge
     return Scene(
         sensor.name,
         plate,
         sensor.layout,
-        ready("centre", plate, edge),
+        load_case_stimuli("centre", plate, edge),
         effects=(GaussianNoise(noise),),
         transduction=sensor.transduction,
         rate=sensor.rate,
@@ -187,22 +194,22 @@ def scene_of_sensor(sensor: Sensor, noise: float) -> Scene:
 
 
 def _check_on(loads: tuple[Load, ...], plate: Plate) -> None:
-    """Refuse `loads` that are not wholly on the skin, in the words of who placed them."""
+    """Refuse `loads` that extend over the rim, with a message for the user."""
     try:
         for load in loads:
             load.check(plate.patch)
     except Refusal as refusal:
         raise Refusal(
-            "expected a load that lies wholly on the skin, got one that reaches over the rim; move "
+            "expected a load completely on the skin, got one that extends over the rim; move "
             "it inwards or make it smaller"
         ) from refusal
 
 
-def named(source: str) -> dict[str, Any]:
-    """The settings that change when the simulation called `source` is to be played.
+def source_settings(source: str) -> dict[str, Any]:
+    """The settings that change when the simulation `source` is started.
 
-    One of the panels' load cases is chosen; any other scene is played as it is written. One that
-    there is not is not played: the engine says so. None named is the one that was played last.
+    The name of a load case selects it in the panel; any other name is that of a scene file. An
+    unknown name is reported by the engine. Without a name the last scene is simulated.
     """
     name = source.removeprefix("sim:")
     if not name:
@@ -216,7 +223,7 @@ def named(source: str) -> dict[str, Any]:
 
 
 def written(file: Path) -> Written:
-    """The scene in `file`, as it is written there; raises `Refusal` for a file of no scene."""
+    """The text of the scene in `file`; raises `Refusal` for a file that is no scene."""
     if file.is_file() and (size := file.stat().st_size) > _LARGEST:
         raise Refusal(
             f"{file}: expected a scene of at most {_LARGEST} bytes, got {size}; check its name"
@@ -225,31 +232,34 @@ def written(file: Path) -> Written:
 
 
 def text_of(settings: Settings) -> str:
-    """The scene that is written, or that of the panels as one would write it."""
+    """The text of the present scene, also of one that is made in the panels."""
     return settings.written.text if settings.written else write_scene(scene_of(settings))
 
 
 def settings_for(source: str) -> Settings:
-    """The settings to begin with on `source`."""
-    return replace(Settings(), **named(source)) if source.startswith("sim:") else Settings()
+    """The initial settings on `source`."""
+    return (
+        replace(Settings(), **source_settings(source)) if source.startswith("sim:") else Settings()
+    )
 
 
 def with_consequences(settings: Settings, scene: Scene, name: str, value: Any) -> dict[str, Any]:
-    """The settings that change when a person changes `name` while `scene` is played.
+    """The settings that change when the user changes `name` while `scene` is simulated.
 
-    A shape brings its usual size, force and height, and its usual edge if it cannot be held as the
-    last one was. Where the skin gets longer, loads move and grow to keep their share of it. A free
-    load presses as the one did that it follows, and moves until all of it is on the skin.
+    A shape sets its default size, force and vertical exaggeration, and its default boundary
+    condition if it does not have the present one. Loads keep their position and size relative to
+    the skin. A free load takes the force of the previous one and moves until it is completely on
+    the skin.
     """
     changed: dict[str, Any] = {name: value}
     if name == "shape":
-        changed |= {**SHAPES[value].asks, **SHAPES[value].begins}
+        changed |= {**SHAPES[value].lengths, **SHAPES[value].defaults}
     if name == "design_shape":
-        changed |= {f"design_{length}": asked for length, asked in SHAPES[value].asks.items()}
+        changed |= {f"design_{name}": length for name, length in SHAPES[value].lengths.items()}
         changed |= {"design_place": "scene"} if value == "strip" else {}
     if name in ("shape", "rim_radius") and "side_x" not in changed:
         patch = patch_of(replace(settings, **changed))
-        changed |= {"side_x": patch.a, "side_y": patch.b}  # of the rectangle around it
+        changed |= {"side_x": patch.a, "side_y": patch.b}  # of the bounding rectangle
     if name == "shape":
         offered = edges_of(patch_of(replace(settings, **changed)))
         changed |= {"edge": offered[0]} if settings.edge not in offered else {}
@@ -268,6 +278,6 @@ def with_consequences(settings: Settings, scene: Scene, name: str, value: Any) -
         changed["force"] = scene.loads[0].force
     after = replace(settings, **changed)
     if after.load_case in FREE_CASES and name in _PLACING:
-        with suppress(Refusal):  # no such skin: the scene says so
-            changed |= whole_on(after, patch_of(after))
+        with suppress(Refusal):  # an invalid skin is reported by the scene
+            changed |= inside_rim(after, patch_of(after))
     return changed

@@ -18,8 +18,8 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.arrangement import AREAS, FLOATING, Layout, Place
 from kappaskin_app.shell.menus import Menus
 from kappaskin_app.shell.parts import Parts
-from kappaskin_app.shell.settings import ask_of
-from kappaskin_app.shell.settings.asks import Range
+from kappaskin_app.shell.settings import form_field
+from kappaskin_app.shell.settings.form_fields import Range
 from kappaskin_app.theme import THEMES
 
 FORMAT = 1
@@ -148,7 +148,7 @@ def _part(table: Mapping[str, Any], key: str, kind: type[_Some], otherwise: _Som
 
 
 def _letters(window: Mapping[str, Any]) -> float:
-    how, percent = ask_of("letters"), window.get("letters", 100.0)
+    how, percent = form_field("letters"), window.get("letters", 100.0)
     if type(percent) not in (int, float) or not (
         isinstance(how, Range) and how.least <= percent <= how.most
     ):

@@ -284,21 +284,21 @@ def test_closing_the_window_ends_what_runs(window: MainWindow) -> None:
 def test_what_is_told_at_the_foot_of_the_window_can_be_cancelled_there(
     window: MainWindow, until
 ) -> None:
-    window.costing.watch(True)
-    until(lambda: window.costing.running)
+    window.measurement.watch(True)
+    until(lambda: window.measurement.running)
     until(lambda: "accuracy" in window.display.status_bar.activity.words.text())
     window.display.status_bar.activity.cancel.click()
-    assert not window.costing.running
-    assert window.costing.refusal.startswith("Cancelled")
+    assert not window.measurement.running
+    assert window.measurement.refusal.startswith("Cancelled")
     until(lambda: "accuracy" not in window.display.status_bar.activity.words.text())
-    window.costing.measure()
-    assert not window.costing.refusal
+    window.measurement.measure()
+    assert not window.measurement.refusal
 
 
 def test_a_plan_that_was_cancelled_is_made_at_the_next_look(window: MainWindow) -> None:
-    window.planning.watch(True)
-    assert window.planning.waiting
-    window.planning.task.cancel()
-    assert not window.planning.waiting
-    window.planning.watch(True)
-    assert window.planning.waiting
+    window.planner.set_active(True)
+    assert window.planner.waiting
+    window.planner.task.cancel()
+    assert not window.planner.waiting
+    window.planner.set_active(True)
+    assert window.planner.waiting

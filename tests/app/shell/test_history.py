@@ -4,7 +4,7 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from kappaskin_app.shell.history import History
-from kappaskin_app.shell.settings import Settings, change_told
+from kappaskin_app.shell.settings import Settings, change_text
 
 
 def test_a_change_is_told_and_can_be_undone(qapp: QApplication) -> None:
@@ -117,10 +117,10 @@ def test_ten_thousand_steps_are_bounded_and_the_last_ones_stay(qapp: QApplicatio
 )
 def test_a_change_is_told_in_its_own_words_and_unit(name: str, value: object, words: str) -> None:
     after = replace(Settings(), **{name: value})
-    said = change_told(name, Settings(), after)
+    said = change_text(name, Settings(), after)
     assert said == words.replace(">", "\N{RIGHTWARDS ARROW}")
 
 
 def test_every_setting_has_words() -> None:
     for field in fields(Settings):
-        assert change_told(field.name, Settings(), Settings())
+        assert change_text(field.name, Settings(), Settings())

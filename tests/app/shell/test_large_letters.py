@@ -161,7 +161,7 @@ def test_what_is_written_in_the_picture_is_read_whole(large: MainWindow) -> None
     wide, high = membrane.plotter.render_window.GetSize()
     found = Distances(0.0849, 0.0851, -0.00212)
     ruler.show(membrane.skin, np.array([(0.02, 0.02), (0.08, 0.08)]), 0.0, found)
-    membrane.show_caption("Colours: shape 64 of 64, no measurement")
+    membrane.show_caption("Colours: mode 64 of 64, no measurement")
     membrane.alarm.show("LOST 12 s\n" + 6 * "no message came from the device; " + "end")
     for text in (ruler.text, membrane.caption, membrane.alarm.actor):
         across = [0, 0, 0, 0]

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication
 
 from kappaskin.scenes import scene_file
 from kappaskin_app.features.calibration import is_calibration
-from kappaskin_app.shell.loads import may_choose
+from kappaskin_app.shell.loads import object_replaceable
 from kappaskin_app.shell.window import MainWindow
 
 TETRAHEDRON = np.array([[0, 0, 0], [20, 0, 10], [-10, 17, 10], [-10, -17, 10]])
@@ -56,12 +56,12 @@ def test_scenes_and_meshes_dropped_are_played_and_listed_until_cleared(
     own.write_text(scene_file("demo").read_text())
     _drop(window, own)
     until(lambda: getattr(window.history.settings.written, "file", None) == own)
-    until(lambda: window.session.inside and may_choose(window.session.scene))
+    until(lambda: window.session.inside and object_replaceable(window.session.scene))
     mesh = _write_obj(tmp_path / "tip & edge.obj")
     _drop(window, mesh)
     assert "tip & edge.obj" in window.history.settings.written.text
     until(lambda: "Mesh" in type(window.session.scene.stimuli[0].what.rigid).__name__)
-    window.staging.play(scene_file("coin"))
+    window.scene_control.play(scene_file("coin"))
     assert window.opening.recent == [mesh, own]
     own.unlink()
     menu = window.actions_by_name["recent"].menu()

@@ -9,13 +9,13 @@ import pytest
 from kappaskin import Refusal, read_scene
 from kappaskin.scenes import scene_file
 from kappaskin_app.shell.background import Tasks
-from kappaskin_app.shell.loads import Memo, tried
+from kappaskin_app.shell.loads import Cache, compliance_or_refusal
 from kappaskin_app.shell.session import ScenePreparation
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.simulation import (
     plate_of,
     scene_of,
-    scene_or_why,
+    scene_or_refusal,
     with_consequences,
     written,
 )
@@ -48,10 +48,10 @@ def test_a_skin_is_computed_beside_and_as_it_would_be_here(
     assert not ahead.ready(settings)
     finish()
     assert ahead.ready(settings)
-    monkeypatch.setattr(tried, "_answer", None)  # it is known, not computed
+    monkeypatch.setattr(compliance_or_refusal, "_function", None)  # it is known, not computed
 
     here = plate_of(settings).compliance(scene_of(settings).basis)
-    assert np.array_equal(tried(*skin).values, here.values)
+    assert np.array_equal(compliance_or_refusal(*skin).values, here.values)
 
 
 def test_a_written_scene_is_read_beside_or_refused_in_the_same_words(
@@ -65,7 +65,7 @@ def test_a_written_scene_is_read_beside_or_refused_in_the_same_words(
         assert not ahead.ready(settings)
         finish()
         assert ahead.ready(settings)
-    monkeypatch.setattr(scene_or_why, "_answer", None)
+    monkeypatch.setattr(scene_or_refusal, "_function", None)
 
     with pytest.raises(Refusal) as here:
         read_scene(text, good.written.file)
@@ -99,7 +99,7 @@ def test_a_scene_is_made_here_when_the_process_dies(ahead: ScenePreparation, fin
 
 def test_a_memo_forgets_what_was_asked_for_longest_ago():
     asked: list[int] = []
-    memo = Memo(lambda n: asked.append(n) or n * n, 2)
+    memo = Cache(lambda n: asked.append(n) or n * n, 2)
 
     answers = [memo(n) for n in (1, 2, 1, 3, 1, 2)]
 

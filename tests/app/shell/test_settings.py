@@ -7,10 +7,10 @@ from kappaskin import Status
 from kappaskin.bases import EDGES
 from kappaskin_app.features.compare.panel import OtherForm
 from kappaskin_app.features.design.panel import DesignForm
-from kappaskin_app.shell.settings import SceneSettings, Settings, ask_of, part
-from kappaskin_app.shell.settings.asks import Choice, Range
+from kappaskin_app.shell.settings import SceneSettings, Settings, form_field, part
+from kappaskin_app.shell.settings.form_fields import Choice, Range
 
-ASKED = [f.name for f in fields(Settings) if "ask" in f.metadata]
+ASKED = [f.name for f in fields(Settings) if "form" in f.metadata]
 
 
 def test_every_setting_asked_for_stands_in_one_panel(panels) -> None:
@@ -22,7 +22,7 @@ def test_every_setting_asked_for_stands_in_one_panel(panels) -> None:
 
 @pytest.mark.parametrize("name", ASKED)
 def test_every_setting_explains_itself_and_starts_in_range(name: str) -> None:
-    how, default = ask_of(name), getattr(Settings(), name)
+    how, default = form_field(name), getattr(Settings(), name)
     assert how.label
     assert how.tip.endswith(".")
     if isinstance(how, Range):
@@ -33,7 +33,7 @@ def test_every_setting_explains_itself_and_starts_in_range(name: str) -> None:
 
 def test_every_edge_there_is_can_be_chosen_and_assumed() -> None:
     for name, before in (("edge", []), ("fit_edge", [""])):
-        how = ask_of(name)
+        how = form_field(name)
         assert isinstance(how, Choice)
         assert [value for value, _ in how.options] == [*before, *EDGES]
 
@@ -164,7 +164,7 @@ def test_a_skin_that_cannot_be_is_explained_until_it_can(panels) -> None:
     shape, status = panels.shape, Status()
     shape.show_refusal("too small a radius")
     shape.show_status(status, simulating=True)
-    assert shape.message.text() == "The last skin stays: too small a radius."
+    assert shape.message.text() == "The previous skin is still simulated: too small a radius."
     shape.show_status(status, simulating=False)
     assert "Only for the simulated skin" in shape.message.text()
     shape.show_refusal("")

@@ -154,7 +154,7 @@ def test_more_elements_than_can_be_scanned_in_time_are_scanned_slower() -> None:
         ({"shape": "cylinder", "base_radius": 0.005}, "larger base radius"),
         ({"edge": "glued"}, "expected an edge"),
         ({"side_y": 0.0}, "two sides above zero"),
-        ({"load_case": "point", "x": 0.2}, "got one that reaches over the rim"),
+        ({"load_case": "point", "x": 0.2}, "got one that extends over the rim"),
     ],
 )
 def test_a_skin_that_cannot_be_is_refused(changed: dict[str, object], why: str) -> None:
@@ -173,7 +173,7 @@ def test_choosing_a_shape_brings_its_size_and_choosing_the_first_again_all_of_it
     settings, first = Settings(), Settings()
     for shape in ("cylinder", "flat"):
         settings = replace(settings, **with_consequences(settings, load_scene(), "shape", shape))
-        for name, value in {**SHAPES[shape].asks, **SHAPES[shape].begins}.items():
+        for name, value in {**SHAPES[shape].lengths, **SHAPES[shape].defaults}.items():
             assert getattr(settings, name) == value
     assert (settings.force, settings.exaggeration) == (first.force, first.exaggeration)
     assert scene_of(settings).plate == load_scene().plate

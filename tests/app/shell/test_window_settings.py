@@ -179,7 +179,7 @@ def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
                 assert window.history.settings == now
                 window.history.stack.undo()
                 obeyed.add(editor.objectName())
-    asked = {f.name for f in fields(Settings) if "ask" in f.metadata}
+    asked = {f.name for f in fields(Settings) if "form" in f.metadata}
     hidden = {"rim_radius", "size", "size_y", "design_base_radius", "design_rim_radius"}
     hidden |= {"base_radius"} if shape == "flat" else set()
     assert asked - obeyed == hidden

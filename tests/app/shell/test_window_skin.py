@@ -87,7 +87,7 @@ def test_a_load_too_near_the_rim_is_warned_of_and_no_more_further_inside(
 
 def test_a_load_over_the_rim_is_explained_where_it_is_placed(window: MainWindow, until) -> None:
     window.history.change("Load", -1, load_case="disc", x=0.001)
-    until(lambda: "reaches over the rim" in window.load.message.text())
+    until(lambda: "extends over the rim" in window.load.message.text())
     window.history.stack.undo()
     until(lambda: not window.load.message.text())
 

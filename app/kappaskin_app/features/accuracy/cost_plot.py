@@ -1,4 +1,4 @@
-"""Error against time of every setting that was measured; a click on a point chooses it."""
+"""Plot of the RMS error against the computing time of each measured setting."""
 
 import math
 from collections.abc import Callable
@@ -8,26 +8,26 @@ from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen, QPol
 from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
 from kappaskin.studies import Cost
-from kappaskin_app.features.accuracy.costing import Frontier, in_words
+from kappaskin_app.features.accuracy.measurement import Frontier, setting_text
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
 from kappaskin_app.theme import current, series
 from kappaskin_app.widgets.plots import LogAxis
 from kappaskin_app.widgets.text import duration, length
 
 _TOP = 10.0
-_BESIDE = 28.0  # px left of the words of the legend
-_SIZE = 4.0  # px from a point's middle to its rim
-_NEAR = 10.0  # px from the mouse to the point that it means
-_APART = 10.0  # px between two written times
-_LONGEST = "0.005 mm"  # of the errors beside the axis
-_AXES = "RMS error (up), arithmetic in a frame"
+_LEGEND_MARGIN = 28.0  # px left of the text of the legend
+_SIZE = 4.0  # px, radius of a point
+_NEAR = 10.0  # px, largest distance of the mouse from a point
+_LABEL_GAP = 10.0  # px between two time labels
+_LONGEST = "0.005 mm"  # label of the error axis
+_AXES = "RMS error (up), computing time"
 _ROWS = len(METHOD_SHORT) + 5  # of the legend
 
 Point = tuple[float, float]
 
 
 class CostPlot(QWidget):
-    """Draws a `Frontier`: each method in its colour and shape, the present one ringed."""
+    """Draws a `Frontier`: a colour and marker per estimator, a ring around the one in use."""
 
     chosen = Signal(object)
 
@@ -53,9 +53,9 @@ class CostPlot(QWidget):
     def show_costs(
         self, frontier: Frontier, present: Cost | None, live: Point, empty: str = ""
     ) -> None:
-        """Draw what was measured, `present` ringed and a cross at `live`, error in m, time in s.
+        """Draw the costs, a ring at `present` and a cross at `live`, (error in m, time in s).
 
-        While there is nothing, `empty` is written.
+        The text `empty` is shown while there are no costs.
         """
         shown = (frontier, present, live, empty)
         if shown != (self.frontier, self._present, self._live, self._empty):
@@ -64,7 +64,7 @@ class CostPlot(QWidget):
             self._y = LogAxis.around([c.rms for c in frontier.costs] + [live[0]])
             self.update()
 
-    # Where things are.
+    # Layout
 
     @property
     def _area(self) -> QRectF:
@@ -74,11 +74,11 @@ class CostPlot(QWidget):
 
     @property
     def _legend(self) -> float:
-        """The px right of the plot."""
-        return _BESIDE + 8 + max(map(self.fontMetrics().horizontalAdvance, _SHORT.values()))
+        """Width of the legend in px."""
+        return _LEGEND_MARGIN + 8 + max(map(self.fontMetrics().horizontalAdvance, _SHORT.values()))
 
     def at(self, error: float, time: float) -> QPointF:
-        """Where an error in m at a time in s is drawn."""
+        """Position of an error in m at a time in s."""
         area = self._area
         return QPointF(
             area.left() + self._x.share(time) * area.width(),
@@ -89,15 +89,15 @@ class CostPlot(QWidget):
         return self.at(cost.rms, cost.time_per_frame)
 
     def _cost_at(self, place: QPointF) -> Cost | None:
-        """The point nearest to a place, of several the best."""
+        """The point nearest to a position; of several, the one of least error."""
         near = [
-            (round(away / 2), cost.rms, number)
+            (round(distance / 2), cost.rms, number)
             for number, cost in enumerate(self.frontier.costs)
-            if (away := _apart(self.place_of(cost), place)) <= _NEAR
+            if (distance := _distance(self.place_of(cost), place)) <= _NEAR
         ]
         return self.frontier.costs[min(near)[2]] if near else None
 
-    # What a person does.
+    # Mouse
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         under = self._cost_at(event.position())
@@ -110,7 +110,7 @@ class CostPlot(QWidget):
         if under is None:
             QToolTip.hideText()
         else:
-            QToolTip.showText(event.globalPosition().toPoint(), told(under), self)
+            QToolTip.showText(event.globalPosition().toPoint(), cost_text(under), self)
 
     def leaveEvent(self, event: QEvent) -> None:
         self._under = None
@@ -122,7 +122,7 @@ class CostPlot(QWidget):
         if cost is not None and event.button() == Qt.MouseButton.LeftButton:
             self.chosen.emit(cost)
 
-    # How it is drawn.
+    # Painting
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter, area, theme = QPainter(self), self._area, current()
@@ -152,7 +152,7 @@ class CostPlot(QWidget):
             width = painter.fontMetrics().horizontalAdvance(words) + 2.0
             left = max(min(x - width / 2, area.right() - width + 4), area.left())
             if written and left >= free:
-                free = left + width + _APART
+                free = left + width + _LABEL_GAP
                 painter.setPen(QColor(theme.faint))
                 painter.drawText(
                     QRectF(left, area.bottom() + 1, width, line), flags.AlignCenter, words
@@ -176,7 +176,7 @@ class CostPlot(QWidget):
         painter.drawRect(area)
 
     def _paint_frontier(self, painter: QPainter, area: QRectF) -> None:
-        """What can be had in a time, or less: a step down at each setting that nothing beats."""
+        """The least error within each time: a step down at each Pareto-optimal setting."""
         best = [self.place_of(cost) for cost in self.frontier.best]
         if not best:
             return
@@ -213,7 +213,7 @@ class CostPlot(QWidget):
 
     def _paint_legend(self, painter: QPainter, area: QRectF) -> None:
         theme, flags = current(), Qt.AlignmentFlag
-        left, width = area.right() + 10, self._legend - _BESIDE
+        left, width = area.right() + 10, self._legend - _LEGEND_MARGIN
         used = [m for m in _METHODS if any(c.setting.method == m for c in self.frontier.costs)]
         rows = [*used, "own", "other", "present", "live", "best"]
         line = min(painter.fontMetrics().height() + 3.0, (self.height() - 6.0) / len(rows))
@@ -238,33 +238,33 @@ class CostPlot(QWidget):
             painter.drawText(box, flags.AlignLeft | flags.AlignVCenter, words)
 
 
-def told(cost: Cost) -> str:
-    """A point in words."""
+def cost_text(cost: Cost) -> str:
+    """The tooltip of a point."""
     return (
-        f"{in_words(cost.setting, cost.count)}: RMS error {length(cost.rms)}, "
-        f"{length(cost.rms_exact)} without noise; {duration(cost.time_per_frame)} of arithmetic in "
-        f"a frame, {duration(cost.conversion_time)} to convert its {cost.channels} channels. Click "
-        "to use it."
+        f"{setting_text(cost.setting, cost.count)}: RMS error {length(cost.rms)}, "
+        f"{length(cost.rms_exact)} without noise; computing time {duration(cost.time_per_frame)} "
+        f"per frame, conversion time {duration(cost.conversion_time)} for {cost.channels} "
+        "channels. Click to use it."
     )
 
 
-def _apart(one: QPointF, other: QPointF) -> float:
+def _distance(one: QPointF, other: QPointF) -> float:
     return math.hypot(one.x() - other.x(), one.y() - other.y())
 
 
-def _tick(value: float, said: Callable[[float], str]) -> str:
-    """A round value without zeros that say nothing."""
-    number, unit = said(value).split()
+def _tick(value: float, formatted: Callable[[float], str]) -> str:
+    """A round value without trailing zeros."""
+    number, unit = formatted(value).split()
     return f"{float(number):g} {unit}"
 
 
 _METHODS = list(METHOD_SHORT)
 _SHORT = {
     **METHOD_SHORT,
-    "own": "filled: elements as now",
+    "own": "filled: own elements",
     "other": "open: other elements",
-    "present": "in use, as predicted",
-    "live": "in use, as measured",
+    "present": "in use, predicted",
+    "live": "in use, measured",
     "best": "best for its time",
 }
 

@@ -1,4 +1,4 @@
-"""What accuracy costs: asks which accuracy is wanted, shows what it takes and what is had."""
+"""Panel of the cost of accuracy: plot, setting in use, required accuracy."""
 
 import math
 
@@ -15,7 +15,12 @@ from PySide6.QtWidgets import (
 
 from kappaskin.studies import Cost, Refused
 from kappaskin_app.features.accuracy.cost_plot import CostPlot
-from kappaskin_app.features.accuracy.costing import Costing, Frontier, gives, in_words
+from kappaskin_app.features.accuracy.measurement import (
+    CostMeasurement,
+    Frontier,
+    performance,
+    setting_text,
+)
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.effects import EffectsTable
 from kappaskin_app.theme import ALERT, FAINT, follow_look, grown, slider_style
@@ -29,47 +34,47 @@ _WORDS, _EFFECTS = 350, 376  # px wide
 
 
 class CostPanel(QWidget):
-    """The plot, the setting in use in figures, and a slider that chooses the cheapest one.
+    """The plot, the figures of the setting in use, and a slider that selects the fastest setting.
 
-    Beside them is what each effect of the scene costs with the setting in use.
+    The table shows the cost of each effect of the scene with the setting in use.
     """
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.plot = CostPlot()
         self._make_figures()
-        self.wanted = QSlider(Qt.Orientation.Horizontal)
-        self.wanted.setObjectName("wanted")
-        self.wanted.setRange(0, _STEPS)
-        self.wanted.setPageStep(_STEPS // 10)
-        self.wanted.setToolTip(
-            "How large the RMS error of the shape may be. Letting go switches to the setting that "
-            "reaches it with the least arithmetic (Ctrl+Z undoes)."
+        self.required = QSlider(Qt.Orientation.Horizontal)
+        self.required.setObjectName("required-accuracy")
+        self.required.setRange(0, _STEPS)
+        self.required.setPageStep(_STEPS // 10)
+        self.required.setToolTip(
+            "Largest permissible RMS error of the shape. Releasing the slider selects the setting "
+            "that reaches it with the least computing time (Ctrl+Z undoes)."
         )
-        self.wanted_words = QLabel()
+        self.required_text = QLabel()
         self.cheapest = text_label()
         self.cheapest.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.again = button(
             "Measure",
             "measure",
-            "Measure every setting anew, on the skin, the load and the noise as they are now. It "
-            "runs beside the window, one setting after the other, while this panel is seen.",
+            "Measure all settings again, with the present skin, load and noise. The background "
+            "task measures one setting after the other while this panel is visible.",
         )
         self.bar = QProgressBar(textVisible=False)  # pyright: ignore[reportCallIssue]
         self.bar.setFixedHeight(8)
-        self.bar.setToolTip("Settings that are measured.")
+        self.bar.setToolTip("Measured settings.")
         self.count, self.message = QLabel(), text_label()
         self.effects, self.no_effects = EffectsTable(), text_label()
         self.no_effects.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.no_effects.setForegroundRole(FAINT)
         self.no_effects.hide()
         self._lay_out()
-        self._costing: Costing | None = None
+        self._measurement: CostMeasurement | None = None
         self._accuracy = math.nan
         self._axis, self._frontier = LogAxis(1e-5, 1e-4), Frontier()
         self._hint = None
-        self.wanted.valueChanged.connect(guarded(self._slid))
-        self.wanted.sliderReleased.connect(guarded(self._take))
+        self.required.valueChanged.connect(guarded(self._slid))
+        self.required.sliderReleased.connect(guarded(self._take))
         self.again.clicked.connect(guarded(self._measure))
         follow_look(self, self._dress)
 
@@ -91,9 +96,9 @@ class CostPanel(QWidget):
         grid = QGridLayout()
         grid.setVerticalSpacing(0)
         tips = {
-            "Predicted": "What this setting gave and took when it was measured beside the window.",
-            "Measured": "What the present frames give and take, over half a second; the error is "
-            "known only where a simulation knows the true shape.",
+            "Predicted": "RMS error and computing time from the measurement of this setting.",
+            "Measured": "Mean RMS error and median computing time of the frames of the last half "
+            "second; the error is known in simulations only.",
         }
         for row, (name, tip) in enumerate(tips.items()):
             label = QLabel(name)
@@ -105,22 +110,22 @@ class CostPanel(QWidget):
         grid.setColumnStretch(1, 2)
         grid.setColumnStretch(2, 3)
         right.addLayout(grid)
-        ask = QHBoxLayout()
-        label = QLabel("Accuracy &wanted")
-        label.setBuddy(self.wanted)
-        label.setToolTip(self.wanted.toolTip())
-        ask.addWidget(label)
-        ask.addWidget(self.wanted, 1)
-        ask.addWidget(self.wanted_words)
-        right.addLayout(ask)
+        accuracy = QHBoxLayout()
+        label = QLabel("Re&quired accuracy")
+        label.setBuddy(self.required)
+        label.setToolTip(self.required.toolTip())
+        accuracy.addWidget(label)
+        accuracy.addWidget(self.required, 1)
+        accuracy.addWidget(self.required_text)
+        right.addLayout(accuracy)
         right.addWidget(self.cheapest)
         right.addStretch(1)
         right.addWidget(self.message)
-        foot = QHBoxLayout()
-        foot.addWidget(self.again)
-        foot.addWidget(self.bar, 1)
-        foot.addWidget(self.count)
-        right.addLayout(foot)
+        bottom = QHBoxLayout()
+        bottom.addWidget(self.again)
+        bottom.addWidget(self.bar, 1)
+        bottom.addWidget(self.count)
+        right.addLayout(bottom)
         words = QWidget()
         words.setLayout(right)
         right.setContentsMargins(0, 0, 0, 0)
@@ -130,63 +135,63 @@ class CostPanel(QWidget):
         around.setSpacing(12)
         around.addWidget(self.plot, 1)
         around.addWidget(words)
-        self._side = self._beside()
-        around.addWidget(self._side)
+        self._effects_box = self._make_effects()
+        around.addWidget(self._effects_box)
 
-    def _beside(self) -> QWidget:
+    def _make_effects(self) -> QWidget:
         """The table of effects, with its title."""
-        title = QLabel("What each effect costs")
+        title = QLabel("Cost of each effect")
         bold = title.font()
         bold.setBold(True)
         title.setFont(bold)
         title.setToolTip(
-            "What spoils the readings of the scene: what it takes to simulate, and the RMS error "
-            "of the shape with it and without it, with the setting in use, all over the scene."
+            "Computing time of each effect on the readings, and the RMS error of the shape with "
+            "and without it, over the whole scene with the setting in use."
         )
-        beside = QWidget()
-        inside = QVBoxLayout(beside)
+        box = QWidget()
+        inside = QVBoxLayout(box)
         inside.setContentsMargins(0, 0, 0, 0)
         inside.setSpacing(4)
         inside.addWidget(title)
         inside.addWidget(self.effects, 1)
         inside.addWidget(self.no_effects, 1)
-        return beside
+        return box
 
-    def attend(self, costing: Costing) -> None:
-        """Show what `costing` measures, and pass on what the user requests."""
-        self._costing = costing
-        costing.changed.connect(guarded(self._show))
-        self.plot.chosen.connect(guarded(costing.choose))
+    def connect_to(self, measurement: CostMeasurement) -> None:
+        """Show the results of `measurement`, and pass on the requests of the user."""
+        self._measurement = measurement
+        measurement.changed.connect(guarded(self._show))
+        self.plot.chosen.connect(guarded(measurement.choose))
 
     def _dress(self) -> None:
         self._words.setFixedWidth(grown(_WORDS))
-        self._side.setFixedWidth(grown(_EFFECTS))
-        wide = self.wanted_words.fontMetrics().horizontalAdvance("0.000 mm")
-        self.wanted_words.setMinimumWidth(wide)
-        self.wanted.setStyleSheet(slider_style())
+        self._effects_box.setFixedWidth(grown(_EFFECTS))
+        wide = self.required_text.fontMetrics().horizontalAdvance("0.000 mm")
+        self.required_text.setMinimumWidth(wide)
+        self.required.setStyleSheet(slider_style())
 
-    # What a person asks.
+    # Requests
 
     def _measure(self, *_: object) -> None:
-        if self._costing is not None:
-            self._costing.measure()
+        if self._measurement is not None:
+            self._measurement.measure()
 
     def _slid(self, step: int) -> None:
         self._accuracy = self._axis.at(step / _STEPS)
-        self._show_wanted()
-        if not self.wanted.isSliderDown():
+        self._show_required()
+        if not self.required.isSliderDown():
             self._take()
 
     def _take(self) -> None:
         cost = self._frontier.cheapest(self._accuracy)
-        now = self._costing
+        now = self._measurement
         if now is not None and cost is not None:
             now.choose(cost)
 
-    # What is so.
+    # State
 
     def _show(self) -> None:
-        now = self._costing
+        now = self._measurement
         if now is None:
             return
         self._frontier, predicted = now.frontier(), now.predicted()
@@ -196,16 +201,16 @@ class CostPanel(QWidget):
         self.plot.show_costs(self._frontier, present, live, empty or self._why(now))
         self._show_figures(now, predicted, live)
         self._show_slider(present)
-        done, asked = now.progress
-        self.bar.setMaximum(max(asked, 1))
+        done, requested = now.progress
+        self.bar.setMaximum(max(requested, 1))
         self.bar.setValue(done)
         self.bar.setVisible(now.running)
-        self.count.setText(f"{done} of {asked}" if asked else "")
+        self.count.setText(f"{done} of {requested}" if requested else "")
         self._show_message(now, self._why(now))
         self._show_effects(now)
 
-    def _show_effects(self, now: Costing) -> None:
-        found, why = now.spoiling(), sentence(now.why_none())
+    def _show_effects(self, now: CostMeasurement) -> None:
+        found, why = now.effect_costs(), sentence(now.why_none())
         known = isinstance(found, tuple)
         self.effects.show_effects(found if known else ())
         self.effects.setVisible(not why)
@@ -213,14 +218,14 @@ class CostPanel(QWidget):
             self.no_effects.setText(why)
         self.no_effects.setVisible(bool(why))
 
-    def _why(self, now: Costing) -> str:
-        """What must be known of the points, or why there are none."""
+    def _why(self, now: CostMeasurement) -> str:
+        """A warning about the points, or why there are none."""
         if now.refusal:
             return sentence(now.refusal)
-        unlike = now.unlike()
-        return f"Measured {unlike}: measure again." if unlike else ""
+        difference = now.difference()
+        return f"Measured {difference}: measure again." if difference else ""
 
-    def _show_message(self, now: Costing, text: str) -> None:
+    def _show_message(self, now: CostMeasurement, text: str) -> None:
         hint = not text
         text = now.note() if hint else text
         if (text, hint) != (self.message.text(), self._hint):
@@ -230,40 +235,42 @@ class CostPanel(QWidget):
         self.message.setVisible(bool(text))
 
     def _show_figures(
-        self, now: Costing, predicted: Cost | Refused | None, live: tuple[float, float]
+        self, now: CostMeasurement, predicted: Cost | Refused | None, live: tuple[float, float]
     ) -> None:
         setting = now.present
         count = predicted.count if isinstance(predicted, Cost) else 0
-        self.setting.show_text(NONE if setting is None else in_words(setting, count))
+        self.setting.show_text(NONE if setting is None else setting_text(setting, count))
         known = isinstance(predicted, Cost)
         error, time = (predicted.rms, predicted.time_per_frame) if known else (math.nan, math.nan)
         for name, (e, t) in (("Predicted", (error, time)), ("Measured", live)):
             self.figures[name, "RMS error"].show_text(length(e))
-            said = f"in {duration(t)}" if math.isfinite(t) else NONE
-            self.figures[name, "time"].show_text(said)
+            text = f"in {duration(t)}" if math.isfinite(t) else NONE
+            self.figures[name, "time"].show_text(text)
 
     def _show_slider(self, present: Cost | None) -> None:
         best = self._frontier.best
-        self.wanted.setEnabled(len(best) > 0)
+        self.required.setEnabled(len(best) > 0)
         if not best:
-            self._accuracy = math.nan  # what was wanted of another skin says nothing of this one
-            self._show_wanted()
-        if not best or self.wanted.isSliderDown():
+            self._accuracy = math.nan  # a requirement for another skin does not apply
+            self._show_required()
+        if not best or self.required.isSliderDown():
             return
         errors = [cost.rms for cost in best]
         if not math.isfinite(self._accuracy) and present is not None:
             self._accuracy = present.rms
-        # A little more than the best one, or rounding would put it out of reach.
+        # A little more than the least error, which rounding could put out of reach.
         self._axis = LogAxis(1.002 * min(errors), 1.01 * max(*errors, 1.01 * min(errors)))
-        with QSignalBlocker(self.wanted):
-            self.wanted.setValue(round(_STEPS * self._axis.share(self._accuracy)))
-        self._show_wanted()
+        with QSignalBlocker(self.required):
+            self.required.setValue(round(_STEPS * self._axis.share(self._accuracy)))
+        self._show_required()
 
-    def _show_wanted(self) -> None:
+    def _show_required(self) -> None:
         cost = self._frontier.cheapest(self._accuracy)
         known = math.isfinite(self._accuracy)
-        self.wanted_words.setText(length(self._accuracy) if known else "")
+        self.required_text.setText(length(self._accuracy) if known else "")
         if cost is None:
-            self.cheapest.setText("Nothing that was measured reaches it." if known else "")
+            self.cheapest.setText("No measured setting reaches it." if known else "")
             return
-        self.cheapest.setText(f"Cheapest: {in_words(cost.setting, cost.count)}: {gives(cost)}")
+        self.cheapest.setText(
+            f"Fastest: {setting_text(cost.setting, cost.count)}: {performance(cost)}"
+        )

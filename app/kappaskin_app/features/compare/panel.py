@@ -1,4 +1,4 @@
-"""A against B: the same readings computed with two settings, side by side, with the difference."""
+"""Panel of the comparison of setups A and B: surfaces, difference, contact."""
 
 import math
 
@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 from kappaskin.bases import edges_of
 from kappaskin.live import PipelineStatus, Status
 from kappaskin.sensing import Sensor
-from kappaskin_app.features.compare.comparing import Comparing, Pair
+from kappaskin_app.features.compare.comparison import Comparison, Pair
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.colouring import SteadyRange
 from kappaskin_app.shell.form import Form
@@ -27,7 +27,7 @@ from kappaskin_app.widgets.layout import fit_rows, scrolled
 from kappaskin_app.widgets.parts import button, sentence, with_error
 from kappaskin_app.widgets.surface_map import SurfaceMap
 
-_ASKS = (
+_SETTINGS = (
     "other_x",
     "other_y",
     "other_method",
@@ -36,41 +36,41 @@ _ASKS = (
     "other_tared",
 )
 _COLUMNS = ("", "A", "B", "B \N{MINUS SIGN} A")
-_FIGURES = 408  # px wide, the table
+_TABLE_WIDTH = 408  # px
 _MICROMETRES, _MILLIMETRES = 1e6, 1e3
-_SURFACE = "Displacement of the skin, on the scale of A and B together; the cross is the contact."
-_DIFFERENCE = "B less A, in \N{MICRO SIGN}m on a scale of its own."
+_SURFACE = "Displacement of the skin, on a common scale of A and B; the cross is the contact."
+_DIFFERENCE = "B minus A in \N{MICRO SIGN}m, on its own scale."
 _TABLE = (
-    "Where the contact is, how hard and how deep, and the principal curvatures of the skin there. "
-    "Each with its standard deviation. That of the difference is as if A and B had nothing in "
-    "common; both are of the same readings, so that it is mostly smaller."
+    "Position, force and depth of the contact, and the principal curvatures of the skin there, "
+    "each with its standard deviation. That of the difference assumes that A and B are "
+    "independent; they use the same readings, so that it is mostly smaller."
 )
 
 
 class OtherForm(Form):
-    """Asks for the settings of B, and says why they were not taken."""
+    """The form of B, with the message of a refusal."""
 
-    purpose = "Other settings for the same readings, to hold against those in use (A)."
+    purpose = "A second setup for the same readings, to compare with the one in use (A)."
     guide_page = "accuracy"
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("B", _ASKS, parent)
-        self.swap = button("Swap A and B", "swap", "Let what is in use and B change places.")
+        super().__init__("B", _SETTINGS, parent)
+        self.swap = button("Swap A and B", "swap", "Exchange the setup in use and B.")
         self.body.addWidget(self.swap)
 
-    def show_told(self, told: PipelineStatus | None, sensor: Sensor | None) -> None:
+    def show_pipeline(self, status: PipelineStatus | None, sensor: Sensor | None) -> None:
         if sensor is not None:
             self.offer("other_edge", ("", *edges_of(sensor.layout.patch)))
-        if told is None:
+        if status is None:
             self.show_message("")
-        elif told.computing:
+        elif status.computing:
             self.show_message("Computing\N{HORIZONTAL ELLIPSIS}", hint=True)
         else:
-            self.show_message(sentence(told.refusal))
+            self.show_message(sentence(status.refusal))
 
 
 class ComparePanel(QWidget):
-    """The form of B, both surfaces, their difference, and what each says of the contact."""
+    """The form of B, both surfaces, their difference, and the contact readouts of both."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -80,7 +80,7 @@ class ComparePanel(QWidget):
             "b": SurfaceMap("B", "mm", _SURFACE),
             "difference": SurfaceMap("B \N{MINUS SIGN} A", "\N{MICRO SIGN}m", _DIFFERENCE),
         }
-        self._scale, self._apart = SteadyRange(0.01), SteadyRange(0.1)
+        self._scale, self._difference = SteadyRange(0.01), SteadyRange(0.1)
         self._status = Status()
         around = QHBoxLayout(self)
         around.setContentsMargins(8, 4, 8, 6)
@@ -90,12 +90,12 @@ class ComparePanel(QWidget):
             around.addWidget(view, 3)
         around.addWidget(self.table, 3)
         self._empty()
-        follow_look(self, lambda: self.table.setMinimumWidth(grown(_FIGURES)))
+        follow_look(self, lambda: self.table.setMinimumWidth(grown(_TABLE_WIDTH)))
 
     def _made_table(self) -> QTableWidget:
         table = QTableWidget(0, len(_COLUMNS))
         table.setObjectName("compared")
-        table.setAccessibleName("What A and B say of the contact")
+        table.setAccessibleName("Contact readouts of A and B")
         table.setToolTip(_TABLE)
         table.setHorizontalHeaderLabels(_COLUMNS)
         table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
@@ -107,20 +107,20 @@ class ComparePanel(QWidget):
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
         return table
 
-    def attend(self, comparing: Comparing) -> None:
-        """Show what `comparing` brings, and pass on what the user requests."""
-        comparing.compared.connect(guarded(self.show_pair))
-        self.form.swap.clicked.connect(guarded(lambda *_: comparing.swap()))
+    def connect_to(self, comparison: Comparison) -> None:
+        """Show the pairs of `comparison`, and pass on the requests of the user."""
+        comparison.compared.connect(guarded(self.show_pair))
+        self.form.swap.clicked.connect(guarded(lambda *_: comparison.swap()))
 
     def show_settings(self, settings: Settings) -> None:
         self.form.show_settings(settings)
 
     def show_status(self, status: Status, old: bool) -> None:
-        """Show how B is doing, and whether what is shown is `old`."""
+        """Show the status of B, and whether the values shown are `old`."""
         self._status = status
         if not self.isVisible():
             return
-        self.form.show_told(status.compared, status.sensor)
+        self.form.show_pipeline(status.compared, status.sensor)
         for view in self.maps.values():
             view.map.show_faded(old)
         if status.slot is None or status.compared is None or status.compared.slot is None:
@@ -138,7 +138,7 @@ class ComparePanel(QWidget):
         return (sensor.layout.patch.a, sensor.layout.patch.b) if sensor else (1.0, 1.0)
 
     def show_pair(self, pair: Pair) -> None:
-        """Show one frame as both have it."""
+        """Show one frame, computed with both setups."""
         if not self.isVisible():
             return
         a, b = _MILLIMETRES * pair.a.surface, _MILLIMETRES * pair.b.surface
@@ -154,23 +154,23 @@ class ComparePanel(QWidget):
         difference = pair.difference
         if difference is not None:
             difference = _MICROMETRES * difference
-            apart = self._apart.follow(_largest(difference), now)
+            limit = self._difference.follow(_largest(difference), now)
             self.maps["difference"].show_surface(
-                difference, (-apart, apart), DIVERGING, np.full(2, np.nan), self._sides
+                difference, (-limit, limit), DIVERGING, np.full(2, np.nan), self._sides
             )
         self._show_words(pair)
         self._show_figures(pair)
 
     def _show_words(self, pair: Pair) -> None:
-        beside = self._status.compared
-        setups = {"a": self._status.setup, "b": beside.setup if beside else None}
+        other = self._status.compared
+        setups = {"a": self._status.setup, "b": other.setup if other else None}
         for name, setup in setups.items():
             if setup is not None:
                 method = METHOD_SHORT.get(setup.method, setup.method)
                 self.maps[name].words.show_text(f"{setup.Ni} x {setup.Nj}, {method}")
         if (difference := pair.difference) is not None:
-            apart = _MICROMETRES * difference[np.isfinite(difference)]
-            rms = math.sqrt(float(np.mean(apart**2)))
+            micrometres = _MICROMETRES * difference[np.isfinite(difference)]
+            rms = math.sqrt(float(np.mean(micrometres**2)))
             self.maps["difference"].words.show_text(f"RMS {rms:.3g} \N{MICRO SIGN}m")
 
     def _show_figures(self, pair: Pair) -> None:

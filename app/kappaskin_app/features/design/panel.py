@@ -1,4 +1,4 @@
-"""Designs a sensor before it is built: sliders, and how sure it would be of the skin's shape."""
+"""Panel of the sensor design: form, predicted and simulated standard deviation."""
 
 import math
 
@@ -12,12 +12,12 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin.studies import Prospect
-from kappaskin_app.features.design.designing import Designing
+from kappaskin_app.features.design.prediction import DesignPrediction
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import Form, pass_window_keys
-from kappaskin_app.shell.settings import Settings, ask_of
-from kappaskin_app.shell.settings.asks import Range
-from kappaskin_app.shell.settings.designed import Designed
+from kappaskin_app.shell.settings import Settings, form_field
+from kappaskin_app.shell.settings.designed import DesignSettings
+from kappaskin_app.shell.settings.form_fields import Range
 from kappaskin_app.shell.settings.scene import SHAPES
 from kappaskin_app.theme import SEQUENTIAL
 from kappaskin_app.widgets.layout import row, scrolled
@@ -26,36 +26,37 @@ from kappaskin_app.widgets.plots import Curve, CurvePlot
 from kappaskin_app.widgets.surface_map import SurfaceMap
 from kappaskin_app.widgets.text import round_up
 
-_NAMES = tuple(field for field in Designed.__dataclass_fields__)
+_NAMES = tuple(field for field in DesignSettings.__dataclass_fields__)
 _LENGTHS = ("side_x", "side_y", "base_radius", "rim_radius")
 _STEPS = 200  # of a slider
-_FACTOR = 4  # steps of a slider that goes by factors, to the next number of two digits
-_WIDE = 50  # times as much at its end as at its beginning: it goes by factors
+_FACTOR = 4  # steps of a logarithmic slider, to the next number of two digits
+_WIDE = 50  # ratio of the ends of a range, beyond which its slider is logarithmic
 _MICRO = 1e6
 _PREDICTED = (
-    "Standard deviation of the displacement that noise alone leaves, from the covariance "
-    "s\N{SUPERSCRIPT TWO} (M'M)\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT ONE} of the fit: nothing is "
-    "simulated. Points are the elements."
+    "Standard deviation of the displacement due to noise, from the covariance "
+    "s\N{SUPERSCRIPT TWO} (M'M)\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT ONE} of the fit, without a "
+    "simulation. Points are the elements."
 )
-_SIMULATED = "The same, by simulating thousands of frames: what the displacement told varied by."
-_ALONG = "Along x through the middle of the skin, on the scale of both maps."
+_SIMULATED = "Standard deviation of the estimated displacement in thousands of simulated frames."
+_ALONG = "Standard deviation along x through the middle of the skin, on the scale of the maps."
 
 
 class DesignForm(Form):
-    """Asks for what is designed, each number with a slider."""
+    """The form of the design; each number has a slider."""
 
     purpose = (
-        "A sensor that is not built yet. How sure it would be follows at once from the covariance "
-        "s\u00b2 (M\u1d40M)\u207b\u00b9 of noise s and the fit's matrix M; nothing is simulated."
+        "A sensor before it is built. Its standard deviation follows from the covariance "
+        "s\u00b2 (M\u1d40M)\u207b\u00b9 with the noise s and the matrix M of the fit, without a "
+        "simulation."
     )
     guide_page = "build"
 
     def __init__(self, parent: QWidget | None = None) -> None:
         self.sliders: dict[str, QSlider] = {}
-        super().__init__("To be built", _NAMES, parent)
+        super().__init__("Design", _NAMES, parent)
 
     def field(self, name: str, editor: QWidget) -> QWidget:
-        how = ask_of(name)
+        how = form_field(name)
         if not isinstance(how, Range):
             return editor
         slider = self.sliders[name] = QSlider(Qt.Orientation.Horizontal)
@@ -63,52 +64,56 @@ class DesignForm(Form):
         slider.setAccessibleName(f"{how.label}, slider")
         slider.setToolTip(editor.toolTip())
         slider.setRange(0, _STEPS)
-        # With an arrow key it must come to another value, or it would stand still.
-        step = _FACTOR if _wide(how) else math.ceil(_STEPS * how.step / (how.most - how.least))
+        # An arrow key must reach another value, or the slider would not move.
+        step = (
+            _FACTOR if _logarithmic(how) else math.ceil(_STEPS * how.step / (how.most - how.least))
+        )
         slider.setSingleStep(step)
         slider.setPageStep(4 * step)
         pass_window_keys(slider)
         slider.setMinimumWidth(70)
-        slider.valueChanged.connect(guarded(lambda at: self.requested.emit(name, _meant(at, how))))
+        slider.valueChanged.connect(
+            guarded(lambda at: self.requested.emit(name, _value_at(at, how)))
+        )
         return row(slider, editor)
 
     def show_settings(self, settings: Settings) -> None:
         super().show_settings(settings)
         for name, slider in self.sliders.items():
-            how = ask_of(name)
+            how = form_field(name)
             if isinstance(how, Range):
                 with QSignalBlocker(slider):
                     slider.setValue(_place(getattr(settings, name), how))
-        asks = SHAPES[settings.design_shape].asks
+        lengths = SHAPES[settings.design_shape].lengths
         for length in _LENGTHS:
             editor = self.editor(f"design_{length}").parentWidget()
             if editor is not None:
-                self.form.setRowVisible(editor, length in asks)
+                self.form.setRowVisible(editor, length in lengths)
 
 
-def _wide(how: Range) -> bool:
-    """Whether a range is so wide that its slider goes by factors."""
+def _logarithmic(how: Range) -> bool:
+    """Whether the slider of a range is logarithmic."""
     return how.least > 0 and how.most / how.least > _WIDE
 
 
-def _meant(at: int, how: Range) -> float:
-    """The value, in SI units, that a slider means: with two digits, or a whole number of steps."""
+def _value_at(at: int, how: Range) -> float:
+    """The value of a slider in SI units, rounded to two digits or to a whole number of steps."""
     share = at / _STEPS
-    if _wide(how):
+    if _logarithmic(how):
         return float(f"{how.least * (how.most / how.least) ** share:.2g}")
     value = how.least + round((how.most - how.least) * share / how.step) * how.step
     return int(value) if isinstance(how.step, int) else value
 
 
 def _place(value: float, how: Range) -> int:
-    """Where the slider of a value stands."""
-    if _wide(how):
+    """The position of the slider at a value."""
+    if _logarithmic(how):
         return round(_STEPS * math.log(value / how.least) / math.log(how.most / how.least))
     return round(_STEPS * (value - how.least) / (how.most - how.least))
 
 
 class DesignPanel(QWidget):
-    """The form, what is predicted, what a simulation makes of it, and both along the middle."""
+    """The form, the predicted and the simulated standard deviation, and both along the middle."""
 
     save_wanted = Signal()
 
@@ -122,16 +127,16 @@ class DesignPanel(QWidget):
         self.simulate = button(
             "Check by simulation",
             "check-design",
-            "Simulate up to 5000 frames of the design, with a point that presses in the middle, "
-            "and lay what comes of it over the prediction. Again to end it.",
+            "Simulate up to 5000 frames of the design with a point load in the middle, and compare "
+            "them with the prediction. Click again to stop.",
         )
         self.save = button(
             f"Save as a scene{ELLIPSIS}",
             "save-design",
-            "Write the design into a file that can be played, edited and studied.",
+            "Write the design into a scene file, which can be simulated, edited and studied.",
         )
         self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self._designing: Designing | None = None
+        self._prediction: DesignPrediction | None = None
         self._lay_out()
 
     def _lay_out(self) -> None:
@@ -146,11 +151,11 @@ class DesignPanel(QWidget):
         right.addWidget(row(self.simulate, self.save))
         around.addLayout(right, 3)
 
-    def attend(self, designing: Designing) -> None:
-        """Show what `designing` brings, and pass on what the user requests."""
-        self._designing = designing
-        designing.changed.connect(guarded(self._show))
-        self.simulate.clicked.connect(guarded(lambda *_: designing.simulate()))
+    def connect_to(self, prediction: DesignPrediction) -> None:
+        """Show the results of `prediction`, and pass on the requests of the user."""
+        self._prediction = prediction
+        prediction.changed.connect(guarded(self._show))
+        self.simulate.clicked.connect(guarded(lambda *_: prediction.simulate()))
         self.save.clicked.connect(guarded(lambda *_: self.save_wanted.emit()))
         self._show()
 
@@ -158,13 +163,13 @@ class DesignPanel(QWidget):
         self.form.show_settings(settings)
 
     def _show(self) -> None:
-        designing = self._designing
-        if designing is None:
+        prediction = self._prediction
+        if prediction is None:
             return
-        busy, found = designing.predicting, designing.prospect
+        busy, found = prediction.predicting, prediction.prospect
         ready = found is not None and not busy
         self.simulate.setEnabled(ready)
-        self.simulate.setText("End the check" if designing.checking else "Check by simulation")
+        self.simulate.setText("Stop the check" if prediction.checking else "Check by simulation")
         self.save.setEnabled(ready)
         for view in (self.predicted, self.simulated):
             view.map.show_faded(busy)
@@ -172,10 +177,10 @@ class DesignPanel(QWidget):
         self._show_words(found)
 
     def _show_maps(self, found: Prospect | None) -> None:
-        check = self._designing.check if self._designing else None
+        check = self._prediction.check if self._prediction else None
         sides = (1.0, 1.0) if found is None else (float(found.x[-1]), float(found.y[-1]))
-        seen = [each.sd for each in (found, check) if each is not None]
-        limit = round_up(max((_MICRO * float(np.nanmax(sd)) for sd in seen), default=0.0)) or 1.0
+        shown = [each.sd for each in (found, check) if each is not None]
+        limit = round_up(max((_MICRO * float(np.nanmax(sd)) for sd in shown), default=0.0)) or 1.0
         curves = list[Curve]()
         for number, (view, source, name) in enumerate(
             ((self.predicted, found, "predicted"), (self.simulated, check, "simulated"))
@@ -190,27 +195,27 @@ class DesignPanel(QWidget):
         self.along.show_curves(x, curves, span, "mm", "No design yet.")
 
     def _show_words(self, found: Prospect | None) -> None:
-        check = self._designing.check if self._designing else None
-        self.predicted.words.show_text("" if found is None else f"RMS {_told(found.rms)}")
+        check = self._prediction.check if self._prediction else None
+        self.predicted.words.show_text("" if found is None else f"RMS {_micrometres(found.rms)}")
         frames = "Not simulated yet" if check is None else f"{check.frames} frames"
         self.simulated.words.show_text(frames)
         if found is None:
-            computing = self._designing is not None and self._designing.predicting
-            why = self._designing.refusal if self._designing else ""
+            computing = self._prediction is not None and self._prediction.predicting
+            why = self._prediction.refusal if self._prediction else ""
             self.words.setText(f"Computing{ELLIPSIS}" if computing else sentence(why))
             return
         words = [
-            f"{len(found.positions)} elements, {found.rate:.0f} frames/s. Noise alone: "
-            f"{_told(found.rms)} RMS over the skin, {_told(found.worst)} at worst."
+            f"{len(found.positions)} elements, {found.rate:.0f} frames/s. Due to noise: "
+            f"{_micrometres(found.rms)} RMS over the skin, {_micrometres(found.worst)} at worst."
         ]
         if check is not None:
             ratio = check.rms_sd / found.rms
             words.append(
-                f"Simulated: {ratio:.3f} times as predicted. With what the functions cannot follow "
-                f"of a point in the middle, {_told(check.rms)} RMS."
+                f"Simulated: {ratio:.3f} times the prediction. With the error of the basis under a "
+                f"point load in the middle: {_micrometres(check.rms)} RMS."
             )
         self.words.setText("\n".join(words))
 
 
-def _told(metres: float) -> str:
+def _micrometres(metres: float) -> str:
     return f"{_MICRO * metres:.3g} \N{MICRO SIGN}m"

@@ -1,4 +1,4 @@
-"""The estimator: method and basis."""
+"""Panel of the estimator and its basis."""
 
 from PySide6.QtWidgets import QWidget
 
@@ -18,11 +18,11 @@ class EstimatorFeature:
 
 
 class BasisPanel(Form):
-    """Asks for Ni x Nj and the edge, and says why a choice was not taken."""
+    """The form of the basis, the estimator and the boundary condition."""
 
     purpose = (
-        "The functions that the shape is made of, w(x, y) = \u03a3 c\u1d62\u2c7c "
-        "\u03c6\u1d62\u2c7c(x, y), and how their coefficients c are found from the curvatures read."
+        "The basis functions of the shape, w(x, y) = \u03a3 c\u1d62\u2c7c "
+        "\u03c6\u1d62\u2c7c(x, y), and the estimator of their coefficients c from the curvatures."
     )
     guide_page = "accuracy"
 

@@ -12,7 +12,7 @@ from kappaskin.live import Status
 from kappaskin.pipeline import Reported, getters
 from kappaskin_app.features.lessons.expression import NUMBER, WORD
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings.asks import Choice, Several, Text
+from kappaskin_app.shell.settings.form_fields import Choice, Several, Text
 
 _RECENT = 24  # estimates of which the median is taken: one alone jumps with the noise
 
@@ -69,9 +69,9 @@ def _kind_of(how: object) -> str:
 
 
 SETTINGS = {
-    field.name: _kind_of(field.metadata["ask"])
+    field.name: _kind_of(field.metadata["form"])
     for field in fields(Settings)
-    if "ask" in field.metadata and not isinstance(field.metadata["ask"], Several)
+    if "form" in field.metadata and not isinstance(field.metadata["form"], Several)
 }
 KINDS = dict.fromkeys((*OF_AN_ESTIMATE, *OF_THE_STATUS, *OF_FEATURES), NUMBER) | SETTINGS
 """Every name that an expression may have, with whether it is a number or a word."""

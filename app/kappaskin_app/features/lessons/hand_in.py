@@ -10,8 +10,8 @@ from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from kappaskin_app.features.lessons.lesson_file import SETTABLE
 from kappaskin_app.features.lessons.progress import Progress
-from kappaskin_app.shell.settings import Settings, ask_of
-from kappaskin_app.shell.settings.asks import Choice, Range, Several, Switch
+from kappaskin_app.shell.settings import Settings, form_field
+from kappaskin_app.shell.settings.form_fields import Choice, Range, Several, Switch
 from kappaskin_app.theme import LIGHT, palette
 
 _WIDTH, _MARGIN = 1000, 24  # px
@@ -21,7 +21,7 @@ def changed(settings: Settings) -> Iterator[str]:
     """Each setting that is not the default, as text."""
     usual = Settings()
     for name in (one for one in vars(usual) if one in SETTABLE):
-        value, how = getattr(settings, name), ask_of(name)
+        value, how = getattr(settings, name), form_field(name)
         if value == getattr(usual, name):
             continue
         text = name.replace("_", " ")

@@ -125,4 +125,4 @@ def whole(sets: Mapping[str, Any]) -> dict[str, Any]:
     shape = SHAPES[values.get("shape", "flat")]
     scene = values.pop("scene", "")
     played = {"written": written(scene_file(scene))} if scene else {}
-    return _PLAIN | {**shape.asks, **shape.begins} | played | values
+    return _PLAIN | {**shape.lengths, **shape.defaults} | played | values

@@ -24,8 +24,8 @@ from kappaskin_app.features.lessons.lesson import (
     Question,
     Step,
 )
-from kappaskin_app.shell.settings import SceneSettings, Settings, ask_of
-from kappaskin_app.shell.settings.asks import Ask, Choice, Range, Several, Switch
+from kappaskin_app.shell.settings import SceneSettings, Settings, form_field
+from kappaskin_app.shell.settings.form_fields import Choice, FormField, Range, Several, Switch
 from kappaskin_app.shell.settings.scene import Scanning
 from kappaskin_app.shell.settings.shown import EstimatorSettings, View
 
@@ -36,7 +36,7 @@ SETTABLE = {
     field.name
     for kind in _KINDS
     for field in fields(kind)
-    if "ask" in field.metadata and field.name not in _OWN
+    if "form" in field.metadata and field.name not in _OWN
 }
 """Settings that a lesson may set, besides lists of elements; none sends data."""
 
@@ -47,7 +47,7 @@ def checked_setting(name: str, value: Any) -> Any:
         return _elements(name, value)
     if name not in SETTABLE:
         raise Refusal(f"expected the name of a setting, got {name!r}; the guide lists them")
-    how = ask_of(name)
+    how = form_field(name)
     if isinstance(how, Range):
         return _checked_number(name, how, value)
     if isinstance(how, Several):
@@ -58,7 +58,7 @@ def checked_setting(name: str, value: Any) -> Any:
     return value
 
 
-def _is_one(how: Ask, value: Any) -> bool:
+def _is_one(how: FormField, value: Any) -> bool:
     if isinstance(how, Choice):
         return value in [one for one, _ in how.options]
     return isinstance(how, Switch) and isinstance(value, bool)

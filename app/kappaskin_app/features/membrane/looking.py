@@ -15,7 +15,7 @@ from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.requests import Requests
-from kappaskin_app.shell.settings import ask_of
+from kappaskin_app.shell.settings import form_field
 from kappaskin_app.shell.settings.shown import COLOURS
 
 
@@ -82,7 +82,7 @@ class Looking:
         add("lower", _MENU, "Draw &lower", partial(self.exaggerate, -1), "Ctrl+-", _LOWER)
         for name, words, key in _TOGGLES:
             toggle = partial(requests.toggle, f"show_{name}")
-            tip = ask_of(f"show_{name}").tip
+            tip = form_field(f"show_{name}").tip
             add(name, _MENU, f"Show or hide {words}", toggle, key, tip)
         camera = self._look("Reset camera", "left")
         add("camera", _MENU, "Reset &camera", camera, "Ctrl+R", _CAMERA)

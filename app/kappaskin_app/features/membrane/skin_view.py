@@ -15,7 +15,7 @@ from kappaskin_app.features.membrane.overlays import Overlaying
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.colouring import SHADES, locked_at
 from kappaskin_app.shell.display import Display, Shown, of_row
-from kappaskin_app.shell.loads import touches_at
+from kappaskin_app.shell.loads import loads_at
 from kappaskin_app.shell.selection import Selection
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
@@ -161,5 +161,5 @@ class SkinView(QObject):
     def _show_loads(self, estimate: Estimate) -> None:
         session = self._session
         at = session.status.playing.time(estimate.device_time)
-        touches = touches_at(session.scene, at) if session.inside else ()
+        touches = loads_at(session.scene, at) if session.inside else ()
         self.membrane.show_loads([touch.load for touch in touches])

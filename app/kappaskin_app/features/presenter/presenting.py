@@ -20,7 +20,7 @@ from kappaskin_app.shell.badge import GAP, SIM, origin
 from kappaskin_app.shell.centre import ActionBanner
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.docks import drawn_once
-from kappaskin_app.shell.loads import may_choose, touches_at
+from kappaskin_app.shell.loads import loads_at, object_replaceable
 from kappaskin_app.shell.selection import LoadHandle
 from kappaskin_app.shell.session import Session
 
@@ -171,7 +171,7 @@ class Presenting(QObject):
         """Show where the simulated hand is, if there is one."""
         session = self._session
         scene, inside = session.scene, session.inside and origin(session.badge()) == SIM
-        there = touches_at(scene, session.time) if inside else []
+        there = loads_at(scene, session.time) if inside else []
         self.stage.show_operating(bool(there) or (inside and self.stage.operator.pad.holding))
         if there:
             load = there[0].load
@@ -180,7 +180,7 @@ class Presenting(QObject):
             self.stage.operator.show_hand(Hand(x, y, load.force), session.refusal)
             things = [number for number, thing in enumerate(THINGS) if thing.is_in(scene)]
             self.stage.operator.show_choice(
-                may_choose(scene) and not session.refusal, (things or [-1])[0]
+                object_replaceable(scene) and not session.refusal, (things or [-1])[0]
             )
 
     def _choose(self, number: int) -> None:

@@ -20,7 +20,7 @@ from kappaskin_app.shell.folders import recordings_folder, repairing
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import RECORDED, Session
 from kappaskin_app.shell.settings import EstimatorSettings
-from kappaskin_app.shell.settings.asks import settings_from
+from kappaskin_app.shell.settings.form_fields import settings_from
 from kappaskin_app.widgets.text import day
 
 FILES = "Recording (*.mcap *.mcap.part)"

@@ -1,4 +1,4 @@
-"""Scenes and loads as a person changes them: played, written, forced, dragged."""
+"""Edits of scenes and loads, as commands of the history."""
 
 import math
 from collections.abc import Mapping
@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from kappaskin.mechanics import Load
-from kappaskin_app.features.scene.scene_text import forced, instead, pressed, shifted
+from kappaskin_app.features.scene.scene_text import forced, replaced, scaled, shifted
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.effects import called
+from kappaskin_app.shell.effects import effect_name
 from kappaskin_app.shell.history import History
-from kappaskin_app.shell.loads import GrabbedStimulus, dragged, most_times
+from kappaskin_app.shell.loads import GrabbedStimulus, dragged, largest_factor
 from kappaskin_app.shell.selection import LoadHandle
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings.scene import Written
@@ -19,7 +19,7 @@ from kappaskin_app.shell.simulation import OWN, text_of
 
 
 class SceneEditing:
-    """Turns what a person does to the scene into commands of the history."""
+    """Turns the user's edits of the scene into commands of the history."""
 
     def __init__(self, history: History, session: Session, load: LoadHandle) -> None:
         self._history, self._session = history, session
@@ -32,74 +32,74 @@ class SceneEditing:
         load.dragged.connect(guarded(self.drag))
         load.pressed.connect(guarded(self.press))
         load.released.connect(guarded(self.release))
-        load.given_up.connect(guarded(self.give_up))
-        load.replaced.connect(guarded(self.touch_with))
+        load.given_up.connect(guarded(self.cancel))
+        load.replaced.connect(guarded(self.replace_object))
 
-    # Scenes as they are written.
+    # Scene texts
 
     def play(self, written: Written) -> None:
-        """Play a scene that is written, from its beginning."""
+        """Simulate the scene of a text, from its beginning."""
         self._session.begin(written)
 
     def write(self, text: str) -> None:
-        """Play what was written instead of the scene so far; a row of keys is one step to undo."""
-        if (written := self._written_anew(text)) is not None:
+        """Simulate the edited text; consecutive keys are one undo step."""
+        if (written := self._edited(text)) is not None:
             self._history.request("written", written=written)
 
-    def _written_anew(self, text: str) -> Written | None:
-        """The scene with another text; None where it has this one."""
+    def _edited(self, text: str) -> Written | None:
+        """The scene with another text; None if the text is the same."""
         now = self._history.settings.written
         if now is not None and text == now.text:
             return None
         return Written(text, OWN if now is None else now.file)
 
     def save(self, file: Path) -> None:
-        """Write the scene into a file, beside which it is from now on; an `OSError` may come."""
+        """Write the scene to a file, which becomes its file; may raise `OSError`."""
         settings = self._history.settings
         file.write_text(text_of(settings), encoding="utf-8")
         if settings.written is not None:
             self._history.change("Save the scene", -1, written=replace(settings.written, file=file))
 
     def force(self, effect: str, how: str) -> None:
-        """Force an effect on or off, or leave it to the plan; refused where the text is no TOML."""
-        written = self._written_anew(forced(text_of(self._history.settings), effect, how))
+        """Force an effect on or off, or by plan; raises `Refusal` for a text that is no TOML."""
+        written = self._edited(forced(text_of(self._history.settings), effect, how))
         if written is not None:
-            self._history.change(f"Force {called(effect).lower()}", -1, written=written)
+            self._history.change(f"Force {effect_name(effect).lower()}", -1, written=written)
 
-    def touch_with(self, said: Mapping[str, Any], x: float, y: float, force: float) -> None:
-        """Let the object that is `said` touch instead of what does, at its place, as hard."""
-        written = self._written_anew(
-            instead(
+    def replace_object(self, table: Mapping[str, Any], x: float, y: float, force: float) -> None:
+        """Replace the object by that of the TOML `table`, at (x, y) in m with `force` in N."""
+        written = self._edited(
+            replaced(
                 text_of(self._history.settings),
                 0,
-                {**said, "x": round(x, 6), "y": round(y, 6), "force": float(f"{force:.4g}")},
+                {**table, "x": round(x, 6), "y": round(y, 6), "force": float(f"{force:.4g}")},
             )
         )
         if written is not None:
-            self._history.change("Choose what touches", -1, written=written)
+            self._history.change("Select the object", -1, written=written)
 
-    # Loads that are dragged.
+    # Dragged loads
 
     def grab(self, x: float, y: float) -> None:
-        """Take hold of the load at (x, y) in m: what is dragged until it is let go is one step."""
+        """Grab the load at (x, y) in m; the changes until its release are one undo step."""
         settings, session = self._history.settings, self._session
         second = math.dist((x, y), (settings.x_end, settings.y_end))
         self._grabbed_end = second < math.dist((x, y), (settings.x, settings.y))
         self._gesture, self._grabbed_in = self._history.new_gesture(), settings.written
-        # What is seen is in it: no other scene stays, nor does until this one is made.
+        # Only where the displayed scene is that of the text.
         writes = settings.written is not None and not (session.refusal or session.making)
         self._held = GrabbedStimulus.at_place(session.scene, session.time, x, y) if writes else None
         self._grabbed_load = session.scene.loads[0] if session.scene.loads else None
         self._place = x, y
 
     @property
-    def _there(self) -> bool:
-        """Whether what was grabbed still is: it was not undone, nor another scene chosen."""
+    def _exists(self) -> bool:
+        """Whether the grabbed load still exists."""
         return self._history.settings.written == self._grabbed_in
 
     def drag(self, x: float, y: float) -> None:
         settings, scene = self._history.settings, self._session.scene
-        if not self._there:
+        if not self._exists:
             return
         if self._held is not None:
             self._session.move(self._held.moved_to(x, y))
@@ -109,30 +109,32 @@ class SceneEditing:
             self._history.change("Drag the load", self._gesture, **moved)
 
     def press(self, times: float) -> None:
-        """Let what was grabbed press so many `times` as hard as it did then."""
+        """Set the grabbed load to `times` its force at the start."""
         settings, scene = self._history.settings, self._session.scene
-        if not self._there:
+        if not self._exists:
             return
         if self._held is not None:
             self._session.move(self._held.pressed(times))
         elif settings.written is None and self._grabbed_load is not None:
-            times = min(times, max(most_times(scene, self._grabbed_load), 1.0))
+            times = min(times, max(largest_factor(scene, self._grabbed_load), 1.0))
             moved = dragged(settings, scene, *self._place, self._grabbed_end)
-            # Two points share their force.
+            # Two point loads share the force.
             whole = self._grabbed_load.force * max(len(scene.loads), 1)
-            self._history.change("Press harder", self._gesture, **moved | {"force": whole * times})
+            self._history.change(
+                "Change the force", self._gesture, **moved | {"force": whole * times}
+            )
 
     def release(self) -> None:
         held, written = self._held, self._history.settings.written
         self._gesture, self._held = -1, None
-        if self._there and held is not None and written is not None and held.moved:
+        if self._exists and held is not None and written is not None and held.moved:
             text = shifted(written.text, held.number, *held.by)
-            text = pressed(text, held.number, held.times) if held.times != 1 else text
+            text = scaled(text, held.number, held.times) if held.times != 1 else text
             self._history.change("Drag the load", -1, written=replace(written, text=text))
 
-    def give_up(self) -> None:
-        """Put the load back to where it was grabbed."""
-        if self._held is not None and self._there:
+    def cancel(self) -> None:
+        """Return the load to where it was grabbed."""
+        if self._held is not None and self._exists:
             self._session.move(self._held.scene)
         elif self._held is None:
             self._history.cancel(self._gesture)

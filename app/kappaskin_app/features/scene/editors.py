@@ -29,19 +29,19 @@ _DIGITS = 6  # of a number that are shown
 
 
 def shown(value: float, unit: Unit) -> str:
-    """A value in the unit that it is shown in, with as few digits as it needs."""
+    """A value in its display unit, with as few digits as it needs."""
     text = f"{value / unit.scale:.{_DIGITS}g}"
     plain = f"{Decimal(text):f}" if "e" in text else text
     return "0" if float(plain) == 0 else plain
 
 
-def meant(number: float, unit: Unit) -> float:
-    """The value that a number shown stands for, without the rounding of its scale."""
+def value_of(number: float, unit: Unit) -> float:
+    """The value of a displayed number, without the rounding error of its scale."""
     return float(f"{number * unit.scale:.10g}")
 
 
 def read_numbers(text: str, before: list[Any], unit: Unit, whole: bool) -> list[Any]:
-    """The numbers of a text; those that read as before are as before, to the last digit."""
+    """The numbers of a text; unchanged ones keep all their digits."""
     befores = [*before, *([None] * len(text))]
     found = list[Any]()
     for word, old in zip(filter(None, re.split(r"[,;\s]+", text)), befores, strict=False):
@@ -49,14 +49,14 @@ def read_numbers(text: str, before: list[Any], unit: Unit, whole: bool) -> list[
             found.append(old)
         else:
             number = float(word)
-            found.append(int(number) if whole and number.is_integer() else meant(number, unit))
+            found.append(int(number) if whole and number.is_integer() else value_of(number, unit))
     if not all(map(math.isfinite, found)):
         raise ValueError("expected finite numbers")
     return found
 
 
 class NumberBox(RealBox):
-    """A number with as few digits as it needs, whose steps are as large as it is."""
+    """A number box with as few digits as needed and steps in proportion to the value."""
 
     def __init__(self, key: Key, usual: Any) -> None:
         super().__init__()
@@ -68,7 +68,7 @@ class NumberBox(RealBox):
         self.setRange(*(min(max(end / unit.scale, -MOST), MOST) for end in key.bounds))
 
     def show_value(self, value: float) -> None:
-        """Show a value, in the unit that it is asked for in; one out of the range as well."""
+        """Show a value in its display unit; a value outside the range extends the range."""
         at = float(shown(value, self._unit))
         self.setRange(min(self.minimum(), at), max(self.maximum(), at))
         self.setValue(at)
@@ -78,7 +78,7 @@ class NumberBox(RealBox):
 
     def stepBy(self, steps: int) -> None:
         value = self.value()
-        # Seen from where it goes: below 10 steps are those of 9.
+        # By the direction of the step: below 10 the steps are those of 9.
         size = abs(value) * (1 - 1e-9 * math.copysign(1, -value * steps))
         step = max(_tenth(size), self._step / 10) if value else self._step
         self.setValue(float(f"{value + steps * step:.10g}"))
@@ -89,7 +89,7 @@ def _tenth(size: float) -> float:
 
 
 class WholeNumberBox(WholeBox):
-    """A whole number."""
+    """A box for a whole number."""
 
     def __init__(self, key: Key) -> None:
         super().__init__()
@@ -97,12 +97,12 @@ class WholeNumberBox(WholeBox):
         self.setRange(int(low), int(high))
 
     def show_value(self, value: int) -> None:
-        """Show a value; one out of the range as well."""
+        """Show a value; a value outside the range extends the range."""
         self.setRange(min(self.minimum(), value), max(self.maximum(), value))
         self.setValue(value)
 
 
-_WIDEST = 300  # px of an editor that is no line of text
+_WIDEST = 300  # px of an editor, except lines of text
 _TYPED = QRegularExpression(r"[-+0-9.eE,; ]*")
 
 Report = Callable[[Any], None]
@@ -110,9 +110,9 @@ Report = Callable[[Any], None]
 
 @dataclass
 class Editor:
-    """A widget with how to show a value in it; `value` is the one it shows.
+    """A widget, the function that fills it, and the `value` shown.
 
-    It is made of several widgets if `parts` are given.
+    It consists of several widgets if `parts` are given.
     """
 
     widget: QWidget
@@ -122,18 +122,18 @@ class Editor:
 
     @property
     def stops(self) -> tuple[QWidget, ...]:
-        """What takes the keyboard, one after the other."""
+        """The widgets that take the keyboard focus, in order."""
         return self.parts or (self.widget,)
 
     def show(self, value: Any) -> None:
-        """Show another value; the same one leaves alone what is being typed."""
+        """Show a value; the present one does not change a text that is being typed."""
         if value != self.value or type(value) is not type(self.value):
             self.value = value
             self.fill(value)
 
 
 def editor_for(row: Row, report: Report, small: bool = False) -> Editor:
-    """An editor that tells `report` of each value that a person gives it."""
+    """An editor that calls `report` with each value entered by the user."""
     count, _, kind = row.kind.rpartition(" ")
     if count:
         editor = _several(row, kind, int(count), report, small)
@@ -141,7 +141,7 @@ def editor_for(row: Row, report: Report, small: bool = False) -> Editor:
         editor = _MAKERS[kind](row, report)
     else:
         editor = _spin(row, kind, row.usual, report, small)
-    tip = row.key.explained + (" Pairs stand with ; in between." if kind == "pairs" else "")
+    tip = row.key.explained + (" Separate pairs by semicolons." if kind == "pairs" else "")
     for widget in editor.stops:
         pass_window_keys(widget)
         widget.setToolTip(tip)
@@ -160,7 +160,7 @@ def _spin(row: Row, kind: str, usual: Any, report: Report, small: bool) -> Edito
         box.setButtonSymbols(QSpinBox.ButtonSymbols.NoButtons)
     room = box.fontMetrics().horizontalAdvance(f"{'00.00' if small else '00.0000'}{box.suffix()}")
     box.setMinimumWidth(room + (10 if small else 30))
-    _as_wide_as_there_is_room(box)
+    _limit_width(box)
 
     def fill(value: Any) -> None:
         with QSignalBlocker(box):
@@ -171,7 +171,7 @@ def _spin(row: Row, kind: str, usual: Any, report: Report, small: bool) -> Edito
 
 def _number_box(key: Key, usual: Any, report: Report) -> NumberBox:
     box = NumberBox(key, usual)
-    box.valueChanged.connect(guarded(lambda value: report(meant(value, key.unit))))
+    box.valueChanged.connect(guarded(lambda value: report(value_of(value, key.unit))))
     return box
 
 
@@ -190,10 +190,10 @@ def _several(row: Row, kind: str, count: int, report: Report, small: bool) -> Ed
     largest = max((one for one in usual if isinstance(one, int | float)), default=None)
 
     def report_one(index: int) -> Report:
-        def tell(value: Any) -> None:
+        def report_value(value: Any) -> None:
             report([*editor.value[:index], value, *editor.value[index + 1 :]])
 
-        return tell
+        return report_value
 
     each = [_spin(row, kind, largest, report_one(index), True) for index in range(count)]
     for one in each:
@@ -203,12 +203,12 @@ def _several(row: Row, kind: str, count: int, report: Report, small: bool) -> Ed
         for one, value in zip(each, values, strict=True):
             one.show(value)
 
-    _as_wide_as_there_is_room(holder)
+    _limit_width(holder)
     editor = Editor(holder, fill, tuple(one.widget for one in each))
     return editor
 
 
-def _as_wide_as_there_is_room(widget: QWidget) -> None:
+def _limit_width(widget: QWidget) -> None:
     widget.setMaximumWidth(_WIDEST)
     widget.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
@@ -223,12 +223,12 @@ def _choice(row: Row, report: Report) -> Editor:
     box = ChoiceBox()
     for value, words in row.key.choices:
         box.addItem(words, value)
-    _as_wide_as_there_is_room(box)
+    _limit_width(box)
     box.activated.connect(guarded(lambda index: report(box.itemData(index))))
 
     def fill(value: Any) -> None:
         if box.findData(value) < 0:
-            box.addItem(value, value)  # what nobody knows is shown as it is
+            box.addItem(value, value)  # an unknown value is shown unchanged
         box.setCurrentIndex(box.findData(value))
 
     return Editor(box, fill)
@@ -245,7 +245,7 @@ def _quietly(widget: QWidget, fill: Callable[[Any], None]) -> Callable[[Any], No
 def _line(
     line: QLineEdit, words: Callable[[Any], str], read: Callable[[str, Any], Any], report: Report
 ) -> Editor:
-    """An editor of one line; what cannot be read is what it was."""
+    """A one-line editor; an invalid text is reset."""
     line.setMinimumWidth(60)
 
     def fill(value: Any) -> None:
@@ -275,7 +275,7 @@ def _text(row: Row, report: Report) -> Editor:
 
 
 def _literal(row: Row, report: Report) -> Editor:
-    """What has no editor of its own, as TOML says it."""
+    """An editor of TOML, for values without their own editor."""
 
     def words(value: Any) -> str:
         return tomlkit.item(value).as_string()

@@ -1,4 +1,4 @@
-"""The gallery of ready scenes: pictures to choose from."""
+"""Gallery of the built-in scenes."""
 
 from PySide6.QtCore import (
     QEvent,
@@ -36,7 +36,7 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin.scenes import SCENES, Scene
-from kappaskin_app.features.scene.scene_picture import Look, Picturing
+from kappaskin_app.features.scene.thumbnails import Thumbnails, ThumbnailStyle
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import Tasks
 from kappaskin_app.theme import FAINT, current, follow_look, grown
@@ -44,9 +44,9 @@ from kappaskin_app.widgets.layout import scrolled
 from kappaskin_app.widgets.parts import ELLIPSIS, button, in_a_row, text_label
 
 PICTURE, PLAYING = int(Qt.ItemDataRole.UserRole), int(Qt.ItemDataRole.UserRole) + 1
-"""Roles of an item: its QPixmap, and whether it is played."""
+"""Roles of an item: its QPixmap, and whether it is simulated."""
 
-_GAP, _PAD = 4, 6  # px around a card, and inside of it
+_GAP, _PAD = 4, 6  # px outside and inside a card
 _FLAT = 0.63  # height of a picture over its width
 _LINES = 2  # of a title
 
@@ -112,7 +112,7 @@ class CardPainter(QStyledItemDelegate):
         painter.drawText(place, Qt.AlignmentFlag.AlignCenter, "\N{HORIZONTAL ELLIPSIS}")
 
     def _paint_playing(self, painter: QPainter, place: QRectF) -> None:
-        theme, words = current(), "Playing"
+        theme, words = current(), "Simulated"
         metrics = QFontMetricsF(painter.font())
         height = metrics.height() + 2
         width = metrics.horizontalAdvance(words) + 1.5 * height + 4
@@ -142,33 +142,33 @@ class CardPainter(QStyledItemDelegate):
         painter.drawText(place, how, title)
 
 
-# What is pleasant to watch, then what the paper has, then what one effect does.
-_WATCHED = (
+# Demonstrations, then the paper's scenes, then scenes of one effect.
+_DEMONSTRATIONS = (
     "sphere pencil coin bolt tapping two-contacts fingertip circle exploring cylinder edge "
     "slipping demo"
 )
 _PAPER = "centre off-centre line calibration"
 _EFFECTS = "failing-elements creep-hold steep saturation long-gages on-foam hot-room hum"
-ORDER = tuple(f"{_WATCHED} {_PAPER} {_EFFECTS}".split())
+ORDER = tuple(f"{_DEMONSTRATIONS} {_PAPER} {_EFFECTS}".split())
 
-_SETTLED = 200  # ms after the last change of size: only then are pictures made anew
-_CARD = 176  # px that a cell is wide, more or less, so that the columns fill the width
-_WORDS = (190, 340)  # px of what stands beside the cards at least and at most
+_RESIZE_DELAY = 200  # ms after the last change of size until pictures are painted
+_CARD = 176  # px, approximate width of a cell: the columns fill the width
+_TEXT_WIDTH = (190, 340)  # px of the text next to the cards, least and most
 
 
 def in_order(names: tuple[str, ...]) -> list[str]:
-    """`names` in the order of `ORDER`; those that it does not have come last."""
+    """`names` in the order of `ORDER`; names not in it come last."""
     known = [name for name in ORDER if name in names]
     return known + [name for name in names if name not in ORDER]
 
 
 def _titled(name: str) -> str:
-    """What a scene is called until its file is read."""
+    """The title of a scene until its file is read."""
     return name.replace("-", " ").capitalize()
 
 
 class _Cards(QListWidget):
-    """Cards in as many columns as fit; says that one is to be played, and when they are resized."""
+    """Cards in as many columns as fit; `played` requests a scene, `resized` reports a new size."""
 
     played = Signal()
     resized = Signal()
@@ -201,7 +201,7 @@ class _Cards(QListWidget):
             self._fit()
 
     def _fit(self) -> None:
-        """Columns that fill the width, beside the scroll bar whether it is there or not."""
+        """Set columns that fill the width, with space for the scroll bar."""
         width = self.width() - self.verticalScrollBar().sizeHint().width() - 1
         self.painter.cell = width // max(1, round(width / _CARD))
         size = self.painter.size(self.fontMetrics().height())
@@ -216,7 +216,7 @@ class _Cards(QListWidget):
 
 
 class GalleryPanel(QWidget):
-    """Cards of the ready scenes; `chosen` names the one to play, `open_wanted` asks for a file."""
+    """Cards of the built-in scenes; `chosen` requests a scene by name, `open_wanted` a file."""
 
     chosen = Signal(str)
     open_wanted = Signal()
@@ -229,18 +229,16 @@ class GalleryPanel(QWidget):
             self.cards.addItem(item)
         self.title, self.text, self.file = text_label(), text_label(), text_label()
         self.play = button(
-            "&Play", "play-scene", "Play this scene on the simulated skin (Enter, or double-click)."
+            "&Simulate", "play-scene", "Simulate this scene (Enter, or double-click)."
         )
-        self.open = button(
-            f"&Open file{ELLIPSIS}", "open-scene", "Play a scene from a file of your own."
-        )
+        self.open = button(f"&Open file{ELLIPSIS}", "open-scene", "Simulate a scene from a file.")
         self._lay_out()
         self._scenes: dict[str, Scene | str] = {}
         self._playing = ""
-        self._picturing = Picturing(list(self.items), tasks, self)
-        self._picturing.read.connect(guarded(self._take_scene))
-        self._picturing.painted.connect(guarded(self._take_picture))
-        self.cards.resized.connect(guarded(lambda: self._begin(_SETTLED)))
+        self._thumbnails = Thumbnails(list(self.items), tasks, self)
+        self._thumbnails.read.connect(guarded(self._take_scene))
+        self._thumbnails.painted.connect(guarded(self._take_picture))
+        self.cards.resized.connect(guarded(lambda: self._begin(_RESIZE_DELAY)))
         self.cards.currentItemChanged.connect(guarded(self._show_words))
         self.cards.played.connect(guarded(self._play))
         self.play.clicked.connect(guarded(self._play))
@@ -255,9 +253,9 @@ class GalleryPanel(QWidget):
         bold = self.title.font()
         bold.setBold(True)
         self.title.setFont(bold)
-        beside = QWidget()
-        self._beside = beside
-        column = QVBoxLayout(beside)
+        details = QWidget()
+        self._details = details
+        column = QVBoxLayout(details)
         column.setContentsMargins(0, 4, 0, 4)
         words = scrolled(self.title, self.text, self.file)
         words.setMinimumWidth(0)
@@ -266,9 +264,9 @@ class GalleryPanel(QWidget):
         row = QHBoxLayout(self)
         row.setContentsMargins(4, 2, 8, 4)
         row.addWidget(self.cards, 7)
-        row.addWidget(beside, 3)
+        row.addWidget(details, 3)
 
-    # What a person asks.
+    # Requests
 
     @property
     def selected(self) -> str:
@@ -280,10 +278,10 @@ class GalleryPanel(QWidget):
         if self.selected:
             self.chosen.emit(self.selected)
 
-    # What is so.
+    # State
 
     def show_playing(self, name: str) -> None:
-        """Mark the ready scene `name` as the one that is played; none for any other name."""
+        """Mark the built-in scene `name` as simulated; none for another name."""
         if name != self._playing:
             self._playing = name
             for other, item in self.items.items():
@@ -291,8 +289,8 @@ class GalleryPanel(QWidget):
             self._show_words()
 
     def _fit(self) -> None:
-        self._beside.setMinimumWidth(grown(_WORDS[0]))
-        self._beside.setMaximumWidth(grown(_WORDS[1]))
+        self._details.setMinimumWidth(grown(_TEXT_WIDTH[0]))
+        self._details.setMaximumWidth(grown(_TEXT_WIDTH[1]))
         self._begin()
 
     def _show_words(self, *_: object) -> None:
@@ -303,17 +301,17 @@ class GalleryPanel(QWidget):
         self.title.setText(self.items[name].text())
         text = scene.text.strip() if isinstance(scene, Scene) else scene or ""
         self.text.setText(text)
-        playing = ", played now" if name == self._playing else ""
+        playing = ", simulated now" if name == self._playing else ""
         self.file.setText(f"{name}.toml{playing}")
 
-    # What is made beside the window.
+    # Thumbnails in the background
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         self._begin()
 
     def hideEvent(self, event: QHideEvent) -> None:
-        self._picturing.rest()
+        self._thumbnails.stop()
         super().hideEvent(event)
 
     def event(self, event: QEvent) -> bool:
@@ -322,11 +320,11 @@ class GalleryPanel(QWidget):
         return super().event(event)
 
     def _begin(self, after: int = 0) -> None:
-        """Have what is missing made where it is seen, beginning `after` so many ms."""
+        """Request the missing thumbnails if the panel is visible, `after` so many ms."""
         if self.isVisible():
             size, ratio = picture_size(self.cards.painter.cell), self.devicePixelRatioF()
-            look = Look(current(), size.width(), size.height(), ratio)
-            self._picturing.paint(look, after)
+            style = ThumbnailStyle(current(), size.width(), size.height(), ratio)
+            self._thumbnails.paint(style, after)
 
     def _take_scene(self, name: str, scene: Scene | str) -> None:
         self._scenes[name] = scene

@@ -1,4 +1,4 @@
-"""What presses on the simulated skin, and what noise its readings have."""
+"""Forms of the load on the simulated skin, and of the noise."""
 
 from PySide6.QtWidgets import QComboBox, QLabel, QWidget
 
@@ -17,11 +17,11 @@ from kappaskin_app.shell.simulation import is_table_1
 
 
 class LoadPanel(SimulationForm):
-    """Asks for the load case; a free one has its place and its force, a spread one its size."""
+    """The form of the load: case, force, position and size."""
 
     purpose = (
-        "What presses on the simulated skin, where and how hard. Drag the red arrow on the skin, "
-        "or type numbers here."
+        "Load on the simulated skin: position, size and force. Drag the red arrow on the skin, or "
+        "enter numbers here."
     )
     guide_page = "scenes"
 
@@ -50,27 +50,27 @@ class LoadPanel(SimulationForm):
             label.setText(SIZES[case])
 
     def show_refusal(self, text: str) -> None:
-        """Say why the load or the skin asked for cannot be, or nothing when it can."""
+        """Show why the requested load or skin is refused; nothing if it is not."""
         self._refusal = text
 
     def alarm(self, status: Status) -> str:
-        return f"The last load stays: {self._refusal}." if self._refusal else ""
+        return f"The previous load is still simulated: {self._refusal}." if self._refusal else ""
 
     def _show_cases(self, table_1: bool) -> None:
-        """Call the cases Table 1's where they are."""
+        """Mark the cases of Table 1 where they apply."""
         box = self.editor("load_case")
         for index, (case, words) in enumerate(LOAD_CASES):
-            also = " (Table 1)" if table_1 and case in TABLE_1_CASES else ""
+            suffix = " (Table 1)" if table_1 and case in TABLE_1_CASES else ""
             if isinstance(box, QComboBox):
-                box.setItemText(index, words + also)
+                box.setItemText(index, words + suffix)
 
 
 class NoisePanel(SimulationForm):
-    """Asks for the noise of the simulated readings."""
+    """The form of the noise of the simulated readings."""
 
     purpose = (
-        "What is added to every simulated reading: independent, of mean zero and of this RMS. "
-        "With a seed the same noise comes back."
+        "Noise added to every simulated reading: independent, of zero mean and of this RMS. The "
+        "seed makes it repeatable."
     )
     guide_page = "scenes"
 

@@ -1,4 +1,4 @@
-"""The scene panel: chosen from pictures, edited as forms and as text, planned."""
+"""Scene panel: gallery, editor with forms and text, effect plan."""
 
 import re
 
@@ -35,12 +35,12 @@ from kappaskin_app.shell.form import for_the_window
 from kappaskin_app.theme import ALERT, current, follow_look
 from kappaskin_app.widgets.parts import button, text_label
 
-_PAUSE = 300  # ms without a key before what is typed counts
-_ROOM = 6  # px beside the numbers
+_PAUSE = 300  # ms without a key until a typed text is used
+_NUMBER_MARGIN = 6  # px
 
 
 class _Numbers(QWidget):
-    """The numbers of the lines, left of them."""
+    """The line numbers."""
 
     def __init__(self, text: "SceneText") -> None:
         super().__init__(text)
@@ -54,7 +54,7 @@ class _Numbers(QWidget):
 
 
 class SceneText(QPlainTextEdit):
-    """A text editor that leaves undoing to the window; `edited` brings the text after a pause."""
+    """A text editor whose undo is the window's; `edited` sends the text after a pause."""
 
     edited = Signal(str)
 
@@ -66,10 +66,10 @@ class SceneText(QPlainTextEdit):
         self.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
         self.setUndoRedoEnabled(False)
         self.setTabChangesFocus(True)
-        self._numbers, self._wrong = _Numbers(self), 0
-        self._showing, self._known = False, ""
+        self._numbers, self._error_line = _Numbers(self), 0
+        self._showing, self._shown = False, ""
         self._pause = QTimer(self, singleShot=True, interval=_PAUSE)  # pyright: ignore[reportCallIssue]
-        self._pause.timeout.connect(guarded(self.tell))
+        self._pause.timeout.connect(guarded(self.send))
         self.textChanged.connect(guarded(self._typed))
         self.blockCountChanged.connect(self._make_room)
         self.updateRequest.connect(self._scroll_numbers)
@@ -77,14 +77,14 @@ class SceneText(QPlainTextEdit):
         follow_look(self, self._mark)
 
     def show_text(self, text: str) -> None:
-        """Show a text that came from elsewhere; the place that is worked at stays in sight.
+        """Show the text of the scene; cursor and scroll position are preserved.
 
-        What is being typed stays over the text that it is typed into, and goes with another one.
+        A text that is being typed is replaced only by another scene's.
         """
-        if self._pause.isActive() and text == self._known:
+        if self._pause.isActive() and text == self._shown:
             return
         self._pause.stop()
-        self._known = text
+        self._shown = text
         if text == self.toPlainText():
             return
         place, bars = (
@@ -101,16 +101,16 @@ class SceneText(QPlainTextEdit):
         for bar, value in zip(bars, scrolled, strict=True):
             bar.setValue(value)
 
-    def tell(self) -> None:
-        """Bring what was typed, without waiting for the pause to be over."""
+    def send(self) -> None:
+        """Send the typed text without the pause."""
         self._pause.stop()
-        self._known = self.toPlainText()
-        self.edited.emit(self._known)
+        self._shown = self.toPlainText()
+        self.edited.emit(self._shown)
 
-    def show_wrong(self, line: int) -> None:
-        """Mark a line, counted from one, as the one where the scene cannot be; none with 0."""
-        if line != self._wrong:
-            self._wrong = line
+    def show_error(self, line: int) -> None:
+        """Mark the line of an error, counted from one; none with 0."""
+        if line != self._error_line:
+            self._error_line = line
             self._mark()
 
     def _typed(self) -> None:
@@ -119,8 +119,8 @@ class SceneText(QPlainTextEdit):
 
     def _mark(self) -> None:
         marks: list[QTextEdit.ExtraSelection] = []
-        block = self.document().findBlockByNumber(self._wrong - 1)
-        if self._wrong and block.isValid():
+        block = self.document().findBlockByNumber(self._error_line - 1)
+        if self._error_line and block.isValid():
             mark, colour = QTextEdit.ExtraSelection(), QColor(current().bad)
             colour.setAlphaF(0.25)
             how = QTextCharFormat()
@@ -135,7 +135,7 @@ class SceneText(QPlainTextEdit):
     def event(self, event: QEvent) -> bool:
         if for_the_window(event):
             if self._pause.isActive():
-                self.tell()  # or what was just typed would come after it was undone
+                self.send()  # before undo, or the typed text would follow it
             event.ignore()
             return True
         return super().event(event)
@@ -143,13 +143,13 @@ class SceneText(QPlainTextEdit):
     def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
         if self._pause.isActive():
-            self.tell()  # or what is changed elsewhere would be changed in the text before
+            self.send()  # before another editor changes the previous text
 
-    # The numbers.
+    # Line numbers
 
     def numbers_width(self) -> int:
         digits = len(str(self.blockCount()))
-        return 2 * _ROOM + digits * self.fontMetrics().horizontalAdvance("9")
+        return 2 * _NUMBER_MARGIN + digits * self.fontMetrics().horizontalAdvance("9")
 
     def _make_room(self) -> None:
         self.setViewportMargins(self.numbers_width(), 0, 0, 0)
@@ -168,7 +168,7 @@ class SceneText(QPlainTextEdit):
         )
 
     def paint_numbers(self, where: QWidget, event: QPaintEvent) -> None:
-        """For the strip of numbers only: paint those of the lines in sight."""
+        """Paint the numbers of the visible lines, for the line number widget only."""
         painter, theme = QPainter(where), current()
         painter.fillRect(event.rect(), QColor(theme.window))
         painter.setFont(self.font())
@@ -179,8 +179,8 @@ class SceneText(QPlainTextEdit):
             if top > event.rect().bottom():
                 break
             number = block.blockNumber() + 1
-            painter.setPen(QColor(theme.alert if number == self._wrong else theme.faint))
-            area = QRect(0, top, where.width() - _ROOM, height)
+            painter.setPen(QColor(theme.alert if number == self._error_line else theme.faint))
+            area = QRect(0, top, where.width() - _NUMBER_MARGIN, height)
             painter.drawText(area, Qt.AlignmentFlag.AlignRight, str(number))
             block = block.next()
 
@@ -192,7 +192,7 @@ _SHARES = (5, 6)  # of the width: the forms, and the text
 
 
 class SceneEditor(QWidget):
-    """Forms and text of the same scene; `edited` brings the text after a change of either."""
+    """Forms and text of one scene; `edited` sends the text after a change of either."""
 
     edited = Signal(str)
     save_wanted = Signal()
@@ -205,7 +205,7 @@ class SceneEditor(QWidget):
         self.save = button(
             "Save as\N{HORIZONTAL ELLIPSIS}",
             "save-scene",
-            "Write the scene into a file (Ctrl+Shift+S); `kappaskin plan` and `simulate` take it.",
+            "Write the scene to a file (Ctrl+Shift+S), for `kappaskin plan` and `simulate`.",
         )
         self.message.setForegroundRole(ALERT)
         above = QHBoxLayout()
@@ -231,23 +231,23 @@ class SceneEditor(QWidget):
         self.show_refusal("")
 
     def show_scene(self, text: str, name: str) -> None:
-        """Show the text of the scene that is called `name`."""
+        """Show the text of the scene `name`."""
         self.name.setText(name)
         self.text.show_text(text)
         self.form.show_text(text)
 
     def show_refusal(self, why: str) -> None:
-        """Say why what is written cannot be played, and mark its line; or nothing when it can."""
+        """Show why the text is refused, and mark its line; nothing if it is not."""
         line = _LINE.search(why)
-        self.text.show_wrong(int(line[1]) if line else 0)
-        self.message.setText(f"The last scene stays: {why}" if why else "")
+        self.text.show_error(int(line[1]) if line else 0)
+        self.message.setText(f"The previous scene is still simulated: {why}" if why else "")
         self.message.setVisible(bool(why))
 
 
 class ScenePanel(QTabWidget):
-    """The gallery, the editor and the plan, a page each; `seen` says when the plan is looked at."""
+    """Pages of gallery, editor and effect plan; `plan_visible` reports when the plan is."""
 
-    seen = Signal(bool)
+    plan_visible = Signal(bool)
 
     def __init__(self, tasks: Tasks, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -260,30 +260,30 @@ class ScenePanel(QTabWidget):
         ):
             self.addTab(page, title)
         self.setDocumentMode(True)
-        self.currentChanged.connect(self._tell_seen)
+        self.currentChanged.connect(self._report_visible)
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
-        self._tell_seen()
+        self._report_visible()
 
     def hideEvent(self, event: QHideEvent) -> None:
         super().hideEvent(event)
-        self._tell_seen()
+        self._report_visible()
 
-    def _tell_seen(self) -> None:
-        self.seen.emit(self.isVisible() and self.currentWidget() is self.effects)
+    def _report_visible(self) -> None:
+        self.plan_visible.emit(self.isVisible() and self.currentWidget() is self.effects)
 
     def show_refusal(self, why: str) -> None:
-        """Say why what is written is not what is played; then nothing of it can be forced."""
+        """Show why the text is not simulated; its effects cannot be forced then."""
         self.editor.show_refusal(why)
-        self.setTabText(_EDIT, "&Edit (not played)" if why else "&Edit")
+        self.setTabText(_EDIT, "&Edit (refused)" if why else "&Edit")
         self.effects.table.setEnabled(not why)
 
     def show_simulated(self, simulated: bool) -> None:
-        """Leave but the gallery, which leads back, where the readings are no simulation's."""
+        """Disable all pages but the gallery while the readings are not simulated."""
         if simulated == self.isTabEnabled(_EDIT):
             return
-        why = "" if simulated else "No scene is played: choose one, or press Ctrl+M."
+        why = "" if simulated else "No scene is simulated: select one, or press Ctrl+M."
         for page in (_EDIT, _EFFECTS):
             self.setTabEnabled(page, simulated)
             self.setTabToolTip(page, why)

@@ -1,4 +1,4 @@
-"""The plan of a scene: which effects it calls for, measured in the background."""
+"""Plan of a scene's effects, measured as a background task."""
 
 from typing import Any
 
@@ -21,17 +21,17 @@ from kappaskin.scenes.effects import EFFECTS
 from kappaskin.studies import plan_updates
 from kappaskin_app.features.scene.scene_text import OFF, ON, PLANNED
 from kappaskin_app.shell.background import BackgroundTask, Tasks
-from kappaskin_app.shell.effects import called, explained
+from kappaskin_app.shell.effects import effect_description, effect_name
 from kappaskin_app.shell.session import Session
 from kappaskin_app.theme import current, follow_look
 from kappaskin_app.widgets.text import duration
 
 
-class Planning(QObject):
-    """Has every effect of the scene sized and timed; `changed` tells when there is news.
+class EffectPlanner(QObject):
+    """Measures size and time of every effect of the scene; `changed` reports new results.
 
-    `rows` are what `plan_updates` told last, of `scene` or, while `waiting`, of the one before it;
-    `refusal` says why there are none.
+    `rows` are the last of `plan_updates`, of `scene` or, while `waiting`, of the previous one;
+    `refusal` is the reason where there are none.
     """
 
     changed = Signal()
@@ -44,34 +44,34 @@ class Planning(QObject):
         self.refusal = ""
         self.task = BackgroundTask(
             tasks,
-            "Sizing and timing effects",
+            "Measuring the effects of the scene",
             self._take,
             self._refuse,
             ended=self.changed.emit,
-            cancelled="Cancelled; it is planned when this is shown again.",
+            cancelled="Cancelled; planned when this panel is shown again.",
         )
-        self._watched = False
+        self._active = False
 
     @property
     def waiting(self) -> bool:
-        """Whether not everything is known yet of the scene that is played."""
+        """Whether the plan of the present scene is incomplete."""
         return self.task.running
 
-    def watch(self, watched: bool) -> None:
-        """Plan while somebody looks, and only then."""
-        self._watched = watched
-        if watched:
+    def set_active(self, active: bool) -> None:
+        """Plan while the panel is visible, and only then."""
+        self._active = active
+        if active:
             if self.refusal:
-                self.scene = None  # it may have been cancelled: begin anew
+                self.scene = None  # it may have been cancelled: plan again
             self.follow(self._session.status)
         elif self.waiting:
             self.task.stop()
-            self.scene = None  # to be begun anew
+            self.scene = None  # to be planned again
             self.changed.emit()
 
     def follow(self, _: Status) -> None:
-        """Begin anew when another scene is played."""
-        idle = self._watched and not self.waiting
+        """Plan again when another scene is simulated."""
+        idle = self._active and not self.waiting
         if idle and self._session.inside and self._session.scene is not self.scene:
             self.scene, self.refusal = self._session.scene, ""
             self.task.compute(plan_updates, self.scene)
@@ -85,23 +85,22 @@ class Planning(QObject):
         self.rows, self.refusal = [], str(error)
 
 
-_COLUMNS = ("Effect", "Simulated", "Kept", "Size", "If left out", "Time", "Why")
+_COLUMNS = ("Effect", "Selection", "Simulated", "Size", "Error if omitted", "Time", "Reason")
 _TIPS = (
-    "What spoils a reading.",
-    "Leave it to the plan, or force it on or off while the scene goes on.",
-    "Whether it is simulated.",
-    "How large it is in this scene, without a unit; its tooltip tells the formula.",
-    "By how much readings change at most when it is left out, as a share of the scene's peak "
-    "curvature.",
-    "What it takes for each frame, measured on this machine.",
-    "Why it is kept or left out.",
+    "An effect on the readings.",
+    "Selected by the plan, or forced on or off.",
+    "Whether the effect is simulated.",
+    "Dimensionless size of the effect in this scene; the tooltip shows the formula.",
+    "Largest change of a reading if the effect is omitted, relative to the scene's peak curvature.",
+    "Computing time per frame, measured on this machine.",
+    "Why the effect is simulated or omitted.",
 )
-_HOWS = ((PLANNED, "As planned"), (ON, "On"), (OFF, "Off"))
-_EFFECT, _FORCE, _KEPT, _SIZE, _ERROR, _TIME, _WHY = range(len(_COLUMNS))
+_SELECTIONS = ((PLANNED, "By plan"), (ON, "On"), (OFF, "Off"))
+_EFFECT, _FORCE, _SIMULATED, _SIZE, _ERROR, _TIME, _WHY = range(len(_COLUMNS))
 
 
 class EffectsPanel(QWidget):
-    """A table of the effects; `forced` says which is to be on, off or as planned."""
+    """A table of the effects; `forced` requests one on, off or by plan."""
 
     forced = Signal(str, str)
 
@@ -134,7 +133,7 @@ class EffectsPanel(QWidget):
         follow_look(self, self._fill)
 
     def show_plan(self, rows: list[dict[str, Any]], choice: EffectSelection) -> None:
-        """Show what `plan_rows` tells of a scene of which `choice` says what is simulated."""
+        """Show the rows of a plan and the `choice` of the effects that are simulated."""
         there = [row for row in rows if row["microseconds"] is not None]
         absent = [row for row in rows if row["microseconds"] is None]
         names = [row["effect"] for row in (*there, *absent)]
@@ -145,7 +144,7 @@ class EffectsPanel(QWidget):
         self._summarise(there)
 
     def show_waiting(self, words: str) -> None:
-        """Say why the table is not that of the scene that is played."""
+        """Show why the table is not that of the present scene."""
         self.summary.setText(words)
 
     def _fill(self) -> None:
@@ -166,8 +165,8 @@ class EffectsPanel(QWidget):
                 self.table.setItem(number, column, item)
             box = QComboBox()
             box.setObjectName(f"force-{name}")
-            box.setAccessibleName(f"{called(name)}, simulated")
-            for value, words in _HOWS:
+            box.setAccessibleName(f"{effect_name(name)}, selection")
+            for value, words in _SELECTIONS:
                 box.addItem(words, value)
             box.activated.connect(lambda _, name=name: self._force(name))
             self.table.setCellWidget(number, _FORCE, box)
@@ -181,8 +180,8 @@ class EffectsPanel(QWidget):
         self._show_force(name, there)
         size = f"Size: {row['formula']}."
         cells = {
-            _EFFECT: (called(name), explained(name)),
-            _KEPT: ("kept" if row["kept"] else "left out" if there else "", ""),
+            _EFFECT: (effect_name(name), effect_description(name)),
+            _SIMULATED: ("yes" if row["kept"] else "no" if there else "", ""),
             _SIZE: (f"{row['size']:.2g}" if there else "", size),
             _ERROR: (_share(row["error"]) if there else "", _TIPS[_ERROR]),
             _TIME: (duration(row["microseconds"] * 1e-6) if there else "", _TIPS[_TIME]),
@@ -205,19 +204,19 @@ class EffectsPanel(QWidget):
         box.setToolTip(
             _TIPS[_FORCE]
             if free
-            else "A failure is there when the scene says so: take it out in the editor."
+            else "A failure is defined by the scene: remove it in the editor."
             if there
-            else "There is nothing of it in this scene: add it in the editor."
+            else "The scene does not have this effect: add it in the editor."
         )
 
     def _summarise(self, there: list[dict[str, Any]]) -> None:
-        kept = [row for row in there if row["kept"]]
-        left = sum(row["error"] for row in there if not row["kept"])
-        taken, all_ = (1e-6 * sum(row["microseconds"] for row in rows) for rows in (kept, there))
+        chosen = [row for row in there if row["kept"]]
+        error = sum(row["error"] for row in there if not row["kept"])
+        taken, all_ = (1e-6 * sum(row["microseconds"] for row in rows) for rows in (chosen, there))
         self.summary.setText(
-            f"{len(kept)} of {len(there)} effects are simulated: {duration(taken)} a frame, where "
-            f"all would take {duration(all_)}. What is left out changes readings by at most "
-            f"{_share(left)} of the peak curvature; {_share(self._choice.accuracy)} may be."
+            f"{len(chosen)} of {len(there)} effects are simulated, in {duration(taken)} per frame "
+            f"({duration(all_)} for all). The omitted effects change readings by at most "
+            f"{_share(error)} of the peak curvature; {_share(self._choice.accuracy)} is permitted."
         )
 
 

@@ -1,4 +1,4 @@
-"""The forms of a scene: a box for each section, and the text that they make."""
+"""Forms of a scene: a box for each section of its text."""
 
 import tomllib
 from collections.abc import Callable
@@ -33,15 +33,15 @@ from kappaskin_app.features.scene.sections import (
 )
 from kappaskin_app.guard import guarded
 
-_BUTTON, _EDGE = 20, 9  # px: the size of a small button, and how far in the last one stands
+_BUTTON, _EDGE = 20, 9  # px: size of a small button, margin of the last one
 _NO_ARROW = "QToolButton::menu-indicator { image: none; }"
 
 Request = Callable[[Change], None]
-_ADDING = "Choose from a list what is added to the scene; its text shows it at once."
+_ADDING = "Select from a list what to add to the scene."
 
 
 class SectionBox(QGroupBox):
-    """Shows a section; `request` is told of every change of the text that a person makes."""
+    """Shows a section; calls `request` with every change of the text by the user."""
 
     def __init__(self, section: Section, request: Request) -> None:
         super().__init__(section.title)
@@ -58,9 +58,9 @@ class SectionBox(QGroupBox):
         self._corner = self._buttons(section) if section.title else QWidget()
         self._corner.setParent(self)
         if not (section.rows or section.sections or section.adding):
-            usual = QLabel("As usual")
-            usual.setEnabled(False)
-            self.grid.addWidget(usual, 0, 0)
+            default = QLabel("Default")
+            default.setEnabled(False)
+            self.grid.addWidget(default, 0, 0)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -68,7 +68,7 @@ class SectionBox(QGroupBox):
         self._corner.move(QPoint(self.width() - self._corner.width() - _EDGE, -1))
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        if self.title():  # else there is only a button, which needs no frame
+        if self.title():  # a single button needs no frame
             super().paintEvent(event)
 
     def show_section(self, section: Section) -> None:
@@ -105,7 +105,7 @@ class SectionBox(QGroupBox):
         at = self.grid.rowCount()
         self.grid.addWidget(label, at, 0)
         across = QHBoxLayout()
-        across.addWidget(editor.widget, 1000)  # first: what is as wide as it may be leaves the rest
+        across.addWidget(editor.widget, 1000)  # an editor of limited width leaves the rest
         across.addStretch(1)
         self.grid.addLayout(across, at, 1)
 
@@ -135,7 +135,7 @@ class SectionBox(QGroupBox):
         return heading
 
     def _steps(self, steps: list[Section]) -> QWidget:
-        """One step after the other, each in a line; how it eases stands below."""
+        """The steps, one per line; the easing is below."""
         holder = QWidget()
         grid = QGridLayout(holder)
         grid.setContentsMargins(0, 0, 0, 0)
@@ -209,11 +209,11 @@ def _tool(text: str, tip: str, place: Place) -> QToolButton:
     return button
 
 
-_LABEL = 14  # digits that a label has room for at least
+_LABEL = 14  # digits, least width of a label
 
 
 class SceneForm(QScrollArea):
-    """Forms over a text: `edited` is the whole new text whenever a person changed something."""
+    """Forms over a text: `edited` sends the whole new text after a change by the user."""
 
     edited = Signal(str)
 
@@ -231,18 +231,18 @@ class SceneForm(QScrollArea):
         self.setWidget(self._content)
 
     def show_text(self, text: str) -> None:
-        """Show what a scene's TOML says; forms over what is none wait, as they were."""
+        """Show the values of a scene's TOML; the forms are disabled while it is invalid."""
         if text == self._text:
             return
         self._text = text
-        self._showing = True  # a box that loses the focus meanwhile says what was typed in it
+        self._showing = True  # a box that loses the focus meanwhile reports its text
         try:
-            said = tomllib.loads(text)
+            values = tomllib.loads(text)
         except (ValueError, RecursionError):  # also of a number too long to read
             self._content.setEnabled(False)
         else:
             self._content.setEnabled(True)
-            self._show(sections_of(said))
+            self._show(sections_of(values))
         finally:
             self._showing = False
 
@@ -271,7 +271,7 @@ class SceneForm(QScrollArea):
                     box.editors[focus].stops[0].setFocus()
 
     def _focus(self) -> Place | None:
-        """The place whose editor has the focus."""
+        """The place of the editor with the focus."""
         widget = QApplication.focusWidget()
         for box in self.boxes:
             for place, editor in box.editors.items():
@@ -282,11 +282,11 @@ class SceneForm(QScrollArea):
         return None
 
     def _rebuild(self, sections: tuple[Section, ...]) -> None:
-        """New boxes for what changed its structure; all others stay."""
+        """Replace the boxes of sections whose structure changed."""
         self._content.setUpdatesEnabled(False)
-        there = {box.section.structure: box for box in self.boxes}
-        self.boxes = [self._box(section, there) for section in sections]
-        for box in there.values():
+        existing = {box.section.structure: box for box in self.boxes}
+        self.boxes = [self._box(section, existing) for section in sections]
+        for box in existing.values():
             self._column.removeWidget(box)
             box.hide()
             box.deleteLater()
@@ -298,15 +298,15 @@ class SceneForm(QScrollArea):
         self._align()
         self._content.setUpdatesEnabled(True)
 
-    def _box(self, section: Section, there: dict[tuple[object, ...], SectionBox]) -> SectionBox:
-        box = there.pop(section.structure, None)
+    def _box(self, section: Section, existing: dict[tuple[object, ...], SectionBox]) -> SectionBox:
+        box = existing.pop(section.structure, None)
         if box is None:
             return SectionBox(section, self._request)
         box.show_section(section)
         return box
 
     def _align(self) -> None:
-        """One column of labels for all boxes."""
+        """Align the labels of all boxes in one column."""
         labels = [label.sizeHint().width() for box in self.boxes for label in box.labels]
         width = max([*labels, self.fontMetrics().horizontalAdvance("0" * _LABEL)])
         for box in self.boxes:

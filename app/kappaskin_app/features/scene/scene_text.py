@@ -1,7 +1,7 @@
-"""Edits of a scene's text: values, tables, effects, places; the rest stays as written.
+"""Edits of a scene's TOML text, which keep its comments and layout.
 
-Each raises `Refusal` for a text that is no TOML, and KeyError or IndexError for a place that there
-is not.
+Each raises `Refusal` for a text that is no TOML, and KeyError or IndexError for a place that does
+not exist.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,26 +18,26 @@ from kappaskin.scenes import PARTS
 Place = tuple[str | int, ...]
 
 ON, OFF, PLANNED = "on", "off", "planned"
-_SIDE = 0.1  # m of the skin that the schema's examples have their places on
+_SIDE = 0.1  # m, side of the skin of the schema's examples
 
 
 def parsed(text: str) -> Any:
-    """The TOML document that can be changed and written again; raises `Refusal` for no TOML."""
+    """The TOML document of a text; raises `Refusal` for invalid TOML."""
     try:
         return tomlkit.parse(text)
     except TOMLKitError as error:
         raise Refusal(
-            f"expected a scene in TOML to change, got a mistake in it: {error}; mend its text first"
+            f"expected a scene in TOML, got an error in it: {error}; correct the text first"
         ) from error
 
 
 def put(text: str, place: Place, value: Any) -> str:
-    """The text with another value at `place`, where there is one."""
+    """The text with another value at an existing `place`."""
     document = parsed(text)
     owner, key = _at(document, place[:-1]), place[-1]
     old = owner[key]
     if old == value:
-        return text  # however it is written
+        return text  # in its present notation
     if isinstance(value, list) and isinstance(old, list) and len(value) == len(old):
         for index, one in enumerate(value):
             if one != old[index]:
@@ -48,7 +48,7 @@ def put(text: str, place: Place, value: Any) -> str:
 
 
 def put_in(text: str, place: Place, key: str, value: Any) -> str:
-    """The text with `key` in the table at `place`, which is made when there is none."""
+    """The text with `key` in the table at `place`, which is added if missing."""
     document = parsed(text)
     owner: Any = document
     for name in place:
@@ -62,14 +62,14 @@ def put_in(text: str, place: Place, key: str, value: Any) -> str:
 
 
 def _new(owner: Any, is_super: bool) -> Any:
-    """A table to put into `owner`: into its line, if it stands in one."""
+    """A new table for `owner`, an inline one if that is inline."""
     if isinstance(owner, InlineTable):
         return tomlkit.inline_table()
     return tomlkit.table(is_super_table=is_super)
 
 
 def remove(text: str, place: Place) -> str:
-    """The text without what stands at `place`, nor the array or table that this leaves empty."""
+    """The text without the value at `place`, nor an array or table that becomes empty."""
     document = parsed(text)
     owner = _at(document, place[:-1])
     del owner[place[-1]]
@@ -81,7 +81,7 @@ def remove(text: str, place: Place) -> str:
 
 
 def add_table(text: str, place: Place, values: dict[str, Any]) -> str:
-    """The text with the table at `place` that says this."""
+    """The text with a table of `values` at `place`."""
     document = parsed(text)
     owner: Any = document
     for name in place[:-1]:
@@ -93,15 +93,15 @@ def add_table(text: str, place: Place, values: dict[str, Any]) -> str:
 
 
 def add_touch(text: str, kind: str) -> str:
-    """The text with one more touch of this kind, at a like place of the skin that is there."""
+    """The text with another touch of this `kind`, at the default relative position."""
     values = placed(PARTS["touch"].needed(kind), parsed(text).get("skin"))
     return _add(text, ("touch",), {"what": kind} | values)
 
 
 def add_step(text: str, path: Place, kind: str) -> str:
-    """The text with one more step of this kind at the end of `path`.
+    """The text with another step of this `kind` at the end of `path`.
 
-    It comes before a last release: a path has to end lifted.
+    It precedes a last release: a path must end without contact.
     """
     many = _at(parsed(text), path)
     before = isinstance(many, list) and many and _lifts(many[-1]) and not _lifts({"step": kind})
@@ -115,9 +115,9 @@ def _lifts(step: Any) -> bool:
 
 
 def change_kind(text: str, place: Place, part: str, kind: str) -> str:
-    """The text with the key at `place`, by which a `part` is of a kind, naming another one.
+    """The text with another `kind` at `place`, the key that defines the kind of a `part`.
 
-    What that kind does not know goes, what it needs comes, all else is kept.
+    Keys unknown to the new kind are removed, its required ones added, all others unchanged.
     """
     document = parsed(text)
     at, key = place[:-1], str(place[-1])
@@ -136,15 +136,15 @@ def change_kind(text: str, place: Place, part: str, kind: str) -> str:
 
 
 def _alike(value: Any, other: Any) -> bool:
-    """Whether two values are of a kind, as far as a form is concerned."""
+    """Whether two values have the same kind of editor."""
     numbers = [isinstance(one, int | float) and not isinstance(one, bool) for one in (value, other)]
     return all(numbers) or (not any(numbers) and type(value) is type(other))
 
 
 def forced(text: str, effect: str, how: str) -> str:
-    """The text with an effect forced `ON` or `OFF`, or `PLANNED`: left to the plan.
+    """The text with an effect forced `ON` or `OFF`, or `PLANNED`: selected by the plan.
 
-    Where the text lists the effects that there are, it is in that list or not.
+    Where the text lists the effects (`choose`), it is added to the list or removed.
     """
     document = parsed(text)
     if "effects" not in document:
@@ -159,7 +159,7 @@ def forced(text: str, effect: str, how: str) -> str:
 
 
 def _name(table: Any, key: str, effect: str, there: bool) -> None:
-    """Have the list at `key` name the effect, or not; an empty one goes unless it chooses all."""
+    """Add the effect to the list at `key` or remove it, and an empty list except `choose`."""
     names = [one for one in table.get(key, ()) if one != effect] + [effect] * there
     if names or key == "choose":
         table[key] = names
@@ -178,9 +178,9 @@ def _plain(value: Any) -> Any:
 
 
 def _set(document: Any, place: Place, values: dict[str, Any]) -> None:
-    """Make the table at `place` say this, in the order that it has."""
+    """Set the values of the table at `place`, which keeps its order."""
     owner = _at(document, place)
-    if isinstance(owner, InlineTable):  # made anew, or its last comma stands without a space
+    if isinstance(owner, InlineTable):  # replaced, or a space is missing after a comma
         _at(document, place[:-1])[place[-1]] = _item({k: _plain(v) for k, v in values.items()})
         return
     for key in list(owner):
@@ -192,17 +192,17 @@ def _set(document: Any, place: Place, values: dict[str, Any]) -> None:
 
 
 def _add(text: str, place: Place, values: dict[str, Any], index: int | None = None) -> str:
-    """The text with one more table in the array at `place`, at its end or at `index`."""
+    """The text with another table in the array at `place`, at its end or at `index`."""
     document = parsed(text)
     owner = _at(document, place[:-1])
     if place[-1] not in owner:
         owner.append(place[-1], tomlkit.aot())
     many = owner[place[-1]]
-    if isinstance(many, AbstractTable):  # one table, which a reader takes for an array of one
-        kept = many.unwrap()
+    if isinstance(many, AbstractTable):  # a single table is read as an array of one
+        first = many.unwrap()
         del owner[place[-1]]
         many = owner[place[-1]] = tomlkit.aot()
-        many.append(_table(kept))
+        many.append(_table(first))
     many.insert(
         len(many) if index is None else index,
         _table(values) if isinstance(many, AoT) else _item(values),
@@ -218,7 +218,7 @@ def _table(values: Mapping[str, Any]) -> Table:
 
 
 def _item(value: Any) -> Any:
-    """The value as parts of a scene are written: tables in a line, arrays of them in several."""
+    """A value in the notation of scenes: inline tables, arrays of tables on several lines."""
     return tomlkit.parse(f"value = {_written(value)}\n")["value"]
 
 
@@ -234,7 +234,7 @@ def _written(value: Any) -> str:
 
 
 def _unname(document: Any, effect: str) -> None:
-    """Name an effect no longer that is not there any more."""
+    """Remove a deleted effect from the lists of names."""
     values = document.get("effects", {})
     for key in ("choose", "on", "off"):
         if isinstance(named := values.get(key), list) and effect in named:
@@ -242,7 +242,7 @@ def _unname(document: Any, effect: str) -> None:
 
 
 def _tidy(text: str, document: Any) -> str:
-    """An empty line before each heading that has another line before it than it had in `text`."""
+    """The document's text with an empty line before each heading that moved against `text`."""
     before = set(pairwise(text.splitlines()))
     lines = tomlkit.dumps(document).rstrip("\n").splitlines()
     tidy = lines[:1]
@@ -256,11 +256,11 @@ def _tidy(text: str, document: Any) -> str:
     return "\n".join(tidy) + "\n"
 
 
-# Places of touches
+# Positions of touches
 
 
 def placed(values: dict[str, Any], skin: Any) -> dict[str, Any]:
-    """The `values` of a touch, its places moved to where they are on the skin that there is."""
+    """The `values` of a touch, its positions scaled to the `skin`."""
     sides = _sides(skin)
     return {
         key: float(f"{value * sides[key[0] == 'y'] / _SIDE:.4g}") if key[0] in "xy" else value
@@ -269,7 +269,7 @@ def placed(values: dict[str, Any], skin: Any) -> dict[str, Any]:
 
 
 def _sides(skin: Any) -> tuple[float, float]:
-    """Lengths of the skin in m along x and y, as far as the text tells them."""
+    """Lengths of the skin in m along x and y; the default where the text does not define them."""
     values = skin if isinstance(skin, Mapping) else {}
     corners = values.get("outline")
     if isinstance(radius := values.get("rim_radius"), int | float):
@@ -297,8 +297,8 @@ def shifted(text: str, touch: int, dx: float, dy: float) -> str:
     return tomlkit.dumps(document)
 
 
-def pressed(text: str, touch: int, times: float) -> str:
-    """The text with a touch, counted from zero, pressing so many `times` as hard.
+def scaled(text: str, touch: int, times: float) -> str:
+    """The text with `times` the force or depth of a touch, counted from zero.
 
     Raises `Refusal` for a text that is no TOML, or has no such touch.
     """
@@ -310,8 +310,8 @@ def pressed(text: str, touch: int, times: float) -> str:
     return tomlkit.dumps(document)
 
 
-def instead(text: str, touch: int, values: Mapping[str, Any]) -> str:
-    """The text with a touch, counted from zero, that says this and nothing else.
+def replaced(text: str, touch: int, values: Mapping[str, Any]) -> str:
+    """The text with the `values` instead of those of a touch, counted from zero.
 
     Raises `Refusal` for a text that is no TOML, or has no such touch.
     """
@@ -326,7 +326,7 @@ def instead(text: str, touch: int, values: Mapping[str, Any]) -> str:
 
 def _touch(document: Any, touch: int) -> Any:
     many = document.get("touch", ())
-    each = [many] if isinstance(many, AbstractTable) else many  # one by itself is an array of one
+    each = [many] if isinstance(many, AbstractTable) else many  # a single table is an array of one
     if not touch < len(each):
-        raise Refusal(f"expected a touch {touch + 1} to change, got a text with {len(each)}")
+        raise Refusal(f"expected a scene with a touch {touch + 1}, got one with {len(each)}")
     return each[touch]

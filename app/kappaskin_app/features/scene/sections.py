@@ -1,4 +1,4 @@
-"""The text of a scene as sections: parts with rows, and what may be added."""
+"""Sections of a scene's forms: rows of values, and possible additions."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -9,16 +9,16 @@ from kappaskin._schema import Key
 from kappaskin.scenes import PARTS
 from kappaskin_app.features.scene import scene_text
 from kappaskin_app.features.scene.scene_text import Place
-from kappaskin_app.shell.effects import called, explained
+from kappaskin_app.shell.effects import effect_description, effect_name
 
-MOST_WHOLE = 2**31 - 1  # that a box for whole numbers can hold
+MOST_WHOLE = 2**31 - 1  # largest value of a box for whole numbers
 MOST = 1e12  # of any number shown in a box
 
 
 def kind_of(value: Any, key: Key) -> str:
-    """By what a value is edited of which `key` declares what it may be.
+    """The kind of editor of a value that is declared by `key`.
 
-    That is a choice, text, literal, switch, number, whole, numbers, wholes or pairs; or a count of
+    One of choice, text, literal, switch, number, whole, numbers, wholes and pairs; or a count of
     numbers or whole ones, as in "2 number".
     """
     if isinstance(value, str):
@@ -43,7 +43,7 @@ def _kind_of_number(value: float, real: bool) -> str:
 
 
 def _kind_of_list(value: list[Any], key: Key) -> str:
-    """That of its numbers with their count, unless they are many, or their number may change."""
+    """The kind of its numbers with their count, unless they are many or their count varies."""
     if value and all(isinstance(one, list) and all(map(_is_number, one)) for one in value):
         return "pairs"
     if not all(map(_is_number, value)):
@@ -55,14 +55,14 @@ def _kind_of_list(value: list[Any], key: Key) -> str:
 
 
 Change = Callable[[str], str]
-"""A text to a text."""
+"""A function from a text to the changed text."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One value at a `place`; `kind` says by what it is edited, `usual` how large it often is.
+    """One value at a `place`, with the `kind` of its editor and its `usual` value.
 
-    The value of one of a `part` says of which kind that part is.
+    With a `part`, the value is the kind of that part.
     """
 
     place: Place
@@ -81,7 +81,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Addition:
-    """Something that may be put in, in words; or others `inside`."""
+    """A possible addition to the scene, or a menu of those `inside`."""
 
     words: str
     tip: str
@@ -91,10 +91,10 @@ class Addition:
 
 @dataclass(frozen=True)
 class Section:
-    """A titled part of a scene: rows, then parts of its own, and what may be added or removed.
+    """A titled part of a scene: rows, then sections, and possible additions.
 
-    `offers` are further rows, `more` further parts, which a button called `adding` offers. A step
-    is shown in one line.
+    `offers` are further rows, `more` further parts, in the menu of a button with the text
+    `adding`. A step is shown in one line.
     """
 
     title: str
@@ -110,7 +110,7 @@ class Section:
 
     @property
     def structure(self) -> tuple[Any, ...]:
-        """All but the values: what its editors are made from."""
+        """All but the values, from which the editors are made."""
         return (
             *(self.title, self.place, self.adding),
             tuple((row.place, row.kind, row.key) for row in self.rows),
@@ -119,7 +119,7 @@ class Section:
         )
 
     def all_rows(self) -> tuple[Row, ...]:
-        """Its own rows, then those of its parts."""
+        """Its own rows, then those of its sections."""
         return (*self.rows, *(row for section in self.sections for row in section.all_rows()))
 
 
@@ -130,7 +130,7 @@ Values = Mapping[str, Any]
 
 
 def sections_of(values: Values) -> tuple[Section, ...]:
-    """What a scene's TOML says, part by part in the order of its forms."""
+    """The sections of a scene's TOML, in the order of the forms."""
     touches = _tables(values, "touch", ())
     found = [
         _section("Scene", "scene", "", values, ()),
@@ -151,7 +151,7 @@ def sections_of(values: Values) -> tuple[Section, ...]:
 def _section(
     title: str, part: str, kind: str, values: Values, place: Place, **more: Any
 ) -> Section:
-    """What a table says that has no parts, or whose parts are `more`."""
+    """The section of a table."""
     rows = _rows(part, kind, values, place)
     offers = (*_offers(part, kind, values, place), *more.pop("offers", ()))
     return Section(title, place, rows, offers=offers, **more)
@@ -214,7 +214,7 @@ def _turn(key: str) -> int:
 
 
 def _more_touches(there: list[str]) -> Section:
-    """A rigid object presses alone, and so do cylinders; loads may be many."""
+    """The button that adds a touch: several loads, or one rigid object, or cylinders."""
     touch = PARTS["touch"]
     rigid = {kind for kind in touch.kinds if "depth" in touch.known(kind)}
     offers = _offers_of_kinds("touch", lambda kind: lambda text: scene_text.add_touch(text, kind))
@@ -226,11 +226,15 @@ def _more_touches(there: list[str]) -> Section:
         values = {"dwell": PARTS["cylinders"].key("dwell").beginning}
         laid = Addition(
             "Cylinders",
-            "Lay the skin on one cylinder after the other, as a calibration does.",
+            "Calibration cylinders, on which the skin is laid one after the other.",
             lambda text: scene_text.add_table(text, ("cylinders",), values),
         )
         offers = (*offers, laid)
-    tip = "" if offers else "A rigid object presses alone: remove it first, or change what it is."
+    tip = (
+        ""
+        if offers
+        else "A rigid object must be the only touch: remove it first, or change its kind."
+    )
     return Section("", ("touch", "more"), adding="Add touch", more=offers, tip=tip)
 
 
@@ -238,14 +242,14 @@ def _effects(values: Values) -> Section:
     there = [name for name, table in values.items() if isinstance(table, Mapping)]
     blocks = tuple(
         _section(
-            *(called(name), "effects", name, values[name], ("effects", name)),
+            *(effect_name(name), "effects", name, values[name], ("effects", name)),
             removable=True,
-            tip=explained(name),
+            tip=effect_description(name),
         )
         for name in there
     )
     more = tuple(
-        Addition(called(name), explained(name), _adding_effect(name))
+        Addition(effect_name(name), effect_description(name), _adding_effect(name))
         for name in PARTS["effects"].kinds
         if name not in there
     )
@@ -285,19 +289,23 @@ def _rows(part: str, kind: str, values: Values, place: Place) -> tuple[Row, ...]
         if isinstance(value, Mapping) or name == "path" or (part == "scene" and name not in may):
             continue
         key = _key(part, kind, name)
-        says = part if name == PARTS[part].chosen_by else ""
-        found.append(Row((*place, name), kind_of(value, key), key, value, may.get(name), says))
+        chooses = part if name == PARTS[part].chosen_by else ""
+        found.append(Row((*place, name), kind_of(value, key), key, value, may.get(name), chooses))
     return tuple(found)
 
 
 def _key(part: str, kind: str, name: str) -> Key:
-    """What is declared of a key; that of an effect tells what the effect does, too."""
+    """The declaration of a key, with the description of the effect for a key of one."""
     key = PARTS[part].key(name, kind)
-    return replace(key, tip=f"{key.tip} {explained(kind)}".strip()) if part == "effects" else key
+    return (
+        replace(key, tip=f"{key.tip} {effect_description(kind)}".strip())
+        if part == "effects"
+        else key
+    )
 
 
 def _offers(part: str, kind: str, values: Values, place: Place) -> tuple[Addition, ...]:
-    """What else a table may say."""
+    """The keys that can be added to a table."""
     found = list[Addition]()
     for name, value in PARTS[part].known(kind).items():
         if name in values:

@@ -1,4 +1,4 @@
-"""The timeline of a scene: how hard it presses over time, under a handle."""
+"""Timeline of a scene: force over time, with a handle."""
 
 import math
 
@@ -15,18 +15,18 @@ from kappaskin_app.widgets.timeline import Clock, Course, glyph_button, icon
 
 Array = NDArray[np.float64]
 
-_SAMPLES = 200  # of how hard it presses
-_APART = 3.0  # px that two ticks are apart at least
-_FRAME = 1 / 60  # s: the shortest step that is seen
+_SAMPLES = 200  # of the force profile
+_TICK_GAP = 3.0  # px, least distance of two ticks
+_FRAME = 1 / 60  # s: the shortest visible step
 _TRACK_TIP = (
-    "How hard the scene presses over its duration; ticks where a motion changes. Press or drag to "
-    "go to another time; Left and Right go by one frame, Page Up and Page Down by a tenth, Home "
-    "and End to the ends; Space plays or pauses."
+    "Force of the scene over its duration; ticks mark the changes of a motion. Click or drag to go "
+    "to another time; Left and Right move by one frame, Page Up and Page Down by a tenth, Home and "
+    "End to the ends; Space plays or pauses."
 )
 
 
 def profile(scene: Scene) -> Array:
-    """How hard `scene` presses at 200 times over its duration, as shares of the hardest, (200,)."""
+    """Force of `scene` at 200 times over its duration, relative to the largest, (200,)."""
     if scene.laid is not None:
         return np.ones(_SAMPLES)
     times = np.linspace(0, np.nextafter(scene.duration, 0), _SAMPLES).tolist()
@@ -36,7 +36,7 @@ def profile(scene: Scene) -> Array:
 
 
 class Track(Course):
-    """The handle over the profile."""
+    """The profile of the force, with a handle."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Time in the scene, in ms", _TRACK_TIP, parent)
@@ -51,7 +51,7 @@ class Track(Course):
         self.show_duration(scene.duration, self.frame, scene.duration - self.frame)
 
     def paint_course(self, painter: QPainter, area: QRectF, handle: float) -> None:
-        if area != self._shaped:  # it is drawn as often as the skin is
+        if area != self._shaped:  # cached: painted in every frame
             self._shaped, self._shape = area, self._shape_in(area)
         painter.setPen(Qt.PenStyle.NoPen)
         for part, ink in self.halves(area, handle):
@@ -63,7 +63,7 @@ class Track(Course):
         self._paint_ticks(painter, area)
 
     def _shape_in(self, area: QRectF) -> QPolygonF:
-        """The profile, with a little of it where nothing presses."""
+        """The outline of the profile, with a least height where the force is zero."""
         x = np.linspace(area.left(), area.right(), _SAMPLES).tolist()
         heights = 1.5 + self._profile * (area.height() - 4)
         top = [QPointF(u, area.bottom() - h) for u, h in zip(x, heights.tolist(), strict=True)]
@@ -73,19 +73,19 @@ class Track(Course):
         painter.setPen(QPen(QColor(current().text), 1))
         drawn = -math.inf
         for moment in self._moments:
-            x = round(self.at(moment)) + 0.5  # or it would be blurred over two px
-            if x - drawn >= _APART and 0 < moment < self.duration:
+            x = round(self.at(moment)) + 0.5  # else blurred over two pixels
+            if x - drawn >= _TICK_GAP and 0 < moment < self.duration:
                 drawn = x
                 painter.drawLine(QPointF(x, area.bottom() - 5), QPointF(x, area.bottom()))
 
 
-_TIP = "The time in the scene, which begins anew when it is over."
+_TIP = "Time in the scene, which repeats."
 
 
 class Timeline(QWidget):
-    """A row that shows the time in a scene; `sought` asks for another one, in s.
+    """A row that shows the time in a scene; `sought` requests another time in s.
 
-    `play_wanted` asks to play, or to pause.
+    `play_wanted` requests to play or to pause.
     """
 
     sought = Signal(float)
@@ -110,17 +110,17 @@ class Timeline(QWidget):
         self.hide()
 
     def show_scene(self, scene: Scene | None) -> None:
-        """Show the course of `scene`; nothing of none, or of one in which nothing moves."""
-        self.track.setSliderDown(False)  # the mouse may be let go where this is not seen
-        goes = scene is not None and (len(scene.laid.steps) > 1 if scene.laid else scene.moves)
-        self._scene = scene if goes else None
+        """Show the profile of `scene`; hidden without a scene, or with one at rest."""
+        self.track.setSliderDown(False)  # the release of the mouse may be missed while hidden
+        moves = scene is not None and (len(scene.laid.steps) > 1 if scene.laid else scene.moves)
+        self._scene = scene if moves else None
         self.setVisible(self._scene is not None)
         if self._scene is not None:
             self.track.show_scene(self._scene)
             self._show_clock(0.0, self._scene.duration)
 
     def show_time(self, seconds: float, playing: bool) -> None:
-        """Show a time in s since the scene began for the first time, and whether it goes on."""
+        """Show a time in s since the first start of the scene, and whether it is playing."""
         if playing != self._playing:
             self._playing = playing
             self._show_playing()
@@ -138,8 +138,8 @@ class Timeline(QWidget):
     def _show_playing(self) -> None:
         verb = "Pause" if self._playing else "Play"
         self.play.setAccessibleName(verb)
-        what = "Hold the scene as it is now" if self._playing else "Let the scene go on from here"
-        self.play.setToolTip(f"{what} (Space)")
+        tip = "Pause the scene" if self._playing else "Continue the scene"
+        self.play.setToolTip(f"{tip} (Space)")
         self.play.setIcon(icon("pause" if self._playing else "play"))
 
     def _seek(self, seconds: float) -> None:

@@ -1,20 +1,20 @@
-"""The simulated sensor: skin, elements, electronics; and the region that is scanned."""
+"""Panels of the simulated sensor: skin, elements, electronics, scanned region."""
 
 import time
 
 from kappaskin_app.features.sensor.panel import (
     ElectronicsPanel,
     ElementsPanel,
+    GagesPanel,
     RegionPanel,
     ShapePanel,
-    SpoilsPanel,
     SupportPanel,
 )
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.pages import SENSOR, SKIN
 from kappaskin_app.shell.window import MainWindow
 
-_EACH = 1.0  # s between two looks at what a region buys
+_UPDATE = 1.0  # s between two updates of the scan's trade-off
 
 
 class SensorFeature:
@@ -26,22 +26,22 @@ class SensorFeature:
         self.shape, self.elements = add(SKIN, ShapePanel()), add(SKIN, ElementsPanel())
         self.support = add(SKIN, SupportPanel())
         self.electronics = add(SENSOR, ElectronicsPanel())
-        self.spoils = add(SENSOR, SpoilsPanel())
+        self.gages = add(SENSOR, GagesPanel())
         self.region = add(SENSOR, RegionPanel())
         session.refused.connect(guarded(self.shape.show_refusal))
         session.preparing.connect(guarded(self.shape.show_preparing))
-        session.reported.connect(guarded(self._show_bargain))
+        session.reported.connect(guarded(self._show_tradeoff))
         shell.selection.chosen.connect(guarded(self._choose))
 
-    def _show_bargain(self, *_: object) -> None:
+    def _show_tradeoff(self, *_: object) -> None:
         now = time.monotonic()
         if now >= self._next:
-            self._next = now + _EACH
-            self.region.show_bargain(self._shell.session.scan_tradeoff())
+            self._next = now + _UPDATE
+            self.region.show_tradeoff(self._shell.session.scan_tradeoff())
 
     def _choose(self, element: int) -> None:
-        """Take an element into the region of those chosen, or out of it."""
+        """Add an element to the selected ones, or remove it."""
         history = self._shell.history
         if history.settings.region == "elements":
-            chosen = set(history.settings.region_elements) ^ {element}
-            history.change("Choose elements", region_elements=tuple(sorted(chosen)))
+            selected = set(history.settings.region_elements) ^ {element}
+            history.change("Select elements", region_elements=tuple(sorted(selected)))

@@ -1,4 +1,4 @@
-"""Panels of the simulated sensor: skin, elements, electronics, and the scanned region."""
+"""Forms of the simulated sensor: skin, elements, electronics, scanned region."""
 
 import math
 from contextlib import suppress
@@ -16,16 +16,16 @@ from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.scene import SHAPES
 from kappaskin_app.shell.simulation import patch_of
 
-_PREPARING = "Computing this skin; the last one stays until then."
+_PREPARING = "Computing this skin; the previous one is shown until then."
 _NUMBERS = ("side_x", "side_y", "base_radius", "rim_radius")
 
 
 class ShapePanel(SimulationForm):
-    """Asks for the shape, its sizes and its edge; says why there can be no such skin."""
+    """The form of the shape, its lengths and its edge, with the message of a refusal."""
 
     purpose = (
-        "The simulated skin at rest, flat or bent, and how its edge is held. What a flat one does "
-        "under a load follows from "
+        "The unloaded simulated skin, flat or curved, and its boundary condition. A flat skin "
+        "under a pressure p follows "
         "D \u2207\u2074w = p, D = E h\u00b3 / (12 (1 \u2212 \u03bd\u00b2))."
     )
     guide_page = "scenes"
@@ -40,20 +40,20 @@ class ShapePanel(SimulationForm):
 
     def show_settings(self, settings: Settings) -> None:
         super().show_settings(settings)
-        asked = set(SHAPES[settings.shape].asks)
-        self.show_rows({"shape", "edge"} | asked)
-        with suppress(Refusal):  # what cannot be is said below
+        lengths = set(SHAPES[settings.shape].lengths)
+        self.show_rows({"shape", "edge"} | lengths)
+        with suppress(Refusal):  # a refusal is shown below
             self.offer("edge", edges_of(patch_of(settings)))
-        self.form.setRowVisible(self.opening, "base_radius" in asked)
+        self.form.setRowVisible(self.opening, "base_radius" in lengths)
         degrees = math.degrees(settings.side_x / settings.base_radius)
         self.opening.setText(f"{degrees:.1f}\N{DEGREE SIGN}")
 
     def show_refusal(self, text: str) -> None:
-        """Say why the skin asked for cannot be, or nothing when it can."""
+        """Show why the requested skin is refused; nothing if it is not."""
         self._refusal = text
 
     def show_preparing(self, preparing: bool) -> None:
-        """Say that the skin asked for is on its way."""
+        """Show that the requested skin is being computed."""
         self._preparing = preparing
 
     def show_status(self, status: Status, simulating: bool) -> None:
@@ -62,15 +62,15 @@ class ShapePanel(SimulationForm):
             self.show_message(_PREPARING, hint=True)
 
     def alarm(self, status: Status) -> str:
-        return f"The last skin stays: {self._refusal}." if self._refusal else ""
+        return f"The previous skin is still simulated: {self._refusal}." if self._refusal else ""
 
 
 class ElementsPanel(SimulationForm):
-    """Asks for m x n elements, and says when they are too few for the functions of the fit."""
+    """The form of the m x n elements, with a message where they are too few for the basis."""
 
     purpose = (
-        "How many sense, on a regular grid. Each reads three curvatures where it is: xx = "
-        "\u2202\u00b2w/\u2202x\u00b2, yy = \u2202\u00b2w/\u2202y\u00b2, "
+        "Number of elements on a regular grid. Each measures three curvatures at its position: "
+        "xx = \u2202\u00b2w/\u2202x\u00b2, yy = \u2202\u00b2w/\u2202y\u00b2, "
         "xy = \u2202\u00b2w/\u2202x\u2202y of a flat skin's displacement w."
     )
     guide_page = "scenes"
@@ -83,23 +83,23 @@ class ElementsPanel(SimulationForm):
 
 
 class SupportPanel(SimulationForm):
-    """Asks for what holds the skin besides its own stiffness."""
+    """The form of tension, foam and fluid."""
 
     purpose = (
-        "What carries the simulated skin beside its stiffness: tension T, foam k, a fluid that "
-        "keeps its volume. D \u2207\u2074w \u2212 T \u2207\u00b2w + k w = p."
+        "Support of the simulated skin in addition to its stiffness: tension T, foam k, a fluid of "
+        "constant volume. D \u2207\u2074w \u2212 T \u2207\u00b2w + k w = p."
     )
     guide_page = "scenes"
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Below and around", ("tension", "foam", "fluid"), parent)
+        super().__init__("Support", ("tension", "foam", "fluid"), parent)
 
 
-_CHOOSE = "Click elements on a heatmap to choose them."
+_SELECT = "Click elements on a heatmap to select them."
 
 
 def _facts(sensor: Sensor) -> tuple[str, str, str]:
-    """What the electronics come to: frame rate, smallest step and range, strain limit."""
+    """Frame rate, resolution and range, and strain limit of the electronics."""
     chain = sensor.transduction
     most = min(abs(limit) for limit in chain.limits) * chain.resolution
     return (
@@ -110,11 +110,11 @@ def _facts(sensor: Sensor) -> tuple[str, str, str]:
 
 
 class ElectronicsPanel(SimulationForm):
-    """Asks for the electronics; says how fast, how fine and how far they read."""
+    """The form of the electronics, with their frame rate, resolution and range."""
 
     purpose = (
-        "What turns the change of resistance of a gage into counts, with how many bits and how "
-        "fast: a step of the converter and its noise are the least that can be told apart."
+        "Conversion of the resistance change of a gage into counts: resolution and conversion "
+        "time. The smallest detectable change is given by the step of the converter and by noise."
     )
     guide_page = "scenes"
 
@@ -122,9 +122,9 @@ class ElectronicsPanel(SimulationForm):
         super().__init__("Electronics", ("electronics", "bits", "conversion_time"), parent)
         self._facts = [QLabel() for _ in range(3)]
         rows = (
-            ("Frame", "The most frames per second: one over the time of all channels."),
-            ("Step", "The curvature of one count, and how far the converter reads."),
-            ("Strain", "Where a gage strains by 1 %, beyond which metal foil is not elastic."),
+            ("Frame", "Largest frame rate: one over the conversion time of all channels."),
+            ("Step", "The curvature of one count, and the range of the converter."),
+            ("Strain", "Curvature at a gage strain of 1 %, the elastic limit of metal foil."),
         )
         for (name, tip), fact in zip(rows, self._facts, strict=True):
             label = QLabel(name)
@@ -141,12 +141,12 @@ class ElectronicsPanel(SimulationForm):
                 label.setText(text)
 
 
-class SpoilsPanel(SimulationForm):
-    """Asks for hysteresis, creep and tolerance."""
+class GagesPanel(SimulationForm):
+    """The form of hysteresis, creep and tolerance."""
 
     purpose = (
-        "What spoils the reading of a real gage: loops (it comes back another way), creep, and "
-        "gages that are not alike."
+        "Effects of real gages on their readings: hysteresis loops, creep, and different gains and "
+        "offsets."
     )
     guide_page = "scenes"
 
@@ -155,62 +155,59 @@ class SpoilsPanel(SimulationForm):
 
 
 class RegionPanel(Form):
-    """Asks for a region of interest; says what it buys and costs, or why there can be none."""
+    """The form of the region of interest, with its frame rate and accuracy, or a refusal."""
 
     purpose = (
-        "Scans only part of the channels in each frame, around the contact or those chosen: "
+        "Scans part of the channels in each frame, around the contact or selected ones: "
         "frames/s = 1 / (channels \u00d7 conversion time)."
     )
     guide_page = "accuracy"
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Region of interest", ("region", "region_radius", "region_share"), parent)
-        self._region, self._chosen = "off", 0
-        self._told, self._rates = "", (math.inf, math.inf)
+        self._region, self._selected = "off", 0
+        self._text, self._rates = "", (math.inf, math.inf)
 
     def show_settings(self, settings: Settings) -> None:
         super().show_settings(settings)
-        self._region, self._chosen = settings.region, len(settings.region_elements)
-        round_a_contact = settings.region in ("skin", "intrinsic")
-        rows = {"region"} | ({"region_radius"} if round_a_contact else set())
+        self._region, self._selected = settings.region, len(settings.region_elements)
+        around_contact = settings.region in ("skin", "intrinsic")
+        rows = {"region"} | ({"region_radius"} if around_contact else set())
         self.show_rows(rows | ({"region_share"} if settings.region != "off" else set()))
 
-    def show_bargain(self, bargain: ScanTradeoff | None) -> None:
-        """What the region in use buys and costs; None while that is not known."""
-        self._told = "" if bargain is None else _words(bargain, *self._rates)
+    def show_tradeoff(self, tradeoff: ScanTradeoff | None) -> None:
+        """Show frame rate and accuracy of the region; None while unknown."""
+        self._text = "" if tradeoff is None else _tradeoff_text(tradeoff, *self._rates)
 
     def show_status(self, status: Status, simulating: bool) -> None:
         if status.sensor is not None:
             self._rates = status.region.rate, status.sensor.rate
         if status.region_refusal:
             self.show_message(f"{status.region_refusal}.")
-        elif self._region == "elements" and not self._chosen:
-            self.show_message(_CHOOSE, hint=True)
+        elif self._region == "elements" and not self._selected:
+            self.show_message(_SELECT, hint=True)
         else:
-            self.show_message(self._told if self._region != "off" else "", hint=True)
+            self.show_message(self._text if self._region != "off" else "", hint=True)
 
 
-def _words(bargain: ScanTradeoff, asked: float, without: float) -> str:
-    """What a region of which `asked` frames/s are wanted buys and costs; so many come `without`."""
-    rate, full_rate = min(asked, bargain.rate), min(without, bargain.full_rate)
-    buys = (
-        f"buys {rate:.0f} instead of {full_rate:.0f} frames/s, {rate / full_rate:.1f} times"
+def _tradeoff_text(tradeoff: ScanTradeoff, requested: float, without: float) -> str:
+    """Frame rate and accuracy of a region, in frames/s `requested` and `without` the region."""
+    rate, full_rate = min(requested, tradeoff.rate), min(without, tradeoff.full_rate)
+    gain = (
+        f"{rate:.0f} instead of {full_rate:.0f} frames/s, {rate / full_rate:.1f} times"
         if rate > 1.005 * full_rate
-        else f"buys no rate: all channels come at {full_rate:.0f} frames/s as well"
+        else f"{full_rate:.0f} frames/s, as with all channels"
     )
-    more = f" (it could be {bargain.rate:.0f})" if bargain.rate > 1.005 * rate else ""
-    told = [axis for axis in (0, 1) if math.isfinite(bargain.full_bound[axis])]  # a strip's x alone
-    if not told:
-        return f"Scans {bargain.channels} channels a frame. It {buys}{more}."
-    mm, full = (1e3 * max(bound[told]) for bound in (bargain.bound, bargain.full_bound))
-    all_tell = f"all channels to \N{PLUS-MINUS SIGN}{full:.2f} mm"
-    if not math.isfinite(mm):
-        costs = f"costs accuracy: one frame does not tell where the contact is, {all_tell} at best"
-        return f"Scans {bargain.channels} channels a frame. It {buys}{more}. It {costs}."
-    costs = (
-        f"costs accuracy: one frame tells where the contact is to \N{PLUS-MINUS SIGN}{mm:.2f} mm "
-        f"at best, {all_tell}"
-        if mm > 1.005 * full
-        else f"costs no accuracy: \N{PLUS-MINUS SIGN}{full:.2f} mm at best, as all channels"
+    more = f" (possible: {tradeoff.rate:.0f})" if tradeoff.rate > 1.005 * rate else ""
+    text = f"{tradeoff.channels} channels per frame. Frame rate: {gain}{more}."
+    known = [axis for axis in (0, 1) if math.isfinite(tradeoff.full_bound[axis])]  # a strip: x only
+    if not known:
+        return text
+    mm, full = (1e3 * max(bound[known]) for bound in (tradeoff.bound, tradeoff.full_bound))
+    accuracy = f"\N{PLUS-MINUS SIGN}{mm:.2f} mm" if math.isfinite(mm) else "undetermined"
+    compared = (
+        f"\N{PLUS-MINUS SIGN}{full:.2f} mm with all channels"
+        if not mm <= 1.005 * full
+        else "as with all channels"
     )
-    return f"Scans {bargain.channels} channels a frame. It {buys}{more}. It {costs}."
+    return f"{text} Contact position from one frame, at best: {accuracy}, {compared}."

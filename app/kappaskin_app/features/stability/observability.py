@@ -1,4 +1,4 @@
-"""How well the elements see each shape of the basis, computed in the background."""
+"""Observability of the modes of the basis, computed as a background task."""
 
 from dataclasses import dataclass
 
@@ -16,14 +16,14 @@ from kappaskin_app.shell.history import History
 Array = NDArray[np.float64]
 
 MOST = 576
-"""Functions up to which it is computed: the window waits for parts of it, and longer for more."""
+"""Largest number of functions: parts of the computation block the window."""
 
-_ALIKE = 1.005  # times as much noise, or less, is as much
+_EQUAL = 1.005  # ratio of singular values up to which they count as equal
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """Singular values (F,) of a basis on a layout, the best seen first, and shapes (F, Ni, Nj)."""
+    """Singular values (F,) of a basis on a layout, the largest first, and modes (F, Ni, Nj)."""
 
     basis: Basis
     layout: SensorLayout
@@ -38,54 +38,53 @@ class Spectrum:
 
     @property
     def floor(self) -> float:
-        """Below it a value is nothing but rounding, as least squares counts."""
+        """The rounding level of the singular values, as in least squares."""
         longer = max(int(self.layout.live.sum()), len(self.values))
         return float(self.values[0]) * longer * float(np.finfo(float).eps)
 
     @property
     def silent(self) -> int:
-        """How many shapes change no reading."""
+        """The number of unobservable modes."""
         return int(np.sum(self.values <= self.floor))
 
     @property
-    def alike(self) -> bool:
-        """Whether all shapes are seen equally well, so that none of them is telling."""
-        return not self.silent and bool(self.values[-1] > self.values[0] / _ALIKE)
+    def uniform(self) -> bool:
+        """Whether all modes are equally observable."""
+        return not self.silent and bool(self.values[-1] > self.values[0] / _EQUAL)
 
     def describe(self) -> str:
-        """What the values mean, in words."""
+        """A summary of the singular values."""
         count = len(self.values)
         if not self.values[0] > 0:
-            return "Nothing is read: no shape is seen."
+            return "No live elements: no mode is observable."
         worst = float(self.values[0] / self.values[count - self.silent - 1])
-        seen = (
-            "all are seen alike"
-            if worst < _ALIKE
-            else f"the worst takes {_times(worst)} times the noise of the best"
+        others = (
+            "all are equally observable"
+            if worst < _EQUAL
+            else f"the worst has {_times(worst)} times the noise of the best"
         )
         if not self.silent:
-            return f"Condition number {_times(worst)}: of {count} shapes {seen}."
-        what = f"{self.silent} of {count} shapes" if self.silent > 1 else f"one of {count} shapes"
-        verb = "change" if self.silent > 1 else "changes"
+            return f"Condition number {_times(worst)}: of {count} modes {others}."
+        verb = "are" if self.silent > 1 else "is"
         return (
-            f"Condition number infinite: {what} {verb} no reading, and only a prior could decide "
-            f"{'them' if self.silent > 1 else 'it'}. Of the others {seen}."
+            f"Condition number infinite: {self.silent} of {count} modes {verb} unobservable and "
+            f"can only be determined by a prior. Of the others {others}."
         )
 
-    def told(self, number: int) -> str:
-        """How well the shape `number`, counted from 1, is seen."""
+    def mode_text(self, number: int) -> str:
+        """The observability of the mode `number`, counted from 1."""
         value = float(self.values[number - 1])
         if value <= self.floor:
-            return "It moves the skin and changes no reading."
+            return "Unobservable: it moves the skin without changing a reading."
         worse = float(self.values[0]) / value
         return (
-            "Seen as well as the best."
-            if worse < _ALIKE
-            else f"Seen {_times(worse)} times less than the best."
+            "As observable as the best mode."
+            if worse < _EQUAL
+            else f"{_times(worse)} times less observable than the best mode."
         )
 
     def surface(self, number: int, nx: int, ny: int) -> Array:
-        """The shape `number` on a grid, (ny, nx), its largest displacement 1; NaN off the skin."""
+        """The mode `number` on a grid, (ny, nx), of largest displacement 1; NaN off the skin."""
         x, y = self.layout.patch.grid(nx, ny)
         surface = self.basis.on_grid(x, y)(self.shapes[number - 1])
         flat = np.nan_to_num(surface).ravel()
@@ -102,10 +101,10 @@ def _times(ratio: float) -> str:
     return f"more than 10^{int(np.log10(ratio))}"
 
 
-class Seeing(QObject):
-    """Follows what is asked for while somebody looks; `changed` tells when it is another spectrum.
+class Observability(QObject):
+    """Computes the spectrum while its panel is visible; `changed` reports a new one.
 
-    `spectrum` is None while `refusal` says why there is none, or while it is computed.
+    `spectrum` is None while it is computed, or refused for the reason in `refusal`.
     """
 
     changed = Signal()
@@ -115,53 +114,53 @@ class Seeing(QObject):
         self._history = history
         self.spectrum: Spectrum | None = None
         self.refusal = ""
-        self.chosen = 0
-        """The number of the shape that is looked at, from 1; 0 while there is none."""
-        self._picked = False
+        self.number = 0
+        """The number of the selected mode, from 1; 0 while there is none."""
+        self._selected = False
         self.task = BackgroundTask(
             tasks,
-            "Computing how shapes are seen",
+            "Computing the observability of the modes",
             self._show,
             self._refuse,
-            cancelled="Cancelled; another basis or edge is computed again.",
+            cancelled="Cancelled; computed again for another basis or boundary condition.",
         )
-        self._asked: tuple[object, ...] = ()
-        self._watched = False
+        self._request: tuple[object, ...] = ()
+        self._active = False
 
-    def watch(self, watched: bool) -> None:
-        """Compute what is asked for only while somebody looks."""
-        self._watched = watched
+    def set_active(self, active: bool) -> None:
+        """Compute while the panel is visible, and only then."""
+        self._active = active
         self.changed.emit()
 
     @property
-    def seen(self) -> Spectrum | None:
-        """The spectrum while somebody looks at it."""
-        return self.spectrum if self._watched else None
+    def visible_spectrum(self) -> Spectrum | None:
+        """The spectrum while the panel is visible."""
+        return self.spectrum if self._active else None
 
-    def telling(self) -> Spectrum | None:
-        """The spectrum while somebody looks at a shape that tells something, or chose it."""
-        spectrum = self.seen
-        return None if spectrum is None or (spectrum.alike and not self._picked) else spectrum
+    def selected(self) -> Spectrum | None:
+        """The visible spectrum; if it is uniform, only after a mode was selected."""
+        spectrum = self.visible_spectrum
+        return None if spectrum is None or (spectrum.uniform and not self._selected) else spectrum
 
     def follow(self, status: Status) -> None:
-        """Begin anew when something else is asked for."""
-        if not self._watched or status.sensor is None:
+        """Compute the spectrum again when sensor, basis or boundary condition change."""
+        if not self._active or status.sensor is None:
             return
         s, sensor = self._history.settings, status.sensor
         functions = s.functions_x, 1 if sensor.layout.patch.strip else s.functions_y
         edge = s.fit_edge or sensor.edge
-        asked = (status.connections, edge, functions)
-        if asked != self._asked:
-            self._asked = asked
+        request = (status.connections, edge, functions)
+        if request != self._request:
+            self._request = request
             if functions[0] * functions[1] <= MOST:
                 self.task.run(Spectrum.of, sensor, edge, functions)
             else:
                 self._show(None, f"Shown for up to {MOST} functions.")
 
-    def choose(self, number: int) -> None:
-        """Look at the shape `number`, from 1."""
+    def select(self, number: int) -> None:
+        """Select the mode `number`, from 1."""
         if self.spectrum is not None and 1 <= number <= len(self.spectrum.values):
-            self.chosen, self._picked = number, True
+            self.number, self._selected = number, True
             self.changed.emit()
 
     def _refuse(self, error: Exception) -> None:
@@ -169,6 +168,6 @@ class Seeing(QObject):
 
     def _show(self, spectrum: Spectrum | None, refusal: str = "") -> None:
         self.spectrum, self.refusal = spectrum, refusal
-        self.chosen = 0 if spectrum is None else len(spectrum.values)
-        self._picked = False
+        self.number = 0 if spectrum is None else len(spectrum.values)
+        self._selected = False
         self.changed.emit()

@@ -1,4 +1,4 @@
-"""Plots of observability: singular values, and one shape as a map."""
+"""Plots of the observability: singular values, and one mode as a map."""
 
 import math
 
@@ -16,7 +16,7 @@ from kappaskin_app.widgets.tint import Tint
 
 Array = NDArray[np.float64]
 
-_THINNEST = 0.2  # of the longer side, so that a narrow skin is seen
+_THINNEST = 0.2  # of the longer side, so that a narrow skin is visible
 
 
 class ModeMap(QWidget):
@@ -29,8 +29,8 @@ class ModeMap(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(120, 70)
         self.setToolTip(
-            "Where the chosen shape moves the skin, inward in one colour and outward in the other, "
-            "of an arbitrary height. Dots: elements; crosses: dead ones."
+            "Displacement of the selected mode, inward in one colour and outward in the other, on "
+            "an arbitrary scale. Dots: elements; crosses: dead elements."
         )
 
     def sizeHint(self) -> QSize:
@@ -79,7 +79,7 @@ class ModeMap(QWidget):
 
 
 _TOP, _RIGHT = 10.0, 12.0
-_AXIS = "Singular value (up) of each shape"
+_AXIS = "Singular value (vertical) of each mode"
 _POWERS = str.maketrans(
     "-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"
 )
@@ -87,7 +87,7 @@ _STEPS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1, Qt.Key.Key_Down: -1, Qt.Key.
 
 
 class SpectrumPlot(QWidget):
-    """Draws a `Spectrum`; a click, or the arrow keys, choose a shape by its number from 1."""
+    """Draws a `Spectrum`; a click or the arrow keys select a mode by its number from 1."""
 
     chosen = Signal(int)
 
@@ -100,10 +100,9 @@ class SpectrumPlot(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("Singular values")
         self.setToolTip(
-            "How much the elements read of each shape: the singular values of the curvature "
-            "operator M (Eq. 2), its columns scaled to length 1. Noise enters a shape in "
-            "proportion to one over its value. Click a value, or use the arrow keys, to look at "
-            "its shape."
+            "Observability of each mode: the singular values of the curvature operator M (Eq. 2) "
+            "with columns of unit length. The noise of a mode is inversely proportional to its "
+            "value. Click a value, or use the arrow keys, to show its mode."
         )
 
     def sizeHint(self) -> QSize:
@@ -114,13 +113,13 @@ class SpectrumPlot(QWidget):
         return QSize(metrics.horizontalAdvance(_AXIS) + 4, 8 * metrics.height())
 
     def show_spectrum(self, spectrum: Spectrum | None, number: int, empty: str) -> None:
-        """Draw it, with the shape `number` ringed; without one, `empty` is written."""
+        """Draw it with a ring around the mode `number`; without a spectrum, the text `empty`."""
         self.spectrum, self._number, self._empty = spectrum, number, empty
         if spectrum is not None:
             floor = max(spectrum.floor, 1e-300)
-            seen = [v / 1.3 for v in spectrum.values.tolist() if v > floor]
-            seen += [float(spectrum.values[0]), *([floor / 30] if spectrum.silent else [])]
-            self._axis = LogAxis.around(seen)  # with room for the ring around the last one
+            values = [v / 1.3 for v in spectrum.values.tolist() if v > floor]
+            values += [float(spectrum.values[0]), *([floor / 30] if spectrum.silent else [])]
+            self._axis = LogAxis.around(values)  # with room for the ring around the last one
         self.update()
 
     @property
@@ -130,7 +129,7 @@ class SpectrumPlot(QWidget):
         return QRectF(self.rect()).adjusted(left, _TOP, -_RIGHT, -below)
 
     def place_of(self, number: int) -> QPointF:
-        """Where the value of the shape `number` is drawn; one without a value at the floor."""
+        """Position of the value of the mode `number`; an unobservable one is at the floor."""
         area, spectrum = self._area, self.spectrum
         if spectrum is None:
             return area.center()
@@ -179,7 +178,7 @@ class SpectrumPlot(QWidget):
         theme, flags = current(), Qt.AlignmentFlag
         line = painter.fontMetrics().height()
         free = -math.inf
-        # From the top, where values of 1 are: what is not written for want of room lies below.
+        # From the top, where values of 1 are: labels without space are omitted below.
         for value, written in reversed(self._axis.ticks()):
             y = area.bottom() - self._axis.share(value) * area.height()
             if not written or y - free < 1.3 * line:
@@ -203,7 +202,7 @@ class SpectrumPlot(QWidget):
 
 
 def _power(value: float) -> str:
-    """A round value; a power of ten where its digits would be many."""
+    """A round value; a power of ten where it has many digits."""
     if 1e-3 < value * 1.0000001 < 1e4:
         return f"{value:g}"
     power = math.floor(math.log10(value) + 1e-9)

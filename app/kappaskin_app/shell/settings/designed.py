@@ -1,13 +1,13 @@
-"""A sensor that is not built yet: its skin, its elements, what they can do, and where they are."""
+"""Settings of the sensor design: skin, elements, noise and placement."""
 
 from dataclasses import dataclass
 
-from kappaskin_app.shell.settings.asks import MILLIMETRES, PER_METRE, Choice, Range, asked
+from kappaskin_app.shell.settings.form_fields import MILLIMETRES, PER_METRE, Choice, Range, setting
 from kappaskin_app.shell.settings.scene import SHAPES
 
 PLACINGS = (
     ("scene", "Regular grid"),
-    ("clustered", "Drawn to the middle"),
+    ("clustered", "Clustered in the middle"),
     ("D", "D-optimal"),
     ("A", "A-optimal"),
 )
@@ -18,56 +18,61 @@ def _length(label: str, tip: str) -> Range:
 
 
 @dataclass(frozen=True)
-class Designed:
-    """What is designed, in SI units; which of its lengths count, its shape says (`SHAPES`)."""
+class DesignSettings:
+    """The sensor design, in SI units; which lengths apply depends on the shape (`SHAPES`)."""
 
-    design_shape: str = asked(
+    design_shape: str = setting(
         "flat",
         Choice(
             "Outline",
-            "The outline of the skin to be built, hinged along its edges.",
+            "Outline of the designed skin, which is hinged along its edges.",
             tuple((name, shape.label) for name, shape in SHAPES.items()),
         ),
     )
-    design_side_x: float = asked(0.1, _length("Side x", "Length of the skin along x."))
-    design_side_y: float = asked(0.1, _length("Side y", "Length of the skin along y."))
-    design_base_radius: float = asked(
-        12.9e-3, _length("Radius", "Radius of the arc that the skin makes at rest.")
+    design_side_x: float = setting(0.1, _length("Side x", "Length of the skin along x."))
+    design_side_y: float = setting(0.1, _length("Side y", "Length of the skin along y."))
+    design_base_radius: float = setting(
+        12.9e-3, _length("Radius", "Radius of the arc of the unloaded skin.")
     )
-    design_rim_radius: float = asked(
-        0.05, _length("Rim radius", "From the middle of the skin to its rim, or to its corners.")
+    design_rim_radius: float = setting(
+        0.05,
+        _length(
+            "Rim radius", "Distance from the middle of the skin to its rim, or to its corners."
+        ),
     )
-    design_x: int = asked(
+    design_x: int = setting(
         10,
         Range(
             "Elements along x",
-            "m, elements along x. Twice as many elements halve the variance of the shape, and take "
-            "twice as long to read.",
+            "m, the number of elements along x. Twice as many elements halve the variance of the "
+            "shape and double the scan time.",
             2,
             32,
             1,
         ),
     )
-    design_y: int = asked(10, Range("Elements along y", "n, elements along y.", 2, 32, 1))
-    design_functions_x: int = asked(
+    design_y: int = setting(
+        10, Range("Elements along y", "n, the number of elements along y.", 2, 32, 1)
+    )
+    design_functions_x: int = setting(
         8,
         Range(
-            "Functions along x",
-            "Ni, the functions along x that the shape is made of (Eq. 1).",
+            "Basis functions in x",
+            "Ni, the number of basis functions in x (Eq. 1).",
             1,
             24,
             1,
         ),
     )
-    design_functions_y: int = asked(
-        8, Range("Functions along y", "Nj, the same along y (Eq. 1).", 1, 24, 1)
+    design_functions_y: int = setting(
+        8,
+        Range("Basis functions in y", "Nj, the number of basis functions in y (Eq. 1).", 1, 24, 1),
     )
-    design_noise: float = asked(
+    design_noise: float = setting(
         0.23,
         Range(
             "Noise",
-            "Standard deviation of what each reading is off by. The error bar is proportional to "
-            "it.",
+            "Standard deviation of the noise of each reading. The error bar is proportional to it.",
             0.01,
             10.0,
             0.01,
@@ -75,12 +80,12 @@ class Designed:
             2,
         ),
     )
-    design_conversion: float = asked(
+    design_conversion: float = setting(
         5e-6,
         Range(
             "Conversion",
-            "Time that the converter takes for one reading; three readings of each element, one "
-            "after the other, make a frame.",
+            "Conversion time of one reading. A frame is three readings of each element, one after "
+            "the other.",
             1e-6,
             1e-3,
             1e-6,
@@ -89,13 +94,14 @@ class Designed:
             1,
         ),
     )
-    design_place: str = asked(
+    design_place: str = setting(
         "scene",
         Choice(
             "Placement",
-            "Where the elements are. D-optimal makes det M'M largest, so that noise leaves the "
-            "smallest volume of shapes; A-optimal makes the mean variance of the displacement "
-            "smallest. Both count noise only: what the functions cannot follow, the check tells.",
+            "Positions of the elements. D-optimal maximises det M'M, which minimises the volume of "
+            "the confidence region of the coefficients; A-optimal minimises the mean variance of "
+            "the displacement. Both include noise only; the check by simulation includes the error "
+            "of the basis.",
             PLACINGS,
         ),
     )

@@ -1,46 +1,46 @@
-"""Whom estimates are sent to, besides being shown."""
+"""Settings of publishing: targets of the estimates."""
 
 from dataclasses import dataclass
 
-from kappaskin_app.shell.settings.asks import Switch, Text, asked
+from kappaskin_app.shell.settings.form_fields import Switch, Text, setting
 
 
 @dataclass(frozen=True)
-class Sending:
-    """Two ways to send, each with where to; off until somebody asks."""
+class PublishSettings:
+    """UDP and Foxglove, each with its address; both are off by default."""
 
-    send_udp: bool = asked(
+    send_udp: bool = setting(
         False,
         Switch(
             "Datagrams (UDP)",
-            "Send contact, shape and error bars of every estimate as JSON, one datagram each: to a "
-            "robot, or to PlotJuggler's UDP server as it is.",
+            "Send contact, shape and error bars of every estimate as JSON, one datagram each, to a "
+            "robot or to PlotJuggler's UDP server.",
         ),
     )
-    udp_to: str = asked(
+    udp_to: str = setting(
         "127.0.0.1:9870",
-        Text("To", "HOST:PORT that gets them; several are separated by commas."),
+        Text("To", "HOST:PORT of the receiver; separate several receivers by commas."),
     )
-    serve_foxglove: bool = asked(
+    serve_foxglove: bool = setting(
         False,
         Switch(
             "Foxglove",
-            "Serve Foxglove and others that speak its WebSocket protocol: the same messages, the "
+            "Serve Foxglove and other clients of its WebSocket protocol: the same messages, the "
             "skin in 3D and a log. In Foxglove, open a connection to ws:// and the address below.",
         ),
     )
-    foxglove_at: str = asked(
+    foxglove_at: str = setting(
         "127.0.0.1:8765",
         Text(
             "At",
-            "HOST:PORT of this machine to serve at. 127.0.0.1 serves this machine alone, 0.0.0.0 "
-            "whoever can reach it.",
+            "HOST:PORT of the server. 127.0.0.1 accepts connections of this machine only, 0.0.0.0 "
+            "from any machine in the network.",
         ),
     )
 
     @property
     def targets(self) -> list[str]:
-        """The targets that are asked for, as the engine calls them."""
+        """The enabled targets, as addresses of the engine."""
         udp = [f"udp://{place.strip()}" for place in self.udp_to.split(",")]
         foxglove = [f"foxglove://{self.foxglove_at.strip()}"]
         return (udp if self.send_udp else []) + (foxglove if self.serve_foxglove else [])

@@ -1,4 +1,4 @@
-"""Settings of the simulated scene: its skin, load, noise, electronics, and what is scanned."""
+"""Settings of the simulated scene: skin, load, noise, electronics and scan."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -8,32 +8,39 @@ from typing import Any
 
 from kappaskin.scenes import PARTS
 from kappaskin.skin import Disk, Patch, Polygon
-from kappaskin_app.shell.settings.asks import MILLIMETRES, PER_METRE, Choice, Range, asked, asked_as
+from kappaskin_app.shell.settings.form_fields import (
+    MILLIMETRES,
+    PER_METRE,
+    Choice,
+    Range,
+    setting,
+    setting_of_key,
+)
 
 _FINGERTIP = 0.0129  # m, the paper's
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A shape made from the settings named in `asks`, with what else it `begins` as when chosen.
+    """A shape with its `lengths` by setting, and the `defaults` of other settings when selected.
 
-    `rate` in frames/s is what a simulation of it can keep up.
+    `rate` in frames/s is the highest that the simulation sustains.
     """
 
     label: str
     make: Callable[..., Patch]
-    asks: Mapping[str, float]
-    begins: Mapping[str, float] = field(default_factory=dict[str, float])
+    lengths: Mapping[str, float]
+    defaults: Mapping[str, float] = field(default_factory=dict[str, float])
     rate: float = 500.0
 
 
 def _strip(side_x: float, side_y: float, base_radius: float) -> Patch:
-    """The paper's planar finger: an arc that is alike all along its width."""
+    """The paper's planar finger: an arc, uniform along its width."""
     return Patch(side_x, side_y, base_radius, strip=True)
 
 
 def _hexagon(rim_radius: float) -> Patch:
-    """Its corners `rim_radius` from its middle, two of them on the left and right."""
+    """A hexagon with corners `rim_radius` from its middle, one each on the left and right."""
     height = math.sqrt(3) / 2
     corners = ((0.5, 0.0), (1.5, 0.0), (2.0, height), (1.5, 2 * height), (0.5, 2 * height))
     return Polygon([(rim_radius * x, rim_radius * y) for x, y in (*corners, (0.0, height))])
@@ -57,43 +64,43 @@ SHAPES = {
     "disk": Shape("Disk", Disk, {"rim_radius": 0.05}, _AS_TABLE_1, rate=200.0),
     "hexagon": Shape("Hexagon", _hexagon, {"rim_radius": 0.05}, _AS_TABLE_1, rate=100.0),
 }
-"""By name; `make` is called with the settings named in `asks`, in their order."""
+"""By name; `make` is called with the `lengths`, in their order."""
 
 
 _SKIN = PARTS["skin"]
 
 
 def _side(axis: str, more: str = "") -> Range:
-    tip = f"Length of the skin along {axis}{more}. The loads keep their places relative to it."
+    tip = f"Length of the skin along {axis}{more}. The loads keep their relative positions."
     return Range(f"Length along {axis}", tip, 0.005, 1.0, 0.001, *MILLIMETRES, decimals=1)
 
 
 def _elements(axis: str, letter: str) -> Range:
-    tip = f"{letter}, the number of sensing elements along {axis}, each amid its own tile."
+    tip = f"{letter}, the number of elements along {axis}, each in the middle of its tile."
     return Range(f"Elements along {axis}", tip, 1, 32, 1)
 
 
 @dataclass(frozen=True)
 class Skin:
-    """The skin, in SI units; which of its numbers count, its shape says (`SHAPES`)."""
+    """The skin, in SI units; which lengths apply depends on the shape (`SHAPES`)."""
 
-    shape: str = asked(
+    shape: str = setting(
         "flat",
         Choice(
             "Shape",
-            "The flat patch of the paper's Table 1; its fingertip: half a circle, bent along x and "
-            "straight along y; or a flat tile, round or with six corners. Choosing one brings its "
-            "usual size, force and height.",
+            "The flat patch of the paper's Table 1; its fingertip, a half circle, curved along x "
+            "and straight along y; or a flat disk or hexagon. Selecting a shape sets its default "
+            "size, force and vertical exaggeration.",
             tuple((name, shape.label) for name, shape in SHAPES.items()),
         ),
     )
-    side_x: float = asked(0.1, _side("x", ", along the arc where it is bent"))
-    side_y: float = asked(0.1, _side("y"))
-    base_radius: float = asked(
+    side_x: float = setting(0.1, _side("x", ", along the arc of a curved skin"))
+    side_y: float = setting(0.1, _side("y"))
+    base_radius: float = setting(
         0.0129,
         Range(
             "Base radius",
-            "Radius of the arc that the skin makes at rest; the paper's fingertip has 12.9 mm.",
+            "Radius of the arc of the unloaded skin; the paper's fingertip has 12.9 mm.",
             0.002,
             1.0,
             0.0005,
@@ -101,11 +108,11 @@ class Skin:
             decimals=1,
         ),
     )
-    rim_radius: float = asked(
+    rim_radius: float = setting(
         0.05,
         Range(
             "Rim radius",
-            "From the middle of the skin to its rim, or to its corners.",
+            "Distance from the middle of the skin to its rim, or to its corners.",
             0.005,
             0.5,
             0.001,
@@ -113,26 +120,26 @@ class Skin:
             decimals=1,
         ),
     )
-    edge: str = asked_as(_SKIN.key("edge"), "hinged")
-    elements_x: int = asked(10, _elements("x", "m"))
-    elements_y: int = asked(10, _elements("y", "n"))
+    edge: str = setting_of_key(_SKIN.key("edge"), "hinged")
+    elements_x: int = setting(10, _elements("x", "m"))
+    elements_y: int = setting(10, _elements("y", "n"))
     dead_elements: tuple[int, ...] = ()  # by a demonstration
-    tension: float = asked_as(_SKIN.key("tension"), 0.0, decimals=1, most=1000.0)
-    foam: float = asked_as(_SKIN.key("foundation"), 0.0, step=1e3, decimals=1, most=1e7)
-    fluid: bool = asked_as(_SKIN.key("fluid"), False)
+    tension: float = setting_of_key(_SKIN.key("tension"), 0.0, decimals=1, most=1000.0)
+    foam: float = setting_of_key(_SKIN.key("foundation"), 0.0, step=1e3, decimals=1, most=1e7)
+    fluid: bool = setting_of_key(_SKIN.key("fluid"), False)
 
 
 @dataclass(frozen=True)
 class Written:
-    """The TOML `text` of a scene; it is called as `file` is, and what it names lies beside that."""
+    """The TOML `text` of a scene; its name and the paths in it are those of `file`."""
 
     text: str
     file: Path
 
 
 @dataclass(frozen=True)
-class Own:
-    """The scene that is `written`, or none: then the panels say what is simulated."""
+class OwnScene:
+    """The scene as text in `written`; with None the panels define the scene."""
 
     written: Written | None = None
 
@@ -155,36 +162,35 @@ SPREAD_CASES = ("disc", "rectangle", "gaussian")
 FREE_CASES = ("point", *TWO_ENDED, *SPREAD_CASES)
 READY_CASES = tuple(case for case, _ in LOAD_CASES if case not in FREE_CASES)
 SIZES = {"disc": "Radius", "rectangle": "Width along x", "gaussian": "Std. deviation"}
-"""What the size of a spread load is called."""
+"""Labels of the size of a distributed load."""
 
 
 def _position(default: float, label: str, tip: str) -> Any:
-    return asked(default, Range(label, tip, 0.0, 1.0, 0.001, *MILLIMETRES, decimals=1))
+    return setting(default, Range(label, tip, 0.0, 1.0, 0.001, *MILLIMETRES, decimals=1))
 
 
 def _size(default: float, label: str, tip: str) -> Any:
-    return asked(default, Range(label, tip, 0.0005, 1.0, 0.0005, *MILLIMETRES, decimals=1))
+    return setting(default, Range(label, tip, 0.0005, 1.0, 0.0005, *MILLIMETRES, decimals=1))
 
 
 @dataclass(frozen=True)
 class LoadSettings:
-    """The load in SI units; a free one has its place on the skin and its force."""
+    """The load in SI units; a free one has a position and a force."""
 
-    load_case: str = asked(
+    load_case: str = setting(
         "circle",
         Choice(
             "Case",
-            "What presses on the simulated skin. Drag the load on the skin with the mouse to move "
-            "it freely.",
+            "Load on the simulated skin. Drag the load with the mouse to move it freely.",
             LOAD_CASES,
         ),
     )
-    force: float = asked(
+    force: float = setting(
         0.15,
         Range(
             "Force",
-            "Total force of a free load; the other cases have the force that displaces Table 1's "
-            "patch as there, and another skin no more steeply.",
+            "Total force of a free load. The other cases set the force so that the skin has the "
+            "slopes of Table 1's patch.",
             -50.0,
             50.0,
             0.01,
@@ -193,38 +199,46 @@ class LoadSettings:
             3,
         ),
     )
-    x: float = _position(0.05, "x", "Where the middle of the load presses, or the line begins.")
-    y: float = _position(0.05, "y", "Where the middle of the load presses, or the line begins.")
-    x_end: float = _position(0.075, "x, second", "The second point, or the end of the line.")
-    y_end: float = _position(0.075, "y, second", "The second point, or the end of the line.")
+    x: float = _position(
+        0.05, "x", "Position of the middle of the load, or of the beginning of the line."
+    )
+    y: float = _position(
+        0.05, "y", "Position of the middle of the load, or of the beginning of the line."
+    )
+    x_end: float = _position(
+        0.075, "x, second point", "Position of the second point, or of the end of the line."
+    )
+    y_end: float = _position(
+        0.075, "y, second point", "Position of the second point, or of the end of the line."
+    )
     size: float = _size(
         0.005,
         "Size",
-        "How far the load is spread: a disc's radius, a rectangle's width along x, or the standard "
-        "deviation of a Gaussian, which needs the skin four times as far on every side. A load "
-        "that would reach over the rim moves inwards.",
+        "Size of a distributed load: radius of a disc, width of a rectangle along x, or standard "
+        "deviation of a Gaussian, which needs four standard deviations of skin on every side. A "
+        "load that would extend over the rim is moved inwards.",
     )
-    size_y: float = _size(0.02, "Width along y", "A rectangle's width along y.")
+    size_y: float = _size(0.02, "Width along y", "Width of a rectangle along y.")
 
 
 @dataclass(frozen=True)
 class Noise:
-    """The noise of each reading, repeatable by its seed."""
+    """The noise of each reading, and its seed."""
 
-    noise_kind: str = asked(
+    noise_kind: str = setting(
         "uniform",
         Choice(
             "Kind",
-            "How the noise added to each simulated reading is distributed.",
+            "Distribution of the noise added to each simulated reading.",
             (("none", "None"), ("uniform", "Uniform (Table 1)"), ("gaussian", "Gaussian")),
         ),
     )
-    noise_rms: float = asked(
+    noise_rms: float = setting(
         0.231,
         Range(
             "RMS",
-            "Root mean square of the curvature noise. Table 1 has 0.231 1/m, even within "
-            "+-0.40 1/m.",
+            "Root mean square of the curvature noise. Table 1 has 0.231 1/m, uniform within "
+            "\N{PLUS-MINUS SIGN}0.40 1/m.",
             0.0,
             20.0,
             0.05,
@@ -232,8 +246,8 @@ class Noise:
             decimals=3,
         ),
     )
-    noise_seed: int = asked(
-        0, Range("Seed", "The same seed gives the same noise again.", 0, 999_999, 1)
+    noise_seed: int = setting(
+        0, Range("Seed", "The same seed gives the same noise.", 0, 999_999, 1)
     )
 
 
@@ -243,39 +257,39 @@ PER_CENT = (1e2, "%")
 
 @dataclass(frozen=True)
 class Electronics:
-    """The chain from gage to count."""
+    """The electronics, from gage to count."""
 
-    electronics: str = asked_as(
+    electronics: str = setting_of_key(
         PARTS["electronics"].key("like"),
         "modern",
         label="Electronics",
         tip="Gages, bridge, amplifier and converter (Figs. 4 and 5). The paper's prototypes "
-        "convert 12 bits in 20 \N{MICRO SIGN}s. Choosing one brings its converter.",
+        "convert 12 bits in 20 \N{MICRO SIGN}s. Selecting one sets its converter.",
     )
-    bits: int = asked_as(_CONVERTER.key("bits"), 16)
-    conversion_time: float = asked_as(
+    bits: int = setting_of_key(_CONVERTER.key("bits"), 16)
+    conversion_time: float = setting_of_key(
         _CONVERTER.key("conversion_time"), 5e-6, step=1e-6, decimals=1, least=1e-6, most=1e-3
     )
 
 
 @dataclass(frozen=True)
-class Spoils:
-    """What the mechanics of the gages does to a reading, besides noise."""
+class GageEffects:
+    """Mechanical effects of the gages on a reading."""
 
-    loops: str = asked(
+    loops: str = setting(
         "none",
         Choice(
             "Hysteresis",
-            "Loops of a reading against the curvature, as in Fig. 8: the widest gap of the second "
-            "prototype is 7 1/m, of the first three times that.",
+            "Hysteresis loops of the reading against the curvature, as in Fig. 8: the widest is "
+            "7 1/m for the second prototype and three times that for the first.",
             (("none", "None"), ("second", "Second prototype"), ("first", "First prototype")),
         ),
     )
-    creep: float = asked(
+    creep: float = setting(
         0.0,
         Range(
             "Creep",
-            "Share of a held reading that relaxes away, with a time constant of 5 s (standard "
+            "Fraction of a constant reading that relaxes, with a time constant of 5 s (standard "
             "linear solid).",
             0.0,
             0.5,
@@ -284,12 +298,12 @@ class Spoils:
             decimals=0,
         ),
     )
-    tolerance: float = asked(
+    tolerance: float = setting(
         0.0,
         Range(
             "Tolerance",
-            "Spread of the gains of gages that were never calibrated, with offsets of as many "
-            "tenths of 1/m: what the calibration takes out.",
+            "Standard deviation of the gains of uncalibrated gages; that of their offsets is "
+            "0.1 1/m for each 1 %. Calibration removes both.",
             0.0,
             0.2,
             0.01,
@@ -301,30 +315,31 @@ class Spoils:
 
 @dataclass(frozen=True)
 class Scanning:
-    """Which elements every frame scans."""
+    """The elements scanned in each frame."""
 
-    region: str = asked(
+    region: str = setting(
         "off",
         Choice(
             "Scan",
-            "Sampling a region of interest buys rate (paper, section 6.2). The force/torque sensor "
-            "stands at the base of the fingertip (intrinsic contact sensing). What tells most is "
-            "chosen by the estimator Tracking; with any other the channels take turns. A sensor on "
-            "a line scans around the contact or chosen elements; the rest is simulated only.",
+            "Scanning a region of interest increases the frame rate (paper, section 6.2). By force "
+            "and torque locates the contact with a force/torque sensor at the base of the "
+            "fingertip (intrinsic contact sensing). Most informative needs the estimator Tracking; "
+            "with any other the channels are scanned in turn. A connected sensor scans around the "
+            "contact or selected elements; the other regions are simulated only.",
             (
                 ("off", "All elements"),
                 ("skin", "Around the contact"),
                 ("intrinsic", "By force and torque"),
-                ("elements", "Chosen elements"),
-                ("adaptive", "What tells most"),
+                ("elements", "Selected elements"),
+                ("adaptive", "Most informative"),
             ),
         ),
     )
-    region_radius: float = asked(
+    region_radius: float = setting(
         0.025,
         Range(
             "Radius",
-            "Elements within it of the contact are in every frame.",
+            "Elements within this distance of the contact are in every frame.",
             0.002,
             0.5,
             0.001,
@@ -332,13 +347,13 @@ class Scanning:
             decimals=1,
         ),
     )
-    region_share: float = asked(
+    region_share: float = setting(
         0.1,
         Range(
             "Share",
-            "Of the other elements, those that take their turn in each frame; their last readings "
-            "are held until then. Of all channels, those that are scanned where they tell most, "
-            "at least 5 %.",
+            "Fraction of the other elements that are scanned in each frame, in turn; between scans "
+            "their last readings are used. With Most informative, the fraction of all channels, at "
+            "least 5 %.",
             0.0,
             1.0,
             0.05,

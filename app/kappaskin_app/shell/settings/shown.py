@@ -1,24 +1,24 @@
-"""Settings of the estimator and of the view."""
+"""Settings of the estimator, the comparison and the view."""
 
 from dataclasses import dataclass, make_dataclass
 from typing import Any
 
 from kappaskin.pipeline import SETUP, skin_colours
-from kappaskin_app.shell.settings.asks import (
+from kappaskin_app.shell.settings.form_fields import (
     Choice,
     Range,
     Several,
     Switch,
-    asked,
-    asked_of_setup,
+    setting,
+    setting_of_setup,
 )
 
 
 @dataclass(frozen=True)
-class Looked:
-    """The direction `look`, in which all of the skin is seen; once turned by hand, the `camera`.
+class Camera:
+    """The view direction `look`, or the `camera` of the 3D view once it was turned by hand.
 
-    Its numbers are the view's own; none of them where it was not turned.
+    `camera` is empty until then.
     """
 
     look: str = "left"
@@ -26,15 +26,15 @@ class Looked:
 
 
 @dataclass(frozen=True)
-class Reading:
-    """How large the window's letters are."""
+class TextSize:
+    """The text size of the window."""
 
-    letters: float = asked(
+    letters: float = setting(
         100.0,
         Range(
-            "Letters",
-            "How large the window's letters are, of what the system asks for. Where the panels "
-            "have no room for larger ones, they scroll.",
+            "Text size",
+            "Text size of the window, relative to that of the system. Panels that are too small "
+            "for larger text scroll.",
             80,
             200,
             10,
@@ -52,40 +52,43 @@ METHOD_SHORT = {
 
 @dataclass(frozen=True)
 class EstimatorSettings:
-    """The functions that the shape is made of, and how they are fitted."""
+    """The basis, the estimator and the boundary condition."""
 
-    functions_x: int = asked_of_setup("Ni")
-    functions_y: int = asked_of_setup("Nj")
-    method: str = asked_of_setup("method")
-    fit_edge: str = asked_of_setup("edge")
+    functions_x: int = setting_of_setup("Ni")
+    functions_y: int = setting_of_setup("Nj")
+    method: str = setting_of_setup("method")
+    fit_edge: str = setting_of_setup("edge")
 
 
 @dataclass(frozen=True)
-class Compared:
-    """B, held against the setup in use, A: another basis and estimator on the same readings.
+class ComparedSettings:
+    """The setup B, which is compared with the setup in use, A, on the same readings.
 
     It has the calibration and tare in use, or none.
     """
 
-    other_x: int = asked_of_setup("Ni", 6)
-    other_y: int = asked_of_setup("Nj", 6)
-    other_method: str = asked_of_setup("method")
-    other_edge: str = asked_of_setup("edge")
-    other_calibrated: bool = asked(
-        True, Switch("Calibration", "Use the calibration in use for B too; without, Eq. 8 as is.")
+    other_x: int = setting_of_setup("Ni", 6)
+    other_y: int = setting_of_setup("Nj", 6)
+    other_method: str = setting_of_setup("method")
+    other_edge: str = setting_of_setup("edge")
+    other_calibrated: bool = setting(
+        True,
+        Switch(
+            "Calibration", "Apply the calibration to B too; without it, B uses Eq. 8 unchanged."
+        ),
     )
-    other_tared: bool = asked(True, Switch("Tare", "Use the tare in use for B too."))
+    other_tared: bool = setting(True, Switch("Tare", "Apply the tare to B too."))
 
 
 def _cut(side: str, axis: str) -> Range:
-    tip = f"Cut away what lies beyond this share of the skin, seen from above along {axis}."
+    tip = f"Limit of the visible part of the skin along {axis}, in per cent of its length."
     return Range(f"{side} {axis}", tip, 0.0, 1.0, 0.05, 100.0, "%", 0)
 
 
 def _cut_level(side: str, beyond: str) -> Range:
     tip = (
-        f"Cut away what is drawn {beyond} this level, from as deep (0 %) to as high (100 %) as "
-        "the skin may be drawn."
+        f"Hide what is drawn {beyond} this level, from the lowest (0 %) to the highest (100 %) "
+        "level that can be drawn."
     )
     return Range(f"{side} height", tip, 0.0, 1.0, 0.05, 100.0, "%", 0)
 
@@ -95,56 +98,57 @@ ColourRanges: Any = make_dataclass(
     [(f"range_{name}", float, 0.0) for name in skin_colours() if name != "health"],
     frozen=True,
 )
-"""How far colours reach, in SI units: on one side, or on both. 0 follows what is shown."""
+"""Limits of the colour scales, in SI units, one-sided or symmetric; 0 is automatic."""
 
 
 @dataclass(frozen=True)
 class View(ColourRanges):
-    """How the skin is shown."""
+    """The view of the skin."""
 
-    colour_by: str = asked(
+    colour_by: str = setting(
         "displacement",
         Choice(
             "Colour",
-            "What colours the skin: how far it moved, how it bends (Eqs. 3 to 5) and curves, what "
-            "the fit leaves of the readings, how sure it is, how wrong, or which elements are "
-            "well. Above the scale of colours stands which it is, with its equation.",
+            "Quantity shown by the colours of the skin: displacement, curvatures (Eqs. 3 to 5), "
+            "principal curvatures, residuals, standard deviation, error, or health of the "
+            "elements. The colour scale shows its name and equation.",
             COLOURS,
         ),
     )
-    colour_from: str = asked(
+    colour_from: str = setting(
         "smooth",
         Choice(
-            "Coloured",
-            "Smooth: the surface that was fitted, at every point. Per element: each element's own "
-            "cell in the colour of what it reads, nothing interpolated; residuals and health are "
-            "always so.",
+            "Shading",
+            "Smooth: the fitted surface at every point. Per element: the cell of each element in "
+            "the colour of its reading, without interpolation; residuals and health are always "
+            "shown per element.",
             (("smooth", "Smooth"), ("elements", "Per element")),
         ),
     )
-    maps: tuple[str, ...] = asked(
+    maps: tuple[str, ...] = setting(
         ("xx", "yy", "xy"),
         Several(
             "Heatmaps",
-            "Which heatmaps are shown beside the skin, one cell for each element. What is not "
-            "shown is not computed.",
+            "Heatmaps shown next to the skin, one cell per element. Hidden heatmaps are not "
+            "computed.",
             COLOURS,
         ),
     )
-    one_range: bool = asked(
+    one_range: bool = setting(
         False,
         Switch(
-            "One range for all",
-            "Let the colours of all curvatures that are shown reach as far as those of the "
-            "largest, and those of all residuals, so that they can be compared.",
+            "Common range",
+            "Use one colour range for all curvatures shown, and one for all residuals, so that "
+            "they can be compared.",
         ),
     )
-    exaggeration: float = asked(
+    exaggeration: float = setting(
         6.0,
         Range(
-            "Height",
-            "How many times the displacement is drawn larger, at most: never so much that it "
-            "leaves the picture. Below the colours stands how many times it is.",
+            "Vertical exaggeration",
+            "Largest factor by which the displacement is drawn enlarged. The factor is reduced "
+            "where the surface would leave the view; the current factor is shown below the colour "
+            "scale.",
             1,
             50,
             1,
@@ -152,70 +156,70 @@ class View(ColourRanges):
             "times",
         ),
     )
-    show_elements: bool = asked(True, Switch("Elements", "Draw the sensing elements as points."))
-    show_truth: bool = asked(
+    show_elements: bool = setting(True, Switch("Elements", "Draw the sensing elements as points."))
+    show_truth: bool = setting(
         True,
-        Switch("True surface", "Draw the surface the simulation knows as a wireframe."),
+        Switch("True surface", "Draw the true surface of the simulation as a wireframe."),
     )
-    show_directions: bool = asked(
+    show_directions: bool = setting(
         False,
         Switch(
             "Principal directions",
-            "Crosses along the directions in which the skin curves most and least, as long as it "
-            "does: orange where it is convex, blue where it is hollow. tan 2\u03b1 = 2 xy / "
+            "Crosses along the principal directions, their length in proportion to the principal "
+            "curvatures: orange where convex, blue where concave. tan 2\u03b1 = 2 xy / "
             "(xx \u2212 yy).",
         ),
     )
-    show_band: bool = asked(
+    show_band: bool = setting(
         False,
         Switch(
             "Error band",
-            "Two translucent surfaces, two standard deviations of the displacement below and "
-            "above: the true one lies between them at about 95 of 100 places, as far as noise "
-            "alone errs.",
+            "Two translucent surfaces, two standard deviations below and above the estimated one: "
+            "the true surface lies between them at about 95 % of the points, as far as noise is "
+            "the only error.",
         ),
     )
-    show_frame: bool = asked(
+    show_frame: bool = setting(
         False,
         Switch(
             "Contact frame",
-            "At the contact the normal of the skin (green) and its two principal directions "
-            "(orange, blue). The cone holds the normal with 95 % by the error bars of the slopes, "
-            "stretched as the skin is.",
+            "Normal of the skin at the contact (green) and the two principal directions (orange, "
+            "blue). The cone is the 95 % confidence region of the normal, from the standard "
+            "deviations of the slopes; it has the vertical exaggeration of the skin.",
         ),
     )
-    show_object: bool = asked(
+    show_object: bool = setting(
         False,
         Switch(
-            "Object found",
-            "What the readings say touches the skin (plane, cylinder, sphere or edge), green and "
-            "translucent where it touches, stretched in height as the skin is. Of a radius known "
-            "to be below some length, it has that.",
+            "Estimated object",
+            "The object estimated from the readings (plane, cylinder, sphere or edge), in "
+            "translucent green at the contact, with the vertical exaggeration of the skin. Where "
+            "only an upper limit of the radius is known, it is drawn with that radius.",
         ),
     )
-    show_pressed: bool = asked(
+    show_pressed: bool = setting(
         False,
         Switch(
-            "Object pressed",
-            "The rigid object of a simulated scene, red and translucent, where it is pressed in "
-            "and stretched in height as the skin is. Loads of the panels have none.",
+            "True object",
+            "The rigid object of a simulated scene, in translucent red, with the vertical "
+            "exaggeration of the skin. The loads of the panel Load have no object.",
         ),
     )
-    from_x: float = asked(0.0, _cut("From", "x"))
-    to_x: float = asked(1.0, _cut("To", "x"))
-    from_y: float = asked(0.0, _cut("From", "y"))
-    to_y: float = asked(1.0, _cut("To", "y"))
-    from_z: float = asked(0.0, _cut_level("From", "below"))
-    to_z: float = asked(1.0, _cut_level("To", "above"))
-    theme: str = asked(
+    from_x: float = setting(0.0, _cut("From", "x"))
+    to_x: float = setting(1.0, _cut("To", "x"))
+    from_y: float = setting(0.0, _cut("From", "y"))
+    to_y: float = setting(1.0, _cut("To", "y"))
+    from_z: float = setting(0.0, _cut_level("From", "below"))
+    to_z: float = setting(1.0, _cut_level("To", "above"))
+    theme: str = setting(
         "dark", Choice("Theme", "Colours of the window.", (("light", "Light"), ("dark", "Dark")))
     )
-    show_start: bool = asked(
+    show_start: bool = setting(
         True,
         Switch(
             "Welcome",
-            "Offer above the skin, whenever the window opens, what one may begin with: a scene, a "
-            "sensor, a lesson, a recording.",
+            "Show when the window opens how to start: with a scene, a sensor, a lesson or a "
+            "recording.",
         ),
     )
     traced: tuple[int, ...] = ()  # elements whose last seconds are drawn

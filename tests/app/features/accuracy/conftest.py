@@ -6,8 +6,8 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from kappaskin.studies import Cost, Setting
-from kappaskin_app.features.accuracy import costing
-from kappaskin_app.features.accuracy.costing import in_words
+from kappaskin_app.features.accuracy import measurement
+from kappaskin_app.features.accuracy.measurement import setting_text
 from kappaskin_app.shell.window import MainWindow
 
 
@@ -15,9 +15,9 @@ from kappaskin_app.shell.window import MainWindow
 def few() -> Iterator[None]:
     """So few settings that measuring them takes no time."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(costing, "METHODS", ("least-squares", "bayes"))
-        patch.setattr(costing, "FUNCTIONS", (4, 8, 12))
-        patch.setattr(costing, "ELEMENTS", (6,))
+        patch.setattr(measurement, "METHODS", ("least-squares", "bayes"))
+        patch.setattr(measurement, "FUNCTIONS", (4, 8, 12))
+        patch.setattr(measurement, "ELEMENTS", (6,))
         yield
 
 
@@ -46,19 +46,19 @@ def measured(shared: MainWindow, until) -> Iterator[MainWindow]:
     stack = shared.history.stack
     while stack.canUndo():
         stack.undo()
-    until(lambda: shared.costing.scene is not None)
-    if shared.costing.unlike():
+    until(lambda: shared.measurement.scene is not None)
+    if shared.measurement.difference():
         shared.cost.again.click()
     until(lambda: all_measured(shared), 60.0)
-    until(lambda: shared.cost.plot.frontier == shared.costing.frontier())
+    until(lambda: shared.cost.plot.frontier == shared.measurement.frontier())
     setting = Setting("least-squares", (8, 8), (10, 10))
-    until(lambda: shared.costing.present == setting)  # the engine takes it up in its own time
-    until(lambda: isinstance(shared.costing.predicted(), Cost))
-    until(lambda: shared.cost.setting.text() == in_words(setting))
+    until(lambda: shared.measurement.present == setting)  # the engine takes it up in its own time
+    until(lambda: isinstance(shared.measurement.predicted(), Cost))
+    until(lambda: shared.cost.setting.text() == setting_text(setting))
     yield shared
     shared.hide()
 
 
 def all_measured(window: MainWindow) -> bool:
-    done, asked = window.costing.progress
-    return asked > 0 and done == asked and not window.costing.running
+    done, asked = window.measurement.progress
+    return asked > 0 and done == asked and not window.measurement.running

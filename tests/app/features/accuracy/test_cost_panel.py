@@ -8,8 +8,8 @@ from PySide6.QtCore import QPoint, Qt
 
 from kappaskin.studies import Cost, EffectCost, Refused, Setting
 from kappaskin_app.features.accuracy.cost_plot import CostPlot
-from kappaskin_app.features.accuracy.costing import in_words
-from kappaskin_app.shell.effects import called
+from kappaskin_app.features.accuracy.measurement import setting_text
+from kappaskin_app.shell.effects import effect_name
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.widgets.text import duration, length
@@ -18,7 +18,7 @@ from kappaskin_app.widgets.text import duration, length
 def test_every_method_and_basis_is_measured_and_what_is_refused_is_not_drawn(
     measured: MainWindow, colours_in
 ) -> None:
-    costs = measured.costing.costs
+    costs = measured.measurement.costs
     assert len(costs) == 2 * 3 * 2
     assert isinstance(costs[Setting("least-squares", (12, 12), (10, 10))], Refused)
     drawn = measured.cost.plot.frontier.costs
@@ -48,8 +48,8 @@ def test_a_click_on_a_point_switches_to_it_and_is_one_step_to_undo(
     s = measured.history.settings
     asked = (s.method, s.functions_x, s.functions_y, s.elements_x, s.elements_y)
     assert Setting(asked[0], asked[1:3], asked[3:]) == cost.setting
-    until(lambda: measured.costing.present == cost.setting)
-    until(lambda: measured.costing.predicted() in plot.frontier.costs)
+    until(lambda: measured.measurement.present == cost.setting)
+    until(lambda: measured.measurement.predicted() in plot.frontier.costs)
     measured.history.stack.undo()
     assert measured.history.settings == was
 
@@ -62,17 +62,17 @@ def test_what_is_predicted_and_what_is_measured_stand_beside_each_other(
         until(lambda row=row: figures[row, "RMS error"].text().endswith(" mm"))
         until(lambda row=row: figures[row, "time"].text().endswith("s"))
     assert measured.cost.setting.text().startswith("Least squares, 8")
-    predicted = measured.costing.predicted()
+    predicted = measured.measurement.predicted()
     assert isinstance(predicted, Cost)
-    until(lambda: measured.costing.measured()[0] == pytest.approx(predicted.rms, rel=0.7))
-    assert 0 < measured.costing.measured()[1] < 1
+    until(lambda: measured.measurement.measured()[0] == pytest.approx(predicted.rms, rel=0.7))
+    assert 0 < measured.measurement.measured()[1] < 1
 
 
 @pytest.mark.cases("least-squares", "as-printed", "robust")
 @pytest.mark.parametrize("method", METHOD_SHORT)
 def test_any_setting_in_use_is_read_whole(measured: MainWindow, method: str) -> None:
     line = measured.cost.setting
-    line.show_text(in_words(Setting(method, (12, 12), (16, 16))))
+    line.show_text(setting_text(Setting(method, (12, 12), (16, 16))))
     assert line.whole
 
 
@@ -103,30 +103,30 @@ def test_both_ends_of_the_error_axis_are_written(measured: MainWindow) -> None:
 def test_the_slider_takes_the_cheapest_setting_that_is_accurate_enough(
     measured: MainWindow, qtbot
 ) -> None:
-    slider, best = measured.cost.wanted, measured.costing.frontier().best
+    slider, best = measured.cost.required, measured.measurement.frontier().best
     assert slider.isEnabled()
     slider.setFocus()
     qtbot.keyClick(slider, Qt.Key.Key_Home)
     qtbot.keyClick(slider, Qt.Key.Key_End)
-    assert measured.costing.present is not None
+    assert measured.measurement.present is not None
     s = measured.history.settings
     chosen = Setting(s.method, (s.functions_x, s.functions_y), (s.elements_x, s.elements_y))
     assert chosen == best[0].setting
-    assert in_words(chosen) in measured.cost.cheapest.text()
+    assert setting_text(chosen) in measured.cost.cheapest.text()
     qtbot.keyClick(slider, Qt.Key.Key_Home)
     s = measured.history.settings
     chosen = Setting(s.method, (s.functions_x, s.functions_y), (s.elements_x, s.elements_y))
-    assert chosen == measured.costing.frontier().best[-1].setting
+    assert chosen == measured.measurement.frontier().best[-1].setting
 
 
 def test_a_slider_held_by_the_mouse_switches_when_it_is_let_go(measured: MainWindow) -> None:
     # Bayes takes longer than least squares: whatever the times, it is not the cheapest.
     measured.history.change("Bayes", -1, method="bayes")
-    slider, was = measured.cost.wanted, measured.history.settings
+    slider, was = measured.cost.required, measured.history.settings
     slider.setSliderDown(True)
     slider.setValue(slider.maximum())
     assert measured.history.settings == was
-    assert measured.cost.cheapest.text().startswith("Cheapest")
+    assert measured.cost.cheapest.text().startswith("Fastest")
     slider.setSliderDown(False)
     assert measured.history.settings != was
 
@@ -135,7 +135,7 @@ def test_a_region_is_said_not_to_be_in_what_is_predicted(measured: MainWindow, u
     message = measured.cost.message
     assert not message.isVisible()
     measured.history.change("Region", -1, region="adaptive")
-    until(lambda: message.text().endswith("without the region."))
+    until(lambda: message.text().endswith("without the region of interest."))
     measured.history.stack.undo()
     until(lambda: not message.isVisible())
 
@@ -151,7 +151,7 @@ def _rows(window: MainWindow) -> dict[str, list[str]]:
 
 def test_each_effect_of_the_scene_is_told_with_and_without_it(measured: MainWindow, until) -> None:
     until(lambda: "Uniform noise" in _rows(measured))
-    found = {called(cost.name): cost for cost in measured.costing.spoiling()}
+    found = {effect_name(cost.name): cost for cost in measured.measurement.effect_costs()}
     rows = _rows(measured)
     assert list(rows) == list(found)
     for name, (kept, time, with_it, without) in rows.items():
@@ -175,27 +175,29 @@ def test_the_error_that_is_had_now_is_bold(measured: MainWindow, until) -> None:
 
 
 def test_effects_are_judged_with_the_setting_in_use(measured: MainWindow, until) -> None:
-    until(lambda: measured.costing.spoiling() is not None)
-    was = measured.costing.spoiling()
+    until(lambda: measured.measurement.effect_costs() is not None)
+    was = measured.measurement.effect_costs()
     measured.history.change("Fewer", -1, functions_x=4, functions_y=4)
-    until(lambda: measured.costing.spoiling() not in (None, was), 60.0)
+    until(lambda: measured.measurement.effect_costs() not in (None, was), 60.0)
     before, noise = (
         next(cost for cost in each if cost.name == "uniform-noise")
-        for each in (was, measured.costing.spoiling())
+        for each in (was, measured.measurement.effect_costs())
     )
     # Four functions cannot follow the load, noise or not.
     assert noise.rms_without > 3 * before.rms_without
     until(lambda: _rows(measured).get("Uniform noise", [])[3:] == [length(noise.rms_without)])
     measured.history.stack.undo()
-    until(lambda: measured.costing.spoiling() == was)
+    until(lambda: measured.measurement.effect_costs() == was)
     until(lambda: _rows(measured)["Uniform noise"][3] == length(before.rms_without))
 
 
 def test_a_setting_that_cannot_judge_effects_says_why(
     measured: MainWindow, until, monkeypatch
 ) -> None:
-    own = replace(measured.costing.present, elements=None)
-    monkeypatch.setitem(measured.costing.effects, own, Refused(own, "too few elements are left"))
+    own = replace(measured.measurement.present, elements=None)
+    monkeypatch.setitem(
+        measured.measurement.effects, own, Refused(own, "too few elements are left")
+    )
     until(lambda: measured.cost.no_effects.isVisible())
     assert measured.cost.no_effects.text() == "Too few elements are left."
     assert not measured.cost.effects.isVisible()
@@ -207,8 +209,10 @@ def test_effects_have_room_in_a_small_window(measured: MainWindow, until, monkey
     names = ["gaussian-noise", "corrupted-frames", "tolerance"]
     costs = tuple(EffectCost(name, True, 9.95e-4, 0.1, 8.8e-6, 8.8e-6) for name in names)
     table = measured.cost.effects
-    own = replace(measured.costing.present, elements=None)
-    monkeypatch.setitem(measured.costing.effects, own, costs * 5)  # so many that they are scrolled
+    own = replace(measured.measurement.present, elements=None)
+    monkeypatch.setitem(
+        measured.measurement.effects, own, costs * 5
+    )  # so many that they are scrolled
     assert (measured.width(), measured.height()) == (1280, 800)
     assert measured.minimumSizeHint().width() <= 1280
     header = table.horizontalHeader()
@@ -225,20 +229,22 @@ def test_every_row_and_column_of_effects_explains_itself(measured: MainWindow, u
     for column in range(table.columnCount()):
         assert table.horizontalHeaderItem(column).toolTip()
     tips = {table.item(row, 0).text(): table.item(row, 0).toolTip() for row in range(3)}
-    assert "% of the peak. It is left out." in tips["Finite slope"]
+    assert "% of the peak. It is omitted." in tips["Finite slope"]
 
 
 def test_measuring_anew_forgets_what_was_wanted_of_the_skin_before(
     measured: MainWindow, until, qtbot
 ) -> None:
     panel = measured.cost
-    qtbot.keyClick(panel.wanted, Qt.Key.Key_Home)
-    until(lambda: panel.wanted.value() == 0)
+    qtbot.keyClick(panel.required, Qt.Key.Key_Home)
+    until(lambda: panel.required.value() == 0)
     assert panel.cheapest.text()
     panel.again.click()
-    assert not panel.wanted.isEnabled()
-    assert (panel.wanted_words.text(), panel.cheapest.text()) == ("", "")
-    until(lambda: panel.wanted_words.text() == panel.figures["Predicted", "RMS error"].text(), 60.0)
+    assert not panel.required.isEnabled()
+    assert (panel.required_text.text(), panel.cheapest.text()) == ("", "")
+    until(
+        lambda: panel.required_text.text() == panel.figures["Predicted", "RMS error"].text(), 60.0
+    )
 
 
 # The last on the shared window, which it leaves measured on another skin.
@@ -248,17 +254,17 @@ def test_another_basis_is_measured_too_and_another_skin_only_when_asked(
     message = measured.cost.message
     measured.history.change("Odd", -1, functions_x=7, functions_y=5)
     odd = Setting("least-squares", (7, 5), (10, 10))
-    until(lambda: odd in measured.costing.costs, 60.0)
+    until(lambda: odd in measured.measurement.costs, 60.0)
     measured.history.change("Noise", -1, noise_rms=1.0)
     until(lambda: message.text() == "Measured with other noise: measure again.")
     measured.history.change("Creep", -1, creep=0.1)
     until(lambda: message.text() == "Measured with other effects: measure again.")
-    was = measured.costing.costs[odd]
+    was = measured.measurement.costs[odd]
     measured.history.change("Edge", -1, edge="clamped")
     until(lambda: "on another skin" in message.text())
     measured.cost.again.click()
-    until(lambda: odd in measured.costing.costs, 60.0)
-    assert measured.costing.costs[odd] is not was
+    until(lambda: odd in measured.measurement.costs, 60.0)
+    assert measured.measurement.costs[odd] is not was
     until(lambda: not message.isVisible())
     measured.history.change("Load", -1, load_case="centre")
     until(lambda: "under another load" in message.text())

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication, QToolTip
 
 from kappaskin.studies import Cost, Setting
 from kappaskin_app.features.accuracy.cost_plot import CostPlot
-from kappaskin_app.features.accuracy.costing import Frontier
+from kappaskin_app.features.accuracy.measurement import Frontier
 
 
 @pytest.fixture

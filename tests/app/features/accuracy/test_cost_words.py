@@ -5,7 +5,7 @@ import math
 import pytest
 
 from kappaskin.estimation import METHODS
-from kappaskin_app.features.accuracy.costing import Frontier
+from kappaskin_app.features.accuracy.measurement import Frontier
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
 from kappaskin_app.widgets.plots import LogAxis
 from kappaskin_app.widgets.text import duration, length

@@ -12,18 +12,18 @@ from PySide6.QtWidgets import QApplication, QFileDialog
 from kappaskin import load_scene, write_scene
 from kappaskin.scenes import read_scene
 from kappaskin.studies import prospect
-from kappaskin_app.features.design.designing import design_of, scene_of
-from kappaskin_app.features.design.panel import DesignForm, _meant, _place
-from kappaskin_app.shell.settings import Settings, ask_of
-from kappaskin_app.shell.settings.asks import Range
-from kappaskin_app.shell.settings.designed import Designed
+from kappaskin_app.features.design.panel import DesignForm, _place, _value_at
+from kappaskin_app.features.design.prediction import design_of, scene_of
+from kappaskin_app.shell.settings import Settings, form_field
+from kappaskin_app.shell.settings.designed import DesignSettings
+from kappaskin_app.shell.settings.form_fields import Range
 from kappaskin_app.shell.settings.scene import SHAPES
 from kappaskin_app.shell.simulation import with_consequences
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import DARK, SEQUENTIAL, apply_look
 from kappaskin_app.widgets.surface_map import SurfaceMap
 
-RANGES = [n for n in Designed.__dataclass_fields__ if isinstance(ask_of(n), Range)]
+RANGES = [n for n in DesignSettings.__dataclass_fields__ if isinstance(form_field(n), Range)]
 
 
 def shaped(name: str) -> Settings:
@@ -41,14 +41,14 @@ def test_every_outline_is_designed_with_its_usual_lengths(name: str):
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_every_outline_is_a_scene_that_opens_however_slow_its_converter_is(name: str):
-    scene = scene_of(replace(shaped(name), design_conversion=ask_of("design_conversion").most))
+    scene = scene_of(replace(shaped(name), design_conversion=form_field("design_conversion").most))
 
     assert read_scene(write_scene(scene), Path("a.toml")).rate == scene.rate
 
 
 @pytest.mark.parametrize("name", RANGES)
 def test_an_arrow_key_moves_every_slider_to_another_value_both_ways(name, qtbot):
-    form, how = DesignForm(), ask_of(name)
+    form, how = DesignForm(), form_field(name)
     qtbot.addWidget(form)
     form.requested.connect(lambda n, v: form.show_settings(replace(Settings(), **{n: v})))
     form.show_settings(Settings())
@@ -63,12 +63,12 @@ def test_an_arrow_key_moves_every_slider_to_another_value_both_ways(name, qtbot)
 
 @pytest.mark.parametrize("name", RANGES)
 def test_a_slider_reaches_both_ends_and_stands_where_its_value_is(name):
-    how = ask_of(name)
+    how = form_field(name)
 
-    assert _meant(0, how) == pytest.approx(how.least)
-    assert _meant(200, how) == pytest.approx(how.most)
+    assert _value_at(0, how) == pytest.approx(how.least)
+    assert _value_at(200, how) == pytest.approx(how.most)
     for at in range(0, 201, 20):
-        assert abs(_place(_meant(at, how), how) - at) <= max(
+        assert abs(_place(_value_at(at, how), how) - at) <= max(
             200 * how.step / (how.most - how.least), 4
         )
 
@@ -76,56 +76,56 @@ def test_a_slider_reaches_both_ends_and_stands_where_its_value_is(name):
 def test_a_design_is_predicted_checked_undone_and_saved(
     window: MainWindow, until, qtbot, tmp_path: Path, monkeypatch
 ):
-    design, designing = window.design, window.designing
+    design, prediction = window.design, window.prediction
     window.docks.reveal("design")
-    until(lambda: designing.prospect is not None and not designing.predicting)
-    first = designing.prospect.rms
+    until(lambda: prediction.prospect is not None and not prediction.predicting)
+    first = prediction.prospect.rms
 
     window.requests.set("design_noise", 0.46)
-    until(lambda: designing.prospect.rms > 1.5 * first and not designing.predicting)
-    assert designing.prospect.rms == pytest.approx(2 * first)
+    until(lambda: prediction.prospect.rms > 1.5 * first and not prediction.predicting)
+    assert prediction.prospect.rms == pytest.approx(2 * first)
     assert "elements" in design.words.text()
     window.history.stack.undo()
-    until(lambda: designing.prospect.rms == pytest.approx(first))
+    until(lambda: prediction.prospect.rms == pytest.approx(first))
 
     design.simulate.click()
-    assert design.simulate.text() == "End the check"
-    until(lambda: designing.check is not None and not designing.checking, 60)
+    assert design.simulate.text() == "Stop the check"
+    until(lambda: prediction.check is not None and not prediction.checking, 60)
     assert [curve.name for curve in design.along.curves] == ["predicted", "simulated"]
-    assert "times as predicted" in design.words.text()
+    assert "times the prediction" in design.words.text()
 
     window.requests.set("design_place", "clustered")
-    until(lambda: designing.check is None and not designing.predicting)
+    until(lambda: prediction.check is None and not prediction.predicting)
     file = tmp_path / "mine.toml"
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(file), ""))
     design.save.click()
     np.testing.assert_allclose(
-        load_scene(str(file)).layout.positions, designing.prospect.positions, atol=1e-9
+        load_scene(str(file)).layout.positions, prediction.prospect.positions, atol=1e-9
     )
 
 
 def test_what_cannot_be_designed_is_told_and_mended(window: MainWindow, until):
-    designing = window.designing
+    prediction = window.prediction
     window.docks.reveal("design")
 
     window.history.change("more", -1, design_functions_x=24, design_functions_y=24)
-    until(lambda: bool(designing.refusal))
-    assert designing.prospect is None
+    until(lambda: bool(prediction.refusal))
+    assert prediction.prospect is None
     assert not window.design.save.isEnabled()
     assert window.design.words.text()
     window.history.stack.undo()
-    until(lambda: designing.prospect is not None and not designing.refusal)
+    until(lambda: prediction.prospect is not None and not prediction.refusal)
 
 
 def test_placing_takes_a_while_and_can_be_ended(window: MainWindow, until):
-    designing = window.designing
+    prediction = window.prediction
     window.docks.reveal("design")
 
     window.requests.set("design_place", "A")
-    until(lambda: designing.predicting)
-    designing.predicts.cancel()
-    assert not designing.predicting
-    assert "Cancelled" in designing.refusal
+    until(lambda: prediction.predicting)
+    prediction.predicts.cancel()
+    assert not prediction.predicting
+    assert "Cancelled" in prediction.refusal
 
 
 def test_what_lies_beside_a_round_skin_has_the_colour_of_the_window(qtbot) -> None:

@@ -21,8 +21,8 @@ from kappaskin_app.features.lessons.lesson_file import (
     read_lesson,
 )
 from kappaskin_app.features.lessons.progress import Answer, Progress, judged, number_in
-from kappaskin_app.shell.settings import Settings, ask_of
-from kappaskin_app.shell.settings.asks import Range
+from kappaskin_app.shell.settings import Settings, form_field
+from kappaskin_app.shell.settings.form_fields import Range
 
 FIGURES_SEEN = [name for name in KINDS if name not in SETTINGS]
 FIGURES = {"force": 0.2, "method": "bayes", "noise": math.nan, "functions_x": 8.0}
@@ -197,7 +197,7 @@ def test_a_file_that_is_too_large_or_not_there_is_refused(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("name", sorted(SETTABLE))
 def test_a_lesson_may_say_of_a_setting_what_a_person_may(name: str) -> None:
-    usual, how = getattr(Settings(), name), ask_of(name)
+    usual, how = getattr(Settings(), name), form_field(name)
     said = list(usual) if isinstance(usual, tuple) else usual
     assert checked_setting(name, said) == usual
     if isinstance(how, Range):

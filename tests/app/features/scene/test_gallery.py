@@ -67,7 +67,7 @@ def test_a_file_is_asked_for(gallery, qtbot):
 def test_the_scene_that_is_played_is_marked(gallery):
     gallery.show_playing("sphere")
     assert gallery.items["sphere"].data(PLAYING)
-    assert gallery.file.text() == "sphere.toml, played now"
+    assert gallery.file.text() == "sphere.toml, simulated now"
     gallery.show_playing("elsewhere/mine.toml")
     assert not any(item.data(PLAYING) for item in gallery.items.values())
     assert gallery.file.text() == "sphere.toml"

@@ -153,12 +153,12 @@ def row_of(panel, name: str) -> list[str]:
 def test_effects_are_planned_and_forced_while_the_scene_plays(window, panel, until) -> None:
     panel.gallery.chosen.emit("tapping")
     until(lambda: plays(window, "tapping"))
-    assert not window.planning.waiting  # nobody looks
+    assert not window.planner.waiting  # nobody looks
     panel.setCurrentIndex(EFFECTS_PAGE)
-    until(lambda: bool(window.planning.rows) and not window.planning.waiting, 60.0)
+    until(lambda: bool(window.planner.rows) and not window.planner.waiting, 60.0)
     assert sorted(panel.effects.forces) == sorted(EFFECTS)
     kept, size, error, took, why = row_of(panel, "gaussian-noise")
-    assert kept == "kept"
+    assert kept == "yes"
     assert error.endswith("%")
     assert took.endswith("s")
     assert size
@@ -168,7 +168,7 @@ def test_effects_are_planned_and_forced_while_the_scene_plays(window, panel, unt
     connections = window.session.status.connections
     force(panel, "gaussian-noise", "off")
     until(lambda: window.session.scene.choice.off == {"gaussian-noise"})
-    until(lambda: row_of(panel, "gaussian-noise")[0] == "left out", 60.0)
+    until(lambda: row_of(panel, "gaussian-noise")[0] == "no", 60.0)
     assert 'off = ["gaussian-noise"]' in panel.editor.text.toPlainText()
     assert window.session.status.connections == connections
     force(panel, "quantisation", "on")
@@ -176,7 +176,7 @@ def test_effects_are_planned_and_forced_while_the_scene_plays(window, panel, unt
     window.history.stack.undo()
     force(panel, "gaussian-noise", "planned")
     until(lambda: not window.session.scene.choice.off)
-    until(lambda: row_of(panel, "gaussian-noise")[0] == "kept", 60.0)
+    until(lambda: row_of(panel, "gaussian-noise")[0] == "yes", 60.0)
 
 
 def test_scenes_are_opened_from_files_and_saved_into_them(

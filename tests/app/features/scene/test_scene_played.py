@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import Qt
 
 from kappaskin.scenes import scene_file
-from kappaskin_app.shell.loads import touches_at
+from kappaskin_app.shell.loads import loads_at
 
 from .conftest import EDIT, EFFECTS_PAGE, plays
 
@@ -60,7 +60,7 @@ def test_a_touch_of_a_written_scene_is_dragged_in_the_picture_and_in_the_text(
     window.session.run(False)
     window.session.seek(1.5)
     scene, drag = window.session.scene, window.membrane.drag
-    x, y = touches_at(scene, 1.5)[0].load.centre().tolist()
+    x, y = loads_at(scene, 1.5)[0].load.centre().tolist()
     until(lambda: drag.handles.tolist() == [[x, y]])
     drag.grabbed.emit(x, y)
     for step in range(1, 11):
@@ -113,11 +113,11 @@ def test_what_is_played_is_neither_dragged_nor_forced_while_the_text_is_no_scene
     window.session.run(False)
     window.session.seek(1.5)
     scene, good = window.session.scene, window.history.settings.written.text
-    x, y = touches_at(scene, 1.5)[0].load.centre().tolist()
+    x, y = loads_at(scene, 1.5)[0].load.centre().tolist()
     until(lambda: window.membrane.drag.handles.tolist() == [[x, y]])
     bad = good.replace("[skin]", "[skin")
     panel.editor.edited.emit(bad)
-    until(lambda: panel.tabText(EDIT) == "&Edit (not played)")
+    until(lambda: panel.tabText(EDIT) == "&Edit (refused)")
     assert not panel.effects.table.isEnabled()
     drag = window.membrane.drag
     drag.grabbed.emit(x, y)

@@ -14,7 +14,7 @@ from kappaskin_app.features.scene import scene_text
 from kappaskin_app.features.scene.editing import SceneEditing
 from kappaskin_app.features.scene.scene_text import OFF, ON, PLANNED, forced, shifted
 from kappaskin_app.shell.history import History
-from kappaskin_app.shell.loads import GrabbedStimulus, touches_at
+from kappaskin_app.shell.loads import GrabbedStimulus, loads_at
 from kappaskin_app.shell.selection import LoadHandle
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.scene import Written
@@ -76,7 +76,7 @@ def test_comments_and_order_stay() -> None:
 @pytest.mark.parametrize("name", READY)
 def test_a_touch_that_is_shifted_in_the_text_is_where_it_was_dragged_to(name) -> None:
     scene = load_scene(name)
-    start = touches_at(scene, _pressed_at(scene))[0]
+    start = loads_at(scene, _pressed_at(scene))[0]
     x, y = start.load.centre().tolist()
     held = GrabbedStimulus.at_place(scene, _pressed_at(scene), x, y)
     assert held is not None
@@ -85,8 +85,8 @@ def test_a_touch_that_is_shifted_in_the_text_is_where_it_was_dragged_to(name) ->
     text = shifted(text_of(name), held.number, *held.by)
     written = read(text, name)
     for time in (0.0, 0.3, _pressed_at(scene)):
-        there = [touch.load.centre() for touch in touches_at(written, time)]
-        expected = [touch.load.centre() for touch in touches_at(moved, time)]
+        there = [touch.load.centre() for touch in loads_at(written, time)]
+        expected = [touch.load.centre() for touch in loads_at(moved, time)]
         assert np.allclose(there, expected, atol=1e-6)
 
 
@@ -96,13 +96,13 @@ def test_the_only_touch_is_shifted_where_it_is_no_array_as_well() -> None:
 
 
 def _drawn(scene, time: float) -> list[object]:
-    return [touch.load for touch in touches_at(scene, time)]
+    return [touch.load for touch in loads_at(scene, time)]
 
 
 def _pressed_at(scene) -> float:
     """A time in s at which something presses."""
     times = np.linspace(0, scene.duration, 50, endpoint=False).tolist()
-    return next(time for time in times if touches_at(scene, time))
+    return next(time for time in times if loads_at(scene, time))
 
 
 def test_a_touch_stops_at_the_rim() -> None:
@@ -118,7 +118,7 @@ def test_a_touch_stops_at_the_rim() -> None:
 def test_of_two_touches_the_nearer_one_is_held() -> None:
     scene = load_scene("two-contacts")
     time = _pressed_at(scene)
-    for touch in touches_at(scene, time):
+    for touch in loads_at(scene, time):
         held = GrabbedStimulus.at_place(scene, time, *touch.load.centre().tolist())
         assert held is not None
         assert held.number == touch.number
@@ -139,9 +139,9 @@ def test_a_text_that_cannot_be_changed_is_refused() -> None:
         forced("format =", "saturation", OFF)
     with pytest.raises(Refusal, match="expected a scene in TOML"):
         shifted("format = 1\nformat = 1", 0, 0.0, 0.0)
-    with pytest.raises(Refusal, match="expected a touch 3 to change, got a text with 2"):
+    with pytest.raises(Refusal, match="expected a scene with a touch 3, got one with 2"):
         shifted(text_of("two-contacts"), 2, 0.0, 0.0)
-    with pytest.raises(Refusal, match="expected a touch 1 to change, got a text with 0"):
+    with pytest.raises(Refusal, match="expected a scene with a touch 1, got one with 0"):
         shifted("format = 1", 0, 0.0, 0.0)
 
 
@@ -155,7 +155,7 @@ def test_a_touch_is_not_dragged_in_a_text_that_is_not_seen_yet(
         scene=scene, time=0.5 * scene.duration, refusal="", making=making, move=lambda _: None
     )
     editing = SceneEditing(history, cast("Any", session), LoadHandle())
-    touch = touches_at(scene, session.time)[0]
+    touch = loads_at(scene, session.time)[0]
     x, y = touch.load.centre()
     editing.grab(x, y)
     editing.drag(x + 1e-3, y)

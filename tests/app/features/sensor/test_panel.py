@@ -66,24 +66,24 @@ def test_a_click_chooses_nothing_while_no_elements_are_asked_for(window):
     assert window.history.settings.region_elements == ()
 
 
-def test_a_region_says_what_it_buys_and_costs(window, until):
+def test_a_region_shows_its_frame_rate_and_accuracy(window, until):
     window.requests.set("electronics", "second")
     window.requests.set("region", "skin")
 
     until(lambda: "instead of 166 frames/s" in window.region.message.text())
-    assert "one frame tells where the contact is to" in window.region.message.text()
+    assert "Contact position from one frame, at best" in window.region.message.text()
     until(lambda: window.session.estimate is not None and not window.session.estimate.fresh.all())
 
 
 @pytest.mark.parametrize(
-    ("electronics", "buys"),
+    ("electronics", "gain"),
     [
-        ("modern", "It buys no rate: all channels come at 500 frames/s as well (it could be"),
-        ("second", "It buys 500 instead of 166 frames/s, 3.0 times (it could be"),
-        ("first", "It buys 500 instead of 166 frames/s, 3.0 times (it could be"),
+        ("modern", "Frame rate: 500 frames/s, as with all channels (possible:"),
+        ("second", "Frame rate: 500 instead of 166 frames/s, 3.0 times (possible:"),
+        ("first", "Frame rate: 500 instead of 166 frames/s, 3.0 times (possible:"),
     ],
 )
-def test_a_bargain_is_of_the_frames_that_really_come(qapp, electronics, buys):
+def test_the_tradeoff_is_of_the_frames_that_really_come(qapp, electronics, gain):
     settings = Settings(
         region="skin",
         **with_consequences(Settings(), scene_of(Settings()), "electronics", electronics),
@@ -92,11 +92,12 @@ def test_a_bargain_is_of_the_frames_that_really_come(qapp, electronics, buys):
     panel = RegionPanel()
     panel.show_settings(settings)
     panel.show_status(Status(sensor=sensor, region=region), simulating=True)
-    panel.show_bargain(ScanTradeoff.of(sensor, region, PointLoad(0.05, 0.05, 0.15), 0.231))
+    panel.show_tradeoff(ScanTradeoff.of(sensor, region, PointLoad(0.05, 0.05, 0.15), 0.231))
     panel.show_status(Status(sensor=sensor, region=region), simulating=True)
 
-    assert buys in panel.message.text()
-    assert "It costs accuracy: one frame tells" in panel.message.text()
+    assert gain in panel.message.text()
+    assert "Contact position from one frame" in panel.message.text()
+    assert "mm with all channels" in panel.message.text()
 
 
 @pytest.mark.cases("tolerance")
@@ -104,7 +105,7 @@ def test_a_bargain_is_of_the_frames_that_really_come(qapp, electronics, buys):
 def test_a_share_is_shown_in_per_cent(window, name):
     window.requests.set(name, 0.15)
 
-    panel = window.region if name == "region_share" else window.spoils
+    panel = window.region if name == "region_share" else window.gages
     assert panel.editor(name).text() == "15 %"
 
 
@@ -119,11 +120,11 @@ def test_elements_bent_beyond_their_limit_are_crossed_out(window, until):
 
 
 def test_a_strip_tells_where_the_contact_is_along_it_alone(qapp) -> None:
-    sensor = scene_of(Settings(shape="strip", **SHAPES["strip"].asks)).sensor()
+    sensor = scene_of(Settings(shape="strip", **SHAPES["strip"].lengths)).sensor()
     region = Region(around="adaptive", share=0.2)
     panel = RegionPanel()
     panel.show_settings(Settings(region="adaptive"))
-    panel.show_bargain(ScanTradeoff.of(sensor, region, PointLoad(0.02, 0.02, 0.5), 0.2))
+    panel.show_tradeoff(ScanTradeoff.of(sensor, region, PointLoad(0.02, 0.02, 0.5), 0.2))
     panel.show_status(Status(state="streaming", sensor=sensor, region=region), True)
-    assert "costs accuracy" in panel.message.text()
-    assert "0.04 mm at best, all channels to \N{PLUS-MINUS SIGN}0.02 mm" in panel.message.text()
+    assert "at best: \N{PLUS-MINUS SIGN}0.04 mm, " in panel.message.text()
+    assert "\N{PLUS-MINUS SIGN}0.02 mm with all channels." in panel.message.text()

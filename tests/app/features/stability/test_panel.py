@@ -36,23 +36,23 @@ def demonstration(title: str) -> dict:
 def test_table_1s_functions_are_all_seen_alike() -> None:
     spectrum = of()
     assert spectrum.silent == 0
-    assert spectrum.alike
-    assert "Condition number 1: of 64 shapes all are seen alike." in spectrum.describe()
+    assert spectrum.uniform
+    assert "Condition number 1: of 64 modes all are equally observable." in spectrum.describe()
 
 
 def test_twelve_by_twelve_from_ten_by_ten_leave_four_shapes_unseen() -> None:
-    spectrum = of(**demonstration("Ask for 12"))
+    spectrum = of(**demonstration("12 x 12 functions"))
     assert spectrum.silent == 4
-    assert "infinite: 4 of 144 shapes change no reading" in spectrum.describe()
-    assert spectrum.told(144) == "It moves the skin and changes no reading."
+    assert "infinite: 4 of 144 modes are unobservable" in spectrum.describe()
+    assert spectrum.mode_text(144).startswith("Unobservable")
     operator = spectrum.layout.curvature_operator(spectrum.basis)
     most = np.abs(operator @ spectrum.shapes[0].ravel()).max()
     assert np.abs(operator @ spectrum.shapes[-1].ravel()).max() < 1e-9 * most
 
 
 def test_a_row_less_costs_twice_the_noise_and_a_quarter_thousands() -> None:
-    assert "takes 2 times the noise" in of(**demonstration("Drop a row")).describe()
-    assert "takes 9\N{THIN SPACE}500 times" in of(**demonstration("Drop a quarter")).describe()
+    assert "has 2 times the noise" in of(**demonstration("Drop a row")).describe()
+    assert "has 9\N{THIN SPACE}500 times" in of(**demonstration("Drop a quarter")).describe()
 
 
 def test_pinned_ends_decide_the_fingertips_silent_mode_and_sliding_ones_do_not() -> None:
@@ -97,7 +97,7 @@ def test_other_elements_or_another_shape_are_all_alive(window: MainWindow) -> No
 
 def _opened(window: MainWindow, until) -> MainWindow:
     window.actions_by_name["dock-stability"].trigger()
-    until(lambda: window.seeing.spectrum is not None)
+    until(lambda: window.observability.spectrum is not None)
     return window
 
 
@@ -107,7 +107,7 @@ def test_the_panel_is_hidden_until_f10_and_then_shows_what_is_asked_for(
     assert not window.stability.isVisible()
     qtbot.keyClick(window, Qt.Key.Key_F10)
     assert window.stability.isVisible()
-    until(lambda: "of 64 shapes" in window.stability.words.text())
+    until(lambda: "of 64 modes" in window.stability.words.text())
     assert colours_in(window, window.stability.plot) > 5
     assert colours_in(window, window.stability.map) > 20
     drawn = len(window.membrane.ages)
@@ -121,7 +121,7 @@ def test_what_the_sensor_refuses_is_shown_all_the_same(window: MainWindow, until
     until(lambda: "determine 140 of the 144" in panel.refused.text())
     assert panel.refused.isVisible()
     until(lambda: window.session.estimate.coefficients.shape != (12, 12))
-    assert panel.told.text() == DEMONSTRATIONS[3].told
+    assert panel.explanation.text() == DEMONSTRATIONS[3].text
     panel.buttons[4].click()
     until(lambda: window.session.estimate.coefficients.shape == (12, 12))
     until(lambda: not panel.refused.text())
@@ -151,7 +151,7 @@ def test_sliding_ends_are_refused_of_a_fingertip_that_is_seen_and_all_of_it_is_o
     until(lambda: "moves the skin as a whole" in panel.refused.text())
     assert panel.refused.text().startswith("In use: Least squares, 8 x 1 functions. 10")
     until(lambda: window.session.estimate is not None and window.display.badge.state == "SIM")
-    until(lambda: "infinite: one of 8 shapes changes no reading" in panel.words.text())
+    until(lambda: "infinite: 1 of 8 modes is unobservable" in panel.words.text())
     panel.undo.click()
     assert window.history.settings == was
 
@@ -162,7 +162,7 @@ def test_a_demonstration_that_is_overtaken_does_not_go_on(window: MainWindow, un
     window.history.stack.undo()
     until(lambda: window.session.status.sensor is not None and not window.session.status.computing)
     for _ in range(3):
-        window.demonstrating.follow(window.session.status)
+        window.demonstrator.follow(window.session.status)
     assert window.history.settings.fit_edge == ""
 
 
@@ -178,9 +178,9 @@ def test_the_worst_seen_shape_colours_the_skin_while_it_is_looked_at(
 ) -> None:
     bar, caption = window.scale.bar, window.membrane.caption
     panel = _opened(window, until).stability
-    assert not caption.input  # all are seen alike: none is telling
+    assert not caption.input  # all are equally observable
     panel.buttons[1].click()
-    until(lambda: caption.input == "Colours: shape 64 of 64, no measurement")
+    until(lambda: caption.input == "Colours: mode 64 of 64, no measurement")
     until(lambda: bar.limits == (-1.0, 1.0))
     assert not window.scale.lock.isEnabled()
     values = window.membrane.surface.mesh.point_data["value"]
@@ -200,27 +200,27 @@ def test_a_shape_is_chosen_by_a_click_the_arrows_or_its_number(
     window: MainWindow, until, qtbot
 ) -> None:
     panel = _opened(window, until).stability
-    assert window.seeing.chosen == 64
+    assert window.observability.number == 64
     place = panel.plot.place_of(10).toPoint()
     qtbot.mouseClick(panel.plot, Qt.MouseButton.LeftButton, pos=place + QPoint(0, -5))
-    assert window.seeing.chosen == 10
+    assert window.observability.number == 10
     assert panel.number.value() == 10
     qtbot.keyClick(panel.plot, Qt.Key.Key_Right)
-    assert window.seeing.chosen == 11
+    assert window.observability.number == 11
     panel.number.setFocus()
     qtbot.keyClick(panel.number, Qt.Key.Key_Down)
-    assert window.seeing.chosen == 10
-    assert "shape 10 of 64" in window.membrane.caption.input  # asked for, if not telling
+    assert window.observability.number == 10
+    assert "mode 10 of 64" in window.membrane.caption.input  # it was selected
 
 
 def test_very_many_functions_are_not_waited_for(window: MainWindow, until) -> None:
     panel = _opened(window, until).stability
     window.history.change("Many", -1, functions_x=64, functions_y=64)
-    until(lambda: str(MOST) in window.seeing.refusal)
-    assert window.seeing.spectrum is None
+    until(lambda: str(MOST) in window.observability.refusal)
+    assert window.observability.spectrum is None
     assert not panel.number.isEnabled()
     window.history.stack.undo()
-    until(lambda: window.seeing.spectrum is not None)
+    until(lambda: window.observability.spectrum is not None)
 
 
 def test_a_real_sensor_leaves_the_demonstrations_to_the_simulation(
@@ -229,7 +229,7 @@ def test_a_real_sensor_leaves_the_demonstrations_to_the_simulation(
     panel = _opened(window, until).stability
     window.session.source = "/dev/real"
     until(lambda: not panel.buttons[0].isEnabled())
-    assert "Ctrl+M" in panel.told.text()
+    assert "Ctrl+M" in panel.explanation.text()
 
 
 def test_both_panels_below_the_skin_share_a_place_and_fit_a_small_window(
@@ -241,10 +241,10 @@ def test_both_panels_below_the_skin_share_a_place_and_fit_a_small_window(
         return tuple(not p.visibleRegion().isEmpty() for p in (window.cost, window.stability))
 
     cost.trigger()
-    until(lambda: window.costing.running)
+    until(lambda: window.measurement.running)
     stability.trigger()
     until(lambda: seen() == (False, True))
-    assert not window.costing.running
+    assert not window.measurement.running
     assert (cost.isChecked(), stability.isChecked()) == (False, True)
     assert (window.width(), window.height()) == (1280, 800)
     assert window.minimumSizeHint().height() <= 800

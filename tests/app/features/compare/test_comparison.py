@@ -8,7 +8,7 @@ import pytest
 
 from kappaskin import Setup
 from kappaskin.pipeline import Readout
-from kappaskin_app.features.compare.comparing import Pair, other_setup
+from kappaskin_app.features.compare.comparison import Pair, other_setup
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.window import MainWindow
 
@@ -17,7 +17,7 @@ from kappaskin_app.shell.window import MainWindow
 def pairs(window: MainWindow, until) -> list[Pair]:
     """What came of comparing in the window on the simulation."""
     found: list[Pair] = []
-    window.comparing.compared.connect(found.append)
+    window.comparison.compared.connect(found.append)
     window.actions_by_name["dock-compare"].trigger()
     until(lambda: len(found) > 0)
     return found

@@ -1,4 +1,4 @@
-"""A sensor that is not built yet: what is predicted of it at once, and simulated to check that."""
+"""Prediction of a sensor design's standard deviation, and its check by simulation."""
 
 import math
 from collections.abc import Generator
@@ -18,20 +18,20 @@ from kappaskin.skin import Patch
 from kappaskin.studies import Check, Design, Prospect, check, prospect
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.history import History
-from kappaskin_app.shell.loads import ready, reference_on
+from kappaskin_app.shell.loads import load_case_stimuli, reference_on
 from kappaskin_app.shell.settings import Settings, part
-from kappaskin_app.shell.settings.designed import Designed
+from kappaskin_app.shell.settings.designed import DesignSettings
 from kappaskin_app.shell.settings.scene import SHAPES
 
 
 def patch_of(settings: Settings) -> Patch:
-    """The skin that is designed."""
+    """The patch of the design."""
     shape = SHAPES[settings.design_shape]
-    return shape.make(*(getattr(settings, f"design_{name}") for name in shape.asks))
+    return shape.make(*(getattr(settings, f"design_{name}") for name in shape.lengths))
 
 
 def scene_of(settings: Settings) -> Scene:
-    """The design with its elements on a regular grid, pressed in the middle by a point."""
+    """The design with its elements on a regular grid, and a point load in the middle."""
     s, patch = settings, patch_of(settings)
     layout, edge = SensorLayout.regular(patch, s.design_x, s.design_y), edges_of(patch)[0]
     plate, electronics = Plate(patch), Transduction()
@@ -42,19 +42,19 @@ def scene_of(settings: Settings) -> Scene:
         "design",
         plate,
         layout,
-        ready("centre", plate, edge),
+        load_case_stimuli("centre", plate, edge),
         (GaussianNoise(s.design_noise),),
         electronics,
         rate=min(SHAPES[s.design_shape].rate, fastest if fastest < 1 else math.floor(fastest)),
         reference=reference_on(patch),
         edge=edge,
         title="A design",
-        text="Designed in the panel Design; a point presses in the middle.",
+        text="A design made in the panel Design, with a point load in the middle.",
     )
 
 
 def design_of(settings: Settings) -> Design:
-    """What is designed, its elements not placed yet."""
+    """The design, before its elements are placed."""
     s = settings
     return Design(scene_of(s), (s.design_functions_x, s.design_functions_y), s.design_place)
 
@@ -64,7 +64,7 @@ def _prospect(settings: Settings) -> Prospect:
 
 
 def _placed(settings: Settings, found: Prospect) -> Scene:
-    """The design with its elements where they were found to be placed."""
+    """The scene of the design with its elements at their computed positions."""
     scene = scene_of(settings)
     if settings.design_place == "scene":
         return scene
@@ -75,11 +75,11 @@ def _checks(settings: Settings, found: Prospect) -> Generator[Check]:
     return check(replace(design_of(settings), scene=_placed(settings, found), by="scene"))
 
 
-class Designing(QObject):
-    """Predicts what is designed while somebody looks; `changed` tells when there is news.
+class DesignPrediction(QObject):
+    """Predicts the design while its panel is visible; `changed` reports a new result.
 
-    `prospect` is the last that was predicted, of the design there is now unless it is `predicting`;
-    `check` what was simulated of it, and `refusal` why there is none.
+    `prospect` is the last prediction, of the present design unless it is `predicting`; `check` is
+    its simulation, and `refusal` the reason where there is none.
     """
 
     changed = Signal()
@@ -96,24 +96,24 @@ class Designing(QObject):
             self._take,
             self._refuse,
             ended=self.changed.emit,
-            cancelled="Cancelled; another design is computed again.",
+            cancelled="Cancelled; computed again when the design changes.",
         )
         self.checks = BackgroundTask(
             tasks,
             "Simulating the design",
             self._take_check,
             ended=self.changed.emit,
-            cancelled="Cancelled; Check by simulation begins anew.",
+            cancelled="Cancelled; Check by simulation starts again.",
         )
-        self._asked: Settings | None = None
-        self._watched = self._quick = False
+        self._requested: Settings | None = None
+        self._active = self._quick = False
 
-    def watch(self, watched: bool) -> None:
-        """Predict while somebody looks, and only then."""
-        self._watched = watched
-        if not watched:
+    def set_active(self, active: bool) -> None:
+        """Predict while the panel is visible, and only then."""
+        self._active = active
+        if not active:
             self._stop()
-            self._asked = None
+            self._requested = None
             self.changed.emit()
 
     @property
@@ -125,19 +125,21 @@ class Designing(QObject):
         return self.checks.running
 
     def follow(self, _: Status) -> None:
-        """Begin anew when something else is designed."""
-        settings, asked = self._history.settings, self._asked
-        another = asked is None or part(settings, Designed) != part(asked, Designed)
-        if self._watched and another:
+        """Predict again when the design has changed."""
+        settings, requested = self._history.settings, self._requested
+        changed = requested is None or part(settings, DesignSettings) != part(
+            requested, DesignSettings
+        )
+        if self._active and changed:
             self._begin(settings)
 
     def _begin(self, settings: Settings) -> None:
         if self.predicting and self._quick:
-            return  # it is as good as done
+            return  # the result comes within a frame
         self._stop()
-        self._asked, self.check, self.refusal = settings, None, ""
-        # Where elements are placed, and where modes are computed, it takes seconds.
-        plain = "rim_radius" not in SHAPES[settings.design_shape].asks
+        self._requested, self.check, self.refusal = settings, None, ""
+        # Optimised positions and computed modes take seconds.
+        plain = "rim_radius" not in SHAPES[settings.design_shape].lengths
         self._quick = plain and settings.design_place in ("scene", "clustered")
         if self._quick:
             self.predicts.run(_prospect, settings)
@@ -156,19 +158,21 @@ class Designing(QObject):
         self.prospect, self.refusal = None, str(error)
 
     def simulate(self) -> None:
-        """Begin to check the prediction by a simulation, or end that."""
+        """Start the check by simulation, or stop it."""
         if self.checking:
             self.checks.stop()
-        elif self._asked is not None and self.prospect is not None and not self.predicting:
+        elif self._requested is not None and self.prospect is not None and not self.predicting:
             self.check = None
-            self.checks.compute(_checks, self._asked, self.prospect)
+            self.checks.compute(_checks, self._requested, self.prospect)
         self.changed.emit()
 
     def write(self, file: Path) -> None:
-        """Write the design into a scene's file; an `OSError` or a `Refusal` may come."""
-        if self._asked is None or self.prospect is None or self.predicting:
-            raise Refusal("expected a design that can be computed; change it until a map is shown")
-        file.write_text(write_scene(_placed(self._asked, self.prospect)), encoding="utf-8")
+        """Write the design into a scene file; may raise `OSError` or `Refusal`."""
+        if self._requested is None or self.prospect is None or self.predicting:
+            raise Refusal(
+                "expected a design with a prediction, got none; change it until a map is shown"
+            )
+        file.write_text(write_scene(_placed(self._requested, self.prospect)), encoding="utf-8")
 
     def _stop(self) -> None:
         self.predicts.stop()

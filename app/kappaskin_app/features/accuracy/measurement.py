@@ -1,4 +1,4 @@
-"""What accuracy costs on the skin that is shown: measured beside the window, point by point."""
+"""Measurement of cost and accuracy of the settings, as a background task."""
 
 import time
 from collections import deque
@@ -30,48 +30,47 @@ from kappaskin_app.shell.simulation import NO_ELEMENTS, elements_of, scene_of_se
 from kappaskin_app.widgets.text import duration, length
 
 FUNCTIONS = (4, 6, 8, 12)
-"""Functions along each side that are tried."""
+"""Basis functions along each side that are measured."""
 ELEMENTS = (6, 16)
-"""Elements along each side that are tried on a simulated skin, besides its own."""
-_MOST_FUNCTIONS = 400  # of a setting that is measured because it is the present one
-_SHOWN = 0.2  # s between two looks: faster cannot be read
-_SMOOTHED = 0.5  # s that the measured error and time of the present frame are taken over
-_WHOLE = "Predicted is what scans of all elements give, without the region."
-_SPOILT = "What spoils the readings of a sensor is in them already: nothing can be left out."
-_NOISIER = 1.5  # times more or less noise is other noise
+"""Elements along each side that are measured on a simulated skin, besides its own."""
+_MOST_FUNCTIONS = 400  # of the present setting, beyond which it is not measured
+_UPDATE = 0.2  # s between two updates of the panel
+_AVERAGED = 0.5  # s over which error and time of the present frames are averaged
+_WHOLE = "Predicted values are for scans of all elements, without the region of interest."
+_REAL = "The readings of a real sensor include all effects: none can be omitted."
+_NOISE_RATIO = 1.5  # beyond this ratio the noise has changed
 
 
-def in_words(setting: Setting, elements: int = 0) -> str:
-    """A setting in words; `elements` is how many there are, if known, where they are no grid."""
+def setting_text(setting: Setting, elements: int = 0) -> str:
+    """The name of a setting; `elements` is their number, if known, where they are no grid."""
     name = METHOD_SHORT.get(setting.method, setting.method)
     m_n = " x ".join(map(str, setting.elements)) if setting.elements else str(elements or "")
     words = f"{name}, {' x '.join(map(str, setting.functions))} functions"
     return f"{words}, {m_n} elements" if m_n else words
 
 
-def gives(cost: Cost) -> str:
-    """What a cost gives for what."""
+def performance(cost: Cost) -> str:
+    """The RMS error of a cost, and its time."""
     return f"{length(cost.rms)} in {duration(cost.time_per_frame)}"
 
 
 @dataclass(frozen=True)
 class Frontier:
-    """What was measured and is worth to be shown: all of it, and what nothing beats."""
+    """The measured costs, and the Pareto-optimal ones among them."""
 
     costs: tuple[Cost, ...] = ()
     best: tuple[Cost, ...] = ()
 
     def cheapest(self, within: float) -> Cost | None:
-        """The one with the least arithmetic whose RMS error is `within` m or less."""
+        """The cost of least computing time whose RMS error is `within` m or less."""
         return next((cost for cost in self.best if cost.rms <= within), None)
 
 
-class Costing(QObject):
-    """Measures settings while somebody looks; `changed` tells when there is something to show.
+class CostMeasurement(QObject):
+    """Measures settings while its panel is visible; `changed` reports new results.
 
-    `scene` is what is measured on and `costs` what came of it, by setting, as `effects` is of what
-    spoils its readings; `refusal` says why nothing can be measured, and `about` on what a real
-    sensor's costs rest.
+    `costs` and `effects` are the results by setting, measured on `scene`; `refusal` is the reason
+    where nothing can be measured, and `about` the conditions on a real sensor.
     """
 
     changed = Signal()
@@ -89,54 +88,54 @@ class Costing(QObject):
         self._tried: tuple[Setting, ...] = ()
         self.task = BackgroundTask(
             tasks,
-            "Measuring what accuracy costs",
-            self._take_up,
+            "Measuring the cost of accuracy",
+            self._take_result,
             self._refuse,
-            cancelled="Cancelled; Measure begins anew.",
+            cancelled="Cancelled; Measure starts again.",
         )
-        self._watched = False
+        self._active = False
         self._next = 0.0
         self._recent: deque[tuple[float, float, float]] = deque()
         self._generation = -1
 
-    # What happens.
+    # Actions
 
-    def watch(self, watched: bool) -> None:
-        """Measure what is still to be measured while somebody looks, and only then."""
-        self._watched, self._next = watched, 0.0
-        if not watched:
+    def set_active(self, active: bool) -> None:
+        """Measure while the panel is visible, and only then."""
+        self._active, self._next = active, 0.0
+        if not active:
             self.task.stop()
 
     def measure(self) -> None:
-        """Measure everything, on the skin as it is now."""
+        """Measure all settings again, on the present skin."""
         self.task.stop()
         self.scene, self.costs, self._tried, self.refusal = None, {}, (), ""
         self.effects = {}
         self._next = 0.0
-        self._go_on()
+        self._continue()
         self.changed.emit()
 
     def follow(self, _: Status) -> None:
-        """Measure what is still to be measured."""
-        if not self._watched:
+        """Continue the measurement."""
+        if not self._active:
             return
         if not self.running and not self.refusal:
-            self._go_on()
+            self._continue()
         now = time.monotonic()
         if now >= self._next:
-            self._next = now + _SHOWN
+            self._next = now + _UPDATE
             self.changed.emit()
 
     def receive(self, estimate: Estimate) -> None:
-        """Remember what this frame took and how wrong it is."""
-        if not self._watched:
+        """Record the time and the error of a frame."""
+        if not self._active:
             return
         now = time.monotonic()
         if estimate.generation != self._generation:
             self._generation = estimate.generation
             self._recent.clear()
         self._recent.append((now, estimate.fit_time, estimate.error_rms))
-        while self._recent[0][0] < now - _SMOOTHED:
+        while self._recent[0][0] < now - _AVERAGED:
             self._recent.popleft()
 
     def choose(self, cost: Cost) -> None:
@@ -145,16 +144,16 @@ class Costing(QObject):
         self._next = 0.0
 
     def _take(self, setting: Setting) -> None:
-        """Fit as `setting` says, on as many elements."""
+        """Select the estimator, the basis and the elements of `setting`."""
         along_x, along_y = setting.functions
         changed = {"method": setting.method, "functions_x": along_x, "functions_y": along_y}
         elements = setting.elements
         another = elements != elements_of(self._history.settings)
         if elements is not None and another and self._session.simulating:
             changed |= {"elements_x": elements[0], "elements_y": elements[1], **NO_ELEMENTS}
-        self._history.change("Choice by its cost", -1, **changed)
+        self._history.change("Setting from Cost of accuracy", -1, **changed)
 
-    # What is so.
+    # State
 
     @property
     def running(self) -> bool:
@@ -162,9 +161,9 @@ class Costing(QObject):
 
     @property
     def progress(self) -> tuple[int, int]:
-        """How many settings are measured, of how many."""
-        asked = self._asked()
-        return sum(setting in self.costs for setting in asked), len(asked)
+        """The number of measured settings, and of all."""
+        requested = self._requested()
+        return sum(setting in self.costs for setting in requested), len(requested)
 
     @property
     def present(self) -> Setting | None:
@@ -180,25 +179,25 @@ class Costing(QObject):
         return Setting(setup.method, (setup.Ni, across), own)
 
     def predicted(self) -> Cost | Refused | None:
-        """What was measured of the setting in use."""
+        """The cost of the setting in use."""
         present = self.present
         return None if present is None else self.costs.get(present)
 
-    def spoiling(self) -> EffectCosts | None:
-        """What the effects of the scene cost with the setting in use, None while not known."""
-        setting = self._with()
+    def effect_costs(self) -> EffectCosts | None:
+        """The costs of the effects with the setting in use; None while unknown."""
+        setting = self._effects_setting()
         return None if setting is None else self.effects.get(setting)
 
     def why_none(self) -> str:
-        """Why no effect is told of, or nothing."""
+        """Why there are no costs of effects; empty if there are."""
         if self.scene is not None and not self._of[0]:
-            return _SPOILT
-        found = self.spoiling()
+            return _REAL
+        found = self.effect_costs()
         return found.reason if isinstance(found, Refused) else ""
 
     def measured(self) -> tuple[float, float]:
-        """Error in m and time in s of the present frames; NaN where they are not known."""
-        lately = time.monotonic() - 2 * _SMOOTHED
+        """Error in m and time in s of the present frames; NaN where unknown."""
+        lately = time.monotonic() - 2 * _AVERAGED
         recent = [(taken, error) for when, taken, error in self._recent if when > lately]
         if not recent:
             return float("nan"), float("nan")
@@ -214,58 +213,58 @@ class Costing(QObject):
         return Frontier(known, frontier(known))
 
     def note(self) -> str:
-        """What to bear in mind while comparing."""
+        """Conditions of the measurement."""
         whole = "" if self._history.settings.region == "off" else _WHOLE
         return " ".join(filter(None, [self.about, whole]))
 
-    def unlike(self) -> str:
-        """What is not as it was when the costs were measured, or nothing."""
+    def difference(self) -> str:
+        """What has changed since the costs were measured; empty if nothing."""
         if self.scene is None:
             return ""
         simulated, connections, noise = self._of
         if simulated != self._session.inside:
             return "on another skin"
         if simulated:
-            return _unlike(self.scene, self._session.scene)
+            return _scene_difference(self.scene, self._session.scene)
         if connections != self._session.status.connections:
             return "on another skin"
         now = self._noise()
-        return "with other noise" if not 1 / _NOISIER < now / noise < _NOISIER else ""
+        return "with other noise" if not 1 / _NOISE_RATIO < now / noise < _NOISE_RATIO else ""
 
-    # How it is measured.
+    # Measurement
 
-    def _asked(self) -> tuple[Setting, ...]:
-        """The settings to be measured; the present one too, wherever that makes sense."""
+    def _requested(self) -> tuple[Setting, ...]:
+        """The settings to measure, with the present one if it is small enough."""
         present = self.present
-        if present is None or present in self._tried or self.unlike() or not self._tried:
+        if present is None or present in self._tried or self.difference() or not self._tried:
             return self._tried
         return (*self._tried, present) if _measurable(present) else self._tried
 
-    def _go_on(self) -> None:
+    def _continue(self) -> None:
         try:
             if self.scene is None:
-                self._look()
-            missing = [setting for setting in self._asked() if setting not in self.costs]
+                self._prepare()
+            missing = [setting for setting in self._requested() if setting not in self.costs]
             missing.sort(key=lambda setting: setting != self.present)
-            effects_with = self._with()
-            if effects_with in self.effects or self.unlike():
+            effects_with = self._effects_setting()
+            if effects_with in self.effects or self.difference():
                 effects_with = None
             if self.scene is not None and (missing or effects_with):
                 self.task.compute(cost_steps, self.scene, missing, effects_with)
         except Refusal as refusal:
             self.refusal = str(refusal)
 
-    def _with(self) -> Setting | None:
-        """The setting to judge effects with; None where there are none to be judged."""
+    def _effects_setting(self) -> Setting | None:
+        """The setting with which effects are measured; None where there are none."""
         present = self.present
         if present is None or not self._tried or not self._of[0] or not _measurable(present):
             return None
-        # As they are, with all that a tiling of as many knows nothing of.
+        # The scene's own elements: a regular grid of as many may differ.
         own = present.elements == self._tried[0].elements
         return replace(present, elements=None) if own else present
 
-    def _look(self) -> None:
-        """Take the skin as it is now to measure on, if there is one and its noise is known."""
+    def _prepare(self) -> None:
+        """Select the present skin for the measurement, if its noise is known."""
         session, status, noise = self._session, self._session.status, self._noise()
         if status.sensor is None or status.state != "streaming":
             return
@@ -273,13 +272,13 @@ class Costing(QObject):
             self.scene, self.about = session.scene, ""
         elif np.isfinite(noise):
             self.scene = scene_of_sensor(status.sensor, noise)
-            self.about = f"With a point load in the middle and the noise of now, {noise:.2g} 1/m."
+            self.about = f"With a point load in the middle and the present noise, {noise:.2g} 1/m."
         if self.scene is not None:
             self._of = session.inside, status.connections, noise
             self._tried = self._to_try(self.scene)
 
     def _to_try(self, scene: Scene) -> tuple[Setting, ...]:
-        """Every method and basis; on a simulated skin with other elements too."""
+        """All estimators and bases; on a simulated skin also with other elements."""
         own, others = scene.layout.shape, ()
         if self._session.simulating:
             s = self._history.settings
@@ -292,11 +291,11 @@ class Costing(QObject):
         return tuple(replace(t, elements=own) if t.elements == first else t for t in tried)
 
     def _noise(self) -> float:
-        """The noise of a reading as it is now, in 1/m."""
+        """The present noise of a reading, in 1/m."""
         estimate = self._session.estimate
         return float("nan") if estimate is None else max(estimate.noise, 1e-9)
 
-    def _take_up(self, found: Cost | Refused | tuple[Setting, EffectCosts]) -> None:
+    def _take_result(self, found: Cost | Refused | tuple[Setting, EffectCosts]) -> None:
         if isinstance(found, tuple):
             self.effects |= [found]
         else:
@@ -308,7 +307,7 @@ class Costing(QObject):
 
 
 def _measurable(setting: Setting) -> bool:
-    """Whether measuring a setting, because it is in use, takes no ages."""
+    """Whether the present setting is small enough to be measured."""
     return setting.functions[0] * setting.functions[1] <= _MOST_FUNCTIONS
 
 
@@ -316,8 +315,8 @@ def _besides_noise(scene: Scene) -> list[object]:
     return [one for one in scene.effects if not isinstance(one, UniformNoise | GaussianNoise)]
 
 
-def _unlike(was: Scene, now: Scene) -> str:
-    """What of a simulated scene is not as it was, besides how many elements it has."""
+def _scene_difference(was: Scene, now: Scene) -> str:
+    """The change of a simulated scene, except in the number of its elements."""
     dead, dead_now = (np.flatnonzero(~scene.layout.live[0]).tolist() for scene in (was, now))
     if (was.plate, was.edge) != (now.plate, now.edge):
         return "on another skin"

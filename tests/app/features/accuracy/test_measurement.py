@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import Qt
 
 from kappaskin.studies import Setting
-from kappaskin_app.features.accuracy.costing import in_words
+from kappaskin_app.features.accuracy.measurement import setting_text
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.simulation import scene_of, scene_of_sensor
 from kappaskin_app.shell.window import MainWindow
@@ -31,7 +31,7 @@ def test_the_panel_is_hidden_until_f9_and_then_measures_by_itself(
     assert window.cost.isVisible()
     until(lambda: _processes() == ["kappaskin-cost_steps"])
     until(lambda: window.cost.bar.isVisible())
-    until(lambda: window.costing.progress[0] > 0, 60.0)
+    until(lambda: window.measurement.progress[0] > 0, 60.0)
     drawn = len(window.membrane.ages)
     until(lambda: len(window.membrane.ages) > drawn + 2)
 
@@ -41,37 +41,37 @@ def test_nobody_looking_ends_the_measuring_and_a_look_takes_it_up_again(
 ) -> None:
     dock = window.actions_by_name["dock-cost"]
     dock.trigger()
-    until(lambda: window.costing.progress[0] > 0, 60.0)
+    until(lambda: window.measurement.progress[0] > 0, 60.0)
     dock.trigger()
-    assert not window.costing.running
+    assert not window.measurement.running
     assert not _processes()
-    kept = dict(window.costing.costs)
+    kept = dict(window.measurement.costs)
     dock.trigger()
     until(lambda: all_measured(window), 60.0)
-    assert all(window.costing.costs[setting] is cost for setting, cost in kept.items())
+    assert all(window.measurement.costs[setting] is cost for setting, cost in kept.items())
 
 
 def test_the_setting_in_use_is_measured_first(window: MainWindow, until) -> None:
     window.history.change("Odd", -1, method="bayes", functions_x=7, functions_y=5)
     until(lambda: window.session.status.setup.Ni == 7)
     window.actions_by_name["dock-cost"].trigger()
-    until(lambda: window.costing.progress[0] > 0, 60.0)
-    assert next(iter(window.costing.costs)) == Setting("bayes", (7, 5), (10, 10))
+    until(lambda: window.measurement.progress[0] > 0, 60.0)
+    assert next(iter(window.measurement.costs)) == Setting("bayes", (7, 5), (10, 10))
 
 
 def test_how_many_elements_there_are_is_told_once_it_is_known() -> None:
     setting = Setting("bayes", (8, 8), None)
-    assert in_words(setting).endswith("functions")
-    assert in_words(setting, 92).endswith("functions, 92 elements")
+    assert setting_text(setting).endswith("functions")
+    assert setting_text(setting, 92).endswith("functions, 92 elements")
 
 
 def test_a_skin_without_a_load_is_refused_in_words(window: MainWindow, until) -> None:
     window.session.scene = scene_of(Settings(load_case="point", force=0.0))
     window.actions_by_name["dock-cost"].trigger()
-    until(lambda: window.costing.refusal != "", 60.0)
+    until(lambda: window.measurement.refusal != "", 60.0)
     until(lambda: window.cost.message.isVisible())
     assert "load" in window.cost.message.text()
-    assert not window.costing.running
+    assert not window.measurement.running
 
 
 def test_a_real_sensor_has_no_effects_to_leave_out(window: MainWindow, until) -> None:
@@ -79,10 +79,10 @@ def test_a_real_sensor_has_no_effects_to_leave_out(window: MainWindow, until) ->
     window.actions_by_name["dock-cost"].trigger()
     until(lambda: window.cost.no_effects.isVisible(), 60.0)
     assert window.cost.no_effects.text() == (
-        "What spoils the readings of a sensor is in them already: nothing can be left out."
+        "The readings of a real sensor include all effects: none can be omitted."
     )
-    until(lambda: window.costing.progress[0] > 0, 60.0)
-    assert not window.costing.effects
+    until(lambda: window.measurement.progress[0] > 0, 60.0)
+    assert not window.measurement.effects
     assert not window.cost.effects.isVisible()
 
 

@@ -8,7 +8,7 @@ from PySide6.QtCore import QSize
 
 from kappaskin import Disk, PointLoad, Polygon, SensorLayout, load_scene
 from kappaskin.scenes import SCENES
-from kappaskin_app.features.scene.scene_picture import picture, relief
+from kappaskin_app.features.scene.thumbnails import picture, relief
 from kappaskin_app.theme import DARK, LIGHT
 
 SIZE = QSize(96, 60)

@@ -1,4 +1,4 @@
-"""Small pictures of scenes, painted in the background."""
+"""Thumbnails of scenes, painted as a background task."""
 
 import math
 from collections.abc import Generator
@@ -31,7 +31,7 @@ _STILL = 1e-6  # m that a touch has to go to leave a path
 
 @dataclass(frozen=True, eq=False)
 class ReliefMarks:
-    """Places (k, 3) in mm on the drawn skin, and its outward unit normals (k, 3) there."""
+    """Points (k, 3) in mm on the drawn skin, and its outward unit normals (k, 3) there."""
 
     points: Array
     out: Array
@@ -41,10 +41,10 @@ class ReliefMarks:
 class Relief:
     """A skin as it is drawn: `points` (n, 3) in mm, their normals, and `faces` (k, 4) of them.
 
-    `share` (n,) is the displacement over the largest one. `elements` are where they sense,
-    `bearing` where a rigid object does. `paths` are the ways of what touches, in pieces wherever it
-    is lifted; `outlines` are those of spread loads, and along an object from end to end. `arrows`
-    (k, 2, 3) in mm go from tail to tip.
+    `share` (n,) is the displacement over the largest one. `elements` are the positions of the
+    elements, `bearing` the contact points of a rigid object. `paths` are the paths of the stimuli,
+    divided where they are lifted; `outlines` are those of distributed loads and of long objects.
+    `arrows` (k, 2, 3) in mm go from tail to tip.
     """
 
     points: Array
@@ -59,7 +59,7 @@ class Relief:
 
 
 def relief(scene: Scene) -> Relief:
-    """The skin of `scene` when it is pressed hardest, drawn deep enough to be seen."""
+    """The skin of `scene` at its largest force, drawn with vertical exaggeration."""
     patch = scene.plate.patch
     skin = DrawnSkin(patch, *(_OF_A_STRIP if patch.strip else (_POINTS, _POINTS)))
     surface, pressed = _hardest(scene, skin)
@@ -87,7 +87,7 @@ def relief(scene: Scene) -> Relief:
 def _drawn(skin: DrawnSkin, surface: Array) -> tuple[Array, Array]:
     """The share of the largest displacement, and the height in mm to draw it at, both (ny, nx).
 
-    A dent four times as deep is drawn twice as deep: each is seen, and which is the deeper one.
+    A dent four times as deep is drawn twice as deep: both are visible, and which is the deeper one.
     """
     most = float(np.max(np.abs(surface)))
     if not most:
@@ -108,11 +108,11 @@ def _marks(skin: DrawnSkin, positions: Array) -> ReliefMarks:
 
 
 def _rod(bearing: ReliefMarks) -> tuple[ReliefMarks, ...]:
-    """The straight line between the two places farthest apart where a rigid object bears."""
+    """The straight line between the two most distant contact points of a rigid object."""
     if len(bearing.points) < 2:
         return ()
-    apart = np.linalg.norm(bearing.points[:, None] - bearing.points, axis=-1)
-    ends = np.array(np.unravel_index(np.argmax(apart), apart.shape))
+    distances = np.linalg.norm(bearing.points[:, None] - bearing.points, axis=-1)
+    ends = np.array(np.unravel_index(np.argmax(distances), distances.shape))
     return (ReliefMarks(bearing.points[ends], bearing.out[ends]),)
 
 
@@ -124,7 +124,7 @@ def _arrows(skin: DrawnSkin, places: Array, pulled: bool) -> Array:
 
 
 def _hardest(scene: Scene, skin: DrawnSkin) -> tuple[Array, AppliedLoads | None]:
-    """Displacement (ny, nx) in m, inward, when the load has done most work, and what presses."""
+    """Inward displacement (ny, nx) in m at the largest work of the load, and the loads."""
     patch = scene.plate.patch
     ny, nx = skin.height.shape
     x, y = patch.grid(nx, ny)
@@ -143,7 +143,7 @@ def _hardest(scene: Scene, skin: DrawnSkin) -> tuple[Array, AppliedLoads | None]
 
 
 def _path(stimulus: Stimulus, duration: float) -> list[Array]:
-    """Pieces (k, 2) in m of the way along which it presses; none of what stays where it is."""
+    """Pieces (k, 2) in m of the path of the stimulus; none if it does not move."""
     what = stimulus.what
     place = (what.x, what.y) if isinstance(what, Indenter) else what.centre()
     poses = [stimulus.pose_at(t) for t in np.linspace(0, np.nextafter(duration, 0), _ALONG)]
@@ -155,8 +155,8 @@ def _path(stimulus: Stimulus, duration: float) -> list[Array]:
 
 
 @dataclass(frozen=True)
-class Look:
-    """How pictures look: in a `theme`, `width` by `height` in px of which each is `ratio` dots."""
+class ThumbnailStyle:
+    """Theme and size of thumbnails: `width` by `height` in px of `ratio` dots each."""
 
     theme: Theme
     width: int
@@ -164,11 +164,11 @@ class Look:
     ratio: float
 
 
-_Made = tuple[str, Look, Scene | str | QImage]
+_Made = tuple[str, ThumbnailStyle, Scene | str | QImage]
 
 
-class Picturing(QObject):
-    """Reads the scenes with these `names` once, then paints each anew for every other look.
+class Thumbnails(QObject):
+    """Reads the scenes with these `names` once, and paints each for every new style.
 
     `read` brings each scene by its name, or in words why it cannot be; `painted` a name and the
     image for it.
@@ -182,67 +182,67 @@ class Picturing(QObject):
         self._names = names
         self._scenes: dict[str, Scene | str] = {}
         self._reliefs: dict[str, Relief] = {}
-        self._looks: dict[str, Look] = {}
-        self._look: Look | None = None
+        self._styles: dict[str, ThumbnailStyle] = {}
+        self._style: ThumbnailStyle | None = None
         self._task = BackgroundTask(
             tasks,
-            "Painting the scenes",
+            "Painting the thumbnails",
             self._take,
-            cancelled="Cancelled; what is missing is painted when it is shown again.",
+            cancelled="Cancelled; missing thumbnails are painted when shown again.",
         )
         self._timer = QTimer(self, singleShot=True)  # pyright: ignore[reportCallIssue]
         self._timer.timeout.connect(guarded(self._begin))
 
-    def paint(self, look: Look, after: int) -> None:
-        """Have what does not look so painted, beginning `after` so many ms."""
-        self._look = look
+    def paint(self, style: ThumbnailStyle, after: int) -> None:
+        """Paint the thumbnails that do not have this style, `after` so many ms."""
+        self._style = style
         self._timer.start(after)
 
-    def rest(self) -> None:
-        """Make nothing more until something is to be painted."""
+    def stop(self) -> None:
+        """Stop painting until the next request."""
         self._timer.stop()
         self._task.stop()
 
     def _begin(self) -> None:
-        missing = [name for name in self._names if self._looks.get(name) != self._look]
+        missing = [name for name in self._names if self._styles.get(name) != self._style]
         if missing:
-            self._task.run(self._made, self._look, missing)
+            self._task.run(self._made, self._style, missing)
 
-    def _made(self, look: Look, names: list[str]) -> Generator[_Made]:
-        """Each scene that is not known yet, or why it cannot be, then a picture of each."""
+    def _made(self, style: ThumbnailStyle, names: list[str]) -> Generator[_Made]:
+        """Each unread scene, or the message of its refusal, then a thumbnail of each."""
         for name in self._names:
             if name not in self._scenes:
                 self._scenes[name] = _loaded(name)
-                yield name, look, self._scenes[name]
+                yield name, style, self._scenes[name]
         for name in names:
             scene = self._scenes[name]
             if isinstance(scene, Scene):
-                yield name, look, self._painted(name, scene, look)
+                yield name, style, self._painted(name, scene, style)
 
     def _take(self, made: _Made) -> None:
-        name, look, what = made
+        name, style, what = made
         if isinstance(what, QImage):
-            self._looks[name] = look
+            self._styles[name] = style
             self.painted.emit(name, what)
         else:
             self.read.emit(name, what)
 
-    def _painted(self, name: str, scene: Scene, look: Look) -> QImage:
+    def _painted(self, name: str, scene: Scene, style: ThumbnailStyle) -> QImage:
         if name not in self._reliefs:
             self._reliefs[name] = relief(scene)
-        size = QSize(look.width, look.height)
-        return picture(self._reliefs[name], look.theme, size, look.ratio)
+        size = QSize(style.width, style.height)
+        return picture(self._reliefs[name], style.theme, size, style.ratio)
 
 
 def _loaded(name: str) -> Scene | str:
-    """A ready scene, or in words why it cannot be."""
+    """A built-in scene, or the message of its refusal."""
     try:
         return load_scene(name)
     except Refusal as refusal:
         return str(refusal)
 
 
-_FAR = 3.0  # times the skin's extent from its middle to the eye
+_FAR = 3.0  # times the skin's extent from its middle to the camera
 _LAMP = (-1.0, 0.4, 0.75)  # as in the view of the skin
 _FINER = 2  # the skin is drawn so many times larger, and shrunk to smooth its edges
 _RIM = 1.2  # px: width of the line along the rim
@@ -259,21 +259,21 @@ def picture(relief: Relief, theme: Theme, size: QSize, ratio: float) -> QImage:
     """
     image = QImage(size * ratio, QImage.Format.Format_ARGB32_Premultiplied)
     image.fill(Qt.GlobalColor.transparent)
-    eye = _Eye(relief, size)
-    skin = _skin(relief, theme, eye, image.width(), image.height())
+    camera = _Camera(relief, size)
+    skin = _skin(relief, theme, camera, image.width(), image.height())
     image.setDevicePixelRatio(ratio)
     skin.setDevicePixelRatio(ratio)
     painter = QPainter(image)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     _paint_ground(painter, theme, size)
     painter.drawImage(QPointF(0, 0), skin)
-    _paint_marks(painter, relief, eye)
+    _paint_marks(painter, relief, camera)
     painter.end()
     return image
 
 
-class _Eye:
-    """Where points in mm are seen in a picture of `size` px, the whole as large as fits."""
+class _Camera:
+    """Projection of points in mm into a picture of `size` px, as large as fits."""
 
     def __init__(self, relief: Relief, size: QSize) -> None:
         self.size = size
@@ -287,46 +287,46 @@ class _Eye:
         self._middle = (low + high) / 2
         self._far = _FAR * float(np.linalg.norm(high - low))
         self._scale, self._shift = 1.0, np.zeros(2)
-        seen = self.sees(whole)
-        low, high = seen.min(axis=0), seen.max(axis=0)
+        projected = self.project(whole)
+        low, high = projected.min(axis=0), projected.max(axis=0)
         sides = np.array([size.width(), size.height()])
         self._scale = float(np.min((sides - 2 * _MARGIN * size.width()) / (high - low)))
         self._shift = sides / 2 - self._scale * (low + high) / 2
 
     def away(self, points: Array) -> Array:
-        """How far (...) in mm points (..., 3) are from the eye."""
+        """Distance (...) in mm of points (..., 3) from the camera."""
         return self._far - (points - self._middle) @ self.towards
 
-    def sees(self, points: Array) -> Array:
-        """Where (..., 2) in px points (..., 3) in mm are seen."""
+    def project(self, points: Array) -> Array:
+        """Projection (..., 2) in px of points (..., 3) in mm."""
         flat = (points - self._middle) @ self._axes.T
         return self._shift + self._scale * flat / self.away(points)[..., None]
 
     def facing(self, marks: ReliefMarks) -> list[QPointF]:
-        """Where those marks are seen that are on a side that faces it."""
-        return _points(self.sees(marks.points)[marks.out @ self.towards > 0])
+        """Projection of the marks on the sides that face the camera."""
+        return _points(self.project(marks.points)[marks.out @ self.towards > 0])
 
 
 def _points(places: Array) -> list[QPointF]:
     return [QPointF(x, y) for x, y in places.tolist()]
 
 
-def _skin(relief: Relief, theme: Theme, eye: _Eye, width: int, height: int) -> QImage:
-    """The faces and the rim, those far away first, in a picture of so many dots."""
-    finer = _FINER * width / eye.size.width()
-    seen, faces = finer * eye.sees(relief.points), relief.faces
-    away = eye.away(relief.points[faces].mean(axis=1))
+def _skin(relief: Relief, theme: Theme, camera: _Camera, width: int, height: int) -> QImage:
+    """The faces and the rim, the farthest first, in a picture of `width` by `height` dots."""
+    finer = _FINER * width / camera.size.width()
+    points, faces = finer * camera.project(relief.points), relief.faces
+    away = camera.away(relief.points[faces].mean(axis=1))
     face, side = np.nonzero(_on_the_rim(relief))
-    rim = _widened(seen[faces[face, side]], seen[faces[face, (side + 1) % 4]], _RIM * finer)
+    rim = _widened(points[faces[face, side]], points[faces[face, (side + 1) % 4]], _RIM * finer)
     turned = np.roll(rim, 1, axis=1)
     rim = np.where((side % 2 == 1)[:, None, None], turned, rim)  # long the way that its face is
     ink = QColor(theme.faint)
     faint = np.array([ink.red(), ink.green(), ink.blue()], np.uint8)
-    colours = np.concatenate([_colours(relief, eye.towards), np.tile(faint, (len(rim), 1))])
+    colours = np.concatenate([_colours(relief, camera.towards), np.tile(faint, (len(rim), 1))])
     # A face nearer, or its neighbours would lie over half of it.
     nearer = np.linalg.norm(np.ptp(relief.points[faces[face]], axis=1), axis=1)
     order = np.argsort(-np.concatenate([away, away[face] - nearer]), kind="stable")
-    corners = np.concatenate([seen[faces], rim])[order]
+    corners = np.concatenate([points[faces], rim])[order]
     fine = _filled(corners, colours[order], _FINER * width, _FINER * height)
     total = np.zeros((height, width, 4), np.uint16)
     for k, m in np.ndindex(_FINER, _FINER):
@@ -337,7 +337,7 @@ def _skin(relief: Relief, theme: Theme, eye: _Eye, width: int, height: int) -> Q
 
 
 def _widened(begin: Array, end: Array, width: float) -> Array:
-    """Corners (k, 4, 2) of lines from `begin` to `end`, (k, 2) each, that are so wide."""
+    """Corners (k, 4, 2) of lines of a `width` from `begin` to `end`, (k, 2) each."""
     along = end - begin
     length = np.maximum(np.hypot(*along.T), 1e-9)[:, None]
     aside = width / 2 * np.stack([-along[:, 1], along[:, 0]], axis=1) / length
@@ -359,12 +359,12 @@ def _filled(corners: Array, colours: Colours, width: int, height: int) -> Colour
     at = np.clip(y, 0, height - 1).astype(np.int32) * width + np.clip(x, 0, width - 1).astype(int)
     rgba = np.column_stack([colours, np.full(len(colours), 255, np.uint8)]).view(np.uint32)
     made = np.zeros(height * width, np.uint32)
-    made[at.ravel()] = np.repeat(rgba, at.shape[1])  # in order, so that the last one is seen
+    made[at.ravel()] = np.repeat(rgba, at.shape[1])  # in order, so that the last one is on top
     return made.view(np.uint8).reshape(height, width, 4)
 
 
 def _on_the_rim(relief: Relief) -> NDArray[np.bool_]:
-    """Which sides (k, 4) of the faces no other face has."""
+    """Whether the sides (k, 4) of the faces are on the rim."""
     faces = relief.faces
     sides = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1), axis=-1)
     _, which, count = np.unique(
@@ -374,7 +374,7 @@ def _on_the_rim(relief: Relief) -> NDArray[np.bool_]:
 
 
 def _colours(relief: Relief, towards: Array) -> Colours:
-    """RGB (k, 3) of the faces: what they are pressed in by, lit by a lamp and from the eye."""
+    """RGB (k, 3) of the faces: their displacement, shaded by a lamp and the camera's light."""
     share = relief.share[relief.faces].mean(axis=1)
     normals = relief.normals[relief.faces].mean(axis=1)
     lamp = np.array(_LAMP) / np.linalg.norm(_LAMP)
@@ -392,20 +392,20 @@ def _paint_ground(painter: QPainter, theme: Theme, size: QSize) -> None:
     painter.drawRoundedRect(QRectF(0, 0, size.width(), size.height()), _ROUND, _ROUND)
 
 
-def _paint_marks(painter: QPainter, relief: Relief, eye: _Eye) -> None:
-    _paint_dots(painter, eye.facing(relief.elements), _faded(LIGHT_INK, 0.75), 0.9)
+def _paint_marks(painter: QPainter, relief: Relief, camera: _Camera) -> None:
+    _paint_dots(painter, camera.facing(relief.elements), _faded(LIGHT_INK, 0.75), 0.9)
     for path in relief.paths:
-        _paint_line(painter, eye.sees(path.points), LIGHT_INK)
+        _paint_line(painter, camera.project(path.points), LIGHT_INK)
     for outline in relief.outlines:
-        seen = eye.sees(outline.points)
-        if np.allclose(seen[0], seen[-1]):
+        projected = camera.project(outline.points)
+        if np.allclose(projected[0], projected[-1]):
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(_faded(_TOUCH, 0.3))
-            painter.drawPolygon(QPolygonF(_points(seen)))
-        _paint_line(painter, seen, _TOUCH)
-    _paint_dots(painter, eye.facing(relief.bearing), QColor(_TOUCH), 1.9)
+            painter.drawPolygon(QPolygonF(_points(projected)))
+        _paint_line(painter, projected, _TOUCH)
+    _paint_dots(painter, camera.facing(relief.bearing), QColor(_TOUCH), 1.9)
     for arrow in relief.arrows:
-        _paint_arrow(painter, eye.sees(arrow))
+        _paint_arrow(painter, camera.project(arrow))
 
 
 def _faded(colour: str, share: float) -> QColor:
