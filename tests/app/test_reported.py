@@ -21,8 +21,8 @@ from kappaskin_app.features.contact.numbers import ELEMENTS, elements_of, facts_
 from kappaskin_app.features.contact.readouts import Readouts
 from kappaskin_app.features.heatmaps.maps import Maps
 from kappaskin_app.features.lessons.reading import READOUTS
-from kappaskin_app.features.traces.element_card import ElementCard, Traces
-from kappaskin_app.features.traces.picking import facts
+from kappaskin_app.features.traces.element_panel import ElementCard, Traces
+from kappaskin_app.features.traces.selected_element import facts
 from kappaskin_app.shell.colouring import SHADES, Colouring
 from kappaskin_app.shell.settings import COLOURS, Settings
 

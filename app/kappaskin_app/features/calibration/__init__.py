@@ -5,7 +5,7 @@ from pathlib import Path
 
 from kappaskin.calibration import TareStore
 from kappaskin.errors import Refusal
-from kappaskin_app.features.calibration.calibrating import Calibrating
+from kappaskin_app.features.calibration.controller import Calibrating
 from kappaskin_app.features.calibration.panel import CalibratePanel, InUsePanel
 from kappaskin_app.features.calibration.tare import TarePanel, Taring
 from kappaskin_app.guard import guarded

@@ -16,7 +16,7 @@ from kappaskin.calibration import Procedure
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS
 from kappaskin.scenes.cylinders import ADVICE, CylinderStep, schedule
-from kappaskin_app.features.calibration.calibrating import Calibrating, Result, parsed_radii
+from kappaskin_app.features.calibration.controller import Calibrating, Result, parsed_radii
 from kappaskin_app.features.calibration.plots import CylinderView, Loop, LoopPlot, PassMap
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import current, follow_look

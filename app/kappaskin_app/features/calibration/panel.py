@@ -9,7 +9,7 @@ from kappaskin.calibration import Calibration
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
 from kappaskin.scenes.cylinders import radii_for
-from kappaskin_app.features.calibration.calibrating import Calibrating, parsed_radii
+from kappaskin_app.features.calibration.controller import Calibrating, parsed_radii
 from kappaskin_app.features.calibration.pages import Outcome, Start, Steps
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.panel import Panel

@@ -6,9 +6,9 @@ import numpy as np
 
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
-from kappaskin_app.features.contact.naming import Naming
 from kappaskin_app.features.contact.numbers import NumbersPanel
 from kappaskin_app.features.contact.readouts import Readouts
+from kappaskin_app.features.contact.recognition import Naming
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.window import MainWindow
 

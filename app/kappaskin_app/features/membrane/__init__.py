@@ -2,8 +2,8 @@
 
 from PySide6.QtCore import Qt
 
-from kappaskin_app.features.membrane.looking import Looking, ViewPanel
 from kappaskin_app.features.membrane.skin_view import SkinView
+from kappaskin_app.features.membrane.view_actions import Looking, ViewPanel
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.pages import LIVE
 from kappaskin_app.shell.window import MainWindow

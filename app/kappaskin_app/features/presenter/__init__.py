@@ -1,7 +1,7 @@
 """The presenter: what is felt fills the screen, and sounds."""
 
-from kappaskin_app.features.presenter.presenting import SOUND_TIP, TIP, Presenting
-from kappaskin_app.features.presenter.stage import Stage
+from kappaskin_app.features.presenter.controller import SOUND_TIP, TIP, Presenting
+from kappaskin_app.features.presenter.view import Stage
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.parts import VIEW
 from kappaskin_app.shell.window import MainWindow

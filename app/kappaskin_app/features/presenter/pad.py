@@ -29,8 +29,8 @@ from PySide6.QtWidgets import (
 
 from kappaskin.scenes import Indenter, Scene
 from kappaskin.skin import Disk, Patch, Polygon
-from kappaskin_app.features.presenter.boards import Board
-from kappaskin_app.features.presenter.cue import Cue
+from kappaskin_app.features.presenter.feedback import Cue
+from kappaskin_app.features.presenter.indicators import Board
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import current, follow_look, series
 from kappaskin_app.widgets.lettering import CAPTION, Words, letters, shrunk

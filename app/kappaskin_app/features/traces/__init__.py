@@ -1,6 +1,6 @@
 """One element in detail, and traces of several over time."""
 
-from kappaskin_app.features.traces.picking import Picking
+from kappaskin_app.features.traces.selected_element import Picking
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.window import MainWindow
 

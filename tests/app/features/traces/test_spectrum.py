@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kappaskin_app.features.traces.picking import amplitude_spectrum
+from kappaskin_app.features.traces.selected_element import amplitude_spectrum
 
 FREQUENCIES = np.arange(1, 200) * 0.25
 

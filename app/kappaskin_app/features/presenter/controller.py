@@ -10,11 +10,11 @@ from PySide6.QtWidgets import QDockWidget, QMainWindow, QToolBar, QWidget
 from kappaskin.contact import ContactObject
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
-from kappaskin_app.features.presenter.boards import REMEDIES, age_in_words
-from kappaskin_app.features.presenter.cue import Cue, Found, cue_of
+from kappaskin_app.features.presenter.feedback import Cue, Found, cue_of
+from kappaskin_app.features.presenter.indicators import REMEDIES, age_in_words
 from kappaskin_app.features.presenter.pad import THINGS, Hand
 from kappaskin_app.features.presenter.sound import Sound
-from kappaskin_app.features.presenter.stage import Stage
+from kappaskin_app.features.presenter.view import Stage
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.badge import GAP, SIM, origin
 from kappaskin_app.shell.banner import Offer

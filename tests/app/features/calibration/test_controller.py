@@ -13,7 +13,7 @@ from kappaskin import Calibration, Estimate, Refusal, Setup, Simulator, Status, 
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.scenes.cylinders import RADII, CylinderStep, Presentation
 from kappaskin.scenes.effects import Tolerance
-from kappaskin_app.features.calibration.calibrating import Calibrating, parsed_radii
+from kappaskin_app.features.calibration.controller import Calibrating, parsed_radii
 from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.settings import Settings
@@ -277,7 +277,7 @@ def test_a_computation_that_fails_ends_the_procedure_and_is_told(
     def fails(*_: object) -> None:
         raise ValueError("no such gain")
 
-    monkeypatch.setattr("kappaskin_app.features.calibration.calibrating.calibrate", fails)
+    monkeypatch.setattr("kappaskin_app.features.calibration.controller.calibrate", fails)
     calibrating = bench.calibrating
     calibrating.begin(RADII[::2], 0.2)
     calibrating.take_all()

@@ -12,7 +12,7 @@ from kappaskin.frames import COMPONENTS, Estimate
 from kappaskin.live import Status
 from kappaskin.pipeline import REPORTED, Reported, ReportedQuantity
 from kappaskin.sensing import Sensor
-from kappaskin_app.features.traces.element_card import TRACED, ElementCard, Traces
+from kappaskin_app.features.traces.element_panel import TRACED, ElementCard, Traces
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.history import History

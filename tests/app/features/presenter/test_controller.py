@@ -7,7 +7,7 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QDockWidget
 
-from kappaskin_app.features.presenter.cue import Roundness
+from kappaskin_app.features.presenter.feedback import Roundness
 from kappaskin_app.shell.badge import GAP, LOST, SIM
 from kappaskin_app.theme import THEMES, current
 

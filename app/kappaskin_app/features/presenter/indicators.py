@@ -7,7 +7,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from kappaskin_app.features.presenter.cue import Roundness
+from kappaskin_app.features.presenter.feedback import Roundness
 from kappaskin_app.shell.badge import GAP, LOST, OFF, STALE, WAITING, colour_of
 from kappaskin_app.shell.colouring import SteadyRange
 from kappaskin_app.theme import current

@@ -6,7 +6,8 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
-from kappaskin_app.features.presenter.boards import (
+from kappaskin_app.features.presenter.feedback import Cue, Roundness
+from kappaskin_app.features.presenter.indicators import (
     Banner,
     Board,
     Figure,
@@ -14,7 +15,6 @@ from kappaskin_app.features.presenter.boards import (
     RoundView,
     Strip,
 )
-from kappaskin_app.features.presenter.cue import Cue, Roundness
 from kappaskin_app.features.presenter.pad import Operator
 from kappaskin_app.widgets.parts import number
 from kappaskin_app.widgets.text import NONE

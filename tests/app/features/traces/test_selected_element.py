@@ -10,7 +10,7 @@ from kappaskin import Status, load_scene
 from kappaskin.health import Health
 from kappaskin.health.findings import Finding
 from kappaskin_app.features.membrane.camera import Sight
-from kappaskin_app.features.traces.picking import SECONDS, Past, facts
+from kappaskin_app.features.traces.selected_element import SECONDS, Past, facts
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.widgets.plots import Curve, CurvePlot
 

@@ -6,8 +6,8 @@ import time
 import pytest
 
 from kappaskin import Pipeline, PointLoad, Setup, Simulator, load_scene
-from kappaskin_app.features.contact import naming
-from kappaskin_app.features.contact.naming import curved
+from kappaskin_app.features.contact import recognition
+from kappaskin_app.features.contact.recognition import curved
 
 
 def _estimate(*loads):
@@ -41,8 +41,8 @@ def test_the_window_says_what_touches_the_skin(window, until):
 
 def test_what_is_not_yet_known_of_a_skin_is_said_to_be_computed(window, until, monkeypatch):
     until(lambda: "curvatures" in window.display.foot.object.text())
-    made, seen = naming.ObjectFinder, threading.Event()
-    monkeypatch.setattr(naming, "ObjectFinder", lambda *of: seen.wait(60) and made(*of))
+    made, seen = recognition.ObjectFinder, threading.Event()
+    monkeypatch.setattr(recognition, "ObjectFinder", lambda *of: seen.wait(60) and made(*of))
     window.requests.set("shape", "cylinder")
     until(lambda: "computing what objects read like" in window.display.foot.object.text())
     seen.set()
@@ -67,7 +67,7 @@ def test_what_fails_once_is_told_once_and_the_next_estimate_is_named(
         monkeypatch.undo()
         raise ZeroDivisionError("once")
 
-    monkeypatch.setattr("kappaskin_app.features.contact.naming.curved", fail_once)
+    monkeypatch.setattr("kappaskin_app.features.contact.recognition.curved", fail_once)
     until(lambda: told)
     named: list[str] = []
     window.naming.named.connect(named.append)

@@ -8,10 +8,10 @@ import sys
 import pytest
 from PySide6.QtGui import QFontMetricsF
 
-from kappaskin_app.features.presenter.boards import REMEDIES, age_in_words
-from kappaskin_app.features.presenter.cue import Cue, Roundness
+from kappaskin_app.features.presenter.feedback import Cue, Roundness
+from kappaskin_app.features.presenter.indicators import REMEDIES, age_in_words
 from kappaskin_app.features.presenter.pad import Hand
-from kappaskin_app.features.presenter.stage import Stage
+from kappaskin_app.features.presenter.view import Stage
 from kappaskin_app.shell.badge import GAP, LIVE, LOST, OFF, SIM, STALE, WAITING
 from kappaskin_app.theme import THEMES, apply_look
 from kappaskin_app.widgets.colour_bar import SkinScale
@@ -134,8 +134,8 @@ _AT_150 = """
 from PySide6.QtWidgets import QApplication, QWidget
 app = QApplication([]); app.setStyle("Fusion")
 import sys; sys.path[:0] = [{here!r}]
-from kappaskin_app.features.presenter.stage import Stage
-from kappaskin_app.features.presenter.cue import Cue, Roundness
+from kappaskin_app.features.presenter.view import Stage
+from kappaskin_app.features.presenter.feedback import Cue, Roundness
 stage = Stage(QWidget()); stage.resize(1280, 720); stage.present(True); stage.show()
 assert stage.devicePixelRatioF() == 1.5
 stage.show_cue(Cue(-12.345, 0.123, 0.03456, 0.00123, (0.1234, 0.1234), 0.00012, "cylinder", 0.06,

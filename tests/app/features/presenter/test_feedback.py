@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from kappaskin import ObjectFinder, Pipeline, PointLoad, Setup, Simulator, load_scene
-from kappaskin_app.features.presenter.cue import Found, Roundness, cue_of
-from kappaskin_app.features.presenter.stage import radius_in_words
+from kappaskin_app.features.presenter.feedback import Found, Roundness, cue_of
+from kappaskin_app.features.presenter.view import radius_in_words
 
 
 @lru_cache(1)
