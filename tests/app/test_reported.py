@@ -19,7 +19,7 @@ from PySide6.QtWidgets import QApplication
 from kappaskin import Pipeline, Setup, Simulator, Status, load_scene
 from kappaskin_app.features.contact.numbers import ELEMENTS, elements_of, facts_of
 from kappaskin_app.features.contact.readouts import Readouts
-from kappaskin_app.features.heatmaps.maps import Maps
+from kappaskin_app.features.heatmaps.maps import HeatmapGrid
 from kappaskin_app.features.lessons.reading import READOUTS
 from kappaskin_app.features.traces.element_panel import ElementCard, Traces
 from kappaskin_app.features.traces.selected_element import facts
@@ -56,7 +56,7 @@ found["colours"] = np.array_equal(colouring.of_elements("twice_xy", estimate), t
 colouring.close()
 found["menu"] = dict(COLOURS)["twice_xy"] == "Twice xy" and SHADES["twice_xy"].on_surface is None
 found["range"] = Settings(range_twice_xy=3.0).range_twice_xy == 3.0
-found["heatmaps"] = "twice_xy" in Maps().heatmaps
+found["heatmaps"] = "twice_xy" in HeatmapGrid().heatmaps
 print(json.dumps({name: bool(whether) for name, whether in found.items()}))
 """
 

@@ -106,7 +106,7 @@ def test_a_map_of_health_tells_which_element_is_what(qapp: QApplication) -> None
     kinds = np.array([0.0, 6.0, 0.0, 2.0])
     heatmap.show_values(kinds, HEALTH)
     heatmap.show_reading(kinds)
-    assert heatmap.value.text() == "2 not well"
+    assert heatmap.value.text() == "2 faulty"
     assert [words for _, words in heatmap.bar.legend] == ["well", "stuck", "dead"]
     heatmap.show_element(1)
     heatmap.show_reading(kinds)

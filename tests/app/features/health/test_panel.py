@@ -86,10 +86,10 @@ def test_the_element_to_press_is_framed(qapp) -> None:
     heatmap.show_values(np.zeros(16), SHADES["xx"].tint(1.0))
     bare = heatmap.cells.grab().toImage()
 
-    heatmap.show_wanted(5)
+    heatmap.show_target(5)
     assert heatmap.cells.grab().toImage() != bare
 
-    heatmap.show_wanted(-1)
+    heatmap.show_target(-1)
     assert heatmap.cells.grab().toImage() == bare
 
 
