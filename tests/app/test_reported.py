@@ -21,7 +21,7 @@ from kappaskin_app.features.contact.numbers import ELEMENTS, elements_of, facts_
 from kappaskin_app.features.contact.readouts import Readouts
 from kappaskin_app.features.heatmaps.maps import HeatmapGrid
 from kappaskin_app.features.lessons.reading import READOUTS
-from kappaskin_app.features.traces.element_panel import ElementCard, Traces
+from kappaskin_app.features.traces.element_panel import ElementPanel, Traces
 from kappaskin_app.features.traces.selected_element import facts
 from kappaskin_app.shell.colouring import SHADES, Colouring
 from kappaskin_app.shell.settings import COLOURS, Settings
@@ -41,13 +41,13 @@ found["lessons"] = "readout-twice" in READOUTS
 found["facts"] = ("Twice", f"{2 * force:.1f}") in [row[:2] for row in facts_of(estimate, "")]
 at = ELEMENTS.index("twice xy [1/m]")
 found["elements"] = float(elements_of(estimate, sensor)[7][at]) == round(twice[2, 7], 3)
-found["card"] = "reads twice [1/m]" in facts(7, sensor, status, estimate)
+found["panel"] = "reads twice [1/m]" in facts(7, sensor, status, estimate)
 
-card, traces = ElementCard(), Traces()
+panel, traces = ElementPanel(), Traces()
 values = np.arange(12.0).reshape(2, 6)
-card.show_past(np.array([-1.0, 0.0]), values, 10.0)
-traces.show_past([3], np.array([-1.0, 0.0]), values[:, :, None], 10.0)
-found["card's past"] = card.pasts[1].curves[2].values.tolist() == [5.0, 11.0]
+panel.show_history(np.array([-1.0, 0.0]), values, 10.0)
+traces.show_history([3], np.array([-1.0, 0.0]), values[:, :, None], 10.0)
+found["panel's history"] = panel.histories[1].curves[2].values.tolist() == [5.0, 11.0]
 found["traces"] = traces.plots[5].curves[0].values.tolist() == [5.0, 11.0]
 
 colouring = Colouring()

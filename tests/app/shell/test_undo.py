@@ -255,13 +255,13 @@ def test_the_element_that_was_picked_before_comes_back_and_then_its_dock_goes(
     for element in (17, 44):
         here.heatmaps["xx"].chosen.emit(element)
         _settle()
-    assert _texts(here) == ["show Element", "pick element 17", "pick element 44"]
+    assert _texts(here) == ["show Element", "select element 17", "select element 44"]
     here.actions_by_name["undo"].trigger()
-    assert here.picking.element == 17
+    assert here.selected_element.element == 17
     here.actions_by_name["undo"].trigger()
     _settle()
-    assert here.picking.element == -1
-    assert "Click an element" in here.picking.card.title.text()
+    assert here.selected_element.element == -1
+    assert "Click an element" in here.selected_element.panel.title.text()
     here.actions_by_name["undo"].trigger()
     _settle()
     assert here.docks["element"].isHidden()
@@ -273,7 +273,7 @@ def test_an_element_that_the_skin_has_no_more_is_not_picked_again(here: MainWind
     here.history.apply(replace(here.history.settings, elements_x=4, elements_y=4))
     until(lambda: len(here.session.status.sensor.layout) == 16)
     here.actions_by_name["undo"].trigger()
-    assert here.picking.element == -1
+    assert here.selected_element.element == -1
 
 
 def test_the_place_in_a_lesson_comes_back_with_its_settings(here: MainWindow) -> None:
