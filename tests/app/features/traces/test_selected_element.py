@@ -149,7 +149,7 @@ def test_a_click_in_a_heatmap_selects_no_element_while_it_sets_the_scan_region(
     assert window.history.settings.region_elements == (44,)
 
 
-def test_another_skin_with_as_many_elements_starts_with_an_empty_buffer(
+def test_another_sensor_of_as_many_elements_starts_with_an_empty_buffer(
     window: MainWindow, until
 ) -> None:
     session, buffer = window.session, window.selected_element._buffer  # noqa: SLF001
