@@ -32,7 +32,7 @@ FIELDS = {
     "contact": (
         "Contact",
         "Position of the point load that fits the readings best; spread: distributed over an "
-        "area, no point load fits; near rim: too close to a held edge for a reliable position and force.",
+        "area, no point load fits; near rim: too close to a held edge to be reliable.",
     ),
 }
 _WIDTHS = {"contact": 22, "rate": 15, "lost": 19, "age": 10}

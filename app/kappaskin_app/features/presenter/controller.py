@@ -1,4 +1,4 @@
-"""The operator's view between the window that it fills, the session, and the hand that moves."""
+"""Presenter controller: full screen, estimates, and the simulated hand."""
 
 import math
 import time
@@ -10,11 +10,11 @@ from PySide6.QtWidgets import QDockWidget, QMainWindow, QToolBar, QWidget
 from kappaskin.contact import ContactObject
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
-from kappaskin_app.features.presenter.feedback import Cue, Found, cue_of
+from kappaskin_app.features.presenter.feedback import Feedback, Recognised, feedback_of
 from kappaskin_app.features.presenter.indicators import REMEDIES, age_in_words
-from kappaskin_app.features.presenter.pad import THINGS, Hand
+from kappaskin_app.features.presenter.pad import DEMO_OBJECTS, Hand
 from kappaskin_app.features.presenter.sound import Sound
-from kappaskin_app.features.presenter.view import Stage
+from kappaskin_app.features.presenter.view import PresenterView
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.badge import GAP, SIM, origin
 from kappaskin_app.shell.banner import Offer
@@ -24,83 +24,83 @@ from kappaskin_app.shell.loads import may_choose, touches_at
 from kappaskin_app.shell.selection import LoadHandle
 from kappaskin_app.shell.session import Session
 
-TIP = "Fill the screen with what is felt, to be read from three metres; Escape leaves"
-SOUND_TIP = "A tone that rises and swells with the force, while the presenter is shown"
-_READ = 0.15  # s between two readings of the figures: faster cannot be read
-_FELT = 0.03  # s between two drawings of the bar
-_OLD = 1.0  # s after which an object that was found is no longer one that touches
+TIP = "Estimates in full screen, legible from three metres; Escape ends"
+SOUND_TIP = "A tone whose pitch and loudness follow the force, while the presenter is shown"
+_FIGURES_PERIOD = 0.15  # s between two updates of the numbers: faster is illegible
+_DRAWING_PERIOD = 0.03  # s between two drawings of the force bar
+_OLD = 1.0  # s after which a recognised object is discarded
 
 
 @dataclass(frozen=True)
-class _Before:
-    """How the window was before it was filled."""
+class _WindowState:
+    """State of the window before full screen."""
 
     layout: QByteArray
     place: QRect
     state: Qt.WindowState
 
 
-class Presenting(QObject):
-    """Fills the screen with the `stage` and leaves it again; shows there what comes in."""
+class PresenterController(QObject):
+    """Shows the `view` in full screen, with the estimates and the state of the session."""
 
     def __init__(
         self,
         window: QMainWindow,
-        stage: Stage,
+        view: PresenterView,
         session: Session,
         display: Display,
         load: LoadHandle,
     ) -> None:
         super().__init__(window)
-        self._window, self.stage, self._session = window, stage, session
+        self._window, self.view, self._session = window, view, session
         self._display, self._load = display, load
-        self._before: _Before | None = None
-        self.cue: Cue | None = None
+        self._before: _WindowState | None = None
+        self.feedback: Feedback | None = None
         self.sound = Sound(self)
-        self._found: Found | None = None
-        self._found_at = -math.inf
-        self._next_figures = self._next_felt = 0.0
-        pad = stage.operator.pad
+        self._recognised: Recognised | None = None
+        self._recognised_at = -math.inf
+        self._next_figures = self._next_drawing = 0.0
+        pad = view.controls.pad
         pad.grabbed.connect(load.grabbed)
         pad.dragged.connect(load.dragged)
         pad.pressed.connect(load.pressed)
         pad.released.connect(load.released)
         pad.given_up.connect(load.given_up)
-        stage.operator.chosen.connect(guarded(self._choose))
+        view.controls.chosen.connect(guarded(self._select_object))
 
     @property
     def on(self) -> bool:
         return self._before is not None
 
-    # In and out.
+    # Full screen.
 
-    def turn(self) -> None:
+    def toggle(self) -> None:
         self.leave() if self.on else self.enter()
 
     def enter(self) -> None:
-        """Fill the screen with the skin and what is felt."""
+        """Show the skin and the estimates in full screen."""
         if self.on:
             return
         window = self._window
-        self._before = _Before(window.saveState(), window.geometry(), window.windowState())
+        self._before = _WindowState(window.saveState(), window.geometry(), window.windowState())
         with drawn_once(window):
-            for part in self._around():
+            for part in self._surroundings():
                 part.hide()
-            self.stage.present(True)
+            self.view.present(True)
             self._show_hand()
             window.showFullScreen()
-        self.stage.operator.pad.setFocus()
+        self.view.controls.pad.setFocus()
 
     def leave(self) -> None:
-        """Have the window as it was."""
+        """Restore the window."""
         if self._before is None:
             return
         window, before = self._window, self._before
         self._before = None
-        self.stage.operator.pad.let_go()
-        self.sound.follow(math.nan)
+        self.view.controls.pad.release()
+        self.sound.set_level(math.nan)
         with drawn_once(window):
-            self.stage.present(False)
+            self.view.present(False)
             window.setWindowState(before.state)
             if before.state == Qt.WindowState.WindowNoState:
                 window.setGeometry(before.place)
@@ -109,80 +109,78 @@ class Presenting(QObject):
             window.restoreState(before.layout)
 
     def close(self) -> None:
-        """Before the window goes: let nothing be let go later, nor go on sounding."""
-        self.stage.operator.pad.give_up()
+        """Cancel a drag and stop the sound before the window closes."""
+        self.view.controls.pad.give_up()
         self.sound.close()
 
-    def _around(self) -> list[QWidget]:
+    def _surroundings(self) -> list[QWidget]:
         window = self._window
         docks = window.findChildren(QDockWidget, options=Qt.FindChildOption.FindDirectChildrenOnly)
         bars = window.findChildren(QToolBar, options=Qt.FindChildOption.FindDirectChildrenOnly)
         return [*docks, *bars, *window.findChildren(Offer), window.menuBar(), window.statusBar()]
 
-    # What comes in.
+    # Input.
 
-    def find(self, what: ContactObject, within: Estimate) -> None:
-        """Take up what was found to touch the skin `within` an estimate."""
-        self._found = Found(what, within.contact) if what.probability else None
-        self._found_at = time.monotonic()
+    def set_object(self, what: ContactObject, within: Estimate) -> None:
+        """Store the object that was recognised `within` an estimate."""
+        self._recognised = Recognised(what, within.contact) if what.probability else None
+        self._recognised_at = time.monotonic()
 
     def receive(self, _: Estimate) -> None:
-        """Show what is felt by now, as often as that can be seen."""
+        """Show the present estimate, at a visible rate."""
         now = time.monotonic()
-        if self.on and now >= self._next_felt:
-            self._feel(now)
+        if self.on and now >= self._next_drawing:
+            self._show_estimate(now)
 
-    def _feel(self, now: float) -> None:
-        self._next_felt = now + _FELT
+    def _show_estimate(self, now: float) -> None:
+        self._next_drawing = now + _DRAWING_PERIOD
         estimate = self._display.estimate_shown()
-        found = self._found if now - self._found_at < _OLD else None
-        self.cue = None if estimate is None else cue_of(estimate, found)
-        self.stage.show_felt(self.cue, now)
-        self.sound.follow(self.stage.bar.share)
+        recognised = self._recognised if now - self._recognised_at < _OLD else None
+        self.feedback = None if estimate is None else feedback_of(estimate, recognised)
+        self.view.show_graphics(self.feedback, now)
+        self.sound.set_level(self.view.bar.share)
         if now >= self._next_figures:
-            self._next_figures = now + _READ
-            why_none = "no reading" if estimate is None else "nothing felt"
-            self.stage.show_cue(self.cue, why_none, self._session.replaying)
+            self._next_figures = now + _FIGURES_PERIOD
+            why_none = "no reading" if estimate is None else "no contact"
+            self.view.show_feedback(self.feedback, why_none, self._session.replaying)
 
     def follow(self, status: Status) -> None:
-        """Show how live it is, and what to do if it is not."""
+        """Show the state and age of the data, and a remedy where no data arrives."""
         if not self.on:
             return
         state, now = self._session.badge(), time.monotonic()
         if state not in REMEDIES:
             age = "" if self._display.old else age_in_words(*self._display.age())
-            self.stage.show_trouble("", "", "")
+            self.view.show_trouble("", "", "")
         else:
-            # What was recorded has a time in the recording, and no age.
+            # Recorded data has a time in the recording, and no age.
             age = "" if state == GAP else age_in_words(now - status.last_frame)
             since = self._session.alarm().partition("\n")[0].removeprefix(state).strip()
-            self.stage.show_trouble(state, since, status.message.replace("`", ""))
-        self._feel(now)  # a recording that stands, or has a gap, brings no estimate
-        self.stage.strip.show_state(state, _called(status), age)
+            self.view.show_trouble(state, since, status.message.replace("`", ""))
+        self._show_estimate(now)  # a paused recording, or a gap, emits no estimate
+        self.view.strip.show_state(state, _source_name(status), age)
         self._show_hand()
 
     def _show_hand(self) -> None:
-        """Show where the simulated hand is, if there is one."""
+        """Show the position of the simulated hand, if there is one."""
         session = self._session
         scene, inside = session.scene, session.inside and origin(session.badge()) == SIM
         there = touches_at(scene, session.time) if inside else []
-        self.stage.show_operating(bool(there) or (inside and self.stage.operator.pad.holding))
+        self.view.show_controls(bool(there) or (inside and self.view.controls.pad.holding))
         if there:
             load = there[0].load
             x, y = (float(value) for value in load.centre())
-            self.stage.operator.pad.show_skin(scene.plate.patch)
-            self.stage.operator.show_hand(Hand(x, y, load.force), session.refusal)
-            things = [number for number, thing in enumerate(THINGS) if thing.is_in(scene)]
-            self.stage.operator.show_choice(
-                may_choose(scene) and not session.refusal, (things or [-1])[0]
-            )
+            self.view.controls.pad.show_skin(scene.plate.patch)
+            self.view.controls.show_hand(Hand(x, y, load.force), session.refusal)
+            present = [n for n, made in enumerate(DEMO_OBJECTS) if made.is_in(scene)]
+            selectable = may_choose(scene) and not session.refusal
+            self.view.controls.show_objects(selectable, (present or [-1])[0])
 
-    def _choose(self, number: int) -> None:
-        hand = self.stage.operator.pad.hand
+    def _select_object(self, number: int) -> None:
+        hand = self.view.controls.pad.hand
         if hand is not None:
-            self._load.replaced.emit(THINGS[number].said, *hand)
+            self._load.replaced.emit(DEMO_OBJECTS[number].settings, *hand)
 
 
-def _called(status: Status) -> str:
-    """What is read, in words."""
+def _source_name(status: Status) -> str:
     return status.sensor.name if status.sensor is not None else status.source

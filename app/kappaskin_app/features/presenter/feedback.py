@@ -1,4 +1,4 @@
-"""An estimate, and what was found to touch the skin, to the few numbers that an operator feels."""
+"""Feedback to the operator: force, position and radius from the contact and the object."""
 
 import math
 from dataclasses import dataclass
@@ -10,36 +10,33 @@ from kappaskin.frames import Contact, Estimate
 
 _95 = 1.96  # standard deviations that a 95 % interval reaches
 _ROUND = ("sphere", "cylinder")  # the kinds that have a radius
-_MOST = 10.0  # times the force of the point load that explains it best that an object may bear
+_MOST = 10.0  # largest ratio of an object's force to that of the best point load
 
 
 @dataclass(frozen=True)
-class Found:
-    """What was found to touch the skin a moment ago, and the `contact` there was then."""
+class Recognised:
+    """The object recognised last, and the `contact` in the same estimate."""
 
     what: ContactObject
     contact: Contact
 
 
 @dataclass(frozen=True)
-class Roundness:
-    """The radius in m of `what` touches, or of the "skin", with its 95 % interval `between`.
+class RadiusEstimate:
+    """Radius `value` in m of the object `what`, or of the "skin", with its 95 % `interval`.
 
-    The interval is from zero where only the upper end is known, and up to infinity where it may be
-    flat; then the radius may be NaN.
+    The interval begins at zero where only an upper bound is known, and ends at infinity where the
+    object may be flat; the value may then be NaN.
     """
 
     what: str
-    radius: float
-    between: tuple[float, float]
+    value: float
+    interval: tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Cue:
-    """What comes back to the operator: numbers in SI units, each with its 95 % half width.
-
-    NaN where it is not known.
-    """
+class Feedback:
+    """Feedback in SI units, each number with its 95 % half-width; NaN where unknown."""
 
     force: float
     force_95: float
@@ -49,45 +46,48 @@ class Cue:
     position_95: float
     kind: str
     length: float
-    roundness: Roundness | None
+    radius: RadiusEstimate | None
     near_rim: bool
 
 
-def cue_of(estimate: Estimate, found: Found | None = None) -> Cue | None:
-    """What is felt in `estimate`; None where nothing touches.
+def feedback_of(estimate: Estimate, recognised: Recognised | None = None) -> Feedback | None:
+    """Feedback of an `estimate`; None without a contact.
 
-    A point load explains a small contact. Of a large one it bears too little, and of a pipe it
-    lies at one of the ends. An object explains both, but is found a few times a second only: how
-    much more than a point load it bore a moment ago corrects the point load of now.
+    A point load describes a small contact. For a large one its force is too small, and for a pipe
+    it lies at one of the ends. The object describes both, but is recognised only a few times per
+    second: the last ratio of its force to that of the point load scales the present point load.
     """
     contact = estimate.contact
     if not contact.present:
         return None
     force, force_95 = contact.force, contact.force_95
     place, place_95 = contact.position, float(np.max(contact.position_95))
-    if found is not None and 0 < found.what.force / found.contact.force < _MOST:
-        more = contact.force / found.contact.force
-        force, force_95 = more * found.what.force, abs(more) * found.what.force_95
+    if recognised is not None and 0 < recognised.what.force / recognised.contact.force < _MOST:
+        more = contact.force / recognised.contact.force
+        force, force_95 = more * recognised.what.force, abs(more) * recognised.what.force_95
         if not contact.single:
-            place, place_95 = found.what.position, float(np.max(found.what.position_95))
+            place, place_95 = recognised.what.position, float(np.max(recognised.what.position_95))
     elif not contact.single:
         force_95 = place_95 = math.nan
     displacement, displacement_95 = contact.displacement, contact.displacement_95
     if not contact.single:
         displacement, displacement_95 = float(np.nanmax(np.abs(estimate.surface))), math.nan
     x, y = (float(value) for value in place)
-    kind, length = (found.what.kind, found.what.length) if found is not None else ("", math.nan)
-    return Cue(
+    kind, length = "", math.nan
+    if recognised is not None:
+        kind, length = recognised.what.kind, recognised.what.length
+    return Feedback(
         *(force, force_95, displacement, displacement_95, (x, y), place_95),
-        *(kind, length, _roundness(estimate, found), contact.near_rim),
+        *(kind, length, _radius_estimate(estimate, recognised), contact.near_rim),
     )
 
 
-def _roundness(estimate: Estimate, found: Found | None) -> Roundness | None:
-    """That of the object if it has one, else of the skin where it curves most; None of an edge."""
-    if found is not None and found.what.kind in _ROUND:
-        return Roundness(found.what.kind, found.what.radius, found.what.radius_95)
-    if found is not None and found.what.kind:
+def _radius_estimate(estimate: Estimate, recognised: Recognised | None) -> RadiusEstimate | None:
+    """Radius of a round object; of the skin at the contact without an object; None of others."""
+    what = None if recognised is None else recognised.what
+    if what is not None and what.kind in _ROUND:
+        return RadiusEstimate(what.kind, what.radius, what.radius_95)
+    if what is not None and what.kind:
         return None
     geometry = estimate.geometry
     sharper = int(np.argmax(np.abs(geometry.principal)))
@@ -96,4 +96,5 @@ def _roundness(estimate: Estimate, found: Found | None) -> Roundness | None:
     low, high = max(k - off, 0.0), k + off
     if not high > 0:
         return None
-    return Roundness("skin", 1 / k if k else math.inf, (1 / high, 1 / low if low > 0 else math.inf))
+    interval = 1 / high, 1 / low if low > 0 else math.inf
+    return RadiusEstimate("skin", 1 / k if k else math.inf, interval)
