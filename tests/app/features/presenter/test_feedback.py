@@ -110,7 +110,7 @@ def test_a_small_contact_is_told_with_all_its_error_bars() -> None:
 
 
 @pytest.mark.parametrize(
-    ("between", "radius", "words"),
+    ("interval", "radius", "words"),
     [
         ((0.038, 0.042), 0.04, ("40.0 mm", "38.0 to 42.0 mm")),
         ((0.0, 0.0265), math.nan, ("< 26.5 mm", "press harder")),
@@ -121,13 +121,13 @@ def test_a_small_contact_is_told_with_all_its_error_bars() -> None:
         ((1.1, 1.4), 1.234, ("1234 mm", "1100 to 1400 mm")),
     ],
 )
-def test_a_radius_is_told_as_far_as_it_is_known(interval, radius, words) -> None:
+def test_a_radius_is_written_as_far_as_it_is_known(interval, radius, words) -> None:
     feedback = replace(feedback_of(_estimate(0.3)), kind="sphere")
     told = radius_in_words(replace(feedback, radius=RadiusEstimate("sphere", radius, interval)))
     assert told == (*words, "Radius of the ball")
 
 
-def test_nobody_is_told_to_press_what_is_recorded_harder() -> None:
+def test_a_recording_has_no_hint_to_press_harder() -> None:
     feedback = replace(feedback_of(_estimate(0.3)), kind="sphere")
     light = replace(feedback, radius=RadiusEstimate("sphere", math.nan, (0.0, 0.0265)))
     assert radius_in_words(light)[1] == "press harder"
