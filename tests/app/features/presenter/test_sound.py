@@ -52,7 +52,7 @@ def player(tmp_path: Path, monkeypatch) -> Path:
 
 def test_what_is_felt_is_streamed_as_it_comes_until_it_is_switched_off(player, until, qtbot):
     heard = Sound()
-    heard.follow(1.0)
+    heard.set_level(1.0)
     assert heard.toggle() == ""
     until(lambda: player.exists() and player.stat().st_size > RATE)  # half a second
     assert heard.toggle() == ""
