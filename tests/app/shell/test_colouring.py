@@ -68,10 +68,10 @@ def test_one_range_for_all_is_that_of_the_largest_shown() -> None:
 
 def test_a_regular_grid_has_a_pixel_for_each_element_and_others_their_nearest() -> None:
     cells = ElementCells()
-    cells.meet(SensorLayout.regular(Patch(0.1, 0.06), 4, 3))
+    cells.set_layout(SensorLayout.regular(Patch(0.1, 0.06), 4, 3))
     assert cells.texture.dimensions == (4, 3)
     layout = SensorLayout.scattered(Patch(0.1, 0.1), [[0.02, 0.05], [0.09, 0.05]])
-    cells.meet(layout)
+    cells.set_layout(layout)
     cells.show(np.array([[255, 0, 0], [0, 0, 255]], np.uint8))
     picture = cells.pixels.reshape(*cells.texture.dimensions[::-1], 3)
     red = (picture[:, :, 0] == 255).mean(axis=0)

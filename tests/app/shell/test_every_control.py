@@ -91,7 +91,7 @@ def test_every_action_can_be_taken_undone_and_redone(
             if way == "undo":
                 assert _sizes(window) == pytest.approx(sizes, abs=0.004), name
         changed |= {name} if after != before else set()
-    assert {"theme", "look-from-above", "dock-cost", "calibrate", "layout-study"} < changed
+    assert {"theme", "view-from-above", "dock-cost", "calibrate", "layout-study"} < changed
     window.session.request_source("sim:")
     until(lambda: window.display.badge.state == "SIM")
 

@@ -104,7 +104,7 @@ def test_a_direction_after_a_turn_is_a_step_that_goes_back_to_the_turn(
 ) -> None:
     _drag(here, qtbot, QPoint(30, 30), QPoint(60, 50))
     turned = _camera(here)
-    here.actions_by_name["look-from-above"].trigger()
+    here.actions_by_name["view-from-above"].trigger()
     assert _camera(here) != pytest.approx(turned)
     here.actions_by_name["undo"].trigger()
     assert _camera(here) == pytest.approx(turned, abs=1e-9)
@@ -222,10 +222,10 @@ def test_with_nothing_to_undo_the_action_says_so(here: MainWindow) -> None:
 
 
 def test_measuring_and_each_place_of_it_come_back(here: MainWindow) -> None:
-    measuring, undo = here.view.measuring, here.actions_by_name["undo"]
+    measuring, undo = here.view.measurement, here.actions_by_name["undo"]
     here.actions_by_name["measure"].trigger()
     for place in ((0.02, 0.03), (0.05, 0.06)):
-        here.membrane.pointing.clicked.emit(*place)
+        here.membrane.pointer.clicked.emit(*place)
     assert _texts(here) == ["measure", "measure from here", "measure to here"]
     undo.trigger()
     assert measuring.places == ((0.02, 0.03),)
@@ -240,7 +240,7 @@ def test_measuring_and_each_place_of_it_come_back(here: MainWindow) -> None:
 
 
 def test_places_beside_the_skin_that_there_is_now_do_not_come_back(here: MainWindow) -> None:
-    measuring = here.view.measuring
+    measuring = here.view.measurement
     measuring.have(((0.02, 0.03), (0.1, 0.1)))
     assert len(measuring.places) == 2
     measuring.have(((0.02, 0.03), (0.11, 0.1)))

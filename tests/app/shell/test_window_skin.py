@@ -239,7 +239,7 @@ def test_the_whole_skin_is_seen_from_every_side(window: MainWindow, until) -> No
     window.requests.set("shape", "cylinder")
     _met(window, until)
     renderer, skin = window.membrane.plotter.renderer, window.membrane.skin
-    for name in ("look-from-above", "look-along-y", "look-along-x", "camera"):
+    for name in ("view-from-above", "view-along-y", "view-along-x", "camera"):
         window.actions_by_name[name].trigger()
         seen = []
         for point in skin.points():
@@ -249,5 +249,5 @@ def test_the_whole_skin_is_seen_from_every_side(window: MainWindow, until) -> No
         assert np.abs(seen).max() < 1, name
         assert np.ptp(seen, axis=0).max() > 1, name  # and large
         written = [bool(label.GetVisibility()) for label in window.membrane.sides.labels]
-        end_on = {"look-along-x": 1, "look-along-y": 2}.get(name)
+        end_on = {"view-along-x": 1, "view-along-y": 2}.get(name)
         assert written == [number != end_on for number in range(3)], name

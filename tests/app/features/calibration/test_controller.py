@@ -168,7 +168,7 @@ def test_a_step_without_readings_is_given_up(bench: Bench) -> None:
     controller.capture()
     bench.now += 6.0
     bench.tell()
-    assert "no reading came" in controller.message.lower()
+    assert "no reading for" in controller.message.lower()
     assert not controller.capturing
     assert controller.procedure is not None
 

@@ -109,7 +109,7 @@ def test_what_is_found_is_shown_in_the_list_on_the_heatmap_and_on_the_skin(
     assert failing.health.isVisible()
     until(lambda: {"44", "45"} <= {row[0] for row in told(failing.health)})
     assert "channels excluded, error bars +" in failing.health.words.text()
-    until(lambda: failing.membrane.out.actor.visibility)
+    until(lambda: failing.membrane.excluded.actor.visibility)
     failing.selection.point(44)
     until(lambda: failing.heatmaps["xx"].value.text().endswith(", dead"))
     assert failing.minimumSizeHint().height() <= 800
@@ -121,7 +121,7 @@ def test_a_simulated_skin_is_pressed_by_dragging_its_load(window: MainWindow, un
     page.quick.click()
     assert window.press_test.running
     assert not window.session.running  # the load rests, until it is dragged
-    until(lambda: window.membrane.asked.actor.visibility)
+    until(lambda: window.membrane.target.actor.visibility)
     until(lambda: window.press_test.test.phase is PressPhase.PRESS)
     assert "Press it now" in page.words.text()
     asked = window.press_test.test.target
@@ -142,7 +142,7 @@ def test_a_simulated_skin_is_pressed_by_dragging_its_load(window: MainWindow, un
     assert [p.verdict for p in window.press_test.test.done] == ["skipped", "nothing"]
     page.stop.click()
     assert not window.press_test.running
-    assert not window.membrane.asked.actor.visibility or window.selection.asked_for == -1
+    assert not window.membrane.target.actor.visibility or window.selection.asked_for == -1
 
 
 def test_a_test_that_is_over_has_a_verdict_and_ends_with_its_device(

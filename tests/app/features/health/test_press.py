@@ -41,8 +41,8 @@ def test_a_scene_that_is_chosen_meanwhile_does_not_press_by_itself(window, until
 
 def test_the_element_asked_for_is_marked_on_the_skin_until_the_test_ends(window, until) -> None:
     window.press_test.begin(quick=True)
-    until(lambda: window.membrane.asked.actor.visibility)
+    until(lambda: window.membrane.target.actor.visibility)
     window.actions_by_name["disconnect"].trigger()
     until(lambda: window.display.badge.state == "OFF")
     assert not window.press_test.running
-    assert not window.membrane.asked.actor.visibility
+    assert not window.membrane.target.actor.visibility

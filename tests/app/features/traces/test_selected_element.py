@@ -9,7 +9,7 @@ from PySide6.QtCore import QPoint, Qt
 from kappaskin import Status, load_scene
 from kappaskin.health import Health
 from kappaskin.health.findings import Finding
-from kappaskin_app.features.membrane.camera import Sight
+from kappaskin_app.features.membrane.camera import Projection
 from kappaskin_app.features.traces.selected_element import SECONDS, ReadingBuffer, facts
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.widgets.plots import Curve, CurvePlot
@@ -20,7 +20,7 @@ def pixel_of(window: MainWindow, element: int) -> QPoint:
     view = window.membrane
     position = window.session.status.sensor.layout.positions[element]
     points, _ = view.skin.place(position[None])
-    return QPoint(*(round(v) for v in Sight(view.plotter).to_screen(points[0]).tolist()))
+    return QPoint(*(round(v) for v in Projection(view.plotter).to_screen(points[0]).tolist()))
 
 
 def read(*times: float, elements: int = 4) -> tuple[np.ndarray, np.ndarray]:
