@@ -51,7 +51,7 @@ READING = (
     ("ruff", "check"),
     ("ruff", "format", "--check"),
     ("basedpyright",),
-    ("lint-imports",),
+    ("lint-imports", "--no-cache"),  # the cache does not notice that a module was renamed
 )
 # Each process has a display of its own; -n0 among ARGUMENTS makes it one for all, on ours.
 # One that crashes ends the run: what it had in hand would be waited for without end.

@@ -23,6 +23,7 @@ from kappaskin_app.features.heatmaps.maps import HeatmapGrid
 from kappaskin_app.features.lessons.reading import READOUTS
 from kappaskin_app.features.traces.element_panel import ElementPanel, Traces
 from kappaskin_app.features.traces.selected_element import facts
+from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.colouring import SHADES, Colouring
 from kappaskin_app.shell.settings import COLOURS, Settings
 
@@ -50,10 +51,11 @@ traces.show_history([3], np.array([-1.0, 0.0]), values[:, :, None], 10.0)
 found["panel's history"] = panel.histories[1].curves[2].values.tolist() == [5.0, 11.0]
 found["traces"] = traces.plots[5].curves[0].values.tolist() == [5.0, 11.0]
 
-colouring = Colouring()
+tasks = Tasks()
+colouring = Colouring(tasks)
 colouring.follow(status)
 found["colours"] = np.array_equal(colouring.of_elements("twice_xy", estimate), twice[2])
-colouring.close()
+tasks.close()
 found["menu"] = dict(COLOURS)["twice_xy"] == "Twice xy" and SHADES["twice_xy"].on_surface is None
 found["range"] = Settings(range_twice_xy=3.0).range_twice_xy == 3.0
 found["heatmaps"] = "twice_xy" in HeatmapGrid().heatmaps

@@ -23,7 +23,6 @@ def _imports(folder: Path) -> set[str]:
     }
 
 
-@pytest.mark.cases("membrane", "recording", "log")
 @pytest.mark.parametrize("left_out", FEATURES, ids=lambda feature: feature.name)
 def test_the_app_works_without(left_out, qapp, window_class, until) -> None:
     rest = [feature for feature in FEATURES if feature is not left_out]

@@ -48,8 +48,11 @@ def nothing_chosen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 def _after(window: MainWindow, act: Callable[[], object]) -> None:
     """Do something, let the window live on, and close what it opened."""
     act()
-    for _ in range(3):
-        QApplication.processEvents()
+    index = None
+    while index != window.history.stack.index():  # a tare, say, may have come in the last turn
+        index = window.history.stack.index()
+        for _ in range(3):
+            QApplication.processEvents()
     for dialog in window.findChildren(QDialog):
         dialog.reject()
 

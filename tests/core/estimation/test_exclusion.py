@@ -81,7 +81,7 @@ def test_of_too_many_the_worst_are_left_out_and_a_shape_is_still_told() -> None:
 
     pipeline.leave_out(kinds_of(bad), badness)
 
-    kept = pipeline.left_out.kept.ravel()
+    kept = pipeline.left_out.retained.ravel()
     assert 44 <= kept.sum() < 240
     assert badness[bad][kept[bad]].max() <= badness[bad][~kept[bad]].min()
     assert np.isfinite(pipeline(FRAME).surface).all()

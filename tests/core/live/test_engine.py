@@ -116,7 +116,7 @@ def test_failing_channels_are_told_with_what_leaving_them_out_costs(engine) -> N
     assert wait_for(told)  # a frame after they were found
     assert 1.03 < status.health.cost < 1.2
     assert status.health.contact_cost > 1.0
-    assert status.health.kept == 0
+    assert status.health.retained == 0
     assert "channels excluded, error bars +" in str(status.health)
     engine.connect("sim:circle")
     state(engine, STREAMING)

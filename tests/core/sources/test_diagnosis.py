@@ -115,7 +115,7 @@ def test_what_is_no_device_is_told(saying, data, why, hasty):
     ("text", "why"),
     [
         (TEXT, "says what it is but sends no readings"),
-        ('{"name": "Half"}', "the device's information lacks"),
+        ('{"name": "Half"}', "the device's information cannot be used: expected serial_number = a"),
     ],
     ids=["no readings", "half an information"],
 )
