@@ -210,8 +210,10 @@ def _instruction(step: CylinderStep) -> str:
         return "Nothing pressing on the skin.\n"
     face = "inner face on it" if step.face > 0 else "outer face on it"
     if step.hold:
-        how = f"press Capture, then lay the skin on it for {step.hold:g} s"
-        return f"{_BENT[step.along]}, {face}: {how}"
+        return (
+            f"{_BENT[step.along]}, {face}: press Capture, then lay the skin on it for "
+            f"{step.hold:g} s"
+        )
     return f"{_BENT[step.along]}, {face},\n{_PHASES[step.way]}"
 
 

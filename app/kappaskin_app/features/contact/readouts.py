@@ -80,9 +80,7 @@ def _age(age: float, sd: float) -> str:
         return NONE
     if not math.isfinite(sd):
         return f"\N{GREATER-THAN OR EQUAL TO} {age:.0f} ms"
-    if sd < _NEGLIGIBLE_SD:
-        return f"{age:.0f} ms"
-    return with_error(age, sd, 0 if sd >= 1 else 1, "ms")
+    return f"{age:.0f} ms" if sd < _NEGLIGIBLE_SD else with_error(age, sd, int(sd < 1), "ms")
 
 
 class Readouts(QWidget):

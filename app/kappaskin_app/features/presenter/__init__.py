@@ -31,8 +31,9 @@ class PresenterFeature:
     def _add_actions(self, shell: MainWindow) -> None:
         add = shell.actions_by_name.add
         add("present", VIEW, "&Presenter", self.presenter.toggle, "F11", TIP)
-        toggle = self._toggle_sound
-        self._action = add("sound", VIEW, "S&ound of the force", toggle, "F12", SOUND_TIP)
+        self._action = add(
+            "sound", VIEW, "S&ound of the force", self._toggle_sound, "F12", SOUND_TIP
+        )
         self._action.setCheckable(True)
         self.presenter.sound.ended.connect(guarded(self._show_sound))
 

@@ -173,8 +173,9 @@ class PresenterController(QObject):
             self.view.controls.pad.show_skin(scene.plate.patch)
             self.view.controls.show_hand(Hand(x, y, load.force), session.refusal)
             present = [n for n, made in enumerate(DEMO_OBJECTS) if made.is_in(scene)]
-            selectable = may_choose(scene) and not session.refusal
-            self.view.controls.show_objects(selectable, (present or [-1])[0])
+            self.view.controls.show_objects(
+                may_choose(scene) and not session.refusal, (present or [-1])[0]
+            )
 
     def _select_object(self, number: int) -> None:
         hand = self.view.controls.pad.hand

@@ -73,9 +73,7 @@ def feedback_of(estimate: Estimate, recognised: Recognised | None = None) -> Fee
     if not contact.single:
         displacement, displacement_95 = float(np.nanmax(np.abs(estimate.surface))), math.nan
     x, y = (float(value) for value in place)
-    kind, length = "", math.nan
-    if recognised is not None:
-        kind, length = recognised.what.kind, recognised.what.length
+    kind, length = (recognised.what.kind, recognised.what.length) if recognised else ("", math.nan)
     return Feedback(
         *(force, force_95, displacement, displacement_95, (x, y), place_95),
         *(kind, length, _radius_estimate(estimate, recognised), contact.near_rim),
@@ -84,10 +82,9 @@ def feedback_of(estimate: Estimate, recognised: Recognised | None = None) -> Fee
 
 def _radius_estimate(estimate: Estimate, recognised: Recognised | None) -> RadiusEstimate | None:
     """Radius of a round object; of the skin at the contact without an object; None of others."""
-    what = None if recognised is None else recognised.what
-    if what is not None and what.kind in _ROUND:
+    if recognised and (what := recognised.what).kind in _ROUND:
         return RadiusEstimate(what.kind, what.radius, what.radius_95)
-    if what is not None and what.kind:
+    if recognised and recognised.what.kind:
         return None
     geometry = estimate.geometry
     sharper = int(np.argmax(np.abs(geometry.principal)))
@@ -96,5 +93,6 @@ def _radius_estimate(estimate: Estimate, recognised: Recognised | None) -> Radiu
     low, high = max(k - off, 0.0), k + off
     if not high > 0:
         return None
-    interval = 1 / high, 1 / low if low > 0 else math.inf
-    return RadiusEstimate("skin", 1 / k if k else math.inf, interval)
+    return RadiusEstimate(
+        "skin", 1 / k if k else math.inf, (1 / high, 1 / low if low > 0 else math.inf)
+    )

@@ -38,8 +38,7 @@ class PresenterView(QWidget):
         super().__init__()
         self.strip, self.controls, self.banner = StatusStrip(), OperatorControls(), Banner()
         self.force, self.bar = NumberIndicator("Force"), ForceBar()
-        self.displacement = NumberIndicator("Displacement")
-        self.place = NumberIndicator("Contact at x, y")
+        self.displacement, self.place = map(NumberIndicator, ("Displacement", "Contact at x, y"))
         self.radius, self.radius_view = NumberIndicator(_RADIUS), RadiusView()
         self.indicators: list[Indicator] = [
             *(self.strip, self.banner, self.force, self.bar),
@@ -125,16 +124,18 @@ class PresenterView(QWidget):
         self.displacement.show_figure(f"{number(1e3 * feedback.displacement, '.2f')} mm", off)
         x, y = (number(1e3 * value, ".1f") for value in feedback.position)
         off = _off(1e3 * feedback.position_95, 1, "mm")
-        note = "near the rim: unreliable" if feedback.near_rim else off
-        self.place.show_figure(f"{x}, {y} mm", note)
+        self.place.show_figure(
+            f"{x}, {y} mm", "near the rim: unreliable" if feedback.near_rim else off
+        )
         self.radius.show_figure(*radius_in_words(feedback, recorded))
 
     def show_graphics(self, feedback: Feedback | None, now: float) -> None:
         """Draw the force bar and the circle of the radius."""
         force = (feedback.force, feedback.force_95) if feedback else (math.nan, math.nan)
         self.bar.show_force(*force, now)
-        radius, edge = (feedback.radius, bool(feedback.kind)) if feedback else (None, False)
-        self.radius_view.show_radius(radius, edge, now)
+        self.radius_view.show_radius(
+            feedback.radius if feedback else None, bool(feedback and feedback.kind), now
+        )
 
     def show_trouble(self, state: str, since: str, why: str) -> None:
         """Show a banner with the reason instead of the numbers; no banner without a `state`."""
