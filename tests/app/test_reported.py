@@ -19,10 +19,10 @@ from PySide6.QtWidgets import QApplication
 from kappaskin import Pipeline, Setup, Simulator, Status, load_scene
 from kappaskin_app.features.contact.numbers import ELEMENTS, elements_of, facts_of
 from kappaskin_app.features.contact.readouts import Readouts
-from kappaskin_app.features.heatmaps.maps import Maps
+from kappaskin_app.features.heatmaps.maps import HeatmapGrid
 from kappaskin_app.features.lessons.lesson_file import READOUTS
-from kappaskin_app.features.traces.element_card import ElementCard, Traces
-from kappaskin_app.features.traces.picking import facts
+from kappaskin_app.features.traces.element_panel import ElementPanel, Traces
+from kappaskin_app.features.traces.selected_element import facts
 from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.colouring import SHADES, Colouring
 from kappaskin_app.shell.settings import COLOURS, Settings
@@ -42,13 +42,13 @@ found["lessons"] = "readout-twice" in READOUTS
 found["facts"] = ("Twice", f"{2 * force:.1f}") in [row[:2] for row in facts_of(estimate, "")]
 at = ELEMENTS.index("twice xy [1/m]")
 found["elements"] = float(elements_of(estimate, sensor)[7][at]) == round(twice[2, 7], 3)
-found["card"] = "reads twice [1/m]" in facts(7, sensor, status, estimate)
+found["panel"] = "reads twice [1/m]" in facts(7, sensor, status, estimate)
 
-card, traces = ElementCard(), Traces()
+panel, traces = ElementPanel(), Traces()
 values = np.arange(12.0).reshape(2, 6)
-card.show_past(np.array([-1.0, 0.0]), values, 10.0)
-traces.show_past([3], np.array([-1.0, 0.0]), values[:, :, None], 10.0)
-found["card's past"] = card.pasts[1].curves[2].values.tolist() == [5.0, 11.0]
+panel.show_history(np.array([-1.0, 0.0]), values, 10.0)
+traces.show_history([3], np.array([-1.0, 0.0]), values[:, :, None], 10.0)
+found["panel's history"] = panel.histories[1].curves[2].values.tolist() == [5.0, 11.0]
 found["traces"] = traces.plots[5].curves[0].values.tolist() == [5.0, 11.0]
 
 tasks = Tasks()
@@ -58,7 +58,7 @@ found["colours"] = np.array_equal(colouring.of_elements("twice_xy", estimate), t
 tasks.close()
 found["menu"] = dict(COLOURS)["twice_xy"] == "Twice xy" and SHADES["twice_xy"].on_surface is None
 found["range"] = Settings(range_twice_xy=3.0).range_twice_xy == 3.0
-found["heatmaps"] = "twice_xy" in Maps().heatmaps
+found["heatmaps"] = "twice_xy" in HeatmapGrid().heatmaps
 print(json.dumps({name: bool(whether) for name, whether in found.items()}))
 """
 

@@ -209,9 +209,12 @@ def parts_of(window: MainWindow) -> dict[str, QWidget]:
     panels = {panel.title(): panel for panel in window.panels.all()}
     frame = {"header": window.display.header, "foot": window.display.status_bar}
     centre = {"skin": window.membrane, "scale": window.scale, "timeline": window.timeline}
-    stage = {"transport": window.transport, "operator": window.stage.operator}
-    stage |= {f"board {number}": board for number, board in enumerate(window.stage.boards)}
-    return {**docks, **panels, **frame, **centre, **stage}
+    view = {"transport": window.transport, "controls": window.presenter_view.controls}
+    view |= {
+        f"indicator {number}": indicator
+        for number, indicator in enumerate(window.presenter_view.indicators)
+    }
+    return {**docks, **panels, **frame, **centre, **view}
 
 
 def show_much(window: MainWindow, status: Status, estimate: Estimate) -> None:

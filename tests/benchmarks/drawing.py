@@ -89,7 +89,7 @@ def _show_everything(window: MainWindow) -> None:
     shown = dict.fromkeys((f"show_{name}" for name in _DRAWN), True)
     maps = tuple(name for name, _ in COLOURS)
     window.history.change("Everything", -1, maps=maps, traced=(33, 44, 55), **shown)
-    window.features["traces"].picking.pick(44)
+    window.features["traces"].selected_element.select(44)
     window.layouts.apply(_SHOWN)
 
 

@@ -64,7 +64,7 @@ def _changing(window: MainWindow) -> Iterator[None]:
             window.history.stack.undo()
             yield
         window.docks.reveal(("element", "traces", "numbers", "health")[turn % 4])
-        window.features["traces"].picking.pick(turn % 100)
+        window.features["traces"].selected_element.select(turn % 100)
         yield
 
 

@@ -204,7 +204,7 @@ class ReportedQuantity:
     many times the value, with so many digits; without labels it is no readout. `header` says how
     it stands in the window's header too. `colours` are what the skin may be coloured by of it.
 
-    What has `COMPONENTS` at every element may be a column `element_head` of an element's card.
+    What has `COMPONENTS` at every element may be a column `element_head` of the element panel.
     `traced` is the title of what is drawn of it over time: then it is a field of the estimate with
     one of `colours` for each component, by whose names it is in the table of all elements.
     """
@@ -508,7 +508,7 @@ _FIT = (
         sd="noise",
         columns=("",),
         shown=("1/m", 1.0, 2),
-        element_head="reads",
+        element_head="reading",
         traced="Curvature",
         colours=_changes(
             ("Curvature xx", "Bending along x as each element reads it: w_xx (Eq. 3)."),
@@ -566,7 +566,7 @@ _FIT = (
         parts=(COMPONENTS, ELEMENT),
         group="fit",
         shown=("1/m", 1.0, 2),
-        element_head="fit leaves",
+        element_head="residual",
         colours=tuple(
             SkinColour(
                 f"residual_{name}",

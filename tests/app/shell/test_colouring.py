@@ -68,10 +68,10 @@ def test_one_range_for_all_is_that_of_the_largest_shown() -> None:
 
 def test_a_regular_grid_has_a_pixel_for_each_element_and_others_their_nearest() -> None:
     cells = ElementCells()
-    cells.meet(SensorLayout.regular(Patch(0.1, 0.06), 4, 3))
+    cells.set_layout(SensorLayout.regular(Patch(0.1, 0.06), 4, 3))
     assert cells.texture.dimensions == (4, 3)
     layout = SensorLayout.scattered(Patch(0.1, 0.1), [[0.02, 0.05], [0.09, 0.05]])
-    cells.meet(layout)
+    cells.set_layout(layout)
     cells.show(np.array([[255, 0, 0], [0, 0, 255]], np.uint8))
     picture = cells.pixels.reshape(*cells.texture.dimensions[::-1], 3)
     red = (picture[:, :, 0] == 255).mean(axis=0)
@@ -106,7 +106,7 @@ def test_a_map_of_health_tells_which_element_is_what(qapp: QApplication) -> None
     kinds = np.array([0.0, 6.0, 0.0, 2.0])
     heatmap.show_values(kinds, HEALTH)
     heatmap.show_reading(kinds)
-    assert heatmap.value.text() == "2 not well"
+    assert heatmap.value.text() == "2 faulty"
     assert [words for _, words in heatmap.bar.legend] == ["well", "stuck", "dead"]
     heatmap.show_element(1)
     heatmap.show_reading(kinds)

@@ -84,7 +84,7 @@ def test_every_action_can_be_taken_undone_and_redone(
     for name in [name for name in actions.entries if name not in _SPARED]:
         before, sizes, index = _state(window), _sizes(window), stack.index()
         _after(window, actions[name].trigger)
-        window.presenting.leave()
+        window.presenter.leave()
         after, steps = _state(window), stack.index() - index
         assert steps or after == before, name
         for way, wanted in (("undo", before), ("redo", after)):

@@ -157,7 +157,7 @@ def test_a_step_of_a_calibration_is_not_wider_than_its_page(large: MainWindow) -
 
 
 def test_what_is_written_in_the_picture_is_read_whole(large: MainWindow) -> None:
-    membrane, ruler = large.membrane, large.view.measuring.ruler
+    membrane, ruler = large.membrane, large.view.measurement.ruler
     wide, high = membrane.plotter.render_window.GetSize()
     found = Distances(0.0849, 0.0851, -0.00212)
     ruler.show(membrane.skin, np.array([(0.02, 0.02), (0.08, 0.08)]), 0.0, found)

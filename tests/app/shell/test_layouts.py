@@ -250,12 +250,12 @@ def test_each_ready_layout_shows_its_panels_and_a_bad_name_is_refused(window: Ma
     window.layouts.choose("Teach")
     assert window.lesson.isVisible()
     window.layouts.choose("Presenter")
-    assert window.presenting.on
+    assert window.presenter.on
     window.layouts.save("Live")
     assert "Expected a name" in window.statusBar().currentMessage()
     assert window.layouts.own == {}
     window.layouts.choose("Live")
-    assert not window.presenting.on
+    assert not window.presenter.on
 
 
 def test_the_skin_is_not_drawn_while_the_window_is_arranged(window: MainWindow) -> None:

@@ -48,7 +48,7 @@ def tip_of(control: QWidget) -> str:
 
 
 def test_every_action_and_every_control_explains_itself(window: MainWindow) -> None:
-    for action in ("export", "report", "event_log"):
+    for action in ("export", "report", "happenings"):
         window.actions_by_name[action].trigger()
     controls = [c for kind in (*_ASKS, *_SHOWS) for c in window.findChildren(kind)]
     asked = [c for c in controls if not isinstance(c, QScrollBar) and not within_another(c)]

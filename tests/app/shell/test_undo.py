@@ -222,10 +222,10 @@ def test_with_nothing_to_undo_the_action_says_so(here: MainWindow) -> None:
 
 
 def test_measuring_and_each_place_of_it_come_back(here: MainWindow) -> None:
-    measuring, undo = here.view.measuring, here.actions_by_name["undo"]
+    measuring, undo = here.view.measurement, here.actions_by_name["undo"]
     here.actions_by_name["measure"].trigger()
     for place in ((0.02, 0.03), (0.05, 0.06)):
-        here.membrane.pointing.clicked.emit(*place)
+        here.membrane.pointer.clicked.emit(*place)
     assert _texts(here) == ["measure", "measure from here", "measure to here"]
     undo.trigger()
     assert measuring.places == ((0.02, 0.03),)
@@ -240,7 +240,7 @@ def test_measuring_and_each_place_of_it_come_back(here: MainWindow) -> None:
 
 
 def test_places_beside_the_skin_that_there_is_now_do_not_come_back(here: MainWindow) -> None:
-    measuring = here.view.measuring
+    measuring = here.view.measurement
     measuring.have(((0.02, 0.03), (0.1, 0.1)))
     assert len(measuring.places) == 2
     measuring.have(((0.02, 0.03), (0.11, 0.1)))
@@ -255,13 +255,13 @@ def test_the_element_that_was_picked_before_comes_back_and_then_its_dock_goes(
     for element in (17, 44):
         here.heatmaps["xx"].chosen.emit(element)
         _settle()
-    assert _texts(here) == ["show Element", "pick element 17", "pick element 44"]
+    assert _texts(here) == ["show Element", "select element 17", "select element 44"]
     here.actions_by_name["undo"].trigger()
-    assert here.picking.element == 17
+    assert here.selected_element.element == 17
     here.actions_by_name["undo"].trigger()
     _settle()
-    assert here.picking.element == -1
-    assert "Click an element" in here.picking.card.title.text()
+    assert here.selected_element.element == -1
+    assert "Click an element" in here.selected_element.panel.title.text()
     here.actions_by_name["undo"].trigger()
     _settle()
     assert here.docks["element"].isHidden()
@@ -273,7 +273,7 @@ def test_an_element_that_the_skin_has_no_more_is_not_picked_again(here: MainWind
     here.history.apply(replace(here.history.settings, elements_x=4, elements_y=4))
     until(lambda: len(here.session.status.sensor.layout) == 16)
     here.actions_by_name["undo"].trigger()
-    assert here.picking.element == -1
+    assert here.selected_element.element == -1
 
 
 def test_the_place_in_a_lesson_comes_back_with_its_settings(here: MainWindow) -> None:

@@ -1,4 +1,4 @@
-"""Pages of a calibration: what to ask, what to do next, and what came of it."""
+"""Pages of the calibration: start, steps and result."""
 
 import numpy as np
 from PySide6.QtCore import Qt
@@ -16,7 +16,11 @@ from kappaskin.calibration import Procedure
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS
 from kappaskin.scenes.cylinders import ADVICE, CylinderStep, schedule
-from kappaskin_app.features.calibration.calibrating import Calibrating, Result, parsed_radii
+from kappaskin_app.features.calibration.controller import (
+    CalibrationController,
+    Result,
+    parsed_radii,
+)
 from kappaskin_app.features.calibration.plots import CylinderView, Loop, LoopPlot, PassMap
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import current, follow_look
@@ -33,36 +37,34 @@ from kappaskin_app.widgets.parts import (
 )
 
 
-class Start(QWidget):
-    """Asks with which cylinders, and how long on each."""
+class StartPage(QWidget):
+    """Page with the cylinders and the duration of each step."""
 
     def __init__(self) -> None:
         super().__init__()
         self.radii = QLineEdit()
         self.radii.setObjectName("radii")
-        self.radii.setToolTip(
-            "Radii in mm of the cylinders that you have, in any order; at least three."
-        )
+        self.radii.setToolTip("Radii in mm of your cylinders, in any order; at least three.")
         self.seconds = seconds_box(
-            "seconds", 0.1, 1.0, "How long the readings of a step are averaged."
+            "seconds", 0.1, 1.0, "Time over which the readings of a step are averaged."
         )
         self.hold = seconds_box(
             "hold",
             0.0,
             0.0,
-            "Above zero, the skin first stays so long on the smallest cylinder, which shows how "
-            "the glue creeps.",
+            "Time on the smallest cylinder at the start, to measure the creep of the glue; zero "
+            "for none.",
         )
         self.hold.setSpecialValueText("none")
         self.plan = text_label()
-        self.begin = button("Begin", "begin", "Begin with the flat table.")
+        self.begin = button("Start", "begin", "Start with the flat table.")
         form = QFormLayout()
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.ExpandingFieldsGrow)
         form.setVerticalSpacing(5)
         for words, editor in (
             ("Radii, mm", self.radii),
-            ("Time on each", self.seconds),
-            ("First hold", self.hold),
+            ("Time per step", self.seconds),
+            ("Initial hold", self.hold),
         ):
             label = QLabel(words)
             label.setBuddy(editor)
@@ -77,17 +79,17 @@ class Start(QWidget):
         self.radii.returnPressed.connect(self.begin.click)
 
     def show_plan(self, strip: bool) -> None:
-        """Say what the cylinders come to."""
+        """Show the number of steps and their duration."""
         try:
             steps = schedule(parsed_radii(self.radii.text()), self.hold.value(), strip)
         except Refusal as refusal:
             text = str(refusal)
         else:
             total = sum(max(self.seconds.value(), step.hold) for step in steps)
-            ways = "along x" if strip else "along x, along y and along the diagonal"
+            bent = "along x" if strip else "along x, along y and along the diagonal"
             text = (
-                f"{len(steps)} steps: bent {ways}; on each face from large to small radii and "
-                f"back, flat between. {_duration(total)} of readings."
+                f"{len(steps)} steps: bent {bent}; on each face with falling and rising radii, "
+                f"flat between. {_duration(total)} of readings."
             )
         if text != self.plan.text():
             self.plan.setText(text[:1].upper() + text[1:])
@@ -98,46 +100,46 @@ def _duration(seconds: float) -> str:
 
 
 _BENT = {"x": "bent along x", "y": "bent along y", "diagonal": "bent along the diagonal"}
-_WAYS = {
-    "there": "on the way there",
-    "back": "on the way back",
-    "first": "first of all, to wipe out its past",
+_PHASES = {
+    "there": "falling radius",
+    "back": "rising radius",
+    "first": "preconditioning",
 }
 
 
-class Steps(QWidget):
-    """Says which step is next, and what the last one read."""
+class StepPage(QWidget):
+    """Page with the present step, and the readings of the last one."""
 
     def __init__(self) -> None:
         super().__init__()
         self.number = QLabel()
         self.bar = QProgressBar(textVisible=False)  # pyright: ignore[reportCallIssue]
         self.bar.setFixedHeight(8)
-        self.bar.setToolTip("Steps that are done, and how far this one is.")
+        self.bar.setToolTip("Progress of the steps.")
         self.what = Heading(1.5)
         self.how = text_label()
         self.drawing = CylinderView()
-        self.take = button(
-            "Take", "take", "Take what the skin reads now, and go on (Enter, Space, Ctrl+Shift+K)."
+        self.capture = button(
+            "Capture", "take", "Capture the readings of this step (Enter, Space, Ctrl+Shift+K)."
         )
-        self.redo = button("Take the last one again", "redo", "Go back by one step.")
-        self.cancel = button("Cancel", "cancel", "End here, and forget what was taken.")
+        self.redo = button("Repeat last step", "redo", "Go back by one step.")
+        self.cancel = button("Cancel", "cancel", "End, and discard the captured steps.")
         self.all = button(
-            "Take all",
+            "Capture all",
             "take-all",
-            "Go through all steps unattended: the simulated skin lays itself on each cylinder.",
+            "Capture all steps automatically, for the simulated skin.",
         )
         self.read = QGridLayout()
         self.read.setVerticalSpacing(2)
         self.heading = text_label()
         self.cells = [[QLabel() for _ in range(3)] for _ in COMPONENTS]
-        self._lay_out()
+        self._arrange()
 
-    def _lay_out(self) -> None:
+    def _arrange(self) -> None:
         heads = (
             ("", ""),
-            ("read", EQUATION_8 + "The median of the elements."),
-            ("cylinder", "The curvature 1/R of the cylinder, as this component has it."),
+            ("reading", EQUATION_8 + "The median of the elements."),
+            ("cylinder", "This component of the curvature 1/R of the cylinder."),
             ("noise", "Standard deviation of one frame, the median of the elements."),
         )
         for column, (words, tip) in enumerate(heads):
@@ -150,30 +152,32 @@ class Steps(QWidget):
                 self.read.addWidget(cell, row, column, Qt.AlignmentFlag.AlignRight)
         around = QVBoxLayout(self)
         around.setContentsMargins(0, 0, 0, 0)
-        for widget in (self.number, self.bar, self.what, self.how, self.drawing, self.take):
+        for widget in (self.number, self.bar, self.what, self.how, self.drawing, self.capture):
             around.addWidget(widget)
         around.addWidget(self.all)
         around.addLayout(in_a_row(self.redo, self.cancel))
         around.addWidget(self.heading)
         around.addLayout(self.read)
 
-    def show_step(self, now: Calibrating, procedure: Procedure, step: CylinderStep | None) -> None:
+    def show_step(
+        self, now: CalibrationController, procedure: Procedure, step: CylinderStep | None
+    ) -> None:
         done, total = len(procedure.taken), len(procedure.steps)
         self.bar.setRange(0, 100 * total)
         self.bar.setValue(round(100 * (done + now.share)))
         self.redo.setEnabled(bool(done) and not now.computing)
-        self.take.setEnabled(not now.computing)
+        self.capture.setEnabled(not now.computing)
         self.all.setEnabled(not now.computing)
-        self.all.setText("Go on step by step" if now.unattended else "Take all")
-        self.take.setText(f"Taking{ELLIPSIS}" if now.taking else "Take")
+        self.all.setText("Step by step" if now.automatic else "Capture all")
+        self.capture.setText(f"Capturing{ELLIPSIS}" if now.capturing else "Capture")
         if step is None:
-            self.number.setText(f"{total} of {total} taken")
+            self.number.setText(f"{total} of {total} captured")
             self.what.setText(f"Computing the calibration{ELLIPSIS}")
             self.how.setText("")
         else:
             self.number.setText(f"Step {step.number} of {total}")
-            self.what.setText(_what(step))
-            self.how.setText(_how(step))
+            self.what.setText(_title(step))
+            self.how.setText(_instruction(step))
             self.drawing.show_step(step, procedure.sensor.layout.patch)
         self._show_read(procedure)
 
@@ -187,7 +191,7 @@ class Steps(QWidget):
         missing = int(np.isnan(taken.mean).sum())
         lost = f"; {missing} channels dead or on a rail" if missing else ""
         self.heading.setText(
-            f"Step {taken.step.number} read, in {taken.frames} frames{lost} (1/m):"
+            f"Step {taken.step.number}: mean of {taken.frames} frames{lost} (1/m):"
         )
         parts = zip(taken.mean.reshape(3, -1), taken.noise.reshape(3, -1), strict=True)
         for row, (mean, noise) in enumerate(parts):
@@ -197,17 +201,20 @@ class Steps(QWidget):
                 cell.setText(text)
 
 
-def _what(step: CylinderStep) -> str:
+def _title(step: CylinderStep) -> str:
     return "Flat table" if step.flat else f"Cylinder of {1e3 * step.radius:g} mm"
 
 
-def _how(step: CylinderStep) -> str:
+def _instruction(step: CylinderStep) -> str:
     if step.flat:
         return "Nothing pressing on the skin.\n"
     face = "inner face on it" if step.face > 0 else "outer face on it"
     if step.hold:
-        return f"{_BENT[step.along]}, {face}: press Take, then lay it on; it stays {step.hold:g} s"
-    return f"{_BENT[step.along]}, {face},\n{_WAYS[step.way]}"
+        return (
+            f"{_BENT[step.along]}, {face}: press Capture, then lay the skin on it for "
+            f"{step.hold:g} s"
+        )
+    return f"{_BENT[step.along]}, {face},\n{_PHASES[step.way]}"
 
 
 def _median(values: np.ndarray) -> float:
@@ -218,16 +225,16 @@ def _median(values: np.ndarray) -> float:
 _WORST = 5
 
 
-class Outcome(QWidget):
-    """Says how good the calibration is, channel by channel."""
+class ResultPage(QWidget):
+    """Page with the result: accuracy of every channel."""
 
     def __init__(self) -> None:
         super().__init__()
         self.passed = Heading(1.3)
         self.errors = text_label(
-            tip="Root mean square of what is left of the cylinders' curvature; widest difference "
-            "between the way there and the way back. Both first with the line of each gage pair "
-            "alone (section 5 of the paper), then with the loops undone too."
+            tip="RMS of the residuals from the cylinders' curvature, and the largest difference of "
+            "readings at falling and rising radius. Both with the line of each gage pair alone "
+            "(section 5 of the paper), and with hysteresis compensated."
         )
         self.map, self.plot, self.channel = PassMap(), LoopPlot(), text_label()
         self.worst = text_label(tip="Click one to see its readings.")
@@ -238,11 +245,11 @@ class Outcome(QWidget):
         self.use = button(
             "Use",
             "use",
-            "Correct the readings by it from now on (Ctrl+Z undoes). Loops are followed from a "
-            "skin at rest: bend a real one back and forth first, less and less.",
+            "Correct the readings with this calibration (Ctrl+Z undoes). The hysteresis model "
+            "starts at rest: bend a real skin back and forth first, with falling amplitude.",
         )
         self.save = button(f"Save{ELLIPSIS}", "save", "Write it to a file.")
-        self.leave = button("New", "leave", "Begin another one; what is not saved is forgotten.")
+        self.leave = button("New", "leave", "Start another calibration; discard an unsaved result.")
         around = QVBoxLayout(self)
         around.setContentsMargins(0, 0, 0, 0)
         around.addWidget(self.passed)
@@ -270,11 +277,11 @@ class Outcome(QWidget):
         wide, left = (float(gaps[:, good].max()) for gaps in (report.gaps, report.gaps_left))
         self.errors.setText(
             "<table cellspacing=0 cellpadding=1>"
-            "<tr><td></td><td align=right><i>&nbsp;line alone</i></td>"
-            "<td align=right><i>&nbsp;&nbsp;loops undone</i></td></tr>"
+            "<tr><td></td><td align=right><i>&nbsp;straight line</i></td>"
+            "<td align=right><i>&nbsp;&nbsp;hysteresis compensated</i></td></tr>"
             f"<tr><td>Residual, RMS</td><td align=right>{before:.2f}</td>"
             f"<td align=right>{after:.2f} 1/m</td></tr>"
-            f"<tr><td>Widest loop</td><td align=right>{wide:.2f}</td>"
+            f"<tr><td>Widest hysteresis loop</td><td align=right>{wide:.2f}</td>"
             f"<td align=right>{left:.2f} 1/m</td></tr></table>"
         )
         failures = dict(report.calibration.failures)
@@ -282,7 +289,7 @@ class Outcome(QWidget):
         worst = [int(channel) for channel in order[:_WORST]]
         self._worst = worst
         self._show_worst()
-        self.map.show_channels(layout, failures, [self._told(c) for c in range(total)])
+        self.map.show_channels(layout, failures, [self._channel_text(c) for c in range(total)])
         self.show_channel(worst[0])
 
     def _show_worst(self) -> None:
@@ -297,8 +304,8 @@ class Outcome(QWidget):
         ]
         self.worst.setText("<br>".join(["Worst:", *lines]))
 
-    def _told(self, channel: int) -> str:
-        """A channel in words."""
+    def _channel_text(self, channel: int) -> str:
+        """Text of a channel: gain, offset and error, or its fault."""
         if self._result is None:
             return ""
         report = self._result.report
@@ -316,14 +323,14 @@ class Outcome(QWidget):
         if self._result is None:
             return
         self.map.show_channel(channel)
-        self.channel.setText(self._told(channel))
+        self.channel.setText(self._channel_text(channel))
         self.plot.show_loop(_loop(self._result, channel))
 
 
 def _loop(result: Result, channel: int) -> Loop:
-    """What `channel` read wherever its component was bent, or all was flat.
+    """Readings of `channel` at the flat steps and those that bend its component.
 
-    Without the steps that only wipe out the past.
+    Without preconditioning.
     """
     sweep, report = result.sweep, result.report
     applied = sweep.curvature[:, channel // (len(report.passed) // 3)]

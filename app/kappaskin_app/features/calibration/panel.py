@@ -1,4 +1,4 @@
-"""The calibration panels: which calibration is in use, and the way to a new one."""
+"""Calibration panels: the calibration in use, and the procedure of a new one."""
 
 from pathlib import Path
 
@@ -9,8 +9,8 @@ from kappaskin.calibration import Calibration
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
 from kappaskin.scenes.cylinders import radii_for
-from kappaskin_app.features.calibration.calibrating import Calibrating, parsed_radii
-from kappaskin_app.features.calibration.pages import Outcome, Start, Steps
+from kappaskin_app.features.calibration.controller import CalibrationController, parsed_radii
+from kappaskin_app.features.calibration.pages import ResultPage, StartPage, StepPage
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.settings import Settings
@@ -27,11 +27,11 @@ from kappaskin_app.widgets.parts import (
 
 
 class InUsePanel(Panel):
-    """Says which calibration the readings are corrected by."""
+    """The calibration in use."""
 
     purpose = (
-        "The calibration that turns readings into curvatures now, if there is one, and how well it "
-        "fits this sensor."
+        "The calibration that converts readings to curvature, and its match with the connected "
+        "sensor."
     )
     guide_page = "calibrate"
 
@@ -39,47 +39,45 @@ class InUsePanel(Panel):
         super().__init__("In use", parent)
         self.what = text_label()
         self.load = button(f"Load{ELLIPSIS}", "load", "Use a calibration from a file.")
-        self.stop = button(
-            "Stop using", "stop", "Show nominal curvature again (Ctrl+Z takes it back)."
-        )
+        self.stop = button("Stop using", "stop", "Return to nominal curvature (Ctrl+Z undoes).")
         self.body.addWidget(self.what)
         self.body.addLayout(in_a_row(self.load, self.stop))
         self._calibration: Calibration | None = None
-        self._status, self._calibrating, self._file_refused = Status(), False, ""
+        self._status, self._in_progress, self._file_refused = Status(), False, ""
 
-    def attend(self, calibrating: Calibrating) -> None:
+    def connect_to(self, controller: CalibrationController) -> None:
         def load() -> None:
             path, _ = QFileDialog.getOpenFileName(self, "Load a calibration", "", FILES)
             if path:
-                calibrating.load(Path(path))
+                controller.load(Path(path))
 
         self.load.clicked.connect(guarded(lambda *_: load()))
-        self.stop.clicked.connect(guarded(lambda *_: calibrating.stop_using()))
-        calibrating.changed.connect(guarded(lambda: self._note(calibrating)))
+        self.stop.clicked.connect(guarded(lambda *_: controller.stop_using()))
+        controller.changed.connect(guarded(lambda: self._note(controller)))
 
-    def _note(self, calibrating: Calibrating) -> None:
-        self._calibrating = calibrating.procedure is not None
-        self._file_refused = calibrating.file_refused
-        self._tell()
+    def _note(self, controller: CalibrationController) -> None:
+        self._in_progress = controller.procedure is not None
+        self._file_refused = controller.file_refused
+        self._show()
 
     def show_settings(self, settings: Settings) -> None:
         self._calibration = settings.calibration
         self.stop.setEnabled(self._calibration is not None)
-        self._tell()
+        self._show()
 
     def show_status(self, status: Status, simulating: bool) -> None:
         self._status = status
-        self._tell()
+        self._show()
 
-    def _tell(self) -> None:
+    def _show(self) -> None:
         found, sensor = self._calibration, self._status.sensor
         alarm = ""
         if found is None:
-            text = "Nothing: readings are nominal curvature (Eq. 8)."
+            text = "None: readings are nominal curvature (Eq. 8)."
         else:
             text = f"{found.name} {found.serial_number},\n{said(found)}"
-            if self._calibrating:
-                alarm = "Not while calibrating."
+            if self._in_progress:
+                alarm = "Not in use during a calibration."
             elif sensor is not None:
                 alarm = _unfit(found, self._status)
         if text != self.what.text():
@@ -88,11 +86,11 @@ class InUsePanel(Panel):
         if self._file_refused:
             self.show_message(sentence(self._file_refused))
         else:
-            self.show_message(alarm, hint=self._calibrating)
+            self.show_message(alarm, hint=self._in_progress)
 
 
 def _unfit(calibration: Calibration, status: Status) -> str:
-    """Why a calibration is not in use with the sensor that is connected, or nothing."""
+    """Reason why a calibration is not in use with the connected sensor, or empty."""
     if status.sensor is None:
         return ""
     try:
@@ -103,20 +101,20 @@ def _unfit(calibration: Calibration, status: Status) -> str:
 
 
 class CalibratePanel(Panel):
-    """Guides through a calibration on cylinders, and shows what came of it."""
+    """Procedure of a calibration on cylinders, and its result."""
 
     purpose = (
-        "Lays the skin on cylinders one after the other: there \u03ba = 1 / R, so that each "
-        "channel's gain and offset follow."
+        "The skin is laid on cylinders one by one, where \u03ba = 1 / R determines the gain and "
+        "offset of each channel."
     )
     guide_page = "calibrate"
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Cylinders of known radius", parent)
-        self.start, self.steps, self.outcome = Start(), Steps(), Outcome()
-        for page in (self.start, self.steps, self.outcome):
+        self.start, self.steps, self.result_page = StartPage(), StepPage(), ResultPage()
+        for page in (self.start, self.steps, self.result_page):
             self.body.addWidget(page)
-        self._calibrating: Calibrating | None = None
+        self._controller: CalibrationController | None = None
         self._status = Status()
         self._connection = 0
         self._phase: QWidget = self.start
@@ -125,22 +123,22 @@ class CalibratePanel(Panel):
             editor.valueChanged.connect(self._plan)
         self.start.radii.textChanged.connect(self._plan)
 
-    def attend(self, calibrating: Calibrating) -> None:
-        """Show how `calibrating` goes, and pass on what the user requests."""
-        self._calibrating = calibrating
-        start, steps, outcome = self.start, self.steps, self.outcome
-        calibrating.changed.connect(guarded(self._show))
-        for pressed, wish in (
+    def connect_to(self, controller: CalibrationController) -> None:
+        """Show the progress of `controller`, and pass the user's requests to it."""
+        self._controller = controller
+        start, steps, result_page = self.start, self.steps, self.result_page
+        controller.changed.connect(guarded(self._show))
+        for pressed, request in (
             (start.begin, self._begin),
-            (steps.take, calibrating.take),
-            (steps.redo, calibrating.redo),
-            (steps.cancel, calibrating.cancel),
-            (steps.all, self._take_all),
-            (outcome.use, calibrating.use),
-            (outcome.leave, calibrating.leave),
-            (outcome.save, self._save),
+            (steps.capture, controller.capture),
+            (steps.redo, controller.redo),
+            (steps.cancel, controller.cancel),
+            (steps.all, self._toggle_all),
+            (result_page.use, controller.use),
+            (result_page.leave, controller.discard),
+            (result_page.save, self._save),
         ):
-            pressed.clicked.connect(guarded(lambda *_, wish=wish: wish()))
+            pressed.clicked.connect(guarded(lambda *_, request=request: request()))
 
     def show_status(self, status: Status, simulating: bool) -> None:
         self._status = status
@@ -159,52 +157,52 @@ class CalibratePanel(Panel):
         self.start.show_plan(sensor is not None and sensor.layout.patch.strip)
 
     def _begin(self) -> None:
-        if self._calibrating is None:
+        if self._controller is None:
             return
         try:
             radii = parsed_radii(self.start.radii.text())
         except Refusal as refusal:
             self.show_message(sentence(str(refusal)))
             return
-        self._calibrating.begin(radii, self.start.seconds.value(), self.start.hold.value())
+        self._controller.begin(radii, self.start.seconds.value(), self.start.hold.value())
 
-    def _take_all(self) -> None:
-        if self._calibrating is not None:
-            now = self._calibrating
-            (now.pause if now.unattended else now.take_all)()
+    def _toggle_all(self) -> None:
+        if self._controller is not None:
+            now = self._controller
+            (now.pause if now.automatic else now.capture_all)()
 
     def _save(self) -> None:
-        if self._calibrating is None or self._calibrating.result is None:
+        if self._controller is None or self._controller.result is None:
             return
-        found = self._calibrating.result.report.calibration
+        found = self._controller.result.report.calibration
         name = f"{found.serial_number}-{found.date.astimezone():%Y%m%d}.calibration.toml"
         path, _ = QFileDialog.getSaveFileName(self, "Save the calibration", name, FILES)
         if path:
-            self._calibrating.save(Path(path))
+            self._controller.save(Path(path))
 
     def _show(self) -> None:
-        now = self._calibrating
+        now = self._controller
         if now is None:
             return
-        phase = self.steps if now.procedure else self.outcome if now.result else self.start
+        phase = self.steps if now.procedure else self.result_page if now.result else self.start
         if now.procedure:
             self.steps.show_step(now, now.procedure, now.step)
         elif now.result:
-            self.outcome.show_result(now.result)
+            self.result_page.show_result(now.result)
         self.show_message(sentence(now.message or now.done), hint=not now.message)
         if phase is not self._phase:
             self._phase = phase
             self._show_page()
             if self.isVisible():
-                self._firstbutton().setFocus()
+                self._first_button().setFocus()
 
-    def _firstbutton(self) -> QPushButton:
+    def _first_button(self) -> QPushButton:
         return {
             self.start: self.start.begin,
-            self.steps: self.steps.take,
-            self.outcome: self.outcome.use,
+            self.steps: self.steps.capture,
+            self.result_page: self.result_page.use,
         }[self._phase]
 
     def _show_page(self) -> None:
-        for page in (self.start, self.steps, self.outcome):
+        for page in (self.start, self.steps, self.result_page):
             page.setVisible(page is self._phase)

@@ -1,4 +1,4 @@
-"""Pictures of a calibration: the skin on its cylinder, a channel's loop, who passed."""
+"""Drawings of a calibration: skin on its cylinder, hysteresis loop, and map of results."""
 
 import math
 from dataclasses import dataclass
@@ -25,16 +25,16 @@ from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
 from kappaskin_app.theme import current
 
-_POINTS = 61  # of the skin's line
+_POINTS = 61  # of the skin's cross-section
 _MOST_WRAPPED = math.pi  # rad: the rest of a long skin hangs down straight
-_CYLINDER_HIGH = 102  # px of the drawings without the words above and below them
+_CYLINDER_HIGH = 102  # px of the drawings without their captions
 _LONGEST = "outer face down"
 _THICK = 5.0  # px, of each face
 _BENDS = {"x": (1.0, 0.0), "y": (0.0, 1.0), "diagonal": (math.sqrt(0.5), math.sqrt(0.5))}
 
 
 class CylinderView(QWidget):
-    """Draws where the skin of a patch is to lie; the radius is to the scale of the skin."""
+    """Drawing of the skin on a cylinder, from the side to scale and from above."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -42,8 +42,8 @@ class CylinderView(QWidget):
         self._patch = Patch(0.1, 0.1)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setToolTip(
-            "Left: the skin on its cylinder, seen along the axis and to scale; the thick line is "
-            "the outer face, which objects touch. Right: from above, with the axis dashed."
+            "Left: the skin on its cylinder along the axis, to scale; the thick line is the outer "
+            "face. Right: from above, with the axis dashed."
         )
 
     def sizeHint(self) -> QSize:
@@ -137,7 +137,7 @@ class CylinderView(QWidget):
     def _paint_axis(
         self, painter: QPainter, skin: QRectF, dx: float, dy: float, radius: float
     ) -> None:
-        """The cylinder below the skin, and its axis, across the direction of bending."""
+        """Draw the cylinder below the skin and its axis."""
         painter.save()
         painter.setClipRect(skin)
         painter.translate(skin.center())
@@ -154,7 +154,7 @@ class CylinderView(QWidget):
 
 
 def _draped(length: float, radius: float) -> list[tuple[QPointF, QPointF]]:
-    """Points of a line of `length` over a circle below the origin, with the normals there, up."""
+    """Points and upward normals of a line of `length` draped over a circle below the origin."""
     wrapped = min(length / 2, _MOST_WRAPPED / 2 * radius)
     found: list[tuple[QPointF, QPointF]] = []
     for k in range(_POINTS):
@@ -181,7 +181,7 @@ def _shifted(line: list[tuple[QPointF, QPointF]], to: QPointF, down: float) -> Q
 
 
 def _paint_arrow(painter: QPainter, skin: QRectF, dx: float, dy: float, colour: QColor) -> None:
-    """An arrow with two heads through the middle, along the direction of bending."""
+    """Draw a double arrow along the direction of bending."""
     half = 0.34 * min(skin.width() / max(abs(dx), 1e-9), skin.height() / max(abs(dy), 1e-9))
     along, across, middle = QPointF(dx, dy), QPointF(-dy, dx), skin.center()
     painter.setPen(QPen(colour, 2.5))
@@ -197,16 +197,16 @@ def _paint_arrow(painter: QPainter, skin: QRectF, dx: float, dy: float, colour: 
 Array = NDArray[np.float64]
 
 _TOP, _RIGHT = 8.0, 10.0
-_HIGH = 158  # px of the plot without the words below it
-_APART = 6.0  # px between two numbers
-_AXES = "read (up) on applied, 1/m"
+_HIGH = 158  # px of the plot without its captions
+_NUMBER_GAP = 6.0  # px between two numbers
+_AXES = "reading (y) against applied (x), 1/m"
 
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """Readings (n,) on curvatures `applied` (n,), both in 1/m, in the order they were taken.
+    """Readings `read` (n,) at curvatures `applied` (n,), both in 1/m, in order of capture.
 
-    `back` (n,) tells the way to larger radii; a new round begins where `begins` (n,) says so.
+    `back` (n,) is true at rising radii; a new cycle begins where `begins` (n,) is true.
     """
 
     applied: Array
@@ -218,7 +218,7 @@ class Loop:
 
 
 class LoopPlot(QWidget):
-    """Draws a `Loop`: filled points on the way there, open ones on the way back."""
+    """Plot of a `Loop`: filled points at falling radii, open ones at rising radii."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -226,8 +226,8 @@ class LoopPlot(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setToolTip(
             "Nominal curvature as Eq. 8 reads it, 4 V / (V_in GF (t_s + t_g) G), over that of the "
-            "cylinder. Dashed: the line of the calibration. Filled points: to smaller radii; "
-            "open ones: back. What lies between the two ways is hysteresis."
+            "cylinder. Dashed: line of the calibration. Filled points: falling radius; open "
+            "points: rising radius. Their difference is hysteresis."
         )
 
     def sizeHint(self) -> QSize:
@@ -283,7 +283,7 @@ class LoopPlot(QWidget):
             painter.drawEllipse(points[k], 2.6, 2.6)
 
     def _area(self, widest: float) -> QRectF:
-        """Where the loop is drawn, beside numbers that are so many px wide."""
+        """Area of the plot, with numbers of `widest` px on its left."""
         below = 2 * self.fontMetrics().height() + 2
         return QRectF(self.rect()).adjusted(widest + 6, _TOP, -_RIGHT, -below)
 
@@ -295,8 +295,8 @@ class LoopPlot(QWidget):
         painter.setPen(QPen(QColor(theme.line), 1))
         painter.drawRect(area)
         step = _round(most) / most / 2
-        # Every so many of them, so that no two lie over each other.
-        beside = math.ceil((widest + _APART) / (step * area.width()))
+        # Skip numbers that would overlap.
+        beside = math.ceil((widest + _NUMBER_GAP) / (step * area.width()))
         above = math.ceil(line / (step * area.height()))
         for number, (value, words) in enumerate(ticks.items(), -(len(ticks) // 2)):
             x = area.center().x() + value / most * area.width() / 2
@@ -316,23 +316,23 @@ class LoopPlot(QWidget):
 
 
 def _ticks(most: float) -> dict[float, str]:
-    """Round values on both sides of zero up to `most`, and how they are written."""
+    """Round values from -`most` to `most`, and their texts."""
     step = _round(most)
     values = (np.arange(-math.floor(most / step), math.floor(most / step) + 1) * step).tolist()
     return {value: f"{value:g}".replace("-", "\N{MINUS SIGN}") for value in values}
 
 
 def _round(most: float) -> float:
-    """A distance of ticks that gives two to four on each side."""
+    """Distance of ticks with two to four on each side of zero."""
     power = 10.0 ** math.floor(math.log10(most / 2))
     return next(m * power for m in (5.0, 2.0, 1.0) if m * power <= most / 2)
 
 
 _MAP_HIGH = 91  # px of each map
-_WIDEST = "xx: 100 pass"  # of the titles, more or less
+_WIDEST = "xx: 100 pass"  # typical title
 _GAP = 8
-_TIP = "Which channels passed. Click one, or use the arrow keys, to see its readings below."
-_SHARE = 0.86  # of the distance between elements that a square fills
+_TIP = "Results of the channels. Click one, or use the arrow keys, to plot its readings below."
+_SHARE = 0.86  # side of a square, of the distance between elements
 _WAYS = {
     Qt.Key.Key_Left: (-1.0, 0.0),
     Qt.Key.Key_Right: (1.0, 0.0),
@@ -342,7 +342,7 @@ _WAYS = {
 
 
 class PassMap(QWidget):
-    """Three small maps, xx, yy and xy; `chosen` tells of channel component * P + element."""
+    """Maps of the results of xx, yy and xy; `chosen` emits the channel component * P + element."""
 
     chosen = Signal(int)
 
@@ -366,7 +366,7 @@ class PassMap(QWidget):
     def show_channels(
         self, layout: SensorLayout, failures: dict[int, str], tips: list[str]
     ) -> None:
-        """Show which channels failed, and `tips` in words for each of all."""
+        """Show the failed channels, and `tips` for every channel."""
         self._layout, self._failures, self._tips = layout, failures, tips
         self._spacing = _spacing(layout)
         self.update()
@@ -377,11 +377,11 @@ class PassMap(QWidget):
 
     @property
     def _title(self) -> int:
-        """The px above each map."""
+        """Height in px of the title above each map."""
         return self.fontMetrics().height() + 2
 
     def _squares(self, component: int) -> list[QRectF]:
-        """Where each element is drawn in the map of a component."""
+        """Squares of the elements in the map of a component."""
         layout = self._layout
         if layout is None:
             return []
@@ -418,7 +418,7 @@ class PassMap(QWidget):
             painter.drawRect(self._squares(component)[element].adjusted(-1, -1, 1, 1))
 
     def _paint_channel(self, painter: QPainter, square: QRectF, channel: int) -> None:
-        """A full square where it passed, a crossed one where not: not told by colour alone."""
+        """Draw a plain square if passed, a crossed one if failed, for the colour-blind too."""
         theme = current()
         if channel not in self._failures:
             painter.fillRect(square, QColor(theme.good))
@@ -448,7 +448,7 @@ class PassMap(QWidget):
         self.chosen.emit(self._next(*way))
 
     def _next(self, dx: float, dy: float) -> int:
-        """The nearest element that way, or the same in the next map where there is none."""
+        """The nearest element in a direction, else the same one in the next map."""
         layout = self._layout
         if layout is None:
             return self._channel
@@ -473,10 +473,10 @@ class PassMap(QWidget):
 
 
 def _spacing(layout: SensorLayout) -> float:
-    """What separates the two nearest elements, in m, along x or y."""
+    """Smallest distance of two elements along x or y, in m."""
     positions = layout.positions
     if len(positions) < 2:
         return 0.3 * min(layout.patch.a, layout.patch.b)
-    apart = np.max(np.abs(positions[:, None] - positions[None]), axis=-1)
-    np.fill_diagonal(apart, np.inf)
-    return max(float(apart.min()), 0.02 * layout.patch.a)
+    distance = np.max(np.abs(positions[:, None] - positions[None]), axis=-1)
+    np.fill_diagonal(distance, np.inf)
+    return max(float(distance.min()), 0.02 * layout.patch.a)

@@ -1,4 +1,4 @@
-"""Tare: taken, undone and found again; and its panel."""
+"""Tare: controller and panel."""
 
 import math
 from datetime import datetime
@@ -18,16 +18,16 @@ from kappaskin_app.shell.settings import Settings
 from kappaskin_app.widgets.parts import button, in_a_row, sentence, text_label
 
 
-class Taring(QObject):
-    """Has the engine take tares, and makes what comes of it a setting that may be undone.
+class TareController(QObject):
+    """Controller of tares, each an undoable setting.
 
-    `message` says why the last was refused, or what could not be kept; `stored` is the tare that
-    was found where this sensor was connected. `told` brings what was done without being asked for,
-    `changed` tells of anything new.
+    `message` is the reason why the last was refused or could not be stored; `stored` the tare that
+    was found for this sensor when it was connected. `reported` emits what was done automatically,
+    `changed` reports any change.
     """
 
     changed = Signal()
-    told = Signal(str)
+    reported = Signal(str)
 
     def __init__(
         self, history: History, engine: Engine, tares: TareStore, parent: QObject | None = None
@@ -35,12 +35,12 @@ class Taring(QObject):
         super().__init__(parent)
         self._history, self._engine, self._tares = history, engine, tares
         self._status = Status()
-        self._connections, self._aside = 0, False
-        self._before: Tare | None = None  # what was in use when the last was taken
+        self._connections, self._calibrating = 0, False
+        self._before: Tare | None = None  # in use before the last one
         self._last = history.settings.tare
         self.stored: Tare | None = None
         self.message = ""
-        history.changed.connect(self._keep)
+        history.changed.connect(self._store)
 
     @property
     def taking(self) -> bool:
@@ -48,65 +48,65 @@ class Taring(QObject):
 
     @property
     def why_not(self) -> str:
-        """Why no tare can be taken now, or nothing."""
+        """Reason why no tare can be taken now, or empty."""
         if self._status.sensor is None or self._status.state != "streaming":
-            return "Nothing streams: connect a sensor to tare it."
-        if self._aside:
-            return "Not while calibrating: readings come as they are."
+            return "No readings: connect a sensor to tare it."
+        if self._calibrating:
+            return "Not during a calibration, which uses readings without a tare."
         return "A tare is being taken." if self.taking else ""
 
     @property
     def _recorded(self) -> bool:
-        """Whether a recording is read, or is to be: what is in use with it is no sensor's now."""
+        """Whether the source is a recording, whose tare is not that of a connected sensor."""
         return (self._engine.source or "").startswith(RECORDED)
 
     # Requests of the user.
 
     def tare(self) -> None:
-        """Take what is read now as the zero, unless the skin is loaded or moves."""
+        """Set the present readings as zero, unless the skin is loaded or moves."""
         if not self.why_not:
             self.message = ""
             self._engine.tare()
             self.changed.emit()
 
     def undo(self) -> None:
-        """Go back to the tare before, or to none."""
+        """Return to the previous tare, or to none."""
         self.message = ""
         before = self._before if self._before != self._history.settings.tare else None
         self._history.change("Undo the tare", tare=before)
         self.changed.emit()
 
-    # News.
+    # Input.
 
     def follow(self, status: Status) -> None:
-        """Take note of how the engine is doing."""
+        """Store the status of the engine, and use a tare that it has taken."""
         was, self._status = self._status, status
         if status.sensor is not None and status.connections != self._connections:
             self._connections = status.connections
-            self._find(status.sensor)
-        news = status.tare
-        if news != was.tare:
-            self.message = news.refusal
-            if news.tare is not None and news.ended != was.tare.ended:
+            self._load_stored(status.sensor)
+        state = status.tare
+        if state != was.tare:
+            self.message = state.refusal
+            if state.tare is not None and state.ended != was.tare.ended:
                 self._before = self._history.settings.tare
-                self._history.change("Tare", tare=news.tare)
+                self._history.change("Tare", tare=state.tare)
             self.changed.emit()
         elif (status.state, status.sensor) != (was.state, was.sensor):
             if status.state != "streaming":
-                self.message = ""  # of a skin that is not there any more
+                self.message = ""  # of a disconnected sensor
             self.changed.emit()
 
-    def stand_aside(self, aside: bool) -> None:
-        """Take none while a calibration does without, or again."""
-        if aside != self._aside:
-            self._aside = aside
+    def set_calibrating(self, aside: bool) -> None:
+        """Refuse tares during a calibration."""
+        if aside != self._calibrating:
+            self._calibrating = aside
             self.changed.emit()
 
-    def _find(self, sensor: Sensor) -> None:
-        """Use the tare that is kept of a sensor just connected, and say so."""
+    def _load_stored(self, sensor: Sensor) -> None:
+        """Use the stored tare of a sensor just connected, and report it."""
         self.message, self.stored, self._before = "", None, None
         if sensor.simulated or self._recorded:
-            return  # one begins anew each time, the other has the tare that it had
+            return  # a simulation starts without, a recording has its own
         try:
             found = self._tares.load(sensor.serial_number).fit_for(sensor)
         except Refusal as refusal:
@@ -117,11 +117,11 @@ class Taring(QObject):
             self.stored = self._last = found
             if found != self._history.settings.tare:
                 self._history.change("Use the stored tare", tare=found)
-            self.told.emit(f"In use: the stored tare of {when(found)}")
+            self.reported.emit(f"In use: the stored tare of {when(found)}")
         self.changed.emit()
 
-    def _keep(self, settings: Settings) -> None:
-        """Remember which tare of the sensor connected is in use, for the next time."""
+    def _store(self, settings: Settings) -> None:
+        """Store the tare in use for the next connection of this sensor."""
         tare, sensor = settings.tare, self._status.sensor
         if tare == self._last:
             return
@@ -135,7 +135,7 @@ class Taring(QObject):
 
 
 def is_of(tare: Tare | None, sensor: Sensor) -> bool:
-    """Whether there is a tare, and it is one of this sensor."""
+    """Whether there is a tare, and it belongs to this sensor."""
     if tare is None:
         return False
     try:
@@ -146,13 +146,13 @@ def is_of(tare: Tare | None, sensor: Sensor) -> bool:
 
 
 def when(tare: Tare) -> str:
-    """When a tare was taken, and how long ago that is."""
+    """Date of a tare, and its age."""
     now = datetime.now().astimezone()
     return f"{tare.date.astimezone():%Y-%m-%d %H:%M} ({ago((now - tare.date).total_seconds())})"
 
 
 def ago(seconds: float) -> str:
-    """A time that passed in one number."""
+    """An age in one number."""
     if seconds < 0:
         return "in the future: is this machine's clock right?"
     for length, unit in ((86400, "days"), (3600, "hours"), (60, "minutes")):
@@ -162,19 +162,19 @@ def ago(seconds: float) -> str:
 
 
 _DEGREES = "\N{DEGREE SIGN}C"
-_TAKE = "What is read now is zero from now on (Ctrl+0). Refused while the skin is loaded or moves."
+_TAKE = "Set the present readings as zero (Ctrl+0). Refused while the skin is loaded or moves."
 _DRIFT = (
-    "How far the readings of the unloaded skin have wandered since the tare: their root mean "
-    "square, and the largest displacement that it looks like. It is shown, never taken off."
+    "RMS change of the unloaded readings since the tare, and the largest displacement that it "
+    "equals. Shown, never subtracted."
 )
 
 
 class TarePanel(Panel):
-    """Says which tare is in use and how it does."""
+    """The tare in use and its drift."""
 
     purpose = (
-        "Takes the mean of what every element reads now for its zero: \u03ba = reading \u2212 "
-        "zero. The skin must be at rest and free, or a contact that is held would vanish."
+        "Sets the present mean reading of every element as its zero: \u03ba = reading \u2212 "
+        "zero. The skin must be at rest and unloaded, or a held contact would vanish."
     )
     guide_page = "connect"
 
@@ -184,82 +184,82 @@ class TarePanel(Panel):
         self.drift = text_label(tip=_DRIFT)
         self.take = button("Tare now", "tare-now", _TAKE)
         self.undo = button(
-            "Undo tare", "undo-tare", "Use the tare before, or none (Ctrl+Z takes it back)."
+            "Undo tare", "undo-tare", "Return to the previous tare, or to none (Ctrl+Z undoes)."
         )
         self.body.addLayout(in_a_row(self.take, self.undo))
         self.body.addWidget(self.what)
         self.body.addWidget(self.drift)
-        self._taring: Taring | None = None
+        self._tare_controller: TareController | None = None
         self._tare: Tare | None = None
         self._status = Status()
-        self._tell()
+        self._show()
 
-    def attend(self, taring: Taring) -> None:
-        """Show how `taring` goes, and pass on what the user requests."""
-        self._taring = taring
-        self.take.clicked.connect(guarded(lambda *_: taring.tare()))
-        self.undo.clicked.connect(guarded(lambda *_: taring.undo()))
-        taring.changed.connect(guarded(self._tell))
+    def connect_to(self, tare_controller: TareController) -> None:
+        """Show the state of `tare_controller`, and pass the user's requests to it."""
+        self._tare_controller = tare_controller
+        self.take.clicked.connect(guarded(lambda *_: tare_controller.tare()))
+        self.undo.clicked.connect(guarded(lambda *_: tare_controller.undo()))
+        tare_controller.changed.connect(guarded(self._show))
 
     def show_settings(self, settings: Settings) -> None:
         self._tare = settings.tare
         self.undo.setEnabled(self._tare is not None)
-        self._tell()
+        self._show()
 
     def show_status(self, status: Status, simulating: bool) -> None:
         self._status = status
-        self._tell()
+        self._show()
 
-    def _tell(self) -> None:
-        taring, status, tare = self._taring, self._status, self._tare
-        for label, text in ((self.what, self._words()), (self.drift, drift_words(status))):
+    def _show(self) -> None:
+        tare_controller, status, tare = self._tare_controller, self._status, self._tare
+        for label, text in ((self.what, self._description()), (self.drift, drift_text(status))):
             if text != label.text():
                 label.setText(text)
             label.setVisible(bool(text))
-        why_not = taring.why_not if taring else ""
-        self.take.setEnabled(taring is not None and not why_not)
+        why_not = tare_controller.why_not if tare_controller else ""
+        self.take.setEnabled(tare_controller is not None and not why_not)
         self.take.setText("Taring\N{HORIZONTAL ELLIPSIS}" if status.tare.taking else "Tare now")
         self.take.setToolTip(why_not or _TAKE)
-        alarm = (taring.message if taring else "") or unfit(tare, status)
+        alarm = (tare_controller.message if tare_controller else "") or unfit(tare, status)
         hint = "" if status.tare.taking else why_not
         self.show_message(sentence(alarm or hint), hint=not alarm)
 
-    def _words(self) -> str:
-        """Which tare is in use, in words."""
+    def _description(self) -> str:
+        """Text of the tare in use."""
         tare = self._tare
         if tare is None:
             return "Not tared."
-        stored = self._taring is not None and tare == self._taring.stored
-        return f"{'Stored: taken' if stored else 'Taken'} {when(tare)}" + warmth(
+        stored = self._tare_controller is not None and tare == self._tare_controller.stored
+        return f"{'Stored: taken' if stored else 'Taken'} {when(tare)}" + temperature_text(
             tare.temperature, self._status.temperature
         )
 
 
-def warmth(then: float | None, now: float) -> str:
-    """At which temperature a tare was taken, and which it is now, where that is known."""
+def temperature_text(then: float | None, now: float) -> str:
+    """Text of the temperatures at the tare and now, where known."""
     if then is None:
         return ""
-    beside = f", now {now:.1f} {_DEGREES}" if math.isfinite(now) else ""
-    return f",\nat {then:.1f} {_DEGREES}{beside}"
+    present = f", now {now:.1f} {_DEGREES}" if math.isfinite(now) else ""
+    return f",\nat {then:.1f} {_DEGREES}{present}"
 
 
-def drift_words(status: Status) -> str:
-    """How far the tare in use has wandered, in words; nothing without one."""
+def drift_text(status: Status) -> str:
+    """Text of the drift since the tare in use; empty without one."""
     drift = status.drift
     if drift is None:
         return ""
     if not math.isfinite(drift.curvature):
         wait = "the skin is loaded" if drift.loaded else "wait two seconds"
-        return f"Drift since: not known yet, {wait}"
+        return f"Drift since: unknown, {wait}"
     then = ", before the load" if drift.loaded else ""
     return (
-        f"Drift since: {drift.curvature:.3f} 1/m (RMS), as if moved by "
+        f"Drift since: {drift.curvature:.3f} 1/m (RMS), equal to a displacement of "
         f"{1e3 * drift.displacement:.3f} mm{then}"
     )
 
 
 def unfit(tare: Tare | None, status: Status) -> str:
-    """Why a tare is not in use with the sensor that is connected, or nothing."""
+    """Reason why a tare is not in use with the connected sensor, or empty."""
     if tare is None or status.sensor is None:
         return ""
     try:

@@ -1,4 +1,4 @@
-"""The connection panel: where the readings come from, and the ports there are."""
+"""Connection panel: selection of the source, and search for serial ports."""
 
 import time
 
@@ -25,30 +25,30 @@ from kappaskin_app.shell.panel import Panel
 from kappaskin_app.widgets.parts import said
 from kappaskin_app.widgets.text import COMMAND, day
 
-_EVERY = 1000  # ms between two looks
+_PERIOD = 1000  # ms between two searches
 
 
-class Plugs(QObject):
-    """Looks for ports each second while `watched` can be seen and used; `found` brings them."""
+class PortSearch(QObject):
+    """Searches for serial ports each second while `combo` is visible; emits them as `found`."""
 
     found = Signal(list)
 
-    def __init__(self, watched: QWidget, tasks: Tasks, parent: QObject | None = None) -> None:
+    def __init__(self, combo: QWidget, tasks: Tasks, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._watched = watched
-        self._looking = BackgroundTask(tasks, "", self.found.emit)  # some systems take a second
-        self._timer = QTimer(self, interval=_EVERY)  # pyright: ignore[reportCallIssue]
-        self._timer.timeout.connect(guarded(self._look_if_seen))
+        self._combo = combo
+        self._search = BackgroundTask(tasks, "", self.found.emit)  # some systems take a second
+        self._timer = QTimer(self, interval=_PERIOD)  # pyright: ignore[reportCallIssue]
+        self._timer.timeout.connect(guarded(self._refresh_if_visible))
         self._timer.start()
 
-    def _look_if_seen(self) -> None:
-        if self._watched.isVisible() and QApplication.activeWindow() is not None:
-            self.look()
+    def _refresh_if_visible(self) -> None:
+        if self._combo.isVisible() and QApplication.activeWindow() is not None:
+            self.refresh()
 
-    def look(self) -> None:
-        """Look now, unless that is being done."""
-        if not self._looking.running:
-            self._looking.run(Port.found)
+    def refresh(self) -> None:
+        """Search now, unless a search is running."""
+        if not self._search.running:
+            self._search.run(Port.found)
 
 
 _SIMULATED = ("sim:", "Simulated skin")
@@ -56,60 +56,60 @@ _TIP = (
     "The simulated skin, a serial port found on this machine, or a port or URL typed here, such as "
     "/dev/ttyACM0, COM3 or socket://host:port."
 )
-_LONGEST, _TAIL = 56, 18  # characters of a port in the list, and of these at the end
+_LONGEST, _TAIL = 56, 18  # characters of a port in the list, and how many of them from its end
 _MARGIN = 16  # px
-_LOSSES = 1.0  # s between two looks at what was lost
+_LOSSES_PERIOD = 1.0  # s between two updates of the losses
 
 
 class ConnectionPanel(Panel):
-    """Asks for a source: the simulation, a serial port found, or a typed port or URL."""
+    """Selection of a source: the simulation, a serial port found, or a typed port or URL."""
 
     purpose = (
-        "Where readings come from: the simulated skin, a serial port, any address that pyserial "
-        "opens, or a recording. A line that breaks is taken up again by itself; what was missed "
-        "meanwhile is counted."
+        "The source of readings: the simulated skin, a serial port, any URL that pyserial opens, "
+        "or a recording. A lost connection is reopened automatically, and lost messages are "
+        "counted."
     )
     guide_page = "connect"
 
-    connect_wanted = Signal(str)
-    disconnect_wanted = Signal()
-    ports_wanted = Signal()
+    connect_requested = Signal(str)
+    disconnect_requested = Signal()
+    refresh_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Connection", parent)
         self._ports: list[Port] = []
-        self._plug: Port | None = None  # what was chosen, be it there or not
+        self._selected: Port | None = None  # the selected port, listed or not
         self._next_losses = 0.0
         self.sources = QComboBox(editable=True, insertPolicy=QComboBox.InsertPolicy.NoInsert)  # pyright: ignore[reportCallIssue]
         self.sources.setObjectName("source")
         self.sources.setAccessibleName("Source of readings")
         self.sources.setMinimumContentsLength(12)
-        self.sources.currentTextChanged.connect(self._note_choice)
-        # A port's name is at its beginning.
+        self.sources.currentTextChanged.connect(self._note_selection)
+        # Show the beginning, where the port's name is.
         self.sources.currentIndexChanged.connect(lambda: self._line.setCursorPosition(0))
-        self.look_button = QPushButton("Look again")
-        self.look_button.setToolTip("Look for serial ports again.")
+        self.refresh_button = QPushButton("Refresh")
+        self.refresh_button.setToolTip("Search for serial ports again.")
         self.connect_button = QPushButton("Connect")
         self.connect_button.setObjectName("connect")
-        self.connect_button.setToolTip("Take readings from the source above (Ctrl+Return).")
+        self.connect_button.setToolTip("Connect the source above (Ctrl+Return).")
         self.disconnect_button = QPushButton("Disconnect")
         self.disconnect_button.setObjectName("disconnect")
-        self.disconnect_button.setToolTip("Take no more readings (Ctrl+D).")
+        self.disconnect_button.setToolTip("Close the source (Ctrl+D).")
         self.device, self.losses = QLabel(wordWrap=True), QLabel(wordWrap=True)  # pyright: ignore[reportCallIssue]
-        self.losses.setToolTip("What was lost on the line since it was connected.")
+        self.losses.setToolTip("Messages lost and bytes discarded since the source was connected.")
         self.copy_button = QPushButton("Copy the command")
-        self.copy_button.setToolTip("Copy what the message above says to type into a terminal.")
+        self.copy_button.setToolTip("Copy the command in the message above, for a terminal.")
         self.copy_button.clicked.connect(self._copy)
-        self.connect_button.clicked.connect(lambda: self.connect_wanted.emit(self.source()))
+        self.connect_button.clicked.connect(lambda: self.connect_requested.emit(self.source()))
         self._line = QLineEdit()
         self._line.returnPressed.connect(self.connect_button.click)
         self.sources.setLineEdit(self._line)
         # A completer would turn a typed ttyACM1 into a listed ttyACM10.
         self.sources.setCompleter(None)  # pyright: ignore[reportArgumentType]
-        self.disconnect_button.clicked.connect(self.disconnect_wanted)
-        self.look_button.clicked.connect(self.ports_wanted)
+        self.disconnect_button.clicked.connect(self.disconnect_requested)
+        self.refresh_button.clicked.connect(self.refresh_requested)
         buttons = QHBoxLayout()
-        for button in (self.connect_button, self.disconnect_button, self.look_button):
+        for button in (self.connect_button, self.disconnect_button, self.refresh_button):
             buttons.addWidget(button)
         self.body.addWidget(self.sources)
         self.body.addLayout(buttons)
@@ -120,42 +120,43 @@ class ConnectionPanel(Panel):
         self._list()
 
     def source(self) -> str:
-        """The name of the source chosen or typed."""
+        """The name of the source that is selected or typed."""
         text = self.sources.currentText().strip()
         index = self.sources.findText(text)
         return str(self.sources.itemData(index)) if index >= 0 else text
 
-    def _note_choice(self) -> None:
-        """Remember the plug chosen, to know it again under another name."""
+    def _note_selection(self) -> None:
+        """Store the selected port, to recognise its device under another name."""
         chosen = self.source()
         known = (port for port in self._ports if port.port == chosen)
-        gone = self._plug if self._plug and self._plug.port == chosen else None
-        self._plug = next(known, gone)
-        words = _SIMULATED[1] if chosen == _SIMULATED[0] else self._plug and _words(self._plug)
+        absent = self._selected if self._selected and self._selected.port == chosen else None
+        self._selected = next(known, absent)
+        listed = self._selected and _port_text(self._selected)
+        words = _SIMULATED[1] if chosen == _SIMULATED[0] else listed
         self.sources.setToolTip(f"{words or chosen}\n\n{_TIP}")
 
     def show_ports(self, ports: list[Port]) -> None:
-        """Offer these beside the simulation; the choice stays, by plug if its name is another."""
+        """List these and the simulation; the selected device stays selected under a new name."""
         if ports == self._ports or self.sources.view().isVisible():
-            return  # one who chooses is left alone until the next look
-        chosen, plug, self._ports = self.source(), self._plug, ports
-        if plug is not None and chosen == plug.port:
-            chosen = next((port.port for port in ports if port.same_plug(plug)), chosen)
+            return  # an open list is not changed under the mouse
+        chosen, selected, self._ports = self.source(), self._selected, ports
+        if selected is not None and chosen == selected.port:
+            chosen = next((port.port for port in ports if port.same_plug(selected)), chosen)
         line = self._line
         at, text = line.cursorPosition(), line.text()
         self._list()
         self.show_source(chosen)
         if line.text() == text:
-            line.setCursorPosition(at)  # where someone types
+            line.setCursorPosition(at)  # where the user types
 
     def _list(self) -> None:
         with QSignalBlocker(self.sources):
             self.sources.clear()
             self.sources.addItem(_SIMULATED[1], _SIMULATED[0])
             for place, port in enumerate(self._ports, 1):
-                self.sources.addItem(_short(_words(port)), port.port)
-                self.sources.setItemData(place, _words(port), Qt.ItemDataRole.ToolTipRole)
-        # Wider than the panel, or the list would cut off what tells two of a kind apart.
+                self.sources.addItem(_abbreviated(_port_text(port)), port.port)
+                self.sources.setItemData(place, _port_text(port), Qt.ItemDataRole.ToolTipRole)
+        # Wider than the panel, or the list would cut off the serial numbers of two of a kind.
         self.sources.view().setMinimumWidth(self.sources.view().sizeHintForColumn(0) + _MARGIN)
 
     def show_source(self, source: str) -> None:
@@ -166,14 +167,14 @@ class ConnectionPanel(Panel):
             else:
                 self.sources.setCurrentText(source)
         self._line.setCursorPosition(0)
-        self._note_choice()
+        self._note_selection()
 
     def show_status(self, status: Status, simulating: bool) -> None:
         text = ""
         if status.sensor is not None and status.state == "streaming":
-            text = _said(status.sensor, status.setup.calibration) + _recorded(status)
+            text = _sensor_text(status.sensor, status.setup.calibration) + _recording_text(status)
         elif status.state == "waiting":
-            text = "Waiting for the device to say what it is\N{HORIZONTAL ELLIPSIS}"
+            text = "Waiting for the device's description\N{HORIZONTAL ELLIPSIS}"
         if text != self.device.text():
             self.device.setText(text)
         self.device.setVisible(bool(text))
@@ -182,13 +183,13 @@ class ConnectionPanel(Panel):
         self.disconnect_button.setEnabled(status.state != "off")
 
     def _show_losses(self, status: Status) -> None:
-        """What was lost, as often as it can be read; of a simulation nothing is."""
+        """Update the losses at a legible rate; a simulation has none."""
         now, sensor = time.monotonic(), status.sensor
-        there = status.accounting.bytes_in > 0
-        if there and sensor is not None and now >= self._next_losses:
-            self._next_losses = now + _LOSSES
+        counted = status.accounting.bytes_in > 0
+        if counted and sensor is not None and now >= self._next_losses:
+            self._next_losses = now + _LOSSES_PERIOD
             self.losses.setText(f"{status.accounting.words}.")
-        self.losses.setVisible(there and sensor is not None)
+        self.losses.setVisible(counted and sensor is not None)
 
     def show_message(self, text: str, hint: bool = False) -> None:
         super().show_message(text, hint)
@@ -199,20 +200,20 @@ class ConnectionPanel(Panel):
             QGuiApplication.clipboard().setText(command[1])
 
 
-def _words(port: Port) -> str:
-    """What a port is, and whether it may be opened."""
+def _port_text(port: Port) -> str:
+    """Description of a port, and whether this user may open it."""
     return port.words if port.opened else f"{port.words}  (no permission)"
 
 
-def _short(words: str) -> str:
-    """The `words` as far as a list shows them, the end too: it tells two of a kind apart."""
+def _abbreviated(words: str) -> str:
+    """The `words` shortened in the middle: the end has the serial number."""
     if len(words) <= _LONGEST:
         return words
     return f"{words[: _LONGEST - _TAIL - 1]}\N{HORIZONTAL ELLIPSIS}{words[-_TAIL:]}"
 
 
-def _recorded(status: Status) -> str:
-    """When what is played was recorded, and how much it is."""
+def _recording_text(status: Status) -> str:
+    """Date and length of the recording that is played."""
     replay = status.replay
     if replay is None:
         return ""
@@ -220,8 +221,8 @@ def _recorded(status: Status) -> str:
     return f"\nRecorded {day(replay.begun)}, {replay.length:.1f} s{whole}"
 
 
-def _said(sensor: Sensor, calibration: Calibration | None) -> str:
-    """What a sensor is, in words."""
+def _sensor_text(sensor: Sensor, calibration: Calibration | None) -> str:
+    """Description of a sensor."""
     patch, live = sensor.layout.patch, sensor.layout.live
     sensing = live[:1] if patch.strip else live  # a strip bends along x alone
     dead = int((~sensing).sum())

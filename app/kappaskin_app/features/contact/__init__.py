@@ -1,4 +1,4 @@
-"""The contact in numbers and words: readouts, the object that touches, tables."""
+"""Contact: readouts, recognised object, and tables."""
 
 import time
 
@@ -6,19 +6,19 @@ import numpy as np
 
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
-from kappaskin_app.features.contact.naming import Naming
 from kappaskin_app.features.contact.numbers import NumbersPanel
 from kappaskin_app.features.contact.readouts import Readouts
+from kappaskin_app.features.contact.recognition import ObjectRecognition
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.window import MainWindow
 
-_OFTEN, _SELDOM = 0.25, 1.0  # s between two looks at what touches: while it is felt, and else
+_FULL_SCREEN_PERIOD, _PERIOD = 0.25, 1.0  # s between two recognitions: in full screen, and else
 _OBJECT = (
-    "What the readings say touches the skin, with 95 % interval and the second guess's "
-    "probability; and the principal curvatures of the skin at the contact."
+    "The object recognised from the readings with 95 % interval and the probability of the second "
+    "guess, and the principal curvatures of the skin at the contact."
 )
 
-_ABOUT = "What the picture shows as tables: contact, object, every element; copied as CSV"
+_TIP = "Tables of the contact, the object and every element, copied as CSV"
 
 
 class ContactFeature:
@@ -28,24 +28,24 @@ class ContactFeature:
         self._shell, self._next = shell, 0.0
         display = shell.display
         self.readouts, self.numbers = Readouts(), NumbersPanel()
-        self.naming = Naming(shell.tasks, shell)
+        self.recognition = ObjectRecognition(shell.tasks, shell)
         display.header.add(self.readouts)
-        shell.docks.put_below("numbers", "Numbers", self.numbers, "Ctrl+Shift+T", _ABOUT)
+        shell.docks.put_below("numbers", "Numbers", self.numbers, "Ctrl+Shift+T", _TIP)
         display.status_bar.object.setToolTip(_OBJECT)
         for name, parts in self.readouts.parts.items():
             display.places[f"readout-{name}"] = parts
         display.places["readouts"] = [self.readouts]
         display.numbers.connect(guarded(self._show))
         display.status_shown.connect(guarded(self._follow))
-        self.naming.named.connect(guarded(display.status_bar.object.show_text))
-        self.naming.found.connect(display.object_found)
+        self.recognition.described.connect(guarded(display.status_bar.object.show_text))
+        self.recognition.found.connect(display.object_found)
 
     def _follow(self, status: Status) -> None:
         shell, now = self._shell, time.monotonic()
         shown = shell.display.estimate_shown()
         if now >= self._next:
-            self._next = now + (_OFTEN if shell.layouts.filled else _SELDOM)
-            self.naming.look(status, shown)
+            self._next = now + (_FULL_SCREEN_PERIOD if shell.layouts.filled else _PERIOD)
+            self.recognition.start(status, shown)
         self.numbers.show_estimate(shown, status.sensor, shell.display.status_bar.object.text())
 
     def _show(self, estimate: Estimate | None) -> None:

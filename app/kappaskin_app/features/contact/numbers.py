@@ -1,4 +1,4 @@
-"""Numbers: what the skin's picture shows, as tables of text."""
+"""Tables of the contact and of every element."""
 
 import csv
 import io
@@ -26,35 +26,40 @@ from kappaskin.sensing import Sensor
 from kappaskin_app.guard import guarded
 from kappaskin_app.widgets.layout import fit_rows
 
-FACTS = ("What", "Value", "95 % within", "Unit")
+FACTS = ("Quantity", "Value", "95 % half-width", "Unit")
 _READ = tuple(quantity for quantity in REPORTED if quantity.traced)
 _HEADS = (f"{of.name.replace('_', ' ')} [{each.unit}]" for each in _READ for of in each.colours)
-ELEMENTS = ("Element", "x [mm]", "y [mm]", *_HEADS, "Left out")
+ELEMENTS = ("Element", "x [mm]", "y [mm]", *_HEADS, "Fault")
 
 Rows = list[tuple[str, ...]]
 
 
-def facts_of(estimate: Estimate, touches: str) -> Rows:
-    """The contact, what `touches` there in words, and how well the shape is known."""
+def facts_of(estimate: Estimate, object_: str) -> Rows:
+    """Rows of the contact, the `object_` in words, and the accuracy of the shape."""
     rows = [
-        (each.label, _told(each.value, each.digits), _told(each.half_width, each.digits), each.unit)
+        (
+            each.label,
+            _text(each.value, each.digits),
+            _text(each.half_width, each.digits),
+            each.unit,
+        )
         for each in readouts(estimate)
     ]
-    return [*rows, ("Touches", touches or "nothing known", "", "")]
+    return [*rows, ("Object", object_ or "unknown", "", "")]
 
 
 def elements_of(estimate: Estimate, sensor: Sensor) -> Rows:
-    """Where every element is, what it reads, and why it is left out."""
+    """Rows of every element: position, readings, and fault if it is excluded."""
     places = 1e3 * sensor.layout.positions
     if estimate.curvature.shape[1] != len(places):
-        return []  # of the skin before
+        return []  # of the previous sensor
     reported = Reported(estimate)
     read = [(each.forms[0][2](reported), each.shown[2]) for each in _READ]
     return [
         (
             str(number),
-            *(_told(value, 1) for value in place),
-            *(_told(value, digits) for values, digits in read for value in values[:, number]),
+            *(_text(value, 1) for value in place),
+            *(_text(value, digits) for values, digits in read for value in values[:, number]),
             FAULTS[estimate.suspect[number]],
         )
         for number, place in enumerate(places)
@@ -62,7 +67,7 @@ def elements_of(estimate: Estimate, sensor: Sensor) -> Rows:
 
 
 def csv_of(*tables: tuple[Sequence[str], Rows]) -> str:
-    """Tables of a head and rows each as CSV, an empty line between them."""
+    """Tables of a head and rows each as CSV, separated by empty lines."""
     text = io.StringIO()
     for number, (head, rows) in enumerate(tables):
         text.write("\n" if number else "")
@@ -70,24 +75,24 @@ def csv_of(*tables: tuple[Sequence[str], Rows]) -> str:
     return text.getvalue()
 
 
-def _told(value: float, digits: int) -> str:
-    """A number, or nothing where there is none; a program reads its minus."""
+def _text(value: float, digits: int) -> str:
+    """A number with an ASCII minus for programs; empty where there is none."""
     return f"{value + 0.0:.{digits}f}" if math.isfinite(value) else ""
 
 
 _LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 _RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-_BESIDE = 14  # px left and right of a column's head together
-_LINES = 6  # that are seen of a table at least
-_EVERY = 0.5  # s between two readings: faster cannot be read
+_MARGIN = 14  # px, margins of a column's head
+_LINES = 6  # visible of a table at least
+_PERIOD = 0.5  # s between two updates: faster is illegible
 
 
 class NumbersPanel(QWidget):
-    """Shows the contact and every element as tables, which can be copied as CSV."""
+    """Tables of the contact and of every element, with a button to copy them as CSV."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.facts = _table("contact", "Contact and what touches", FACTS)
+        self.facts = _table("contact", "Contact and object", FACTS)
         self.elements = _table("elements", "Readings of every element", ELEMENTS)
         self.copy = QPushButton("&Copy as CSV")
         self.copy.setToolTip("Copy both tables, for a spreadsheet.")
@@ -101,18 +106,18 @@ class NumbersPanel(QWidget):
         around.addWidget(self.elements, 3)
 
     def show_estimate(self, estimate: Estimate | None, sensor: Sensor | None, what: str) -> None:
-        """Show the numbers of an estimate, as often as they can be read; or none."""
+        """Update the tables at a legible rate; empty without an estimate."""
         now = time.monotonic()
         if not self.isVisible() or now < self._next:
             return
-        self._next = now + _EVERY
+        self._next = now + _PERIOD
         self._facts, self._elements = [], []
         if estimate is not None and sensor is not None:
             self._facts, self._elements = facts_of(estimate, what), elements_of(estimate, sensor)
         _fill(self.facts, self._facts)
         _fill(self.elements, self._elements)
         if self._facts:
-            self.facts.setSpan(len(self._facts) - 1, 1, 1, len(FACTS) - 1)  # words, no number
+            self.facts.setSpan(len(self._facts) - 1, 1, 1, len(FACTS) - 1)  # the text of the object
 
     def _copy(self) -> None:
         text = csv_of((FACTS, self._facts), (ELEMENTS, self._elements))
@@ -125,7 +130,7 @@ def _table(name: str, title: str, head: Sequence[str]) -> QTableWidget:
     table.setAccessibleName(title)
     table.setHorizontalHeaderLabels(list(head))
     table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-    table.setTabKeyNavigation(False)  # Tab leads on, the arrows go through the table
+    table.setTabKeyNavigation(False)  # Tab leaves the table, the arrows move in it
     table.setWordWrap(False)
     table.verticalHeader().hide()
     header = table.horizontalHeader()
@@ -135,13 +140,13 @@ def _table(name: str, title: str, head: Sequence[str]) -> QTableWidget:
 
 
 def _fill(table: QTableWidget, rows: Rows) -> None:
-    """Write rows into a table, but for what stands there."""
+    """Write the changed cells of a table."""
     table.setRowCount(len(rows))
     fit_rows(table)
     wide = table.fontMetrics().horizontalAdvance
     heads = map(table.horizontalHeaderItem, range(table.columnCount()))
     widest = max((wide(head.text()) for head in heads if head is not None), default=0)
-    table.horizontalHeader().setMinimumSectionSize(widest + _BESIDE)
+    table.horizontalHeader().setMinimumSectionSize(widest + _MARGIN)
     table.setMinimumHeight((_LINES + 1) * table.verticalHeader().defaultSectionSize())
     for row, texts in enumerate(rows):
         for column, text in enumerate(texts):

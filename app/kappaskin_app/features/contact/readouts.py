@@ -1,4 +1,4 @@
-"""The numbers in words: how live it is, where the contact is and how wrong the shape is."""
+"""Readouts: frame rate, latency, contact and accuracy as text."""
 
 import math
 
@@ -13,50 +13,50 @@ from kappaskin_app.widgets.line import Line
 from kappaskin_app.widgets.parts import with_error
 from kappaskin_app.widgets.text import NONE
 
-_FINE = 0.02  # mm of error bar, below which a hundredth is too coarse
-_TINY = 0.05  # ms of error bar, below which it would be shown as none
+_COARSE_SD = 0.02  # mm: smaller error bars need one more digit
+_NEGLIGIBLE_SD = 0.05  # ms: a smaller error bar is omitted
 
 
 FIELDS = {
-    "rate": ("Frames", "Frames that come per second, and pictures drawn of them."),
+    "rate": ("Frames", "Frames received per second, and pictures drawn of them."),
     "age": (
         "Age",
-        "How old what you see was when it was drawn: since its scan began, with the standard "
-        "deviation that the device's clock is known to by pings. At least so old, where a line "
-        "answers none: then since its bytes came.",
+        "Time from the start of a scan to its drawing, with the standard deviation of the device's "
+        "clock from pings. A device that answers no pings: time since its bytes were received, a "
+        "lower bound.",
     ),
     "lost": (
         "Lost frames",
-        "Frames that never came; skipped: too many to compute; B: bytes that made no sense.",
+        "Frames not received; skipped: received but not computed; B: bytes discarded.",
     ),
     "contact": (
         "Contact",
-        "Where one point load explains the readings best; spread: they are not of one; near rim: "
-        "too near a held edge for place and force to be trusted.",
+        "Position of the point load that fits the readings best; spread: distributed over an "
+        "area, no point load fits; near rim: too close to a held edge to be reliable.",
     ),
 }
 _WIDTHS = {"contact": 22, "rate": 15, "lost": 19, "age": 10}
-"""Characters of each, as many as it mostly has."""
+"""Usual number of characters of each."""
 _NUMBERS = [(each, each.header) for each in REPORTED if each.header is not None]
 FIELDS |= {header.key: (of.labels_shown[0], header.tip) for of, header in _NUMBERS}
 _WIDTHS |= {header.key: header.width for _, header in _NUMBERS}
 
-_DIGITS = 1.14  # as wide as a character on average, the space between two fields with it
-_SMALL = 0.85  # of a number's letters are those of its name
+_DIGITS = 1.14  # average width of a character in digits, with the space between two fields
+_SMALL = 0.85  # size of a name's letters, of those of its number
 
 
-def _told(found: Readout, sign: str) -> str:
-    """A number of the table with its error bar."""
+def _with_error(found: Readout, sign: str) -> str:
+    """A number with its error bar."""
     _, value, sd, _, unit, digits = found
     if unit == "mN" and abs(value) >= 1e3:
         return with_error(1e-3 * value, 1e-3 * sd, 3, "N", sign)
-    if unit == "mm" and sd >= _FINE:
+    if unit == "mm" and sd >= _COARSE_SD:
         digits -= 1
     return with_error(value, sd, digits, unit, sign)
 
 
 def _short(count: int) -> str:
-    """A count in few digits, so that three of them fit beside each other."""
+    """A count in few digits, so that three fit in a readout."""
     if count < 10_000:
         return str(count)
     return f"{count / 1e3:.0f} k" if count < 999_500 else f"{count / 1e6:.1f} M"
@@ -75,19 +75,16 @@ def _contact(contact: Contact) -> str:
 
 
 def _age(age: float, sd: float) -> str:
-    """An age in ms with its error bar, unless that is too small to be seen."""
+    """An age in ms with its error bar, unless that is negligible."""
     if not math.isfinite(age):
         return NONE
     if not math.isfinite(sd):
         return f"\N{GREATER-THAN OR EQUAL TO} {age:.0f} ms"
-    return f"{age:.0f} ms" if sd < _TINY else with_error(age, sd, 0 if sd >= 1 else 1, "ms")
+    return f"{age:.0f} ms" if sd < _NEGLIGIBLE_SD else with_error(age, sd, int(sd < 1), "ms")
 
 
 class Readouts(QWidget):
-    """Names above numbers, each of a fixed width so that nothing jitters.
-
-    In two rows where the letters are too large for one.
-    """
+    """Names above numbers of fixed widths, in two rows where they do not fit in one."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -108,11 +105,11 @@ class Readouts(QWidget):
             self._names.append(above)
             self._numbers[key] = below
         self._columns = 0
-        self._lay_out(len(FIELDS))
-        follow_look(self, self._shrink)
+        self._arrange(len(FIELDS))
+        follow_look(self, self._fit_names)
 
-    def _lay_out(self, columns: int) -> None:
-        """Put so many fields beside each other."""
+    def _arrange(self, columns: int) -> None:
+        """Arrange the fields in so many columns."""
         if columns == self._columns:
             return
         self._columns = columns
@@ -129,14 +126,14 @@ class Readouts(QWidget):
     def _fit(self) -> None:
         digit = self._numbers["rate"].fontMetrics().horizontalAdvance("0")
         room = self.width() >= _DIGITS * digit * sum(_WIDTHS.values())
-        self._lay_out(len(FIELDS) if room else len(FIELDS) // 2)
+        self._arrange(len(FIELDS) if room else len(FIELDS) // 2)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._fit()
 
-    def _shrink(self) -> None:
-        """Have the names in smaller letters than the numbers."""
+    def _fit_names(self) -> None:
+        """Set the names in smaller letters than the numbers."""
         font = self.font()
         font.setPixelSize(round(_SMALL * QFontInfo(font).pixelSize()))
         for label in self._names:
@@ -148,7 +145,7 @@ class Readouts(QWidget):
 
     @property
     def parts(self) -> dict[str, list[QWidget]]:
-        """Each number with what stands above it, by name."""
+        """Each number with its name above, by key."""
         return {
             key: [number, name]
             for (key, number), name in zip(self._numbers.items(), self._names, strict=True)
@@ -165,16 +162,16 @@ class Readouts(QWidget):
         discarded: int = 0,
         skipped: int = 0,
     ) -> None:
-        """Show how live the view is: `rate` in frames/s, `drawn` in pictures/s, `age` in s.
+        """Show `rate` in frames/s, `drawn` in pictures/s, and `age` in s.
 
-        `age_sd` in s is the standard deviation of the age, infinite where it is only the least;
-        the others count frames, and bytes discarded.
+        `age_sd` is its standard deviation in s, infinite where `age` is a lower bound; the others
+        count frames, and bytes discarded.
         """
         self._write("rate", f"{rate:.0f}/s, {drawn:.0f} drawn")
         self._write("age", _age(1e3 * age, 1e3 * age_sd))
         also = ((skipped, "skipped"), (discarded, "B"))
-        told = [_short(lost), *(f"{_short(count)} {what}" for count, what in also if count)]
-        self._write("lost", ", ".join(told))
+        parts = [_short(lost), *(f"{_short(count)} {what}" for count, what in also if count)]
+        self._write("lost", ", ".join(parts))
 
     def show_estimate(self, estimate: Estimate | None) -> None:
         if estimate is None:
@@ -185,7 +182,7 @@ class Readouts(QWidget):
         reported = Reported(estimate)
         for quantity, header in _NUMBERS:
             (found,) = readouts_of(quantity, reported)
-            self._write(header.key, _told(found, "+" if header.signed else ""))
+            self._write(header.key, _with_error(found, "+" if header.signed else ""))
 
     def _write(self, key: str, text: str) -> None:
         self._numbers[key].show_text(text)

@@ -1,4 +1,4 @@
-"""Which channels are not to be trusted, what leaving them out costs, and a test of their map."""
+"""Health panel: list of faulty channels, loss of accuracy, and the press test."""
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
@@ -14,23 +14,23 @@ from PySide6.QtWidgets import (
 
 from kappaskin.health import Health
 from kappaskin.live import Status
-from kappaskin_app.features.health.press import MapTesting, PressPage
+from kappaskin_app.features.health.press import ChannelMapTest, PressPage
 from kappaskin_app.guard import guarded
 from kappaskin_app.widgets.layout import fit_rows
 from kappaskin_app.widgets.parts import sentence, text_label
 
-_COLUMNS = ("Element", "Channel", "What", "Since", "Figure")
+_COLUMNS = ("Element", "Channel", "Fault", "Since", "Measured")
 _TIP = (
-    "Channels that are dead, stuck, noisy, on a rail, swapped, drifting or off. They are left out "
-    "of the shape until they agree with those around them again; a dead, stuck or swapped one "
-    "shows that only while it is moved. Choose one to see where it is."
+    "Channels that are dead, stuck, noisy, saturated, swapped, drifting or offset. They are "
+    "excluded from the estimate until they agree with their neighbours again, which for "
+    "a dead, stuck or swapped channel is detected only while it is loaded. Select one to mark it."
 )
 
 
 class HealthPanel(QWidget):
-    """The findings as a list, their cost in words, and the press-here test beside them.
+    """The faulty channels, their effect on accuracy, and the press test.
 
-    `pointed` says which element is looked at, -1 for none.
+    `pointed` emits the element of the selected row, -1 for none.
     """
 
     pointed = Signal(int)
@@ -54,7 +54,7 @@ class HealthPanel(QWidget):
     def _made_table(self) -> QTableWidget:
         table = QTableWidget(0, len(_COLUMNS))
         table.setObjectName("findings")
-        table.setAccessibleName("Channels that are found wanting")
+        table.setAccessibleName("Faulty channels")
         table.setToolTip(_TIP)
         table.setHorizontalHeaderLabels(_COLUMNS)
         table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
@@ -71,9 +71,9 @@ class HealthPanel(QWidget):
         table.itemSelectionChanged.connect(guarded(self._point))
         return table
 
-    def attend(self, testing: MapTesting) -> None:
-        """Show how `testing` goes, and pass on what the user requests."""
-        self.press.attend(testing)
+    def connect_to(self, press_test: ChannelMapTest) -> None:
+        """Show the progress of `press_test`, and pass the user's requests to it."""
+        self.press.connect_to(press_test)
 
     def show_status(self, status: Status, inside: bool) -> None:
         if self.isVisible():

@@ -1,4 +1,4 @@
-"""The press test: elements pressed one after the other to verify the channel map."""
+"""Press test: elements pressed one by one to verify the channel map."""
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QFont
@@ -13,19 +13,20 @@ from kappaskin_app.shell.session import Session
 from kappaskin_app.theme import FAINT
 from kappaskin_app.widgets.parts import button, sentence, text_label
 
-_ENDED = "The test ended: the line was lost, or another skin answered. Begin anew."
+_ENDED = "The test ended: connection lost, or another sensor connected. Start again."
 
 
-class MapTesting(QObject):
-    """A press-here test: `test` while one is done or was, with its `verdict` once it is over.
+class ChannelMapTest(QObject):
+    """A press test of the channel map.
 
-    `changed` tells of anything new, `asked` which element is to be pressed now, -1 for none, and
-    `begun` that one begins; `message` says why there is none.
+    `test` is the current or last one, None without; `verdict` its result once it is over, and
+    `message` the reason why none runs. `changed` reports any change, `target_changed` the element
+    to be pressed now (-1 for none), and `started` the start of a test.
     """
 
     changed = Signal()
-    asked = Signal(int)
-    begun = Signal()
+    target_changed = Signal(int)
+    started = Signal()
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -40,102 +41,102 @@ class MapTesting(QObject):
         return self.test is not None and self.verdict is None
 
     def begin(self, quick: bool) -> None:
-        """Ask for all elements, or where `quick` for a few that tell of a grid's lines."""
+        """Start a test of all elements, or where `quick` of two in each row and column."""
         try:
             sensor = self._status.sensor
             if sensor is None or self._status.state != "streaming":
-                raise Refusal("no sensor is connected; connect one, then begin")
+                raise Refusal("no sensor is connected; connect one, then start")
             self.test = PressTest(sensor, PressTest.choose_elements(sensor.layout, quick))
         except Refusal as refusal:
-            self._tell(str(refusal))
+            self._update(str(refusal))
             return
         self.verdict, self._connection = None, self._status.connections
-        self.begun.emit()
-        self._tell("")
+        self.started.emit()
+        self._update("")
 
     def skip(self) -> None:
         if self.running and self.test is not None:
             self.test.skip()
-            self._tell("")
+            self._update("")
 
     def nothing_came(self) -> None:
         if self.running and self.test is not None:
             self.test.nothing_came()
-            self._tell("")
+            self._update("")
 
     def back(self) -> None:
         self.verdict = None
-        self.follow(self._status)  # who read the verdict may have another skin by now
+        self.follow(self._status)  # another sensor may be connected by now
         if self.test is not None:
             self.test.back()
-            self._tell("")
+            self._update("")
 
     def stop(self, why: str = "") -> None:
-        """End the test and forget what was pressed."""
+        """End the test and discard its results."""
         self.test = self.verdict = None
-        self._tell(why)
+        self._update(why)
 
     def follow(self, status: Status) -> None:
-        """End a test whose device has gone."""
+        """End the test if its device is disconnected."""
         self._status = status
-        gone = status.state != "streaming" or status.connections != self._connection
-        if self.running and gone:
+        lost = status.state != "streaming" or status.connections != self._connection
+        if self.running and lost:
             self.stop(_ENDED)
 
     def receive(self, estimate: Estimate) -> None:
-        """Take in the readings of an estimate, not the shape that trusts the map."""
+        """Pass the readings of an estimate to the test; its shape relies on the channel map."""
         test = self.test
         if not self.running or test is None:
             return
         readings = estimate.curvature.ravel()
         if readings.size != test.sensor.channels:
-            return  # a last one of the skin before
+            return  # a late one of the previous sensor
         if test.take(estimate.device_time, readings) or test.phase is not self._phase:
-            self._tell("")
+            self._update("")
 
-    def _tell(self, message: str) -> None:
+    def _update(self, message: str) -> None:
         test, self.message = self.test, message
         self._phase = None if test is None else test.phase
         if test is not None and test.over and self.verdict is None:
             self.verdict = test.verdict()
         now = test.target if test is not None and self.running else None
-        self.asked.emit(-1 if now is None else now)
+        self.target_changed.emit(-1 if now is None else now)
         self.changed.emit()
 
 
-class Resting:
-    """Holds what a `session` simulates still while a `testing` of its channel map goes on."""
+class LoadHold:
+    """Pauses the simulated loads of a `session` during a `press_test`."""
 
-    def __init__(self, session: Session, testing: MapTesting) -> None:
-        self._session, self._testing = session, testing
-        self._held = False
+    def __init__(self, session: Session, press_test: ChannelMapTest) -> None:
+        self._session, self._press_test = session, press_test
+        self._holding = False
 
     def hold(self) -> None:
         if self._session.inside and self._session.running:
-            self._held = True
+            self._holding = True
             self._session.run(False)
 
-    def let_go(self) -> None:
-        """Let it go on after the test."""
-        if self._held and not self._testing.running:
-            self._held = False
+    def release(self) -> None:
+        """Resume the loads after the test."""
+        if self._holding and not self._press_test.running:
+            self._holding = False
             self._session.run(True)
 
 
 _WHAT = (
-    "<b>Press here</b> tests the channel map: it asks for one element after the other, framed in "
-    "yellow in the heatmaps and on the skin, and sees by itself which one answers."
+    "<b>Press here</b> tests the channel map: press the elements one by one as they are framed in "
+    "yellow in the heatmaps and on the skin; the element that responds is detected."
 )
-_DRAG = " The simulated skin you press by dragging the red arrow there."
+_DRAG = " To press the simulated skin, drag the red arrow there."
 _WAIT = {
-    PressPhase.REST: "Wait for rest: take your hand off, or hold still.",
+    PressPhase.REST: "Wait until the readings settle: take your hand off, or hold still.",
     PressPhase.PRESS: "Press it now.",
-    PressPhase.RELEASE: "Pressed. Let go, or hold still for a moment.",
+    PressPhase.RELEASE: "Pressed. Release it, or hold still.",
 }
 
 
 class PressPage(QWidget):
-    """What to press, how far the test is, and its verdict."""
+    """Page of the press test: instruction, progress and verdict."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -146,21 +147,21 @@ class PressPage(QWidget):
         self.verdict.setFont(bold)
         self.progress = QProgressBar()
         self.progress.setFormat("%v of %m")
-        self.progress.setToolTip("Elements that were asked for.")
-        self.all = button("Ever&y element", "press-all", "Ask for each live element, row by row.")
+        self.progress.setToolTip("Elements tested.")
+        self.all = button("Ever&y element", "press-all", "Test each live element, row by row.")
         self.quick = button(
             "&Quick test",
             "press-quick",
-            "Ask for two elements in each row and column: tells whether rows, columns or "
-            "components are exchanged, but not every two elements.",
+            "Test two elements in each row and column: detects exchanged rows, columns and "
+            "components, but not every exchange of two elements.",
         )
-        self.skip = button("Ski&p", "press-skip", "Go on without this element.")
+        self.skip = button("Ski&p", "press-skip", "Omit this element.")
         self.nothing = button(
-            "N&othing came", "press-nothing", "You pressed it, but nothing was noticed."
+            "N&o response", "press-nothing", "You pressed it, but no element responded."
         )
-        self.back = button("&Back", "press-back", "Press the last one again.")
-        self.stop = button("S&top", "press-stop", "End the test and forget what was pressed.")
-        self._testing: MapTesting | None = None
+        self.back = button("&Back", "press-back", "Repeat the last element.")
+        self.stop = button("S&top", "press-stop", "End the test and discard its results.")
+        self._press_test: ChannelMapTest | None = None
         self._inside = False
         around = QVBoxLayout(self)
         around.setContentsMargins(0, 0, 0, 0)
@@ -176,18 +177,18 @@ class PressPage(QWidget):
             grid.addWidget(widget, 1, place)
         around.addLayout(grid)
 
-    def attend(self, testing: MapTesting) -> None:
-        self._testing = testing
-        testing.changed.connect(guarded(self._show))
-        for widget, wish in (
-            (self.all, lambda: testing.begin(quick=False)),
-            (self.quick, lambda: testing.begin(quick=True)),
-            (self.skip, testing.skip),
-            (self.nothing, testing.nothing_came),
-            (self.back, testing.back),
-            (self.stop, testing.stop),
+    def connect_to(self, press_test: ChannelMapTest) -> None:
+        self._press_test = press_test
+        press_test.changed.connect(guarded(self._show))
+        for widget, request in (
+            (self.all, lambda: press_test.begin(quick=False)),
+            (self.quick, lambda: press_test.begin(quick=True)),
+            (self.skip, press_test.skip),
+            (self.nothing, press_test.nothing_came),
+            (self.back, press_test.back),
+            (self.stop, press_test.stop),
         ):
-            widget.clicked.connect(guarded(lambda *_, wish=wish: wish()))
+            widget.clicked.connect(guarded(lambda *_, request=request: request()))
         self._show()
 
     def show_status(self, status: Status, inside: bool) -> None:
@@ -199,18 +200,18 @@ class PressPage(QWidget):
             self._show()
 
     def _show(self) -> None:
-        testing = self._testing
-        if testing is None:
+        press_test = self._press_test
+        if press_test is None:
             return
-        test, running = testing.test, testing.running
-        self.words.setText(sentence(testing.message) or self._asked(test, running))
+        test, running = press_test.test, press_test.running
+        self.words.setText(sentence(press_test.message) or self._instruction(test, running))
         self.progress.setVisible(test is not None)
         if test is not None:
             self.progress.setRange(0, len(test.elements))
             self.progress.setValue(len(test.done))
         done = () if test is None else test.done
         self.last.setText(sentence(str(done[-1])) if done else "")
-        verdict = testing.verdict
+        verdict = press_test.verdict
         self.verdict.setText("" if verdict is None else sentence(str(verdict)))
         for widget in (self.skip, self.nothing):
             widget.setVisible(running)
@@ -220,7 +221,7 @@ class PressPage(QWidget):
         for widget in (self.all, self.quick):
             widget.setVisible(not running)
 
-    def _asked(self, test: PressTest | None, running: bool) -> str:
+    def _instruction(self, test: PressTest | None, running: bool) -> str:
         if test is None or test.target is None or not running:
             return _WHAT + (_DRAG if self._inside else "")
         x, y = test.sensor.layout.positions[test.target] * 1e3

@@ -1,4 +1,4 @@
-"""Heatmaps: a quantity of every element, not interpolated."""
+"""Heatmaps: quantities of every element, one cell each, not interpolated."""
 
 from functools import partial
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
-from kappaskin_app.features.heatmaps.maps import Maps
+from kappaskin_app.features.heatmaps.maps import HeatmapGrid
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.colouring import locked_at
 from kappaskin_app.shell.display import Display, Shown, of_row
@@ -14,9 +14,9 @@ from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.shown import COLOURS
 from kappaskin_app.shell.window import MainWindow
 
-_EACH = 0.06  # s between two drawings
+_PERIOD = 0.06  # s between two drawings
 
-_ABOUT = "What each element reads, map by map: curvature xx, yy, xy or what View says"
+_TIP = "Heatmaps of every element: curvature xx, yy, xy or others selected under View"
 
 
 class HeatmapsFeature:
@@ -26,9 +26,9 @@ class HeatmapsFeature:
         self._display: Display = shell.display
         self._settings = Settings()
         self._next = 0.0
-        self.maps = Maps()
+        self.maps = HeatmapGrid()
         self.heatmaps = self.maps.heatmaps
-        shell.docks.put_right("curvature", "By element", self.maps, _ABOUT, share=0.22)
+        shell.docks.put_right("curvature", "By element", self.maps, _TIP, share=0.22)
         words = {name: words[0].lower() + words[1:] for name, words in COLOURS}
         shell.display.views["Picture of a &map"] = {
             f"the map of {words[name]}": heatmap for name, heatmap in self.heatmaps.items()
@@ -46,18 +46,18 @@ class HeatmapsFeature:
             heatmap.chosen.connect(selection.chosen)
             heatmap.lock_wanted.connect(guarded(partial(shell.requests.set, f"range_{name}")))
             selection.pointed.connect(guarded(heatmap.show_element))
-            selection.asked.connect(guarded(heatmap.show_wanted))
+            selection.asked.connect(guarded(heatmap.show_target))
 
     def _show_settings(self, settings: Settings) -> None:
         self._settings = settings
-        self.maps.show_those(settings.maps)
+        self.maps.show_selected(settings.maps)
         for name, heatmap in self.heatmaps.items():
             heatmap.show_lock(locked_at(name, settings) > 0)
 
     def _limits(self) -> dict[str, float]:
-        """How far the colours of those that are seen reach, in SI units."""
-        seen = [name for name in self._settings.maps if self.heatmaps[name].isVisible()]
-        return {name: self.heatmaps[name].limit for name in seen}
+        """Colour limits of the visible heatmaps, in SI units."""
+        visible = [name for name in self._settings.maps if self.heatmaps[name].isVisible()]
+        return {name: self.heatmaps[name].limit for name in visible}
 
     def _restart(self, status: Status) -> None:
         if status.sensor is not None:
@@ -79,7 +79,7 @@ class HeatmapsFeature:
     def _show(self, shown: Shown) -> None:
         if shown.now < self._next:
             return
-        self._next = shown.now + _EACH
+        self._next = shown.now + _PERIOD
         display, estimate = self._display, shown.estimate
         crossed, dotted = display.marks(estimate.curvature)
         for name in self._settings.maps:

@@ -1,4 +1,4 @@
-"""A heatmap: a quantity of every element as one cell, with its scale and value."""
+"""Heatmap: a quantity of every element, one cell each."""
 
 import math
 
@@ -26,12 +26,12 @@ _LETTERS: dict[str, str] = dict(
     )
 )
 
-_LEGIBLE = 9  # px at least, of a letter
-_ROOM = 18.0  # px of a cell with room for a letter in a ring
+_LEGIBLE = 9  # px, height of the smallest letter
+_ROOM = 18.0  # px, side of the smallest cell with a ring around its letter
 
 
-class FlatCells(QWidget):
-    """The elements, drawn as cells that tile a regular grid or as squares where they are."""
+class CellGrid(QWidget):
+    """Elements as the cells of a regular grid, or as squares at scattered positions."""
 
     pointed = Signal(int)
     chosen = Signal(int)
@@ -40,10 +40,10 @@ class FlatCells(QWidget):
         super().__init__(parent)
         self._layout: SensorLayout | None = None
         self._colours: Colours = np.empty((0, 3), np.uint8)
-        self._under, self._faded = -1, False
+        self._hovered, self._faded = -1, False
         self._marks: tuple[list[int], ...] = ([], [])
-        self._kinds: dict[int, str] = {}
-        self._wanted = -1
+        self._faults: dict[int, str] = {}
+        self._target = -1
         self.setMouseTracking(True)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(90, 90)
@@ -53,15 +53,15 @@ class FlatCells(QWidget):
 
     def show_layout(self, layout: SensorLayout) -> None:
         self._layout = layout
-        self._under, self._marks, self._kinds, self._wanted = -1, ([], []), {}, -1
+        self._hovered, self._marks, self._faults, self._target = -1, ([], []), {}, -1
 
-    def _spacing(self) -> float:
-        """What separates the two nearest elements, in m: squares of that side hide none."""
+    def _square_side(self) -> float:
+        """Side in m of squares at the elements that hide none: the smallest distance of two."""
         positions = self._layout.positions if self._layout else np.empty((0, 2))
         if len(positions) < 2 or self._layout is None:
             return 0.2 * self._layout.patch.a if self._layout else 1.0
-        apart = np.max(np.abs(positions[:, None] - positions[None]), axis=-1)
-        nearest = float(np.min(apart + np.where(np.eye(len(positions)), np.inf, 0.0)))
+        distance = np.max(np.abs(positions[:, None] - positions[None]), axis=-1)
+        nearest = float(np.min(distance + np.where(np.eye(len(positions)), np.inf, 0.0)))
         return max(0.9 * nearest, 0.02 * self._layout.patch.a)
 
     def show_cells(self, rgb: Colours) -> None:
@@ -69,16 +69,16 @@ class FlatCells(QWidget):
         self.update()
 
     def show_marks(self, crossed: Indices, dotted: Indices, kinds: dict[int, str]) -> None:
-        """Cross out and dot elements by number, and ring those of some kind in `FAULTS`."""
+        """Cross out and dot elements by number, and letter those with a fault of `FAULTS`."""
         marks = (crossed.tolist(), dotted.tolist())
-        if (marks, kinds) != (self._marks, self._kinds):
-            self._marks, self._kinds = marks, kinds
+        if (marks, kinds) != (self._marks, self._faults):
+            self._marks, self._faults = marks, kinds
             self.update()
 
-    def show_wanted(self, element: int) -> None:
+    def show_target(self, element: int) -> None:
         """Frame the element that is to be pressed; -1 for none."""
-        if element != self._wanted:
-            self._wanted = element
+        if element != self._target:
+            self._target = element
             self.update()
 
     def show_faded(self, faded: bool) -> None:
@@ -87,7 +87,7 @@ class FlatCells(QWidget):
             self.update()
 
     def area_of_patch(self) -> QRectF:
-        """The patch on the widget: as large as fits, in its own proportions."""
+        """The patch on the widget, as large as fits at its aspect ratio."""
         patch = self._layout.patch if self._layout else None
         ratio = patch.a / patch.b if patch else 1.0
         width, height = float(self.width() - 2), float(self.height() - 2)
@@ -95,11 +95,11 @@ class FlatCells(QWidget):
         return QRectF((self.width() - width) / 2, (self.height() - height) / 2, width, height)
 
     def _squares(self, area: QRectF) -> list[QRectF]:
-        """One square for each element that stands alone."""
+        """A square for each element of an irregular layout."""
         layout = self._layout
         if layout is None:
             return []
-        side = self._spacing() * area.width() / layout.patch.a
+        side = self._square_side() * area.width() / layout.patch.a
         return [
             QRectF(c.x() - side / 2, c.y() - side / 2, side, side)
             for c in (self.pixel_of(area, x, y) for x, y in layout.positions)
@@ -123,7 +123,7 @@ class FlatCells(QWidget):
             rgb = np.ascontiguousarray(self._colours.reshape(n, m, 3)[::-1])
             painter.drawImage(area, QImage(rgb.tobytes(), m, n, 3 * m, QImage.Format.Format_RGB888))
         else:
-            painter.setPen(line)  # or those near zero are lost on a light ground
+            painter.setPen(line)  # or values near zero vanish on a light background
             for square, rgb in zip(self._squares(area), self._colours, strict=True):
                 painter.setBrush(QColor(*(int(v) for v in rgb)))
                 painter.drawRect(square)
@@ -132,17 +132,17 @@ class FlatCells(QWidget):
         painter.setPen(line)
         painter.drawRect(area)
         self._paint_marks(painter, area)
-        self._paint_kinds(painter, area)
-        if self._wanted >= 0:
-            self._frame(painter, self._cell(area, self._wanted))
-        if self._under >= 0:
-            cell = self._cell(area, self._under)
-            for colour, width in (("#16191d", 4), ("#ffffff", 2)):  # seen on every colour
+        self._paint_faults(painter, area)
+        if self._target >= 0:
+            self._paint_target(painter, self._cell(area, self._target))
+        if self._hovered >= 0:
+            cell = self._cell(area, self._hovered)
+            for colour, width in (("#16191d", 4), ("#ffffff", 2)):  # visible on every colour
                 painter.setPen(QPen(QColor(colour), width))
                 painter.drawRect(cell)
 
-    def _frame(self, painter: QPainter, cell: QRectF) -> None:
-        """A frame around what is to be pressed, wider than the cell: seen at a glance."""
+    def _paint_target(self, painter: QPainter, cell: QRectF) -> None:
+        """Draw a frame wider than the cell around the element to press."""
         around = cell.adjusted(-3, -3, 3, 3)
         for colour, width in (("#16191d", 6), (WANTED, 3)):
             painter.setPen(QPen(QColor(colour), width))
@@ -150,7 +150,7 @@ class FlatCells(QWidget):
 
     def _paint_marks(self, painter: QPainter, area: QRectF) -> None:
         crossed, dotted = self._marks
-        for colour, width in (("#16191d", 3), ("#ffffff", 1)):  # seen on every colour
+        for colour, width in (("#16191d", 3), ("#ffffff", 1)):  # visible on every colour
             painter.setPen(QPen(QColor(colour), width))
             for element in crossed:
                 cell = self._cell(area, element)
@@ -161,9 +161,9 @@ class FlatCells(QWidget):
                 painter.drawEllipse(self._cell(area, element).center(), 1.5, 1.5)
             painter.setBrush(Qt.BrushStyle.NoBrush)
 
-    def _paint_kinds(self, painter: QPainter, area: QRectF) -> None:
-        """A letter for each element that is left out, in a ring where there is room for both."""
-        for element, kind in self._kinds.items():
+    def _paint_faults(self, painter: QPainter, area: QRectF) -> None:
+        """Draw a letter on each excluded element, with a ring where there is room for both."""
+        for element, kind in self._faults.items():
             cell = self._cell(area, element)
             side = min(cell.width(), cell.height())
             ringed, font = side >= _ROOM, painter.font()
@@ -203,15 +203,15 @@ class FlatCells(QWidget):
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         self.point_at(self._element_at(event.position()))
-        self.pointed.emit(self._under)
+        self.pointed.emit(self._hovered)
 
     def leaveEvent(self, event: object) -> None:
         self.point_at(-1)
         self.pointed.emit(-1)
 
     def point_at(self, element: int) -> None:
-        if element != self._under:
-            self._under = element
+        if element != self._hovered:
+            self._hovered = element
             self.update()
 
 
@@ -220,17 +220,17 @@ Mask = NDArray[np.bool_]
 
 _LEGEND = (
     "One cell for each element. Grey: no reading. Violet: on a rail, the end of the converter's "
-    "range, beyond which nothing is known. "
-    "Crossed: bent beyond 1 % strain, where the gage is not elastic any more. Dotted: chosen to be "
-    "in every frame. A letter: left out, and why: D dead, S stuck, N noisy, "
-    "R on a rail, X swapped, T drifting, O off by the same, P a spike. Framed: to be pressed now."
+    "range. Crossed: bent beyond 1 % strain, where the gage is not elastic any more. Dotted: "
+    "scanned in every frame. Letter: excluded, by fault: D dead, S stuck, N noisy, R saturated, "
+    "X swapped, T drifting, O offset, P spike. Framed: to be pressed now."
 )
 
 
 class Heatmap(QWidget):
-    """One quantity, element by element; says which element is pointed at.
+    """A quantity of every element, with colour bar and value.
 
-    `picked` says which one is to be told all about.
+    `pointed` emits the element under the mouse (-1: none), `chosen` the one clicked, and
+    `lock_wanted` the limit to fix the colours at in SI units (0: automatic).
     """
 
     pointed = Signal(int)
@@ -245,17 +245,17 @@ class Heatmap(QWidget):
         self.value = Line()
         self.value.setToolTip("The element under the mouse, else the largest reading.")
         self.lock = LockButton()
-        self.lock.wanted.connect(self._ask_lock)
-        self.lock.setVisible(name != "health")  # whose colours are no range
+        self.lock.wanted.connect(self._request_lock)
+        self.lock.setVisible(name != "health")  # a classification has no range
         self.lock.setEnabled(name != "health")
-        self.cells, self.bar = FlatCells(), ColourBar()
+        self.cells, self.bar = CellGrid(), ColourBar()
         self.cells.setToolTip(_LEGEND)
         self.cells.setAccessibleName(f"Heatmap of {name.replace('_', ' ')}")
         self.cells.pointed.connect(self.pointed)
         self.cells.chosen.connect(self.chosen)
         self._tint, self._layout, self._element = self._shade.tint(1.0), None, -1
         self._values, self._railed = np.empty(0), None
-        self._kinds: dict[int, str] = {}
+        self._faults: dict[int, str] = {}
         top = QHBoxLayout()
         top.addWidget(self._title)
         top.addWidget(self.value, 1)
@@ -279,20 +279,20 @@ class Heatmap(QWidget):
         self.cells.show_layout(layout)
 
     def show_element(self, element: int) -> None:
-        """Point at an element here because it is pointed at elsewhere; -1 at none."""
+        """Mark the element that is pointed at in any view; -1 for none."""
         self._element = element
         self.cells.point_at(element)
 
     @property
     def limit(self) -> float:
-        """How far the colours reach, in SI units."""
+        """Limit of the colour range, in SI units."""
         return self._tint.limit / self._shade.scale
 
-    def _ask_lock(self, locked: bool) -> None:
+    def _request_lock(self, locked: bool) -> None:
         self.lock_wanted.emit(self.limit * locked)
 
     def show_values(self, values: Array, tint: Tint, railed: Mask | None = None) -> None:
-        """Colour `values` (P,) on the screen's scale by `tint`, but those that are `railed`."""
+        """Colour `values` (P,) in display units by `tint`, except where `railed` (P,)."""
         self._values, self._tint, self._railed = values, tint, railed
         self._colour()
 
@@ -302,42 +302,42 @@ class Heatmap(QWidget):
         self.bar.show_tint(tint, tint.legend(*shown))
 
     def show_marks(self, crossed: Mask, dotted: Mask, kinds: NDArray[np.uint8]) -> None:
-        """Cross out elements (P,) bent too far, dot those chosen to scan, ring those left out.
+        """Cross out elements (P,) bent too far, dot those of the scan region, letter faulty ones.
 
-        Of these `kinds` (P,) say why, by number in `FAULTS`.
+        `kinds` (P,) are the faults, by number in `FAULTS`.
         """
-        self._kinds = {int(p): FAULTS[kinds[p]] for p in np.flatnonzero(kinds)}
-        self.cells.show_marks(np.flatnonzero(crossed), np.flatnonzero(dotted), self._kinds)
+        self._faults = {int(p): FAULTS[kinds[p]] for p in np.flatnonzero(kinds)}
+        self.cells.show_marks(np.flatnonzero(crossed), np.flatnonzero(dotted), self._faults)
 
-    def show_wanted(self, element: int) -> None:
-        """Frame the element that is to be pressed; -1 for none."""
-        self.cells.show_wanted(element)
+    def show_target(self, element: int) -> None:
+        """Frame the element to press; -1 for none."""
+        self.cells.show_target(element)
 
     def show_lost(self, lost: bool) -> None:
-        """Fade the cells while what they show is not coming in any more."""
+        """Fade the cells while the connection is lost."""
         self.cells.show_faded(lost)
 
     def show_reading(self, values: Array) -> None:
-        """Write the value of the element pointed at, else the largest."""
+        """Write the value of the element under the mouse, else the peak."""
         if self._layout is None or len(values) != len(self._layout):
             self.value.show_text("")
         elif self._element >= 0:
-            self.value.show_text(self._of_one(self._element, values[self._element], self._layout))
+            self.value.show_text(self._value_at(self._element, values[self._element], self._layout))
         else:
-            self.value.show_text(self._of_all(values), "peak ")
+            self.value.show_text(self._summary(values), "peak ")
 
-    def _of_one(self, element: int, value: float, layout: SensorLayout) -> str:
+    def _value_at(self, element: int, value: float, layout: SensorLayout) -> str:
         x, y = layout.positions[element] * 1e3
         what = self._shade.written(value) if math.isfinite(value) else "no reading"
-        why = f", {self._kinds[element]}" if element in self._kinds and self.bar.scaled else ""
+        why = f", {self._faults[element]}" if element in self._faults and self.bar.scaled else ""
         return f"{what} at ({x:.0f}, {y:.0f}) mm{why}"
 
-    def _of_all(self, values: Array) -> str:
+    def _summary(self, values: Array) -> str:
         finite = values[np.isfinite(values)]
         if not self.bar.scaled:
-            ill = int(np.count_nonzero(finite))
-            return f"{ill} not well" if ill else "all well"
+            faulty = int(np.count_nonzero(finite))
+            return f"{faulty} faulty" if faulty else "all OK"
         peak = finite[np.argmax(np.abs(finite))] if len(finite) else math.nan
         missing = len(values) - len(finite)
-        told = [f"peak {self._shade.written(peak)}"] if len(finite) else []
-        return ", ".join(told + [f"{missing} missing"] * bool(missing))
+        parts = [f"peak {self._shade.written(peak)}"] if len(finite) else []
+        return ", ".join(parts + [f"{missing} missing"] * bool(missing))

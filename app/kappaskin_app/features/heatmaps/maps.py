@@ -1,4 +1,4 @@
-"""The heatmaps beside the skin: those that are wanted, one below the other or in two columns."""
+"""Grid of the selected heatmaps, in one or two columns."""
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QLabel, QScrollArea, QWidget
@@ -6,17 +6,17 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QScrollArea, QWidget
 from kappaskin_app.features.heatmaps.heatmap import Heatmap
 from kappaskin_app.shell.colouring import SHADES
 
-_COLUMN = 3  # that are seen well one below the other
-_NARROWEST = (270, 360)  # px of one column, and of two
+_COLUMN = 3  # heatmaps at most in a single column
+_NARROWEST = (270, 360)  # px, minimum width of one column and of two
 
 
-class Maps(QScrollArea):
-    """All heatmaps by name, of which those not shown cost nothing."""
+class HeatmapGrid(QScrollArea):
+    """Scrollable grid of the heatmaps; hidden ones are not drawn."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.heatmaps = {name: Heatmap(name) for name in SHADES}
-        self._none = QLabel("Choose heatmaps under View.", alignment=Qt.AlignmentFlag.AlignCenter)  # pyright: ignore[reportCallIssue]
+        self._none = QLabel("Select heatmaps under View.", alignment=Qt.AlignmentFlag.AlignCenter)  # pyright: ignore[reportCallIssue]
         self._shown: tuple[str, ...] | None = None
         whole = QWidget()
         self._grid = QGridLayout(whole)
@@ -32,8 +32,8 @@ class Maps(QScrollArea):
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setMinimumWidth(_NARROWEST[0])
 
-    def show_those(self, names: tuple[str, ...]) -> None:
-        """Show the heatmaps called `names` and no others."""
+    def show_selected(self, names: tuple[str, ...]) -> None:
+        """Show only the heatmaps called `names`."""
         if names == self._shown:
             return
         self._shown = names

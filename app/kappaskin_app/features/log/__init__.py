@@ -27,7 +27,7 @@ class LogFeature:
         display.badge.clicked.connect(guarded(self.event_log.open_list))
         self.event_log.notified.connect(guarded(shell.notify))
         show = self.event_log.open_list
-        shell.actions_by_name.add("event_log", SOURCE, "E&vent log", show, "F4", _EVENTS)
+        shell.actions_by_name.add("happenings", SOURCE, "E&vent log", show, "F4", _EVENTS)
         self.errors.add_actions(shell.actions_by_name, HELP)
         shell.closing.connect(guarded(self.errors.close))
         shell.closed.connect(guarded(self.log_buffer.close))

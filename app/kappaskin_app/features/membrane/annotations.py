@@ -1,4 +1,4 @@
-"""What is written and marked in the picture of the skin: sides, ruler, elements, alarm."""
+"""Annotations in the view of the skin: sides, ruler, marks and alarm."""
 
 import textwrap
 from typing import Any
@@ -12,44 +12,44 @@ from kappaskin_app.shell.drawn_skin import MM, Direction, DrawnSkin, Indices
 from kappaskin_app.theme import WANTED, current, follow_look, grown
 
 UNLIT = {"lighting": False, "pickable": False, "reset_camera": False, "render": False}
-"""For `add_mesh`: the same colour from every side, nothing drawn and the camera left alone."""
+"""Arguments of `add_mesh`: no lighting, no rendering, no change of the camera."""
 
 
 def pixels(plotter: Any, size: float) -> float:
-    """How many of VTK's pixels, which are the screen's, are `size` of the window's."""
+    """`size` in px of the window, in physical px of the screen as VTK counts."""
     return size * plotter.devicePixelRatioF()
 
 
-_LETTER = 0.55  # times its height that a letter is wide on the average, or less
-_BESIDE = 0.015  # of the picture's width on both sides
+_LETTER = 0.55  # average width of a letter, of its height
+_MARGIN = 0.015  # of the view's width, on both sides
 _LEAST = 12  # characters in a line
 
 
 def room_for(plotter: Any, px: float) -> int:
-    """How many letters of `px`, in those of now, have room beside each other in the picture."""
-    room = (1 - 2 * _BESIDE) * plotter.width() / (_LETTER * grown(px))
+    """Number of letters of `px` that fit in the view's width at the present letter size."""
+    room = (1 - 2 * _MARGIN) * plotter.width() / (_LETTER * grown(px))
     return max(int(room), _LEAST)
 
 
 class Caption:
-    """Says something from `height` of the picture of a `plotter` on, in letters of `px`."""
+    """Text in letters of `px` at a relative `height` of a `plotter`."""
 
     def __init__(self, plotter: Any, px: float, height: float, vertical: str = "bottom") -> None:
         self._plotter, self._px, self.words = plotter, px, ""
         self.text: Any = pv.Text("")
         self.text.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
-        self.text.position = _BESIDE, height
+        self.text.position = _MARGIN, height
         self.text.prop.justification_vertical = vertical
         plotter.add_actor(self.text, reset_camera=False, render=False)
         follow_look(plotter, self.fit)
 
-    def say(self, words: str) -> None:
-        """Say `words`; a number and its unit stay together."""
+    def show(self, words: str) -> None:
+        """Show `words`; a number and its unit are not separated."""
         self.words = words
         self.fit()
 
     def fit(self) -> None:
-        """Say them in the letters of now, in lines for which the picture of now has room."""
+        """Wrap the text at the present size of letters and view."""
         whole = self.words.replace(" mm", "\N{NO-BREAK SPACE}mm")
         lines = textwrap.wrap(whole, room_for(self._plotter, self._px))
         self.text.prop.font_size, self.text.prop.color = grown(self._px), current().text
@@ -57,14 +57,14 @@ class Caption:
 
 
 _SIDE_LETTERS = 15  # px
-_LONG = 5.2  # times as long as its letters are high: a label with a space beside it
-_MOST = 0.2  # of a picture's width that one label may take
+_LABEL_WIDTH = 5.2  # width of a label with its margin, of the letters' height
+_MOST_WIDTH = 0.2  # of the view's width, of one label
 
 
 class Sides:
-    """The labels of the corner 0 and of the sides along x and y.
+    """Labels of the corner 0 and of the sides along x and y.
 
-    Where the skin ends inside of its rectangle, lines show the sides that are meant.
+    For a skin smaller than its rectangle, lines show these sides.
     """
 
     def __init__(self, plotter: Any) -> None:
@@ -74,7 +74,7 @@ class Sides:
         self.labels: list[Any] = [pv.Label() for _ in range(3)]
         for label in self.labels:
             plotter.add_actor(label, reset_camera=False, render=False)
-        follow_look(plotter, self._dress)
+        follow_look(plotter, self._apply_theme)
 
     def show_skin(self, skin: DrawnSkin) -> None:
         a, b = skin.patch.a, skin.patch.b
@@ -86,23 +86,23 @@ class Sides:
         for label, text, at in zip(self.labels, texts, corners + beside, strict=True):
             label.input = text
             label.position = tuple(at)
-        # Where the skin rises steeply beside it, a text in the middle would lie below it.
+        # A centred text would lie below a skin that rises steeply.
         y_at = "right" if skin.patch.base_curvature else "center"
         self.labels[2].prop.justification_horizontal = y_at
 
     def show_from(self, direction: Direction | None) -> None:
-        """Label what is not seen end-on, where a text would lie on the skin's rim."""
+        """Hide the label of a side seen end-on, which would cover the rim."""
         for axis, label in enumerate(self.labels[1:]):
             label.SetVisibility(direction is None or direction.sees(axis))
 
     def fit(self, wide: float) -> float:
-        """The share of a picture of so many px (`wide`) that a label takes, in letters that fit."""
-        size = max(1, min(grown(_SIDE_LETTERS), int(_MOST * wide / _LONG)))
+        """Fit the letters to a view of `wide` px; the share of it that a label takes."""
+        size = max(1, min(grown(_SIDE_LETTERS), int(_MOST_WIDTH * wide / _LABEL_WIDTH)))
         for label in self.labels:
             label.size = size
-        return _LONG * size / wide
+        return _LABEL_WIDTH * size / wide
 
-    def _dress(self) -> None:
+    def _apply_theme(self) -> None:
         for part in (self.actor, *self.labels):
             part.prop.color = current().text
 
@@ -110,11 +110,11 @@ class Sides:
 Array = NDArray[np.float64]
 
 _LETTERS = 15  # px
-_STEPS = 48  # of the line along the skin
+_STEPS = 48  # points of the line along the skin
 
 
 class Ruler:
-    """A line along the skin and one through the air, with their lengths."""
+    """A line along the skin and a straight one, with their lengths."""
 
     def __init__(self, plotter: Any) -> None:
         along = np.insert(np.arange(_STEPS), 0, _STEPS)
@@ -129,22 +129,22 @@ class Ruler:
         self._ends_actor = plotter.add_mesh(
             self._ends, style="points", point_size=pixels(plotter, 11), color=WANTED, **UNLIT
         )
-        self._words = Caption(plotter, _LETTERS, 0.03)
-        self.text: Any = self._words.text
-        self.fit = self._words.fit
+        self._caption = Caption(plotter, _LETTERS, 0.03)
+        self.text: Any = self._caption.text
+        self.fit = self._caption.fit
         self.hide()
 
     def hide(self) -> None:
         self.actor.visibility = self._ends_actor.visibility = False
-        self._words.say("")
+        self._caption.show("")
 
-    def ask(self, words: str) -> None:
-        """Say what is to be done; nothing is measured yet."""
+    def show_hint(self, words: str) -> None:
+        """Show what to do next; nothing is measured yet."""
         self.hide()
-        self._words.say(words)
+        self._caption.show(words)
 
     def show(self, skin: DrawnSkin, places: Array, lift: float, found: Distances | None) -> None:
-        """Draw it between `places` (k, 2) in m, one or two, `lift` mm above the skin."""
+        """Draw it between one or two `places` (k, 2) in m, `lift` mm above the skin."""
         line = places[0] + np.linspace(0, 1, _STEPS)[:, None] * (places[-1] - places[0])
         points, _ = skin.place(line, lift)
         self._lines.points[:] = points
@@ -152,11 +152,11 @@ class Ruler:
         self._ends_actor.visibility = True
         self.actor.visibility = found is not None
         if found is not None:
-            self._words.say(told(found))
+            self._caption.show(distances_text(found))
 
 
-def told(found: Distances) -> str:
-    """The distances in words."""
+def distances_text(found: Distances) -> str:
+    """Text of the distances."""
     higher = f"{1e3 * found.higher:+z.2f}".replace("-", "\N{MINUS SIGN}")
     return (
         f"straight {1e3 * found.straight:.2f} mm, along the skin {1e3 * found.along:.2f} mm, "
@@ -164,11 +164,11 @@ def told(found: Distances) -> str:
     )
 
 
-_ABOVE = 1.5  # times as high as the elements are drawn, or one hides in the other
+_ABOVE = 1.5  # of the elements' lift, or marks and elements hide each other
 
 
 class Marks:
-    """Large points of one colour at some elements, which move with the skin."""
+    """Large points of one colour at elements, which follow the shape."""
 
     def __init__(self, plotter: Any, size: int, colour: str) -> None:
         self._points: Any = pv.PolyData(np.zeros((1, 3)))
@@ -194,20 +194,20 @@ class Marks:
         self._points.verts = np.column_stack([np.ones(count, int), np.arange(count)]).ravel()
 
     def follow(self, skin: DrawnSkin, lift: float) -> None:
-        """Move with a `skin` that has another shape, `lift` above it."""
+        """Follow the shape of the `skin`, `lift` mm above it."""
         if self.actor.visibility:
             points, out = self._at_rest
             height = skin.height.ravel()[self._nearest] + _ABOVE * lift
             self._points.points[:] = points + out * height[:, None]
 
 
-_WIDTH = 54  # characters, at which what is said still fits beside the panels of a small window
-_LINES = 5  # of such a width, and more of a lesser one
+_WIDTH = 54  # characters that fit in a small window
+_LINES = 5  # of this width, and more if narrower
 _ALARM_LETTERS = 15  # px
 
 
 class Alarm:
-    """A box of text in the upper left of the picture of `plotter`."""
+    """Box of text in the upper left of the view."""
 
     def __init__(self, plotter: Any) -> None:
         self._plotter, self.text = plotter, ""
@@ -221,7 +221,7 @@ class Alarm:
         follow_look(plotter, self.fit)
 
     def show(self, text: str) -> None:
-        """Say `text`, its first line apart; or nothing."""
+        """Show `text` below its first line; no box if empty."""
         if text == self.text:
             return
         self.text = text
@@ -229,7 +229,7 @@ class Alarm:
         self._plotter.update()
 
     def fit(self) -> None:
-        """Say it in the letters of now, in lines for which the picture of now has room."""
+        """Wrap the text at the present size of letters and view."""
         head, _, rest = self.text.partition("\n")
         wide = min(room_for(self._plotter, _ALARM_LETTERS), _WIDTH)
         most = _LINES * _WIDTH // wide

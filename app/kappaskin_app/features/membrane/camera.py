@@ -1,4 +1,4 @@
-"""The camera: from where the skin is looked at, and lines of sight."""
+"""Camera: direction of view, and projection between skin and screen."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -13,8 +13,8 @@ from kappaskin_app.shell.drawn_skin import FROM_THE_LEFT, MM, NO_SKIN, Direction
 
 Array = NDArray[np.float64]
 
-_LOW = 0.2  # of the shorter side: how far in the view reaches below the skin at rest
-_MARGIN = 0.06  # of the longer side: room for the labels beside the edges and the arrow above
+_LOW = 0.2  # of the shorter side: depth of view below the skin at rest
+_MARGIN = 0.06  # of the longer side: room for labels and arrow
 
 
 DIRECTIONS = {
@@ -23,15 +23,15 @@ DIRECTIONS = {
     "front": Direction("along y", (0.0, -1.6, 0.0)),
     "side": Direction("along x", (1.6, 0.0, 0.0)),
     "below": Direction("from below", (0.0, 0.0, -1.6), (0.0, 1.0, 0.0)),
-    "corner": Direction("from a corner, all sides alike", (-1.0, -1.0, 1.0)),
+    "corner": Direction("from a corner, isometric", (-1.0, -1.0, 1.0)),
 }
-_NUMBERS = 12  # that say how a camera stands
+_NUMBERS = 12  # of a camera
 
 
 def fit_camera(renderer: Any, skin: DrawnSkin, direction: Direction, label: float) -> None:
-    """Look at the whole of `skin` from `direction`.
+    """View the whole `skin` from `direction`.
 
-    With room to its left and right for a label each, which takes this share of the picture's width.
+    With room on both sides for a label, which takes the share `label` of the width.
     """
     camera = renderer.GetActiveCamera()
     body = _around(skin, 0.0)
@@ -54,9 +54,9 @@ def fit_camera(renderer: Any, skin: DrawnSkin, direction: Direction, label: floa
 
 
 def camera_of(renderer: Any, skin: DrawnSkin) -> tuple[float, ...]:
-    """How the camera stands: what it looks at and from where, what is up, its angle, its shift.
+    """Numbers of the camera: focal point, position, view-up, angle and shift.
 
-    From the middle of `skin`, with its longer side for a unit, so that another is seen so too.
+    Relative to the middle of `skin` in units of its longer side, so that they suit other skins.
     """
     camera, middle = renderer.GetActiveCamera(), _middle(skin)
     places = (camera.GetFocalPoint(), camera.GetPosition())
@@ -66,13 +66,13 @@ def camera_of(renderer: Any, skin: DrawnSkin) -> tuple[float, ...]:
 
 
 def place_camera(renderer: Any, skin: DrawnSkin, numbers: Sequence[float]) -> None:
-    """Have the camera stand as `camera_of` told it; other numbers leave it as it is."""
+    """Place the camera by the numbers of `camera_of`; ignore others."""
     if len(numbers) != _NUMBERS:
         return
     camera, middle = renderer.GetActiveCamera(), _middle(skin)
-    at, stands, up = (np.array(numbers[n : n + 3]) for n in (0, 3, 6))
+    at, position, up = (np.array(numbers[n : n + 3]) for n in (0, 3, 6))
     camera.SetFocalPoint(*(middle + skin.side * at))
-    camera.SetPosition(*(middle + skin.side * stands))
+    camera.SetPosition(*(middle + skin.side * position))
     camera.SetViewUp(*up)
     camera.SetViewAngle(numbers[9])
     camera.SetWindowCenter(*numbers[10:])
@@ -80,13 +80,13 @@ def place_camera(renderer: Any, skin: DrawnSkin, numbers: Sequence[float]) -> No
 
 
 def _middle(skin: DrawnSkin) -> Array:
-    """The middle (3,) of what a skin reaches at rest, in mm."""
+    """Middle (3,) of a skin at rest, in mm."""
     body = _around(skin, 0.0)
     return (body.min(axis=0) + body.max(axis=0)) / 2
 
 
 def _around(skin: DrawnSkin, share: float) -> Array:
-    """Points (k, 3) in mm around the skin and what is drawn within this share of it."""
+    """Points (k, 3) in mm around the skin with a margin of this share."""
     a, b = skin.patch.a, skin.patch.b
     margin = share * skin.side
     x = np.linspace(0, a, 9 if skin.patch.base_curvature else 2)
@@ -97,14 +97,14 @@ def _around(skin: DrawnSkin, share: float) -> Array:
 
 
 def _in_view(renderer: Any, x: float, y: float, z: float) -> Array:
-    """Where a point in mm is in the picture, (2,), each from -1 to 1."""
+    """View coordinates (2,) of a point in mm, from -1 to 1."""
     renderer.SetWorldPoint(x, y, z, 1.0)
     renderer.WorldToView()
     return np.array(renderer.GetViewPoint()[:2])
 
 
-class Sight:
-    """What is seen where; points (3,) are in mm, pixels the widget's."""
+class Projection:
+    """Projection between points (3,) in mm and pixels of the widget."""
 
     def __init__(self, plotter: QtInteractor) -> None:
         self._plotter = plotter
@@ -118,7 +118,7 @@ class Sight:
         return np.array([x / ratio, self._plotter.height() - y / ratio])
 
     def line(self, at: QPointF) -> tuple[Array, Array]:
-        """The nearest and the farthest point that lie under a pixel."""
+        """The nearest and the farthest point under a pixel."""
         renderer, ratio = self._plotter.renderer, self._plotter.devicePixelRatioF()
         ends: list[Array] = []
         for depth in (0.0, 1.0):
@@ -130,10 +130,10 @@ class Sight:
         return ends[0], ends[1]
 
 
-class Gaze(QObject):
-    """Places the camera of a `plotter`, in whose picture the `sides` of the `skin` are named.
+class CameraControl(QObject):
+    """Places the camera of a `plotter` and labels the `sides` of the `skin`.
 
-    `turned` brings how the camera stands after it was dragged, or else after a turn of the wheel.
+    `turned` emits the camera's numbers after the mouse has moved it: dragged, or else by the wheel.
     """
 
     turned = Signal(tuple, bool)
@@ -142,7 +142,7 @@ class Gaze(QObject):
         super().__init__(plotter)
         self._plotter, self._sides, self.skin = plotter, sides, NO_SKIN
         self._look, self._camera = "left", ()
-        self._stood: tuple[float, ...] = ()  # how the camera stood when the mouse took hold of it
+        self._start: tuple[float, ...] = ()  # the camera before a drag
         self._dragged = False
         for event, note in (
             ("StartInteractionEvent", self._begin),
@@ -152,34 +152,34 @@ class Gaze(QObject):
             plotter.iren.interactor.AddObserver(event, note)
 
     def _begin(self, *_: object) -> None:
-        self._stood, self._dragged = camera_of(self._plotter.renderer, self.skin), False
+        self._start, self._dragged = camera_of(self._plotter.renderer, self.skin), False
 
     def _drag(self, *_: object) -> None:
         self._dragged = True
         self._sides.show_from(None)
 
     def _end(self, *_: object) -> None:
-        stands = camera_of(self._plotter.renderer, self.skin)
-        if stands != self._stood:
-            self._camera = stands
+        position = camera_of(self._plotter.renderer, self.skin)
+        if position != self._start:
+            self._camera = position
             self._sides.show_from(None)
-            self.turned.emit(stands, self._dragged)
+            self.turned.emit(position, self._dragged)
 
     def show(self, look: str, camera: tuple[float, ...]) -> None:
-        """Look at the whole skin from a direction, or as the `camera` stood that was turned."""
+        """View the whole skin from a direction, or with the numbers of a `camera`."""
         if (look, camera) != (self._look, self._camera):
             self._look, self._camera = look, camera
             self.place()
 
     def fit(self) -> None:
-        """After picture or letters have another size: have all in it, unless it was turned."""
+        """Fit the skin to the view after a change of size, unless the user moved the camera."""
         if self._camera:
             self._sides.fit(self._plotter.width())
         else:
             self.place()
 
     def place(self) -> None:
-        """Look as is asked for, at this skin."""
+        """Place the camera as requested, for the present skin."""
         renderer, direction = self._plotter.renderer, DIRECTIONS.get(self._look, FROM_THE_LEFT)
         label = self._sides.fit(self._plotter.width())
         if self._camera:

@@ -1,4 +1,4 @@
-"""Simulated loads as they are drawn on the skin: arrows, and a line round what is spread."""
+"""Simulated loads on the skin: arrows, and outlines of distributed loads."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -19,11 +19,11 @@ _RED = "#e8543f"
 
 
 class DrawnLoads:
-    """An arrow for each load, more of them made when there are more than ever before."""
+    """Arrows and outlines of loads."""
 
     def __init__(self, plotter: Any) -> None:
         self._plotter = plotter
-        # Sized for a skin of size 1, and scaled to the one there is.
+        # Sized for a skin of size 1, and scaled by the present one.
         self._arrow = pv.Arrow(
             start=(0, 0, ARROW), direction=(0, 0, -1), scale=ARROW, tip_length=0.35
         )
@@ -37,7 +37,7 @@ class DrawnLoads:
         )
 
     def show(self, loads: Sequence[Load], skin: DrawnSkin, lift: float) -> Array:
-        """Draw `loads` where they are now on `skin`; the places (k, 2) in m that they stand at."""
+        """Draw `loads` on `skin`; their positions (k, 2) in m."""
         centres = np.array([load.centre() for load in loads]).reshape(-1, 2)
         while len(self._arrows) < len(centres):
             self._arrows.append(
@@ -66,7 +66,7 @@ class DrawnLoads:
 
 
 def put_upright(actor: pv.Actor, skin: DrawnSkin, position: Array, above: float = 0.0) -> None:
-    """Put an actor on the drawn skin at `position` (2,) in m, upright on it, or hide it at NaN."""
+    """Place an actor normal to the drawn skin at `position` (2,) in m; hide it at NaN."""
     actor.visibility = shown = bool(np.isfinite(position).all())
     if shown:
         points, out = skin.place(position[None], above)

@@ -1,4 +1,4 @@
-"""Measuring between two places of the skin that are clicked, as it is bent now."""
+"""Measurement of the distance between two places on the bent skin."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +15,15 @@ Places = tuple[tuple[float, float], ...] | None
 _FIRST = "Measure: click a place on the skin; Esc ends"
 _SECOND = "Measure: click another place; Esc ends"
 
-_NEARER = 1 - 1e-9  # to the middle, so that a place on the rim is not beside it
-_ASKED = (_FIRST, _SECOND)  # by how many places there are
+_INWARD = 1 - 1e-9  # scale towards the middle, so that rounding leaves no place outside the rim
+_HINTS = (_FIRST, _SECOND)  # by the number of places
 
 
-class Measuring(QObject):
-    """Takes clicks while it is `on`; a third one begins anew. `changed` says whether it is on.
+class Measurement(QObject):
+    """Measurement by clicks while it is `on`; a third click starts again.
 
-    `stepped` tells what a person did, in words, and the `places` before and after: up to two, each
-    (x, y) in m, or None while nothing is measured.
+    `changed` emits whether it is on; `stepped` the words of a step and the `places` before and
+    after it: up to two (x, y) in m, None while off.
     """
 
     changed = Signal(bool)
@@ -39,7 +39,7 @@ class Measuring(QObject):
     def on(self) -> bool:
         return self.places is not None
 
-    def turn(self) -> None:
+    def toggle(self) -> None:
         if self.on:
             self.end()
         else:
@@ -47,35 +47,35 @@ class Measuring(QObject):
 
     def end(self) -> None:
         if self.on:
-            self._step("end measuring", None)
+            self._step("end measurement", None)
 
-    def take(self, x: float, y: float) -> None:
-        """Measure from or to the place (x, y) in m."""
+    def add_place(self, x: float, y: float) -> None:
+        """Add the place (x, y) in m as the first or second."""
         before = self.places if self.places is not None and len(self.places) < 2 else ()
         self._step("measure to here" if before else "measure from here", (*before, (x, y)))
 
     def _step(self, words: str, after: Places) -> None:
         self.stepped.emit(words, self.places, after)
 
-    def have(self, places: Places) -> None:
-        """Measure between these."""
+    def set_places(self, places: Places) -> None:
+        """Measure between these places; None switches off."""
         was, self._skin = self.on, self._membrane.skin
         if places and not _lie_on(self._skin.patch, places):
-            places = ()  # undo brought them back, and there is another skin by now
+            places = ()  # restored by undo, but outside the present skin
         self.places = places
-        self.ruler.ask(_ASKED[len(places)] if places is not None and len(places) < 2 else "")
+        self.ruler.show_hint(_HINTS[len(places)] if places is not None and len(places) < 2 else "")
         self._membrane.plotter.update()
         if was != self.on:
             self.changed.emit(self.on)
 
     def show(self, estimate: Estimate) -> None:
-        """Measure on the skin as it is in `estimate`."""
+        """Update the distances on the skin of `estimate`."""
         skin = self._membrane.skin
-        self.ruler.fit()  # into a picture that may have another size
+        self.ruler.fit()  # the view may have another size
         if not self.places:
             return
         if skin.patch != self._skin.patch:
-            self.have(())  # the places were on another skin
+            self.set_places(())  # the places belong to another skin
             return
         places = np.array(self.places)
         found = None
@@ -85,6 +85,6 @@ class Measuring(QObject):
 
 
 def _lie_on(patch: Patch, places: tuple[tuple[float, float], ...]) -> bool:
-    """Whether all `places` in m are on a patch, its rim included however they are rounded."""
+    """Whether all `places` in m are on a patch, including its rim despite rounding."""
     middle = np.array([patch.a, patch.b]) / 2
-    return bool(patch.contains(middle + _NEARER * (np.array(places) - middle)).all())
+    return bool(patch.contains(middle + _INWARD * (np.array(places) - middle)).all())

@@ -1,4 +1,4 @@
-"""The mouse on the skin: what it points at, and loads that it drags."""
+"""Mouse on the skin: pointing, clicks and drags of loads."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,20 +6,20 @@ from PySide6.QtCore import QEvent, QObject, QPointF, Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent, QMouseEvent
 from pyvistaqt import QtInteractor
 
-from kappaskin_app.features.membrane.camera import Sight
+from kappaskin_app.features.membrane.camera import Projection
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.drawn_skin import NO_SKIN
 
 Array = NDArray[np.float64]
 
 ARROW = 0.22  # from a load's tip to its tail, as a share of the skin's size
-_NEAR = 14.0  # pixels around an arrow within which the mouse takes hold of it
+_NEAR = 14.0  # px around an arrow in which the mouse grabs it
 
 
 class LoadDrag(QObject):
-    """Watches the mouse over a plotter; positions are (x, y) on the skin in m.
+    """Drags of loads with the mouse; positions are (x, y) on the skin in m.
 
-    `handles` (k, 2) are where loads are drawn on the `skin`. Escape gives up a drag.
+    `handles` (k, 2) are the positions of the drawn loads on the `skin`. Escape cancels a drag.
     """
 
     grabbed = Signal(float, float)
@@ -29,18 +29,18 @@ class LoadDrag(QObject):
 
     def __init__(self, plotter: QtInteractor) -> None:
         super().__init__(plotter)
-        self._plotter, self._sight = plotter, Sight(plotter)
+        self._plotter, self._projection = plotter, Projection(plotter)
         self.skin = NO_SKIN
         self.handles: Array = np.empty((0, 2))
         self._pressed = self._dragging = False
-        self._slip, self._held = np.zeros(2), np.zeros(2)
+        self._offset, self._held = np.zeros(2), np.zeros(2)
         plotter.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         kind, left = event.type(), Qt.MouseButton.LeftButton
         if kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
             escapes = isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_Escape
-            # For the window: VTK's own keys turn on stereo or wireframe for good.
+            # Else VTK's own keys would switch to stereo or wireframe.
             event.setAccepted(escapes and self._dragging)
             if escapes:
                 self._give_up()
@@ -60,10 +60,10 @@ class LoadDrag(QObject):
         """Widget pixels (2,) of the tip and the tail of the arrow at `handle`."""
         points, out = self.skin.place(handle[None])
         tail = points[0] + out[0] * ARROW * self.skin.size
-        return self._sight.to_screen(points[0]), self._sight.to_screen(tail)
+        return self._projection.to_screen(points[0]), self._projection.to_screen(tail)
 
     def _handle_near(self, at: QPointF) -> Array | None:
-        """The handle (2,) in m whose arrow is drawn near `at`."""
+        """The handle (2,) in m of an arrow near `at`, if any."""
         for handle in self.handles:
             tip, tail = self._ends(handle)
             along = tail - tip
@@ -80,7 +80,7 @@ class LoadDrag(QObject):
         self._pressed = self._dragging = True
         self._plotter.setFocus(Qt.FocusReason.MouseFocusReason)  # for Escape
         self._held = handle
-        self._slip = handle - self._seen_at(at, handle)
+        self._offset = handle - self._position_at(at, handle)
         self.grabbed.emit(*handle)
         return True
 
@@ -104,32 +104,32 @@ class LoadDrag(QObject):
         self._plotter.setCursor(Qt.CursorShape.ClosedHandCursor)
         if self._dragging:
             held = self._held
-            if len(self.handles):  # the skin sinks as the load moves on it: stay at its height
+            if len(self.handles):  # at the height of the load, which changes as it moves
                 held = self.handles[np.argmin(np.linalg.norm(self.handles - held, axis=1))]
-            self._held = self._seen_at(at, held) + self._slip
+            self._held = self._position_at(at, held) + self._offset
             self.dragged.emit(*self._held)
         return True
 
-    def _seen_at(self, at: QPointF, handle: Array) -> Array:
-        """What lies under `at` of the skin as high as it is drawn at `handle`, (2,) in m."""
-        near, far = self._sight.line(at)
+    def _position_at(self, at: QPointF, handle: Array) -> Array:
+        """Position (2,) in m under `at` on the skin at the drawn height of `handle`."""
+        near, far = self._projection.line(at)
         return self.skin.seen_at(near, far, float(self.skin.height_at(handle[None])[0]), handle)
 
     def on_screen(self) -> QPointF | None:
-        """Where in the plotter the first load's arrow ends, None without a load."""
+        """Pixel of the tip of the first load's arrow, None without a load."""
         if not len(self.handles):
             return None
         return QPointF(*self._ends(self.handles[0])[0])
 
 
-_STILL = 4.0  # px that the mouse may move while it clicks
-_LOOKS = 30  # ms between two looks at where it points
+_STILL = 4.0  # px that the mouse may move in a click
+_PERIOD = 30  # ms between two positions
 
 
 class SurfacePointer(QObject):
-    """Watches the mouse over a plotter; places are (x, y) on the `skin` in m.
+    """Position of the mouse on the `skin`, (x, y) in m.
 
-    `moved` brings None where it points beside the skin.
+    `moved` emits None outside the skin.
     """
 
     clicked = Signal(float, float)
@@ -137,11 +137,11 @@ class SurfacePointer(QObject):
 
     def __init__(self, plotter: QtInteractor) -> None:
         super().__init__(plotter)
-        self.skin, self._sight = NO_SKIN, Sight(plotter)
+        self.skin, self._projection = NO_SKIN, Projection(plotter)
         self._pressed_at: QPointF | None = None
         self._moved_to: QPointF | None = None
-        self._looked = QTimer(self, interval=_LOOKS, singleShot=True)  # pyright: ignore[reportCallIssue]
-        self._looked.timeout.connect(guarded(self._look))
+        self._timer = QTimer(self, interval=_PERIOD, singleShot=True)  # pyright: ignore[reportCallIssue]
+        self._timer.timeout.connect(guarded(self._report))
         plotter.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
@@ -157,21 +157,21 @@ class SurfacePointer(QObject):
                 self._release(at)
             elif kind == QEvent.Type.MouseMove and not event.buttons():
                 self._moved_to = at
-                if not self._looked.isActive():
-                    self._look()
+                if not self._timer.isActive():
+                    self._report()
         return False
 
     def _release(self, at: QPointF) -> None:
         pressed, self._pressed_at = self._pressed_at, None
         if pressed is None or (at - pressed).manhattanLength() > _STILL:
             return
-        place = self.skin.hit(*self._sight.line(at))
+        place = self.skin.hit(*self._projection.line(at))
         if place is not None:
             self.clicked.emit(*place.tolist())
 
-    def _look(self) -> None:
-        """Tell where the mouse is, unless it was told: also where it stops right after a look."""
+    def _report(self) -> None:
+        """Emit the last position of the mouse, at most once per period."""
         at, self._moved_to = self._moved_to, None
         if at is not None:
-            self._looked.start()
-            self.moved.emit(self.skin.hit(*self._sight.line(at)))
+            self._timer.start()
+            self.moved.emit(self.skin.hit(*self._projection.line(at)))

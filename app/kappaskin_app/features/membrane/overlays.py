@@ -28,7 +28,7 @@ _COLOUR = "#8fd0ff"
 
 
 class Band:
-    """The surface, `TIMES_SD` error bars out and as many in."""
+    """Band of `TIMES_SD` standard deviations on both sides of the surface."""
 
     def __init__(self, plotter: Any) -> None:
         self._plotter = plotter
@@ -37,9 +37,9 @@ class Band:
         self._actors: list[Any] = []
 
     def show(self, skin: DrawnSkin, sd: Array | None, times: float) -> None:
-        """Draw it around `skin` for standard deviations `sd` (ny, nx) in m; nothing of None."""
+        """Draw it around `skin` for standard deviations `sd` (ny, nx) in m; hide it for None."""
         if sd is not None and skin is not self._skin:
-            self._meet(skin)
+            self._build(skin)
         for actor in self._actors:
             actor.visibility = sd is not None
         if sd is not None:
@@ -47,7 +47,7 @@ class Band:
             for side, mesh in zip((-1, 1), self._meshes, strict=True):
                 mesh.points[:] = skin.points(height=skin.height.ravel() + side * wide)
 
-    def _meet(self, skin: DrawnSkin) -> None:
+    def _build(self, skin: DrawnSkin) -> None:
         for actor in self._actors:
             self._plotter.remove_actor(actor, render=False)
         self._skin = skin
@@ -65,14 +65,14 @@ class Band:
 
 
 _STRIDE = 6  # points of the surface between two crosses
-_SHARE = 0.9  # of the distance between two crosses: the longest arm to arm
+_SHARE = 0.9  # longest line, of the distance between two crosses
 _HOLLOW, _CONVEX = DIVERGING[40], DIVERGING[215]
 
 
 class Directions:
-    """Two lines a cross, as long as the curvature is large; blue where hollow, orange where convex.
+    """Crosses of the principal directions, with lengths by curvature.
 
-    As seen from outside.
+    Blue is concave and orange convex, seen from outside.
     """
 
     def __init__(self, plotter: Any) -> None:
@@ -85,12 +85,12 @@ class Directions:
     def show(
         self, skin: DrawnSkin, found: Array | None, most: float = 1.0, lift: float = 0.0
     ) -> None:
-        """Draw curvatures and angle `found` (3, ny, nx), `lift` mm above the skin; none of None.
+        """Draw curvatures and angle `found` (3, ny, nx), `lift` mm above the skin; hide for None.
 
-        A curvature of `most` in 1/m has the longest arm.
+        A curvature of `most` in 1/m has the longest line.
         """
         if found is not None and skin is not self._skin:
-            self._meet(skin)
+            self._build(skin)
         if self.actor is not None:
             self.actor.visibility = found is not None
         if found is None or not len(self._nodes):
@@ -116,7 +116,7 @@ class Directions:
             ends.append(rest + out * (height + side * slope)[:, None])
         return np.stack(ends, axis=1).reshape(-1, 3)
 
-    def _meet(self, skin: DrawnSkin) -> None:
+    def _build(self, skin: DrawnSkin) -> None:
         self._skin = skin
         stride = _STRIDE * max(1, skin.on.shape[1] // 64)
         chosen = np.zeros(skin.on.shape, bool)
@@ -148,7 +148,7 @@ _COLOURS = np.array([_NORMAL, DIVERGING[215], DIVERGING[40]], np.uint8)
 
 
 class ContactFrame:
-    """Three lines from the contact on the drawn skin, and a translucent cone round the normal."""
+    """Axes of the contact frame, and a cone of the normal's uncertainty."""
 
     def __init__(self, plotter: Any) -> None:
         points = np.arange(3 * _POINTS).reshape(3, -1)
@@ -189,7 +189,7 @@ class ContactFrame:
         length = _LONG * skin.size
         lines = [origin + length * np.linspace(0, 1, _POINTS)[:, None] * normal]
         for turn in (angle, angle + np.pi / 2):
-            # Along the skin: straight ones would be hidden where it is hollow.
+            # Along the skin: straight lines would be hidden where it is concave.
             along = length / MM * np.linspace(-0.5, 0.5, _POINTS)[:, None]
             there = position + along * (np.cos(turn), np.sin(turn))
             lines.append(skin.place(there, lift)[0])
@@ -204,14 +204,14 @@ class ContactFrame:
             self._cone.points[:] = np.vstack([origin, origin + rim])
 
 
-_AROUND, _OUT, _FINE = 64, 14, 48  # points around, outwards, and to find how far it is near
-_ABOVE = 0.35  # of the skin's size: what is higher is not drawn
+_AROUND, _OUT, _FINE = 64, 14, 48  # points around, outward, and to find the extent
+_ABOVE = 0.35  # of the skin's size: the highest part drawn
 _WAYS = 2 * np.pi * np.arange(_AROUND) / _AROUND
 _SIDES = np.stack([np.cos(_WAYS), np.sin(_WAYS)], axis=-1)
 
 
-class Sheet:
-    """A mesh round the object's place, stretched in height as the skin is, so that both fit."""
+class ObjectMesh:
+    """Translucent mesh of an object, exaggerated in height as the skin is."""
 
     def __init__(self, plotter: Any, colour: str) -> None:
         self._mesh: Any = pv.PolyData(np.zeros((_OUT * _AROUND, 3)), faces=_faces())
@@ -224,7 +224,7 @@ class Sheet:
         self.actor.visibility = False
 
     def show(self, stands: PlacedObject | None, skin: DrawnSkin, times: float) -> None:
-        """Draw the object that `stands` there resting on the `skin`; nothing of None."""
+        """Draw a placed object resting on the `skin`; hide it for None."""
         points = None if stands is None else underside(stands, skin, times)
         self.actor.visibility = points is not None
         if points is not None:
@@ -232,9 +232,9 @@ class Sheet:
 
 
 def underside(stands: PlacedObject, skin: DrawnSkin, times: float) -> Array | None:
-    """Points (k, 3) in mm of the underside, so low that it touches the drawn skin.
+    """Points (k, 3) in mm of the underside in contact with the drawn skin.
 
-    None where it is nowhere above it.
+    None where the object is nowhere above the skin.
     """
     reach = min(float(np.hypot(*stands.object_.extent)), skin.side / MM)
     shares = np.linspace(0.0, 1.0, _FINE)
@@ -256,7 +256,7 @@ def underside(stands: PlacedObject, skin: DrawnSkin, times: float) -> Array | No
 
 
 def _depth(skin: DrawnSkin, places: Array, height: Array, times: float) -> float:
-    """How far in m its lowest point is in, when it touches the skin and enters it nowhere."""
+    """Depth in m of the lowest point when the object touches the skin without entering it."""
     over = np.isfinite(height) & skin.patch.contains(places)
     if not over.any():
         return float("nan")
@@ -265,47 +265,49 @@ def _depth(skin: DrawnSkin, places: Array, height: Array, times: float) -> float
 
 
 def _faces() -> NDArray[np.intp]:
-    """Squares between the rings, VTK's way."""
+    """Faces between the rings, in VTK's format."""
     index = np.arange(_OUT * _AROUND).reshape(_OUT, _AROUND)
     beside = np.roll(index, -1, axis=1)
     corners = np.stack([index[:-1], beside[:-1], beside[1:], index[1:]], axis=-1).reshape(-1, 4)
     return np.insert(corners, 0, 4, axis=1).ravel()
 
 
-_LEAST = 2.0  # 1/m with the longest arm, at least: or noise would have long ones
-_OLD = 2.0  # s after which an object that was found is no longer one that touches
+_LEAST = 2.0  # 1/m of the longest line at least, so that noise stays short
+_OLD = 2.0  # s after which a recognised object is discarded
 _FOUND, _PRESSED = "#1fd17a", "#e8543f"  # as the contact and the loads are marked
 
 
-class Overlaying:
-    """Draws directions, band, frame and objects on the skin of a `membrane`."""
+class Overlays:
+    """Principal directions, error band, contact frame and objects on a `membrane`."""
 
     def __init__(self, membrane: MembraneView, colouring: Colouring, session: Session) -> None:
         self._membrane, self._colouring, self._session = membrane, colouring, session
         plotter = membrane.plotter
         self.directions, self.frame = Directions(plotter), ContactFrame(plotter)
         self.band = Band(plotter)
-        self.found, self.pressed = Sheet(plotter, _FOUND), Sheet(plotter, _PRESSED)
+        self.found, self.pressed = ObjectMesh(plotter, _FOUND), ObjectMesh(plotter, _PRESSED)
         self._longest = SteadyRange(_LEAST)
-        self._what: ContactObject | None = None
-        self._found_at = -math.inf
+        self._object: ContactObject | None = None
+        self._object_time = -math.inf
 
-    def find(self, what: ContactObject) -> None:
-        """Take up what was found to touch the skin."""
-        self._what, self._found_at = what, time.monotonic()
+    def set_object(self, what: ContactObject) -> None:
+        """Store the recognised object."""
+        self._object, self._object_time = what, time.monotonic()
 
     def show(self, estimate: Estimate, settings: Settings, times: float) -> None:
-        """Draw what is wanted, of a skin that is drawn so many `times` higher."""
+        """Draw the selected overlays on a skin exaggerated by `times`."""
         self._show_directions(estimate, settings)
         self._show_band(estimate, settings, times)
         self._show_frame(estimate, settings, times)
         skin = self._membrane.skin
-        self.found.show(self._of_found(estimate) if settings.show_object else None, skin, times)
-        stands = self._of_scene(estimate) if settings.show_pressed else None
+        self.found.show(
+            self._recognised_object(estimate) if settings.show_object else None, skin, times
+        )
+        stands = self._pressed_object(estimate) if settings.show_pressed else None
         self.pressed.show(stands, skin, times)
 
     def hide(self) -> None:
-        """Draw nothing while nothing new comes in."""
+        """Hide all overlays."""
         skin = self._membrane.skin
         self.directions.show(skin, None)
         self.band.show(skin, None, 1.0)
@@ -339,16 +341,16 @@ class Overlaying:
         membrane = self._membrane
         self.frame.show(membrane.skin, contact.position, angle, slopes, membrane.lift)
 
-    def _of_found(self, estimate: Estimate) -> PlacedObject | None:
-        """What was found of late, where the contact is now."""
-        what, contact = self._what, estimate.contact
-        if what is None or not contact.present or time.monotonic() - self._found_at > _OLD:
+    def _recognised_object(self, estimate: Estimate) -> PlacedObject | None:
+        """The recently recognised object at the present contact."""
+        what, contact = self._object, estimate.contact
+        if what is None or not contact.present or time.monotonic() - self._object_time > _OLD:
             return None
         patch = self._membrane.skin.patch
         return placed_object(what, contact.position, max(patch.a, patch.b))
 
-    def _of_scene(self, estimate: Estimate) -> PlacedObject | None:
-        """The rigid object of the scene that is played, where it is now."""
+    def _pressed_object(self, estimate: Estimate) -> PlacedObject | None:
+        """The rigid object of the playing scene at its present place."""
         session = self._session
         if not session.inside:
             return None

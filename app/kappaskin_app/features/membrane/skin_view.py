@@ -1,4 +1,4 @@
-"""The skin in three dimensions as the settings want it: in which colours, how high, what beside."""
+"""Skin view: connects the 3-D view to display, settings and selection."""
 
 import time
 
@@ -9,9 +9,9 @@ from PySide6.QtCore import QObject
 from kappaskin.contact import ContactObject
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
-from kappaskin_app.features.membrane.measuring import Measuring
+from kappaskin_app.features.membrane.measuring import Measurement
 from kappaskin_app.features.membrane.membrane import MembraneView
-from kappaskin_app.features.membrane.overlays import Overlaying
+from kappaskin_app.features.membrane.overlays import Overlays
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.colouring import SHADES, locked_at
 from kappaskin_app.shell.display import Display, Shown, of_row
@@ -23,27 +23,27 @@ from kappaskin_app.theme import DIVERGING, current, follow_look
 from kappaskin_app.widgets.colour_bar import SkinScale
 from kappaskin_app.widgets.tint import Tint
 
-_MARKS = 0.06  # s between two drawings of the marks
+_MARKS = 0.06  # s between two updates of the marks
 
 Array = NDArray[np.float64]
 
 
 class SkinView(QObject):
-    """Shows on the `membrane`, with its `scale`, what the `display` brings.
+    """Shows the data of the `display` on the `membrane` with its colour `scale`.
 
-    `alarming` says whether the picture says why nothing comes in, as nothing else does.
+    With `alarm_enabled` the view shows the reason why no data arrives.
     """
 
     def __init__(self, display: Display, session: Session, selection: Selection) -> None:
         super().__init__(display)
         self._display, self._session, self._selection = display, session, selection
         self.membrane, self.scale = MembraneView(), SkinScale()
-        self.measuring = Measuring(self.membrane)
-        self.overlays = Overlaying(self.membrane, display.colouring, session)
-        self.alarming = True
+        self.measurement = Measurement(self.membrane)
+        self.overlays = Overlays(self.membrane, display.colouring, session)
+        self.alarm_enabled = True
         self._settings = Settings()
         self._colours: object = None
-        self._out = np.empty(0, np.intp)  # elements that are left out
+        self._excluded = np.empty(0, np.intp)  # elements
         self._shown: Shown | None = None
         self._next_marks = 0.0
         follow_look(self.membrane, lambda: self._shown and self._colour(self._shown))
@@ -51,13 +51,13 @@ class SkinView(QObject):
         display.restarted.connect(guarded(self._restart))
         display.status_shown.connect(guarded(self._show_status))
         display.shown.connect(guarded(self._show))
-        display.object_found.connect(guarded(self._find))
+        display.object_found.connect(guarded(self._show_object))
         selection.pointed.connect(guarded(self.membrane.point))
         selection.asked.connect(guarded(lambda *_: self._show_marked()))
         selection.mode_changed.connect(guarded(self._show_mode))
 
-    def _find(self, what: ContactObject, _: Estimate) -> None:
-        self.overlays.find(what)
+    def _show_object(self, what: ContactObject, _: Estimate) -> None:
+        self.overlays.set_object(what)
 
     def show_settings(self, settings: Settings) -> None:
         self._settings = settings
@@ -66,14 +66,14 @@ class SkinView(QObject):
         s = settings
         self.membrane.show_box((s.from_x, s.to_x, s.from_y, s.to_y, s.from_z, s.to_z))
         self.membrane.show_options(settings.show_elements, settings.show_truth)
-        self.membrane.gaze.show(settings.look, settings.camera)
+        self.membrane.camera_control.show(settings.look, settings.camera)
 
     def limit_shown(self) -> float:
-        """How far the colours of the skin reach, in SI units."""
+        """Limit of the skin's colour range, in SI units."""
         return self.scale.bar.reach / SHADES[self._settings.colour_by].scale
 
     def _limits(self) -> dict[str, float]:
-        """How far the colours reach, by what is coloured."""
+        """Colour limit by the name of the quantity."""
         if self._selection.mode is not None:
             return {}
         return {self._settings.colour_by: self.limit_shown()}
@@ -83,45 +83,45 @@ class SkinView(QObject):
         self._allow_lock()
 
     def _allow_lock(self) -> None:
-        """Some colours have no range to keep."""
-        keeps = self._selection.mode is None and self._settings.colour_by != "health"
-        self.scale.lock.setEnabled(keeps)
+        """Enable the lock for quantities with a range."""
+        ranged = self._selection.mode is None and self._settings.colour_by != "health"
+        self.scale.lock.setEnabled(ranged)
 
     def _restart(self, status: Status) -> None:
         if status.sensor is not None:
             self._selection.point(-1)
-            self._out = np.empty(0, np.intp)
+            self._excluded = np.empty(0, np.intp)
             self.membrane.show_skin(status.sensor, status.setup.nx, status.setup.ny)
 
     def _show_status(self, _: Status) -> None:
         self._display.age_sd = self.membrane.age_sd
-        self.membrane.alarm.show(self._session.alarm() if self.alarming else "")
+        self.membrane.alarm.show(self._session.alarm() if self.alarm_enabled else "")
         self.membrane.show_lost(self._display.old)
         if self._display.old:
             self.overlays.hide()
 
     def _ages(self) -> list[float]:
-        """How old in s what was drawn within the last second was."""
+        """Ages in s of the frames drawn within the last second."""
         now = time.monotonic()
         return [age for when, age in self.membrane.ages if when > now - 1.0]
 
     def _show(self, shown: Shown) -> None:
         if not self.membrane.ready:
-            return  # a picture is due; the next tick brings a newer estimate
+            return  # the last drawing is due; the next tick has a newer estimate
         estimate, settings, now = shown.estimate, self._settings, shown.now
         self._display.ranges.limit("displacement", 1e3 * estimate.surface, settings, now)
         self._shown = shown
         self._colour(shown)
         self._show_loads(estimate)
         self.overlays.show(estimate, settings, self._times())
-        self.measuring.show(estimate)
+        self.measurement.show(estimate)
         if now >= self._next_marks:
             self._next_marks = now + _MARKS
-            self._out = np.flatnonzero(shown.kinds.any(axis=0))
+            self._excluded = np.flatnonzero(shown.kinds.any(axis=0))
             self._show_marked()
 
     def _show_marked(self) -> None:
-        self.membrane.show_marked(self._out, self._selection.asked_for)
+        self.membrane.show_marked(self._excluded, self._selection.asked_for)
 
     def _colour(self, shown: Shown) -> None:
         name, times, display = self._settings.colour_by, self._times(), self._display
@@ -141,20 +141,20 @@ class SkinView(QObject):
         if tint.colours is not self._colours:
             self._colours = tint.colours
             self.membrane.show_colours(tint.colours, tint.ink)
-        self._say_unknown(name, values)
+        self._show_reason(name, values)
         self.membrane.show_estimate(estimate, values, tint.limits, times)
         self.scale.bar.show_tint(tint, beside)
         self.scale.show_what("" if tint.unit == "shape" else shade.symbol, shade.tip)
         self.scale.show_times(times)
 
-    def _say_unknown(self, name: str, values: NDArray[np.generic]) -> None:
-        """Say in the picture why there are no colours."""
+    def _show_reason(self, name: str, values: NDArray[np.generic]) -> None:
+        """Show in the view why there are no colours."""
         known = name == "health" or values.dtype == np.uint8 or bool(np.isfinite(values).any())
         if self._selection.mode is None:
             self.membrane.show_caption("" if known else SHADES[name].unknown)
 
     def _times(self) -> float:
-        """How many times the displacement is drawn larger: as wanted, or as much as fits."""
+        """Vertical exaggeration: the requested one, or the largest that fits."""
         fits = self.membrane.skin.deepest / self._display.ranges.deepest()
         return min(self._settings.exaggeration, fits)
 

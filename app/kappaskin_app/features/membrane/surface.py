@@ -1,4 +1,4 @@
-"""The skin's surface as it is drawn: shape, colours, and the box that cuts it."""
+"""Surface of the skin: mesh, colours and clipping box."""
 
 from typing import Any
 
@@ -12,18 +12,18 @@ from kappaskin.sensing import SensorLayout
 from kappaskin_app.shell.drawn_skin import DrawnSkin
 from kappaskin_app.theme import Colours, current, follow_look
 
-_PIXELS = 384  # along each side, of cells that are no rectangles of a regular grid
+_PIXELS = 384  # per side, for elements of an irregular layout
 
 
 class ElementCells:
-    """A picture that lies on the skin; written in place, and not at all while it is not seen."""
+    """Texture with one cell per element."""
 
     def __init__(self) -> None:
         self.texture: Any = None
         self._which: NDArray[np.intp] = np.empty(0, np.intp)
 
-    def meet(self, layout: SensorLayout) -> None:
-        """Lay out the cells of another skin: each pixel shows its nearest element."""
+    def set_layout(self, layout: SensorLayout) -> None:
+        """Set the layout of another skin: each pixel shows its nearest element."""
         if layout.shape:
             width, height = layout.shape
             self._which = np.arange(len(layout))
@@ -40,7 +40,7 @@ class ElementCells:
         self.texture.repeat = False
 
     def show(self, rgb: Colours) -> None:
-        """Colour each element by its own of `rgb` (P, 3)."""
+        """Colour the elements by `rgb` (P, 3)."""
         self.pixels[:] = rgb[self._which]
         self._image.Modified()
         self.texture.Modified()
@@ -49,12 +49,12 @@ class ElementCells:
 Shares = tuple[float, float, float, float, float, float]
 
 WHOLE: Shares = (0.0, 1.0, 0.0, 1.0, 0.0, 1.0)
-"""Nothing is cut away."""
-_EDGE = 1e-3  # of the box: a skin that is drawn just as deep as it may be is not cut there
+"""No clipping."""
+_EDGE = 1e-3  # of the box: margin, so that a skin of the largest depth is not clipped
 
 
 class Box:
-    """Six planes across x, y and the height; they hold for every actor that it was told to cut."""
+    """Clipping box of six planes across x, y and height."""
 
     def __init__(self) -> None:
         self._planes = [vtkPlane() for _ in range(6)]
@@ -67,7 +67,7 @@ class Box:
         self.shares = WHOLE
 
     def show(self, skin: DrawnSkin) -> None:
-        """Stand where the skin is, from and to these shares of it along x, y and the height."""
+        """Place the planes on the skin, at its `shares`."""
         low, high = (np.repeat(side, 2) for side in skin.bounds)
         places = low + np.array(self.shares) * (high - low)
         outwards = np.tile([-_EDGE, _EDGE], 3) * (high - low)
@@ -77,7 +77,7 @@ class Box:
             self._planes[number].SetOrigin(*origin)
 
     def cut(self, actors: Any) -> None:
-        """Cut all `actors` that have a mapper, or let them be whole again."""
+        """Clip all `actors` that have a mapper; none if the box is whole."""
         wanted = self._none if self.shares == WHOLE else self._all
         for actor in actors:
             mapper = getattr(actor, "mapper", None)
@@ -86,17 +86,17 @@ class Box:
 
 
 class Surface:
-    """A mesh that is written in place; its actor is None until there is a skin."""
+    """Mesh of the skin, written in place; its actor is None until there is a skin."""
 
     def __init__(self, plotter: Any) -> None:
         self._plotter = plotter
         self._colours, self._cells = pv.LookupTable(), ElementCells()
-        # Any: what PyVista says of its own types is too narrow to write into arrays in place.
+        # Any: PyVista's annotations are too narrow for writing into arrays in place.
         self.mesh: Any = pv.PolyData()
         self.actor: Any = None
         self._arrays: dict[str, Any] = {}
         self._lost = self._by_element = False
-        follow_look(plotter, self._dress)
+        follow_look(plotter, self._apply_theme)
 
     def show_skin(self, skin: DrawnSkin, layout: SensorLayout) -> None:
         """Draw another skin, at rest."""
@@ -104,7 +104,7 @@ class Surface:
         self.mesh.point_data["value"] = np.zeros(skin.on.size)
         self.mesh.point_data.active_normals = skin.shading()
         self.mesh.active_texture_coordinates = skin.shares
-        self._cells.meet(layout)
+        self._cells.set_layout(layout)
         if self.actor is not None:
             self._plotter.remove_actor(self.actor, render=False)
         self.actor = self._plotter.add_mesh(
@@ -120,14 +120,14 @@ class Surface:
             diffuse=0.42,
         )
         self.actor.prop.interpolation = "Gouraud"
-        # VTK's own arrays: looking them up takes longer than to fill them.
+        # VTK arrays: looking them up takes longer than filling them.
         data = self.mesh.point_data
         self._arrays = {
             "points": self.mesh.points,
             "normals": data.active_normals,
             "values": data["value"],
         }
-        self._dress()
+        self._apply_theme()
 
     def show_shape(self, skin: DrawnSkin) -> None:
         self._arrays["points"][:] = skin.points()
@@ -140,7 +140,7 @@ class Surface:
         by_element = values.dtype == np.uint8
         if by_element != self._by_element:
             self._by_element = by_element
-            self._dress()
+            self._apply_theme()
         if by_element:
             self._cells.show(values)
         else:
@@ -148,7 +148,7 @@ class Surface:
             self.actor.mapper.scalar_range = limits
 
     def show_colours(self, colours: Colours) -> None:
-        """Colour values by a map of 256 colours (256, 3)."""
+        """Set the colour map (256, 3) of values."""
         opaque = np.full((len(colours), 1), 255, np.uint8)
         self._colours.values = np.hstack([colours, opaque])
 
@@ -159,10 +159,10 @@ class Surface:
 
     def show_lost(self, lost: bool) -> None:
         self._lost = lost
-        self._dress()
+        self._apply_theme()
 
-    def _dress(self) -> None:
-        """Show the values, a picture of the elements, or neither when lost."""
+    def _apply_theme(self) -> None:
+        """Show the values, the texture of the elements, or grey when lost."""
         self._colours.nan_color = current().missing
         if self.actor is None:
             return

@@ -1,12 +1,12 @@
-"""The presenter: what is felt fills the screen, and sounds."""
+"""Presenter: the skin and the estimates in full screen, and as sound."""
 
-from kappaskin_app.features.presenter.presenting import SOUND_TIP, TIP, Presenting
-from kappaskin_app.features.presenter.stage import Stage
+from kappaskin_app.features.presenter.controller import SOUND_TIP, TIP, PresenterController
+from kappaskin_app.features.presenter.view import PresenterView
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.parts import VIEW
 from kappaskin_app.shell.window import MainWindow
 
-_LAYOUT = "The skin and what is felt fill the screen; Esc leaves"
+_LAYOUT = "The skin and the estimates in full screen; Esc ends"
 
 
 class PresenterFeature:
@@ -15,38 +15,40 @@ class PresenterFeature:
     def install(self, shell: MainWindow) -> None:
         self._shell = shell
         shell.takeCentralWidget()
-        self.stage = Stage(shell.display.centre)
-        shell.setCentralWidget(self.stage)
-        self.presenting = Presenting(
-            shell, self.stage, shell.session, shell.display, shell.selection.load
+        self.presenter_view = PresenterView(shell.display.centre)
+        shell.setCentralWidget(self.presenter_view)
+        self.presenter = PresenterController(
+            shell, self.presenter_view, shell.session, shell.display, shell.selection.load
         )
-        shell.layouts.add("Presenter", _LAYOUT, full=self.presenting)
-        shell.session.estimated.connect(guarded(self.presenting.receive))
-        shell.display.status_shown.connect(guarded(self.presenting.follow))
-        shell.display.object_found.connect(guarded(self.presenting.find))
-        self.stage.fitted.connect(shell.display.unit_changed)
+        shell.layouts.add("Presenter", _LAYOUT, full=self.presenter)
+        shell.session.estimated.connect(guarded(self.presenter.receive))
+        shell.display.status_shown.connect(guarded(self.presenter.follow))
+        shell.display.object_found.connect(guarded(self.presenter.set_object))
+        self.presenter_view.fitted.connect(shell.display.unit_changed)
         self._add_actions(shell)
-        shell.closing.connect(guarded(self.presenting.close))
+        shell.closing.connect(guarded(self.presenter.close))
 
     def _add_actions(self, shell: MainWindow) -> None:
         add = shell.actions_by_name.add
-        add("present", VIEW, "&Presenter", self.presenting.turn, "F11", TIP)
-        self._action = add("sound", VIEW, "S&ound of the force", self._turn, "F12", SOUND_TIP)
+        add("present", VIEW, "&Presenter", self.presenter.toggle, "F11", TIP)
+        self._action = add(
+            "sound", VIEW, "S&ound of the force", self._toggle_sound, "F12", SOUND_TIP
+        )
         self._action.setCheckable(True)
-        self.presenting.sound.ended.connect(guarded(self._show_sound))
+        self.presenter.sound.ended.connect(guarded(self._show_sound))
 
-    def _turn(self) -> None:
-        sound, before = self.presenting.sound, self.presenting.sound.on
-        self._have_sound(not before)
-        if sound.on != before:  # or there is nothing to undo: nothing here can play it
+    def _toggle_sound(self) -> None:
+        sound, before = self.presenter.sound, self.presenter.sound.on
+        self._set_sound(not before)
+        if sound.on != before:  # else no player was found, and there is nothing to undo
             words = "sound of the force on" if sound.on else "sound of the force off"
-            self._shell.history.step(words, self._have_sound, before, sound.on)
+            self._shell.history.step(words, self._set_sound, before, sound.on)
 
-    def _have_sound(self, on: bool) -> None:
-        sound = self.presenting.sound
+    def _set_sound(self, on: bool) -> None:
+        sound = self.presenter.sound
         if sound.on != on:
-            self._show_sound(sound.turn())
+            self._show_sound(sound.toggle())
 
     def _show_sound(self, why_not: str) -> None:
         self._shell.notify(why_not)
-        self._action.setChecked(self.presenting.sound.on)
+        self._action.setChecked(self.presenter.sound.on)

@@ -1,4 +1,4 @@
-"""The pad: the skin from above, on which a hand moves an object and presses."""
+"""Pad: the skin from above, where the user moves a simulated object and presses it."""
 
 import math
 from collections.abc import Mapping
@@ -29,8 +29,8 @@ from PySide6.QtWidgets import (
 
 from kappaskin.scenes import Indenter, Scene
 from kappaskin.skin import Disk, Patch, Polygon
-from kappaskin_app.features.presenter.boards import Board
-from kappaskin_app.features.presenter.cue import Cue
+from kappaskin_app.features.presenter.feedback import Feedback
+from kappaskin_app.features.presenter.indicators import Indicator
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import current, follow_look, series
 from kappaskin_app.widgets.lettering import CAPTION, Words, letters, shrunk
@@ -38,24 +38,24 @@ from kappaskin_app.widgets.lettering import CAPTION, Words, letters, shrunk
 
 @dataclass(frozen=True)
 class DemoObject:
-    """An object that a simulated finger may press: what its button and its tooltip say."""
+    """An object of the demonstration: title and tooltip of its button, and its scene settings."""
 
     title: str
     tip: str
-    said: Mapping[str, Any]
+    settings: Mapping[str, Any]
 
     def is_in(self, scene: Scene) -> bool:
-        """Whether it is what touches in `scene`."""
+        """Whether it is the object in `scene`."""
         what = scene.stimuli[0].what
         rigid = what.rigid if isinstance(what, Indenter) else what
         named = type(rigid).__name__.removesuffix("Load").lower()
-        sizes = {name: value for name, value in self.said.items() if name != "what"}
-        return named == self.said["what"] and all(
+        sizes = {name: value for name, value in self.settings.items() if name != "what"}
+        return named == self.settings["what"] and all(
             getattr(rigid, name, None) == value for name, value in sizes.items()
         )
 
 
-THINGS = (
+DEMO_OBJECTS = (
     DemoObject("Ball 40 mm", "A ball of 40 mm radius.", {"what": "sphere", "radius": 0.04}),
     DemoObject("Ball 60 mm", "A ball of 60 mm radius.", {"what": "sphere", "radius": 0.06}),
     DemoObject("Ball 80 mm", "A ball of 80 mm radius.", {"what": "sphere", "radius": 0.08}),
@@ -69,24 +69,24 @@ THINGS = (
         "The edge of a box, 40 mm long, along x.",
         {"what": "wedge", "angle": math.pi / 2, "length": 0.04, "width": 0.02},
     ),
-    DemoObject("Point", "A point: it has no radius.", {"what": "point"}),
+    DemoObject("Point", "A point, without a radius.", {"what": "point"}),
 )
 
 
 _MARGIN = 0.05  # of the pad's shorter side, around the skin
-_NOTCH = 1.08  # times as hard, by one notch of the wheel or one key
-_PER_PIXEL = 1.01  # times as hard, by one px of Shift and drag
-_STEP = 0.01  # of the skin's longer side, by one key
-_LET_GO = 400  # ms after the last notch or key that a hand lets go
-_HAND = "#e8543f"  # as the load in the view of the skin
+_PER_NOTCH = 1.08  # factor of the force per notch of the wheel or key
+_PER_PIXEL = 1.01  # factor of the force per px of Shift and drag
+_STEP = 0.01  # of the skin's longer side, per key
+_RELEASE_DELAY = 400  # ms after the last notch or key
+_HAND_COLOUR = "#e8543f"  # as the load in the view of the skin
 
-_KEYS = {
+_MOVE_KEYS = {
     Qt.Key.Key_Left: (-1, 0),
     Qt.Key.Key_Right: (1, 0),
     Qt.Key.Key_Up: (0, 1),
     Qt.Key.Key_Down: (0, -1),
 }
-_HARDER = {
+_FORCE_KEYS = {
     Qt.Key.Key_PageUp: 1,
     Qt.Key.Key_Plus: 1,
     Qt.Key.Key_PageDown: -1,
@@ -95,18 +95,19 @@ _HARDER = {
 
 
 class Hand(NamedTuple):
-    """Where a hand holds what touches, in m, and how hard in N."""
+    """Position in m and force in N of the simulated object."""
 
     x: float
     y: float
     force: float
 
 
-class Pad(Board):
-    """Drag: `dragged` to (x, y) in m; wheel, Shift and drag: `pressed` so many times as hard.
+class Pad(Indicator):
+    """Pad to move and press the object.
 
-    `grabbed` comes before them, `released` after; Escape emits `given_up`. Arrow keys move, Page
-    Up and Page Down press.
+    Dragging emits `dragged` to (x, y) in m; the wheel, or Shift and drag, `pressed` with the factor
+    of the force. `grabbed` comes before them, `released` after; Escape emits `given_up`. Arrow keys
+    move, Page Up and Page Down press.
     """
 
     grabbed = Signal(float, float)
@@ -118,22 +119,22 @@ class Pad(Board):
     def __init__(self) -> None:
         super().__init__()
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setAccessibleName("Pad: drag to move what touches the skin, wheel to press harder")
+        self.setAccessibleName("Pad: drag to move the object, wheel to press harder")
         self.setToolTip(
-            "Drag to move what touches the skin; wheel, or Shift and drag, to press harder. Arrow "
-            "keys move, Page Up and Page Down press, Escape puts it back."
+            "Drag to move the object; wheel, or Shift and drag, to press harder. Arrow keys move, "
+            "Page Up and Page Down press, Escape cancels."
         )
         self.setCursor(Qt.CursorShape.CrossCursor)
         self._patch: Patch | None = None
         self.hand: Hand | None = None
-        self.cue: Cue | None = None
+        self.feedback: Feedback | None = None
         self.holding = False
-        self._times, self._place = 1.0, QPointF()
+        self._factor, self._place = 1.0, QPointF()
         self._from = QPointF()
-        self._timer = QTimer(self, interval=_LET_GO, singleShot=True)  # pyright: ignore[reportCallIssue]
-        self._timer.timeout.connect(self.let_go)
+        self._timer = QTimer(self, interval=_RELEASE_DELAY, singleShot=True)  # pyright: ignore[reportCallIssue]
+        self._timer.timeout.connect(self.release)
 
-    # What it shows.
+    # Display.
 
     def show_skin(self, patch: Patch) -> None:
         if patch != self._patch:
@@ -141,18 +142,18 @@ class Pad(Board):
             self.update()
 
     def show_hand(self, hand: Hand | None) -> None:
-        """What touches the simulated skin, which the estimate does not know."""
+        """Show the true position of the simulated object."""
         if hand != self.hand:
             self.hand = hand
             self.update()
 
-    def show_cue(self, cue: Cue | None) -> None:
-        self.cue = cue
+    def show_feedback(self, feedback: Feedback | None) -> None:
+        self.feedback = feedback
         self.update()
 
     @property
     def skin(self) -> QRectF:
-        """Where the skin's rectangle is drawn, as large as it fits."""
+        """Place of the skin, as large as fits."""
         if self._patch is None:
             return QRectF(self.rect())
         margin = _MARGIN * min(self.width(), self.height())
@@ -162,8 +163,8 @@ class Pad(Board):
         place.moveCenter(self.middle)
         return place
 
-    def seen_at(self, x: float, y: float) -> QPointF:
-        """Where (x, y) in m is seen: y goes up."""
+    def to_pixel(self, x: float, y: float) -> QPointF:
+        """Pixel of (x, y) in m; y points up."""
         place, patch = self.skin, self._patch
         if patch is None:
             return place.center()
@@ -172,8 +173,8 @@ class Pad(Board):
             place.bottom() - y / patch.b * place.height(),
         )
 
-    def placed_at(self, at: QPointF) -> tuple[float, float]:
-        """The place (x, y) in m under `at`, or the nearest one of the skin's rectangle."""
+    def to_skin(self, at: QPointF) -> tuple[float, float]:
+        """Position (x, y) in m of the pixel `at`, limited to the skin's rectangle."""
         place, patch = self.skin, self._patch
         if patch is None:
             return 0.0, 0.0
@@ -187,11 +188,11 @@ class Pad(Board):
         painter.setPen(QPen(QColor(focus), 2 if self.hasFocus() else 1))
         painter.setBrush(QColor(theme.base))
         self._draw_outline(painter, place)
-        if self.cue is not None:
-            self._draw_cue(painter, self.cue)
+        if self.feedback is not None:
+            self._draw_feedback(painter, self.feedback)
         if self.hand is not None:
-            at, r = self.seen_at(self.hand.x, self.hand.y), 13 * self.unit + 3
-            painter.setPen(QPen(QColor(_HAND), max(2.0, 4 * self.unit)))
+            at, r = self.to_pixel(self.hand.x, self.hand.y), 13 * self.unit + 3
+            painter.setPen(QPen(QColor(_HAND_COLOUR), max(2.0, 4 * self.unit)))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.drawEllipse(at, r, r)
             for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
@@ -202,55 +203,55 @@ class Pad(Board):
         if isinstance(self._patch, Disk):
             painter.drawEllipse(place)
         elif isinstance(self._patch, Polygon):
-            corners = [self.seen_at(x, y) for x, y in np.asarray(self._patch.vertices).tolist()]
+            corners = [self.to_pixel(x, y) for x, y in np.asarray(self._patch.vertices).tolist()]
             painter.drawPolygon(QPolygonF(corners))
         else:
             painter.drawRect(place)
 
-    def _draw_cue(self, painter: QPainter, cue: Cue) -> None:
-        """A dot where the contact is estimated to be."""
+    def _draw_feedback(self, painter: QPainter, feedback: Feedback) -> None:
+        """Draw a dot at the estimated contact."""
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(series(3))
         r = 7 * self.unit + 2
-        painter.drawEllipse(self.seen_at(*cue.position), r, r)
+        painter.drawEllipse(self.to_pixel(*feedback.position), r, r)
 
-    # What the hand does.
+    # Input.
 
-    def _hold(self) -> bool:
-        """Take hold of what touches, unless it is held already; whether there is anything."""
+    def _grab(self) -> bool:
+        """Grab the object unless it is held already; whether there is one."""
         if not self.holding and self.hand is not None:
-            self.holding, self._times = True, 1.0
+            self.holding, self._factor = True, 1.0
             self._place = QPointF(self.hand.x, self.hand.y)
             self.grabbed.emit(self.hand.x, self.hand.y)
         return self.holding
 
-    def let_go(self) -> None:
+    def release(self) -> None:
         self._timer.stop()
         if self.holding:
             self.holding = False
             self.released.emit()
 
     def give_up(self) -> None:
-        """Put back what is held, if anything is."""
+        """Cancel the drag, if there is one."""
         self._timer.stop()
         if self.holding:
             self.holding = False
             self.given_up.emit()
 
     def _press(self, times: float) -> None:
-        self._times *= times
-        self.pressed.emit(self._times)
+        self._factor *= times
+        self.pressed.emit(self._factor)
 
     def _move(self, x: float, y: float) -> None:
         self._place = QPointF(x, y)
         self.dragged.emit(x, y)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        if event.button() == Qt.MouseButton.LeftButton and self._hold():
+        if event.button() == Qt.MouseButton.LeftButton and self._grab():
             self._timer.stop()
             self._from = event.position()
             if not event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
-                self._move(*self.placed_at(event.position()))
+                self._move(*self.to_skin(event.position()))
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if not self.holding or not event.buttons() & Qt.MouseButton.LeftButton:
@@ -258,22 +259,22 @@ class Pad(Board):
         if event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
             self._press(_PER_PIXEL ** (self._from.y() - event.position().y()))
         else:
-            self._move(*self.placed_at(event.position()))
+            self._move(*self.to_skin(event.position()))
         self._from = event.position()
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
-            self.let_go()
+            self.release()
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         notches = event.angleDelta().y() / 120 or event.angleDelta().x() / 120
-        if notches and self._hold():
-            self._press(_NOTCH**notches)
-            self._soon(event.buttons())
+        if notches and self._grab():
+            self._press(_PER_NOTCH**notches)
+            self._release_later(event.buttons())
         event.accept()
 
-    def _soon(self, buttons: Qt.MouseButton = Qt.MouseButton.NoButton) -> None:
-        """Let go in a moment, unless the mouse holds on."""
+    def _release_later(self, buttons: Qt.MouseButton = Qt.MouseButton.NoButton) -> None:
+        """Release after a delay, unless the mouse button is held."""
         if not buttons & Qt.MouseButton.LeftButton:
             self._timer.start()
 
@@ -282,21 +283,21 @@ class Pad(Board):
         others = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier
         if key == Qt.Key.Key_Escape and self.holding:
             self.give_up()
-        elif key in _KEYS and not event.modifiers() & others and self._hold():
-            self._step(*_KEYS[key])
-        elif key in _HARDER and not event.modifiers() & others and self._hold():
-            self._press(_NOTCH ** _HARDER[key])
-            self._soon()
+        elif key in _MOVE_KEYS and not event.modifiers() & others and self._grab():
+            self._step(*_MOVE_KEYS[key])
+        elif key in _FORCE_KEYS and not event.modifiers() & others and self._grab():
+            self._press(_PER_NOTCH ** _FORCE_KEYS[key])
+            self._release_later()
         else:
             super().keyPressEvent(event)
 
     def _step(self, dx: int, dy: int) -> None:
-        """Move by one key."""
+        """Move by one step of a key."""
         patch = self._patch
         step = _STEP * max(patch.a, patch.b) if patch is not None else 0.0
-        there = self.seen_at(self._place.x() + dx * step, self._place.y() + dy * step)
-        self._move(*self.placed_at(there))
-        self._soon()
+        there = self.to_pixel(self._place.x() + dx * step, self._place.y() + dy * step)
+        self._move(*self.to_skin(there))
+        self._release_later()
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
@@ -304,23 +305,23 @@ class Pad(Board):
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
-        self.let_go()
+        self.release()
         self.update()
 
 
 HEIGHT = 330.0  # units
 _HINT = (
-    "Drag on the pad to move it; wheel, or Shift and drag, to press harder. The ring is your hand, "
-    "the dot where the skin feels it."
+    "Drag on the pad to move the object; wheel, or Shift and drag, to press harder. Ring: your "
+    "hand. Dot: estimated contact."
 )
-_BACK = "Ctrl+Z takes it back."
+_UNDO_HINT = "Ctrl+Z undoes."
 _COLUMNS = 3
-_BUTTON = 15.0  # units that a capital on a button is high
+_BUTTON = 15.0  # units, height of a capital on a button
 _TOP = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop
 
 
-class _Told(Board):
-    """What the hand does, which the cue does not know of, and how to move it."""
+class _HandText(Indicator):
+    """Force and position of the simulated object, and how to move it."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -337,45 +338,45 @@ class _Told(Board):
             return []
         place, third = self.rect().toRectF(), self.height() / 3
         x, y, force = 1e3 * self.hand.x, 1e3 * self.hand.y, self.hand.force
-        told = f"Your hand: {force:.2f} N at {x:.0f}, {y:.0f} mm"
+        hand_text = f"Your hand: {force:.2f} N at {x:.0f}, {y:.0f} mm"
         above = place.adjusted(0, 0, 0, -2 * third)
         below = place.adjusted(0, third, 0, 0)
-        hint = f"{self.refusal}. {_BACK}" if self.refusal else _HINT
+        hint = f"{self.refusal}. {_UNDO_HINT}" if self.refusal else _HINT
         large, small = self.letters(CAPTION, bold=True), self.letters(0.8 * CAPTION)
         return [
-            shrunk(Words(told, large, above, align=_TOP)),
+            shrunk(Words(hand_text, large, above, align=_TOP)),
             shrunk(Words(hint, small, below, faint=True, align=_TOP, lines=True)),
         ]
 
 
-class Operator(QWidget):
-    """A pad and a choice of objects; `chosen` says the number of one in `THINGS`."""
+class OperatorControls(QWidget):
+    """Pad and buttons of the objects; `chosen` emits a number in `DEMO_OBJECTS`."""
 
     chosen = Signal(int)
 
     def __init__(self) -> None:
         super().__init__()
-        self.pad, self.told = Pad(), _Told()
+        self.pad, self.hand_text = Pad(), _HandText()
         self.pad.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Ignored)
-        self.things, self._choice = QButtonGroup(self), QWidget()
-        self._choice.setAccessibleName("What touches the skin")
-        grid = QGridLayout(self._choice)
+        self.objects, self._selection = QButtonGroup(self), QWidget()
+        self._selection.setAccessibleName("Object")
+        grid = QGridLayout(self._selection)
         grid.setContentsMargins(0, 0, 0, 0)
-        for number, thing in enumerate(THINGS):
-            button = QPushButton(thing.title)
+        for number, demo_object in enumerate(DEMO_OBJECTS):
+            button = QPushButton(demo_object.title)
             button.setCheckable(True)
-            button.setToolTip(thing.tip)
+            button.setToolTip(demo_object.tip)
             button.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
-            self.things.addButton(button, number)
+            self.objects.addButton(button, number)
             grid.addWidget(button, *divmod(number, _COLUMNS))
-        self.things.idClicked.connect(guarded(self.chosen.emit))
+        self.objects.idClicked.connect(guarded(self.chosen.emit))
         beside, row = QVBoxLayout(), QHBoxLayout(self)
-        beside.addWidget(self.told, 1)
-        beside.addWidget(self._choice)
+        beside.addWidget(self.hand_text, 1)
+        beside.addWidget(self._selection)
         row.addWidget(self.pad)
         row.addLayout(beside, 1)
         self._row, self._unit = row, 0.0
-        follow_look(self, self._dress)
+        follow_look(self, self._apply_theme)
 
     def show_unit(self, unit: float) -> None:
         self._unit = unit
@@ -384,29 +385,29 @@ class Operator(QWidget):
         edge = round(12 * unit)
         self._row.setContentsMargins(edge, edge, edge, edge)
         self._row.setSpacing(2 * edge)
-        for board in (self.pad, self.told):
-            board.show_unit(unit)
-        for button in self.things.buttons():
+        for indicator in (self.pad, self.hand_text):
+            indicator.show_unit(unit)
+        for button in self.objects.buttons():
             button.setFont(letters(self.font(), _BUTTON * unit))
 
     def show_hand(self, hand: Hand | None, refusal: str = "") -> None:
-        """What the hand holds, and why the scene is not the one that was asked for last."""
+        """Show the simulated object, and why the last requested scene was refused."""
         self.pad.show_hand(hand)
-        self.told.show_hand(hand, refusal)
+        self.hand_text.show_hand(hand, refusal)
 
-    def show_choice(self, there: bool, number: int) -> None:
-        """Which of `THINGS` touches, -1 for none of them; not `there`, none can be chosen."""
-        self._choice.setVisible(there)
-        checked = self.things.checkedId()
+    def show_objects(self, selectable: bool, number: int) -> None:
+        """Check the present one of `DEMO_OBJECTS`, -1 for none; hidden if not `selectable`."""
+        self._selection.setVisible(selectable)
+        checked = self.objects.checkedId()
         if number != checked:
-            self.things.setExclusive(False)
-            for button in self.things.buttons():
-                button.setChecked(self.things.id(button) == number)
-            self.things.setExclusive(True)
+            self.objects.setExclusive(False)
+            for button in self.objects.buttons():
+                button.setChecked(self.objects.id(button) == number)
+            self.objects.setExclusive(True)
 
-    def _dress(self) -> None:
+    def _apply_theme(self) -> None:
         theme = current()
-        self._choice.setStyleSheet(
+        self._selection.setStyleSheet(
             f"QPushButton:checked {{ background: {theme.accent}; color: {theme.base};"
             f" border: 1px solid {theme.accent}; border-radius: 3px; padding: 4px; }}"
         )

@@ -1,4 +1,4 @@
-"""A force to a tone that rises and swells with it, streamed through the system's own player."""
+"""Sound of the force: a tone whose pitch and loudness follow it, played by a system program."""
 
 import math
 import shutil
@@ -17,25 +17,25 @@ PLAYERS = {
     "pw-cat": ("--playback", "--raw", "--latency=40ms", "--format=s16", *_ONE_AT, "-"),
     "aplay": ("-q", "-t", "raw", "-f", "S16_LE", "-r", str(RATE), "-c", "1", "-B", "60000", "-"),
 }
-"""What plays samples from its input, by name, and how it is asked to: PulseAudio, PipeWire, ALSA.
+"""Programs that play samples from standard input, and their arguments: PulseAudio, PipeWire, ALSA.
 
-Qt's own sound is in the large half of PySide6, which nothing else here needs.
+Qt's audio module is in the large add-on package of PySide6, which nothing else here needs.
 """
 
 _TICK = 20  # ms between two writes
-_AHEAD = 0.06  # s of samples that the player is given beforehand
-_LOWEST, _OCTAVES = 220.0, 2.0  # Hz of the lightest touch, and how much higher the hardest is
-_LOUD, _FAINT = 0.25, 0.06  # of full scale, at the hardest and at the lightest touch
+_AHEAD = 0.06  # s of samples buffered in the player
+_LOWEST, _OCTAVES = 220.0, 2.0  # Hz at the smallest force, and the range up to the largest
+_LOUD, _FAINT = 0.25, 0.06  # of full scale, at the largest and the smallest force
 
 
 class Tone:
-    """Samples of a sine without a jump: its phase goes on, its loudness passes evenly."""
+    """Sine generator with continuous phase and smooth loudness."""
 
     def __init__(self) -> None:
         self._phase = self._loudness = 0.0
 
     def samples(self, count: int, share: float) -> NDArray[np.int16]:
-        """The next `count` samples for a force that is `share` of the hardest; NaN of none."""
+        """The next `count` samples for a force that is `share` of the largest; NaN for none."""
         silent = not share > 0
         share = 0.0 if silent else min(share, 1.0)
         loudness = 0.0 if silent else _FAINT + (_LOUD - _FAINT) * share
@@ -52,7 +52,7 @@ def player() -> tuple[str, tuple[str, ...]] | None:
 
 
 class Sound(QObject):
-    """Plays the force while it is on; silent from the start. `ended` tells why it went off."""
+    """Player of the force, off at first; `ended` emits the reason when the program ends."""
 
     ended = Signal(str)
 
@@ -68,8 +68,8 @@ class Sound(QObject):
     def on(self) -> bool:
         return self._process is not None
 
-    def turn(self) -> str:
-        """Switch it on or off; why it is not on, if it should be."""
+    def toggle(self) -> str:
+        """Switch it on or off; the error message if it cannot be switched on."""
         if self.on:
             self.close()
             return ""
@@ -82,20 +82,20 @@ class Sound(QObject):
         self._timer.start()
         return ""
 
-    def follow(self, share: float) -> None:
-        """A force that is so much of the hardest; NaN of none."""
+    def set_level(self, share: float) -> None:
+        """Set the force as a share of the largest; NaN for none."""
         self._share = share
 
     def _write(self) -> None:
         if self._process is None:
             return
         if self._process.state() == QProcess.ProcessState.NotRunning:
-            said = bytes(self._process.readAllStandardError().data()).decode(errors="replace")
+            error = bytes(self._process.readAllStandardError().data()).decode(errors="replace")
             self.close()
-            self.ended.emit(f"No sound: the player ended. {said.strip()}".strip())
+            self.ended.emit(f"No sound: the player ended. {error.strip()}".strip())
             return
         due = round((time.monotonic() - self._began + _AHEAD) * RATE) - self._written
-        if due > RATE // 2:  # the window was busy: what is missed is not made up for
+        if due > RATE // 2:  # after a stall of the window the missed samples are dropped
             self._written += due - RATE // 50
             due = RATE // 50
         if due > 0 and self._process.bytesToWrite() < RATE:

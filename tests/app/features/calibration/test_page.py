@@ -1,4 +1,4 @@
-"""A calibration taken and used on the window."""
+"""Calibration page: a calibration captured and used in the window."""
 
 from collections.abc import Callable
 from datetime import UTC, datetime
@@ -13,7 +13,7 @@ from kappaskin_app.shell.window import MainWindow
 
 
 def test_a_refused_file_is_told_where_files_are_loaded(window, tmp_path: Path) -> None:
-    window.calibrating.load(tmp_path / "none.toml")
+    window.calibration.load(tmp_path / "none.toml")
     assert "none.toml" in window.in_use.message.text()
     assert not window.calibrate.message.text()
 
@@ -42,13 +42,13 @@ def test_a_calibration_taken_in_the_window_mends_the_shape(
     panel.start.radii.setText("150, 80, 45")
     panel.start.seconds.setValue(0.1)
     panel.start.begin.click()
-    assert panel.steps.take.isVisible()
+    assert panel.steps.capture.isVisible()
     panel.steps.all.click()
-    until(lambda: panel.outcome.use.isVisible(), 240.0)
-    assert "of 300 channels pass" in panel.outcome.passed.text()
-    for view in (panel.outcome.map, panel.outcome.plot):
+    until(lambda: panel.result_page.use.isVisible(), 240.0)
+    assert "of 300 channels pass" in panel.result_page.passed.text()
+    for view in (panel.result_page.map, panel.result_page.plot):
         assert colours_in(window, view) > 3
-    panel.outcome.use.click()
+    panel.result_page.use.click()
     until(lambda: window.session.status.setup.calibration is not None)
     calibrated = _error(window, until)
     assert calibrated < 0.2 * nominal

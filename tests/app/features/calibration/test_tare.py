@@ -1,4 +1,4 @@
-"""Tares in the app: taken on demand, undone, kept for real sensors, found again and said."""
+"""Tares: taken, undone, stored for real sensors, and loaded again."""
 
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
@@ -12,7 +12,13 @@ from kappaskin import Setup, Status, Tare, load_scene
 from kappaskin.calibration import Drift, TareStore
 from kappaskin.calibration.calibration import fingerprint
 from kappaskin.live.tare_taking import TareStatus
-from kappaskin_app.features.calibration.tare import TarePanel, Taring, ago, drift_words, warmth
+from kappaskin_app.features.calibration.tare import (
+    TareController,
+    TarePanel,
+    ago,
+    drift_text,
+    temperature_text,
+)
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.settings import Settings
 
@@ -32,14 +38,14 @@ class Bench:
     """The controller and its panel, without an engine."""
 
     def __init__(self, folder, **settings):
-        self.asked, self.told = 0, []
+        self.asked, self.reported = 0, []
         self.history = History(Settings(**settings))
         self.tares = TareStore(folder)
         self.engine = SimpleNamespace(tare=self.ask, source="/dev/ttyACM0")
-        self.taring = Taring(self.history, cast(Any, self.engine), self.tares)
-        self.taring.told.connect(self.told.append)
+        self.tare_controller = TareController(self.history, cast(Any, self.engine), self.tares)
+        self.tare_controller.reported.connect(self.reported.append)
         self.panel = TarePanel()
-        self.panel.attend(self.taring)
+        self.panel.connect_to(self.tare_controller)
         self.history.changed.connect(self.panel.show_settings)
         self.panel.show_settings(self.history.settings)
         self.status = Status()
@@ -51,7 +57,7 @@ class Bench:
 
     def tell(self, **changes):
         self.status = replace(self.status, **changes)
-        self.taring.follow(self.status)
+        self.tare_controller.follow(self.status)
         self.panel.show_status(self.status, False)
 
     def meet(self, sensor=SENSOR):
@@ -88,21 +94,21 @@ def test_a_tare_is_taken_used_and_kept(bench):
 
 def test_a_refusal_is_said_and_changes_nothing(bench):
     bench.meet()
-    bench.taring.tare()
+    bench.tare_controller.tare()
     bench.end(refusal="the skin is loaded: 12 mN")
 
     assert bench.used is None
     assert bench.panel.message.text() == "The skin is loaded: 12 mN."
     assert bench.tares.load("KS-7").tares == ()
 
-    bench.taring.tare()
+    bench.tare_controller.tare()
     assert bench.panel.message.text() == ""
 
 
 def test_it_is_undone_by_its_button_and_by_the_stack(bench):
     bench.meet()
     for level in (1.0, 2.0):
-        bench.taring.tare()
+        bench.tare_controller.tare()
         bench.end(tare_of(level))
 
     bench.panel.undo.click()
@@ -119,13 +125,13 @@ def test_it_is_undone_by_its_button_and_by_the_stack(bench):
 
 def test_undoing_the_only_one_leaves_none(bench):
     bench.meet()
-    bench.taring.tare()
+    bench.tare_controller.tare()
     bench.end(tare_of(1.0))
 
-    bench.taring.undo()
+    bench.tare_controller.undo()
     assert bench.used is None
     bench.history.stack.undo()
-    bench.taring.undo()
+    bench.tare_controller.undo()
     assert bench.used is None
 
 
@@ -135,19 +141,19 @@ def test_the_one_kept_is_used_again_and_said(bench):
     bench.meet()
 
     assert bench.used == tare_of(1.0, date=NOW - timedelta(hours=10))
-    assert len(bench.told) == 1
-    said = bench.told[0].removeprefix("In use: the stored tare of ")
-    assert "(10 hours ago)" in said
-    assert bench.panel.what.text().startswith(f"Stored: taken {said},")
+    assert len(bench.reported) == 1
+    text = bench.reported[0].removeprefix("In use: the stored tare of ")
+    assert "(10 hours ago)" in text
+    assert bench.panel.what.text().startswith(f"Stored: taken {text},")
     bench.tell(temperature=24.5)
     assert "at 21.2 °C, now 24.5 °C" in bench.panel.what.text()
 
 
 def test_one_that_was_undone_is_not_used_again(bench, tmp_path):
     bench.meet()
-    bench.taring.tare()
+    bench.tare_controller.tare()
     bench.end(tare_of(1.0))
-    bench.taring.undo()
+    bench.tare_controller.undo()
 
     again = Bench(tmp_path)
     again.meet()
@@ -170,7 +176,7 @@ def test_each_sensor_has_its_own(bench):
 
 def test_another_sensor_without_one_is_told_that_it_is_not_in_use(bench):
     bench.meet()
-    bench.taring.tare()
+    bench.tare_controller.tare()
     bench.end(tare_of(1.0))
     bench.meet(OTHER)
 
@@ -183,7 +189,7 @@ def test_another_sensor_without_one_is_told_that_it_is_not_in_use(bench):
 def test_those_of_a_simulated_sensor_are_not_kept(bench):
     sensor = replace(SENSOR, simulated=True)
     bench.meet(sensor)
-    bench.taring.tare()
+    bench.tare_controller.tare()
     bench.end(tare_of(1.0))
 
     assert bench.used == tare_of(1.0)
@@ -202,7 +208,7 @@ def test_a_file_that_cannot_be_written_is_said_and_the_tare_used(bench, monkeypa
 
     monkeypatch.setattr("os.fsync", full)
     bench.meet()
-    bench.taring.tare()
+    bench.tare_controller.tare()
     bench.end(tare_of(1.0))
 
     assert bench.used == tare_of(1.0)
@@ -211,8 +217,8 @@ def test_a_file_that_cannot_be_written_is_said_and_the_tare_used(bench, monkeypa
 
 def test_nothing_can_be_tared_while_nothing_streams(bench):
     assert not bench.panel.take.isEnabled()
-    assert bench.panel.message.text() == "Nothing streams: connect a sensor to tare it."
-    bench.taring.tare()
+    assert bench.panel.message.text() == "No readings: connect a sensor to tare it."
+    bench.tare_controller.tare()
     assert bench.asked == 0
 
     bench.meet()
@@ -223,35 +229,38 @@ def test_nothing_can_be_tared_while_nothing_streams(bench):
 
 def test_none_is_taken_while_calibrating(bench):
     bench.meet()
-    bench.taring.stand_aside(True)
+    bench.tare_controller.set_calibrating(True)
     assert not bench.panel.take.isEnabled()
-    assert bench.panel.message.text() == "Not while calibrating: readings come as they are."
-    bench.taring.stand_aside(False)
+    assert (
+        bench.panel.message.text()
+        == "Not during a calibration, which uses readings without a tare."
+    )
+    bench.tare_controller.set_calibrating(False)
     assert bench.panel.take.isEnabled()
 
 
-def test_a_refusal_is_forgotten_with_its_connection(bench):
+def test_a_refusal_is_cleared_with_its_connection(bench):
     bench.meet()
-    bench.taring.tare()
+    bench.tare_controller.tare()
     bench.end(refusal="the skin is loaded")
     bench.tell(state="off", sensor=None)
-    assert "Nothing streams" in bench.panel.message.text()
+    assert "No readings" in bench.panel.message.text()
 
 
 def test_drift_is_told_in_words():
     status = Status(setup=Setup(tare=tare_of()), drift=Drift(0.0512, 3.4e-5, 12.0))
-    words = "Drift since: 0.051 1/m (RMS), as if moved by 0.034 mm"
-    assert drift_words(status) == words
+    words = "Drift since: 0.051 1/m (RMS), equal to a displacement of 0.034 mm"
+    assert drift_text(status) == words
     loaded = replace(status, drift=Drift(0.0512, 3.4e-5, 12.0, True))
-    assert drift_words(loaded) == f"{words}, before the load"
-    assert "wait two seconds" in drift_words(replace(status, drift=Drift()))
-    assert "the skin is loaded" in drift_words(replace(status, drift=Drift(loaded=True)))
-    assert drift_words(Status()) == ""
+    assert drift_text(loaded) == f"{words}, before the load"
+    assert "wait two seconds" in drift_text(replace(status, drift=Drift()))
+    assert "the skin is loaded" in drift_text(replace(status, drift=Drift(loaded=True)))
+    assert drift_text(Status()) == ""
 
 
 def test_temperatures_are_told_where_they_are_known():
-    assert warmth(None, 20.0) == ""
-    assert warmth(20.0, np.nan) == ",\nat 20.0 °C"
+    assert temperature_text(None, 20.0) == ""
+    assert temperature_text(20.0, np.nan) == ",\nat 20.0 °C"
 
 
 @pytest.mark.parametrize(
@@ -284,27 +293,27 @@ def test_a_window_tares_a_skin_at_rest_and_refuses_a_loaded_one(window, until):
 
 
 def test_the_age_has_its_error_bar(window, until):
-    def told(age, sd):
+    def reported(age, sd):
         window.readouts.show_health(500, 60, age, sd)
         return window.readouts.text("age")
 
-    assert told(0.0124, 0.0) == "12 ms"
-    assert told(0.0124, 0.00031) == "12.4 ± 0.3 ms"
-    assert told(0.0124, 0.0014) == "12 ± 1 ms"
-    assert told(0.0124, np.inf) == "≥ 12 ms"
-    assert told(np.nan, np.inf) == "–"
+    assert reported(0.0124, 0.0) == "12 ms"
+    assert reported(0.0124, 0.00031) == "12.4 ± 0.3 ms"
+    assert reported(0.0124, 0.0014) == "12 ± 1 ms"
+    assert reported(0.0124, np.inf) == "≥ 12 ms"
+    assert reported(np.nan, np.inf) == "–"
 
 
 def test_large_counts_are_told_in_few_digits(window):
-    def told(lost, discarded, skipped):
+    def reported(lost, discarded, skipped):
         counts = {"lost": lost, "discarded": discarded, "skipped": skipped}
         window.readouts.show_health(500, 60, 0.01, 0.0, **counts)
         return window.readouts.text("lost")
 
-    assert told(0, 0, 0) == "0"
-    assert told(3, 120, 9_999) == "3, 9999 skipped, 120 B"
-    assert told(0, 0, 43_210) == "0, 43 k skipped"
-    assert told(0, 0, 999_600) == "0, 1.0 M skipped"
+    assert reported(0, 0, 0) == "0"
+    assert reported(3, 120, 9_999) == "3, 9999 skipped, 120 B"
+    assert reported(0, 0, 43_210) == "0, 43 k skipped"
+    assert reported(0, 0, 999_600) == "0, 1.0 M skipped"
 
 
 def test_what_is_in_use_with_a_recording_is_no_tare_of_the_sensor_now(bench):

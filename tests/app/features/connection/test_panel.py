@@ -1,4 +1,4 @@
-"""The panel that connects, by itself: the ports it lists, the one chosen, and what it says."""
+"""Connection panel: listed ports, selection and messages."""
 
 import threading
 import time
@@ -11,8 +11,8 @@ from PySide6.QtWidgets import QLineEdit
 
 from kappaskin import Event, Status, load_scene
 from kappaskin.sources import Port
-from kappaskin_app.features.connection import panel as plugs
-from kappaskin_app.features.connection.panel import ConnectionPanel, Plugs
+from kappaskin_app.features.connection import panel as connection_panel
+from kappaskin_app.features.connection.panel import ConnectionPanel, PortSearch
 from kappaskin_app.features.log.events import EventLog
 from kappaskin_app.shell.background import Tasks
 
@@ -51,7 +51,7 @@ def test_ports_are_listed_with_maker_and_number_and_whether_they_may_be_opened(p
     panel.sources.setCurrentIndex(1)
     assert panel.source() == "/dev/ttyACM0"
     assert whole in panel.sources.toolTip()
-    assert panel.sources.lineEdit().cursorPosition() == 0  # the name is to be seen
+    assert panel.sources.lineEdit().cursorPosition() == 0  # the name is to be search
 
 
 def test_the_choice_stays_when_other_ports_come_and_go(panel):
@@ -115,34 +115,32 @@ def test_what_was_lost_on_the_line_is_told_in_words(panel):
 
 @pytest.fixture
 def found(monkeypatch):
-    """What the finder of ports was called for: the threads that it was called in."""
+    """The threads in which the ports were searched."""
     calls = []
     monkeypatch.setattr(
-        plugs.Port, "found", lambda: calls.append(threading.current_thread()) or [SKIN]
+        connection_panel.Port, "found", lambda: calls.append(threading.current_thread()) or [SKIN]
     )
-    monkeypatch.setattr(plugs, "_EVERY", 50)
+    monkeypatch.setattr(connection_panel, "_PERIOD", 50)
     return calls
 
 
-def test_ports_are_looked_for_beside_the_window_and_only_while_the_list_is_seen(
-    panel, found, until, qtbot
-):
+def test_ports_are_searched_in_the_background_while_the_list_is_visible(panel, found, until, qtbot):
     panel.activateWindow()
     tasks = Tasks()
-    seen = Plugs(panel.sources, tasks, panel)
+    search = PortSearch(panel.sources, tasks, panel)
     taken = []
-    seen.found.connect(panel.show_ports)
-    seen.found.connect(taken.append)
+    search.found.connect(panel.show_ports)
+    search.found.connect(taken.append)
     until(lambda: len(found) > 1 and panel.sources.count() == 2)
     assert threading.main_thread() not in found
     panel.hide()
-    seen.look()  # unless one is going on: after it there is none
+    search.refresh()  # unless a search is running: after it there is none
     before = len(taken)
     until(lambda: len(taken) > before)
     count = len(found)
     qtbot.wait(300)
     assert len(found) == count
-    seen.look()  # asked for, it looks
+    search.refresh()  # requested, it searches
     until(lambda: len(found) == count + 1)
     tasks.close()
     assert not any(thread.is_alive() for thread in found)

@@ -42,7 +42,7 @@ class Plugged(PseudoDevice):
 
 @pytest.fixture
 def plug(tmp_path):
-    """Plugs a device into the one port that there is."""
+    """PortSearch a device into the one port that there is."""
     made = []
 
     def plug(**said):

@@ -1,4 +1,4 @@
-"""The health of elements in the window: found, listed, marked; and the test of their map."""
+"""Health panel: list of faulty channels, marks of their elements, and the press test."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from kappaskin.estimation import FAULTS
 from kappaskin.health import Health
 from kappaskin.health.findings import Finding
 from kappaskin_app.features.health.panel import HealthPanel
-from kappaskin_app.features.health.press import MapTesting
+from kappaskin_app.features.health.press import ChannelMapTest
 from kappaskin_app.features.heatmaps.heatmap import Heatmap
 from kappaskin_app.shell.colouring import SHADES
 from kappaskin_app.shell.window import MainWindow
@@ -56,7 +56,7 @@ def test_a_finding_that_is_chosen_is_pointed_at(qapp, qtbot) -> None:
     assert pointed == [12, 57]
 
 
-def test_a_letter_says_why_an_element_is_left_out_and_so_does_its_value(qapp) -> None:
+def test_a_letter_and_the_value_name_the_fault_of_an_excluded_element(qapp) -> None:
     heatmap = Heatmap("xx")
     heatmap.resize(300, 260)
     apply_look(DARK)
@@ -86,10 +86,10 @@ def test_the_element_to_press_is_framed(qapp) -> None:
     heatmap.show_values(np.zeros(16), SHADES["xx"].tint(1.0))
     bare = heatmap.cells.grab().toImage()
 
-    heatmap.show_wanted(5)
+    heatmap.show_target(5)
     assert heatmap.cells.grab().toImage() != bare
 
-    heatmap.show_wanted(-1)
+    heatmap.show_target(-1)
     assert heatmap.cells.grab().toImage() == bare
 
 
@@ -109,7 +109,7 @@ def test_what_is_found_is_shown_in_the_list_on_the_heatmap_and_on_the_skin(
     assert failing.health.isVisible()
     until(lambda: {"44", "45"} <= {row[0] for row in told(failing.health)})
     assert "channels excluded, error bars +" in failing.health.words.text()
-    until(lambda: failing.membrane.out.actor.visibility)
+    until(lambda: failing.membrane.excluded.actor.visibility)
     failing.selection.point(44)
     until(lambda: failing.heatmaps["xx"].value.text().endswith(", dead"))
     assert failing.minimumSizeHint().height() <= 800
@@ -119,67 +119,67 @@ def test_a_simulated_skin_is_pressed_by_dragging_its_load(window: MainWindow, un
     window.actions_by_name["dock-health"].trigger()
     page = window.health.press
     page.quick.click()
-    assert window.testing.running
+    assert window.press_test.running
     assert not window.session.running  # the load rests, until it is dragged
-    until(lambda: window.membrane.asked.actor.visibility)
-    until(lambda: window.testing.test.phase is PressPhase.PRESS)
+    until(lambda: window.membrane.target.actor.visibility)
+    until(lambda: window.press_test.test.phase is PressPhase.PRESS)
     assert "Press it now" in page.words.text()
-    asked = window.testing.test.target
+    asked = window.press_test.test.target
     x, y = window.session.scene.layout.positions[asked]
     wishes, at = window.editing, window.session.estimate.contact.position
 
     wishes.grab(*at)
     wishes.drag(float(x), float(y))
-    until(lambda: window.testing.test.done)
+    until(lambda: window.press_test.test.done)
     wishes.release()
 
-    assert str(window.testing.test.done[0]) == f"element {asked} responds"
+    assert str(window.press_test.test.done[0]) == f"element {asked} responds"
     assert page.last.text() == f"Element {asked} responds."
     page.back.click()
-    assert window.testing.test.target == asked
+    assert window.press_test.test.target == asked
     page.skip.click()
     page.nothing.click()
-    assert [p.verdict for p in window.testing.test.done] == ["skipped", "nothing"]
+    assert [p.verdict for p in window.press_test.test.done] == ["skipped", "nothing"]
     page.stop.click()
-    assert not window.testing.running
-    assert not window.membrane.asked.actor.visibility or window.selection.asked_for == -1
+    assert not window.press_test.running
+    assert not window.membrane.target.actor.visibility or window.selection.asked_for == -1
 
 
 def test_a_test_that_is_over_has_a_verdict_and_ends_with_its_device(
     window: MainWindow, until
 ) -> None:
-    testing, page = window.testing, window.health.press
+    press_test, page = window.press_test, window.health.press
     window.actions_by_name["dock-health"].trigger()
     page.quick.click()
-    while testing.running:
-        testing.skip()
+    while press_test.running:
+        press_test.skip()
     assert page.verdict.text().startswith("The presses do not determine the map; element 0")
     page.quick.click()
     window.session.disconnect_from()
-    until(lambda: not testing.running)
-    assert "Begin anew" in page.words.text()
+    until(lambda: not press_test.running)
+    assert "Start again" in page.words.text()
 
 
 def test_without_a_sensor_there_is_nothing_to_press(qapp) -> None:
-    testing = MapTesting()
+    press_test = ChannelMapTest()
 
-    testing.begin(quick=True)
+    press_test.begin(quick=True)
 
-    assert not testing.running
-    assert testing.message.startswith("no sensor is connected")
+    assert not press_test.running
+    assert press_test.message.startswith("no sensor is connected")
 
 
-def test_going_back_after_a_verdict_asks_nothing_of_another_skin(qapp) -> None:
-    testing, asked = MapTesting(), []
+def test_going_back_after_a_verdict_requests_nothing_of_another_sensor(qapp) -> None:
+    press_test, targets = ChannelMapTest(), []
     sensor, other = (load_scene(name).sensor() for name in ("centre", "fingertip"))
-    testing.follow(Status(state="streaming", sensor=sensor, connections=1))
-    testing.begin(False)
-    while testing.running:
-        testing.skip()
-    testing.asked.connect(asked.append)
+    press_test.follow(Status(state="streaming", sensor=sensor, connections=1))
+    press_test.begin(False)
+    while press_test.running:
+        press_test.skip()
+    press_test.target_changed.connect(targets.append)
 
-    testing.follow(Status(state="streaming", sensor=other, connections=2))
-    testing.back()
+    press_test.follow(Status(state="streaming", sensor=other, connections=2))
+    press_test.back()
 
-    assert set(asked) == {-1}
-    assert testing.message
+    assert set(targets) == {-1}
+    assert press_test.message

@@ -1,4 +1,4 @@
-"""Press here, as a person goes through it."""
+"""Press test page: keys, and tests of a scene that changes."""
 
 from collections import Counter
 
@@ -24,7 +24,7 @@ def test_no_key_of_the_page_is_that_of_a_menu_or_of_a_page_of_settings(window) -
 
 
 def test_a_scene_that_is_chosen_meanwhile_does_not_press_by_itself(window, until) -> None:
-    window.testing.begin(quick=True)
+    window.press_test.begin(quick=True)
     until(lambda: window.session.status.playing.speed == 0)
     file, played = scene_file("tapping"), []
     window.session.playing.connect(played.append)
@@ -35,14 +35,14 @@ def test_a_scene_that_is_chosen_meanwhile_does_not_press_by_itself(window, until
     assert not window.session.running
     until(lambda: window.session.status.playing.speed == 0)
 
-    window.testing.stop()
+    window.press_test.stop()
     until(lambda: window.session.status.playing.speed == 1)  # it goes on
 
 
 def test_the_element_asked_for_is_marked_on_the_skin_until_the_test_ends(window, until) -> None:
-    window.testing.begin(quick=True)
-    until(lambda: window.membrane.asked.actor.visibility)
+    window.press_test.begin(quick=True)
+    until(lambda: window.membrane.target.actor.visibility)
     window.actions_by_name["disconnect"].trigger()
     until(lambda: window.display.badge.state == "OFF")
-    assert not window.testing.running
-    assert not window.membrane.asked.actor.visibility
+    assert not window.press_test.running
+    assert not window.membrane.target.actor.visibility

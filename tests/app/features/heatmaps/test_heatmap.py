@@ -63,16 +63,16 @@ def test_scattered_elements_are_drawn_where_they_are(qapp: QApplication) -> None
     assert found == [tuple(DIVERGING[0].tolist()), tuple(DIVERGING[255].tolist())]
 
 
-def test_the_element_under_the_mouse_is_told_and_its_value_written(
+def test_the_element_under_the_mouse_is_emitted_and_its_value_written(
     qapp: QApplication, until, points_at
 ) -> None:
     layout = SensorLayout.regular(Patch(0.08, 0.08), 4, 4)
-    heatmap, told = _heatmap(layout), []
+    heatmap, pointed = _heatmap(layout), []
     heatmap.show()
-    heatmap.pointed.connect(told.append)
+    heatmap.pointed.connect(pointed.append)
     area = heatmap.cells.area_of_patch()
     points_at(heatmap.cells, heatmap.cells.pixel_of(area, *layout.positions[6]).toPoint())
-    until(lambda: told[-1:] == [6])
+    until(lambda: pointed[-1:] == [6])
     heatmap.show_element(6)
     values = np.full(16, np.nan)
     values[6] = -1.25
@@ -84,14 +84,14 @@ def test_the_element_under_the_mouse_is_told_and_its_value_written(
     heatmap.close()
 
 
-def test_locking_asks_for_the_limit_shown_and_unlocking_for_none(qapp: QApplication, qtbot) -> None:
-    heatmap, asked = _heatmap(SensorLayout.regular(Patch(0.1, 0.1), 2, 2)), []
-    heatmap.lock_wanted.connect(asked.append)
+def test_locking_requests_the_limit_shown_and_unlocking_none(qapp: QApplication, qtbot) -> None:
+    heatmap, requested = _heatmap(SensorLayout.regular(Patch(0.1, 0.1), 2, 2)), []
+    heatmap.lock_wanted.connect(requested.append)
     heatmap.show_values(np.zeros(4), SHADES["xx"].tint(3.0))
     heatmap.lock.click()
     heatmap.show_lock(True)
     heatmap.lock.click()
-    assert asked == [3.0, 0.0]
+    assert requested == [3.0, 0.0]
 
 
 @pytest.mark.parametrize("name", ["displacement", "xx"])

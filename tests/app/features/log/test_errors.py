@@ -62,9 +62,9 @@ def test_the_log_never_grows_beyond_its_files(tmp_path: Path) -> None:
 def test_a_failure_is_counted_and_listed_while_the_session_goes_on(
     window: MainWindow, until
 ) -> None:
-    window.plugs.found.connect(guard.guarded(lambda *_: fail()))
-    window.plugs.found.emit([])
-    window.plugs.found.emit([])
+    window.port_search.found.connect(guard.guarded(lambda *_: fail()))
+    window.port_search.found.emit([])
+    window.port_search.found.emit([])
     assert window.errors.count.text() == "2 failures"
     assert window.errors.count.isVisible()
     window.notify("in passing")

@@ -5,8 +5,8 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 
 from kappaskin.skin import Distances
-from kappaskin_app.features.membrane.annotations import told
-from kappaskin_app.features.membrane.camera import Sight
+from kappaskin_app.features.membrane.annotations import distances_text
+from kappaskin_app.features.membrane.camera import Projection
 from kappaskin_app.shell.window import MainWindow
 
 
@@ -14,13 +14,13 @@ def pixel_of(window: MainWindow, x: float, y: float) -> QPoint:
     """Where (x, y) in m of the skin is seen."""
     view = window.membrane
     points, _ = view.skin.place(np.array([[x, y]]))
-    return QPoint(*(round(v) for v in Sight(view.plotter).to_screen(points[0]).tolist()))
+    return QPoint(*(round(v) for v in Projection(view.plotter).to_screen(points[0]).tolist()))
 
 
 def test_distances_are_told_with_their_units() -> None:
-    text = told(Distances(0.0421, 0.0433, -0.00212))
+    text = distances_text(Distances(0.0421, 0.0433, -0.00212))
     assert text == "straight 42.10 mm, along the skin 43.30 mm, height \N{MINUS SIGN}2.12 mm"
-    assert told(Distances(0.0421, 0.0421, -1e-6)).endswith("height +0.00 mm")
+    assert distances_text(Distances(0.0421, 0.0421, -1e-6)).endswith("height +0.00 mm")
 
 
 def test_two_clicks_measure_a_third_begins_anew_and_escape_ends(
@@ -29,7 +29,7 @@ def test_two_clicks_measure_a_third_begins_anew_and_escape_ends(
     left, plotter = Qt.MouseButton.LeftButton, window.membrane.plotter
     window.history.change("Rest", -1, load_case="point", force=0.0, noise_kind="none")
     until(lambda: np.abs(window.session.estimate.surface).max() < 1e-6)
-    ruler, action = window.view.measuring.ruler, window.actions_by_name["measure"]
+    ruler, action = window.view.measurement.ruler, window.actions_by_name["measure"]
     action.trigger()
     assert action.isChecked()
     assert "click a place" in ruler.text.input

@@ -43,7 +43,7 @@ def notch(pad, times, buttons=Qt.MouseButton.NoButton):
 
 
 def at(pad, x, y):
-    return pad.seen_at(x, y).toPoint()
+    return pad.to_pixel(x, y).toPoint()
 
 
 def test_a_drag_grabs_moves_and_lets_go(pad, qtbot) -> None:
@@ -123,7 +123,7 @@ def test_a_hand_that_is_not_there_does_nothing(pad, qtbot) -> None:
 def test_losing_the_focus_lets_go(pad, qtbot) -> None:
     qtbot.keyClick(pad, Qt.Key.Key_Left)
     pad.clearFocus()
-    pad.let_go()
+    pad.release()
     assert pad.said[-1] == ("released",)
     assert not pad.holding
 
@@ -133,5 +133,5 @@ def test_places_are_seen_where_they_are_pointed_at(pad, patch) -> None:
     pad.show_skin(patch)
     for share in (0.1, 0.5, 0.8):
         x, y = share * patch.a, (1 - share) * patch.b
-        assert pad.placed_at(pad.seen_at(x, y)) == pytest.approx((x, y))
+        assert pad.to_skin(pad.to_pixel(x, y)) == pytest.approx((x, y))
     assert pad.rect().toRectF().contains(pad.skin)

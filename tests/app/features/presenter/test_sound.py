@@ -52,10 +52,10 @@ def player(tmp_path: Path, monkeypatch) -> Path:
 
 def test_what_is_felt_is_streamed_as_it_comes_until_it_is_switched_off(player, until, qtbot):
     heard = Sound()
-    heard.follow(1.0)
-    assert heard.turn() == ""
+    heard.set_level(1.0)
+    assert heard.toggle() == ""
     until(lambda: player.exists() and player.stat().st_size > RATE)  # half a second
-    assert heard.turn() == ""
+    assert heard.toggle() == ""
     assert not heard.on
     samples = np.frombuffer(player.read_bytes()[: 2 * (RATE // 2)], np.int16)
     assert pitch(samples[2000:]) == pytest.approx(880, abs=5)
@@ -65,7 +65,7 @@ def test_a_player_that_ends_is_given_up(player, until):
     (player.parent / "aplay").write_text("#!/bin/sh\necho no device >&2\nexit 1\n")
     heard, told = Sound(), []
     heard.ended.connect(told.append)
-    heard.turn()
+    heard.toggle()
     until(lambda: not heard.on)
     assert told == ["No sound: the player ended. no device"]
 
@@ -73,7 +73,7 @@ def test_a_player_that_ends_is_given_up(player, until):
 def test_without_a_player_it_is_said(monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     heard = Sound()
-    assert "none of paplay, pw-cat, aplay" in heard.turn()
+    assert "none of paplay, pw-cat, aplay" in heard.toggle()
     assert not heard.on
 
 
@@ -90,14 +90,14 @@ def test_the_window_sounds_only_while_something_is_felt(window, player, until):
     assert action.isChecked()
     until(lambda: player.exists() and player.stat().st_size > RATE // 2)
     assert not np.frombuffer(player.read_bytes()[: RATE // 2 & ~1], np.int16).any()
-    window.presenting.enter()
+    window.presenter.enter()
 
     def sounds() -> bool:
         data = player.read_bytes()
         return np.frombuffer(data[: len(data) // 2 * 2], np.int16)[-600:].any()
 
     until(sounds)
-    window.presenting.leave()
+    window.presenter.leave()
     action.trigger()
     assert not action.isChecked()
 
@@ -105,7 +105,7 @@ def test_the_window_sounds_only_while_something_is_felt(window, player, until):
 def test_sound_that_was_switched_on_or_off_comes_back_and_none_that_never_was(
     window, player, monkeypatch, tmp_path_factory
 ):
-    sound, actions, stack = window.presenting.sound, window.actions_by_name, window.history.stack
+    sound, actions, stack = window.presenter.sound, window.actions_by_name, window.history.stack
     actions["sound"].trigger()
     actions["sound"].trigger()
     assert [stack.text(n) for n in range(stack.count())] == [

@@ -72,10 +72,10 @@ def test_where_nothing_came_it_is_grey(standing: MainWindow, until) -> None:
     standing.playback.seek(1.4)
     until(lambda: standing.display.badge.state == "REPLAY \N{MIDDLE DOT} gap")
     until(lambda: standing.membrane.greyed)
-    standing.presenting.enter()
-    until(lambda: standing.presenting.stage.strip.state == standing.display.badge.state)
-    assert "Ctrl+P" in standing.presenting.stage.banner.remedy
-    assert standing.presenting.stage.banner.isVisible()
+    standing.presenter.enter()
+    until(lambda: standing.presenter.view.strip.state == standing.display.badge.state)
+    assert "Ctrl+P" in standing.presenter.view.banner.remedy
+    assert standing.presenter.view.banner.isVisible()
 
 
 def test_the_settings_recorded_are_used_and_can_be_undone(

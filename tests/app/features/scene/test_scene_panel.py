@@ -241,7 +241,7 @@ def test_on_another_source_only_the_gallery_leads_back(window, panel, until) -> 
     until(lambda: plays(window, "tapping"))
     until(lambda: panel.gallery.items["tapping"].data(PLAYING))
     panel.setCurrentIndex(EFFECTS_PAGE)
-    window.connection.connect_wanted.emit("socket://127.0.0.1:9")
+    window.connection.connect_requested.emit("socket://127.0.0.1:9")
     until(lambda: panel.currentIndex() == GALLERY)
     assert not panel.isTabEnabled(EDIT)
     assert not panel.isTabEnabled(EFFECTS_PAGE)

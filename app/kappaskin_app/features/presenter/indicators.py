@@ -1,4 +1,4 @@
-"""Boards of the presenter: figures, bars and words that are read from afar."""
+"""Indicators of the presenter: numbers, bars and texts that are legible from afar."""
 
 import math
 from dataclasses import replace
@@ -7,7 +7,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from kappaskin_app.features.presenter.cue import Roundness
+from kappaskin_app.features.presenter.feedback import RadiusEstimate
 from kappaskin_app.shell.badge import GAP, LOST, OFF, STALE, WAITING, colour_of
 from kappaskin_app.shell.colouring import SteadyRange
 from kappaskin_app.theme import current
@@ -26,11 +26,10 @@ from kappaskin_app.widgets.lettering import (
 from kappaskin_app.widgets.text import NONE
 
 
-class Board(QWidget):
-    """Paints what `words` lays out; `unit` is the px of this screen for one of 1080 px of height.
+class Indicator(QWidget):
+    """Widget that paints its `words`; `unit` is the px of this view per px of a 1080 px screen.
 
-    A screen of 24 inches is read alike whether it has 720 px, 1080 px or twice as many: letters
-    grow with the picture.
+    Letters scale with the view, so that they are as large on any screen of the same size.
     """
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -39,28 +38,28 @@ class Board(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
 
     def words(self) -> list[Words]:
-        """What is written, and where."""
+        """Texts and their places."""
         return []
 
     def draw(self, painter: QPainter) -> None:
-        """What lies below the words."""
+        """Paint the background below the words."""
 
     def show_unit(self, unit: float) -> None:
         self.unit = unit
         self.update()
 
     def fix_height(self, units: float) -> None:
-        """Be so many units high."""
-        # Ignored, a layout would give it no height beside what stretches.
+        """Fix the height at so many units."""
+        # With an ignored size policy a layout would give it no height.
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.setFixedHeight(round(units * self.unit))
 
     def letters(self, capital: float, bold: bool = False) -> QFont:
-        """Letters whose capitals are so many units high."""
+        """Font with capitals of so many units."""
         return letters(self.font(), capital * self.unit, bold)
 
     def line(self, text: str, font: QFont, x: float, baseline: float, width: float) -> Words:
-        """One line that begins at `x` and stands on `baseline`, smaller if `width` asks for it."""
+        """One line from `x` on `baseline`, made smaller to fit in `width`."""
         metrics = QFontMetricsF(font)
         top, height = baseline - metrics.ascent(), metrics.height()
         align = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignBottom
@@ -75,7 +74,7 @@ class Board(QWidget):
             words.paint(painter)
 
     def ink(self, words: Words) -> str:
-        """The colour that the words have."""
+        """Colour of the words."""
         return current().faint if words.faint else current().text
 
     def fill(self, painter: QPainter, place: QRectF, colour: str, radius: float = 0.0) -> None:
@@ -84,7 +83,7 @@ class Board(QWidget):
         painter.drawRoundedRect(place, radius, radius)
 
     def clear(self, colour: str, strength: float) -> QColor:
-        """A `colour` that what lies below shows through, from 0 to 1 strong."""
+        """A translucent `colour`, with an opacity from 0 to 1."""
         made = QColor(colour)
         made.setAlphaF(strength)
         return made
@@ -98,13 +97,13 @@ STRIP_HEIGHT = 112.0  # units
 _PAD = 28.0  # units beside the word
 
 
-class Strip(Board):
-    """Shows the badge's word in its colour, the source's name, and the age of the data."""
+class StatusStrip(Indicator):
+    """State in its colour, name of the source, and age of the data."""
 
     def __init__(self) -> None:
         super().__init__()
         self.state, self.source, self.age = OFF, "", ""
-        self.edge = 0.0  # px kept free on both sides
+        self.edge = 0.0  # px, margin on both sides
 
     def show_unit(self, unit: float) -> None:
         super().show_unit(unit)
@@ -118,7 +117,7 @@ class Strip(Board):
 
     @property
     def badge(self) -> QRectF:
-        """Where the word stands."""
+        """Place of the state."""
         wide = width_of(self.letters(PRIMARY, bold=True), self.state)
         gap = 8 * self.unit
         return QRectF(self.edge, gap, wide + 2 * _PAD * self.unit, self.height() - 2 * gap)
@@ -142,7 +141,7 @@ class Strip(Board):
 
 
 def age_in_words(seconds: float, least: bool = False) -> str:
-    """An age as it is read at a glance; `least` where it may be more."""
+    """An age in one number; `least` marks a lower bound."""
     if not math.isfinite(seconds):
         return ""
     more = "\N{GREATER-THAN OR EQUAL TO}\N{THIN SPACE}" if least else ""
@@ -154,25 +153,24 @@ def age_in_words(seconds: float, least: bool = False) -> str:
 
 
 REMEDIES = {
-    LOST: "Check the cable and the power. It goes on by itself when the device is back; "
-    "Ctrl+Return connects anew, Ctrl+M simulates instead.",
-    STALE: "Wait a moment. If it lasts: check the cable, then press Ctrl+Return to connect anew.",
-    WAITING: "Wait: the first reading is on its way. If it lasts, press Esc and look under "
-    "Connection.",
-    OFF: "Ctrl+Return connects the source that is chosen, Ctrl+M simulates. To choose another, "
+    LOST: "Check the cable and the power; retrying. Ctrl+Return connects again, Ctrl+M simulates "
+    "instead.",
+    STALE: "Wait. If this state lasts, check the cable, then press Ctrl+Return to connect again.",
+    WAITING: "Waiting for the first reading. If this state lasts, press Esc and see Connection.",
+    OFF: "Ctrl+Return connects the selected source, Ctrl+M simulates. To select another source, "
     "press Esc.",
-    GAP: "Nothing came here when it was recorded. Wait, or press Ctrl+P if it is paused: it plays "
-    "past this. Ctrl+] goes to the next event.",
+    GAP: "No data in the recording here. Wait, or press Ctrl+P if playback is paused. Ctrl+] goes "
+    "to the next event.",
 }
-"""What to do in each state in which nothing new is shown."""
+"""What to do in each state in which no new data is shown."""
 
 _BANNER_MARGIN = 36.0  # units
-_WHY = 0.45  # of the height below the word that the reason has at most
+_REASON_SHARE = 0.45  # of the height below the state: most that the reason takes
 _TOP = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop
 
 
-class Banner(Board):
-    """Says since when nothing comes, why, and what to do about it."""
+class Banner(Indicator):
+    """State without data: its duration, reason and remedy."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -195,22 +193,22 @@ class Banner(Board):
         return "#ffffff"
 
     def words(self) -> list[Words]:
-        """The word, the reason in at most its share of the height, and the remedy below it."""
+        """The state, the reason in at most its share of the height, and the remedy below."""
         edge = _BANNER_MARGIN * self.unit
         inside = QRectF(self.rect()).adjusted(edge, edge, -edge, -edge)
         head, rest = 2 * PRIMARY * self.unit, inside.height() - 2 * PRIMARY * self.unit
         title = f"{self.state} {self.since}".strip()
-        shown, share = [self._lines(title, PRIMARY, inside.adjusted(0, 0, 0, -rest))], 0.0
+        shown, share = [self._paragraph(title, PRIMARY, inside.adjusted(0, 0, 0, -rest))], 0.0
         if self.why:
-            share = _WHY * rest
-            why = self._lines(self.why, SECONDARY, inside.adjusted(0, head, 0, share - rest))
+            share = _REASON_SHARE * rest
+            why = self._paragraph(self.why, SECONDARY, inside.adjusted(0, head, 0, share - rest))
             shown.append(why)
             share = min(why.needed.height() + SECONDARY * self.unit, share)
         below = inside.adjusted(0, head + share, 0, 0)
-        shown.append(self._lines(self.remedy, 1.2 * SECONDARY, below))
+        shown.append(self._paragraph(self.remedy, 1.2 * SECONDARY, below))
         return shown
 
-    def _lines(self, text: str, capital: float, place: QRectF) -> Words:
+    def _paragraph(self, text: str, capital: float, place: QRectF) -> Words:
         font = self.letters(capital, bold=capital != SECONDARY)
         return shrunk(Words(text, font, place, align=_TOP, lines=True))
 
@@ -219,8 +217,8 @@ FIGURE_HEIGHT = 142.0  # units
 _GAP = 26.0
 
 
-class Figure(Board):
-    """A name above a large value, and beside it in smaller letters a note."""
+class NumberIndicator(Indicator):
+    """A name above a large value with a note in smaller letters."""
 
     def __init__(self, name: str) -> None:
         super().__init__()
@@ -238,7 +236,7 @@ class Figure(Board):
         self.fix_height(FIGURE_HEIGHT)
 
     def words(self) -> list[Words]:
-        """The value is never made smaller for the sake of the note."""
+        """The note shrinks to fit; the value does not."""
         caption, large = self.letters(CAPTION), self.letters(PRIMARY, bold=True)
         wide, base = float(self.width()), self.height() - QFontMetricsF(large).descent()
         value = self.line(self.value, large, 0.0, base, wide)
@@ -252,12 +250,12 @@ class Figure(Board):
 
 HEIGHT = 104.0  # units
 _BAR = 46.0  # units that the bar is high
-_LEAST = 0.2  # N at the end of the scale at least
-_THIN = 3.0  # px of the band at least: an error bar too small to be seen is still there
+_LEAST = 0.2  # N, shortest scale
+_LEAST_BAND = 3.0  # px, so that a small error bar stays visible
 
 
-class ForceBar(Board):
-    """Shows how large a force is, to the left the sign does not matter: a pull is as long."""
+class ForceBar(Indicator):
+    """Bar of the absolute force with its error bar."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -269,31 +267,31 @@ class ForceBar(Board):
         self.fix_height(HEIGHT)
 
     def show_force(self, force: float, force_95: float, now: float) -> None:
-        """A force in N with its 95 % half width, at `now` in s; NaN of none."""
+        """Show a force in N with its 95 % half-width, at `now` in s; NaN for none."""
         self.force, self.force_95 = abs(force), force_95
         self._range.follow(self.force + (force_95 if math.isfinite(force_95) else 0.0), now)
         self.update()
 
     @property
     def scale(self) -> QRectF:
-        """Where the whole scale is, the last number with its half beside its end."""
+        """Place of the scale; half of the last number extends beyond its end."""
         side = width_of(self.letters(CAPTION), "0.00 N") / 2
         return QRectF(0, 0, max(self.width() - side, 1.0), _BAR * self.unit)
 
     @property
     def share(self) -> float:
-        """How much of the scale the force is; NaN of none."""
+        """The force as a share of the scale; NaN for none."""
         return self.force / self._range.limit
 
     def at(self, force: float) -> float:
-        """Where in px a force in N is on the scale, its end for more."""
+        """Position in px of a force in N, limited to the scale."""
         return self.scale.width() * min(max(force / self._range.limit, 0.0), 1.0)
 
     def band(self) -> tuple[float, float]:
-        """Where in px the error bar begins and ends."""
+        """Ends of the error bar in px."""
         off = self.force_95 if math.isfinite(self.force_95) else 0.0
         low, high = self.at(self.force - off), self.at(self.force + off)
-        short = max(_THIN - (high - low), 0.0) / 2
+        short = max(_LEAST_BAND - (high - low), 0.0) / 2
         return low - short, high + short
 
     def draw(self, painter: QPainter) -> None:
@@ -323,74 +321,75 @@ class ForceBar(Board):
         return shown
 
 
-_LEAST_RADIUS, _MOST = 0.02, 0.2  # m of radius that fill the picture: a larger circle leaves it
-_MARGIN = 0.04  # of the picture's height
-_SCALE_BAR = 0.3  # of the picture's width that the scale bar takes at most
-_SHARP = 0.6  # of the picture's height that an edge is drawn high
+_LEAST_RADIUS, _MOST = 0.02, 0.2  # m, range of the radius that fills the view
+_MARGIN = 0.04  # of the view's height
+_SCALE_BAR = 0.3  # of the view's width at most
+_EDGE_HEIGHT = 0.6  # of the view's height
 
 
-class RoundView(Board):
-    """The circles all touch the skin where the object does: the band lies between two of them."""
+class RadiusView(Indicator):
+    """Circle of the radius at the contact, in the band between both ends of its interval."""
 
     def __init__(self) -> None:
         super().__init__()
         self._range = SteadyRange(_LEAST_RADIUS)
-        self.roundness: Roundness | None = None
+        self.radius: RadiusEstimate | None = None
         self.edge = False
         self.setMinimumHeight(60)
 
-    def show_roundness(self, roundness: Roundness | None, edge: bool, now: float) -> None:
-        """A radius at `now` in s, or an edge, or nothing."""
-        self.roundness, self.edge = roundness, edge
-        if roundness is not None:
-            known = [r for r in (roundness.radius, *roundness.between) if 0 < r < math.inf]
+    def show_radius(self, radius: RadiusEstimate | None, edge: bool, now: float) -> None:
+        """Show a radius at `now` in s, or an edge, or nothing."""
+        self.radius, self.edge = radius, edge
+        if radius is not None:
+            known = [r for r in (radius.value, *radius.interval) if 0 < r < math.inf]
             self._range.follow(min(max(known, default=_LEAST_RADIUS), _MOST), now)
         self.update()
 
     @property
     def per_metre(self) -> float:
-        """Pixels per metre: the largest circle of late fills the height."""
+        """Pixels per metre: the largest recent circle fills the height."""
         return self.height() * (1 - 2 * _MARGIN) / (2 * self._range.limit)
 
     @property
     def bar(self) -> float:
-        """The length in m of the scale bar: a round one."""
+        """Length of the scale bar in m, a round number."""
         most = _SCALE_BAR * self.width() / self.per_metre
         return next(
             b for b in (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0) if b <= most
         )
 
     @property
-    def foot(self) -> QPointF:
-        """Where the object touches the skin."""
+    def contact_point(self) -> QPointF:
+        """Place of the contact in the view."""
         return QPointF(self.width() / 2, self.height() * (1 - _MARGIN))
 
     def circle(self, radius: float) -> QRectF:
-        """Where a circle of `radius` in m is drawn."""
-        r, foot = radius * self.per_metre, self.foot
-        return QRectF(foot.x() - r, foot.y() - 2 * r, 2 * r, 2 * r)
+        """Place of a circle of `radius` in m."""
+        r, contact_point = radius * self.per_metre, self.contact_point
+        return QRectF(contact_point.x() - r, contact_point.y() - 2 * r, 2 * r, 2 * r)
 
     def draw(self, painter: QPainter) -> None:
-        theme, foot = current(), self.foot
+        theme, contact_point = current(), self.contact_point
         painter.setClipRect(self.rect())
-        if self.roundness is not None:
-            self._draw_round(painter, self.roundness)
+        if self.radius is not None:
+            self._draw_round(painter, self.radius)
         elif self.edge:
             self._draw_edge(painter)
         pen = QPen(QColor(theme.text), max(2.0, 4 * self.unit))
         painter.setPen(pen)
         painter.drawLine(
-            QPointF(0.16 * self.width(), foot.y()), QPointF(0.84 * self.width(), foot.y())
+            QPointF(0.16 * self.width(), contact_point.y()),
+            QPointF(0.84 * self.width(), contact_point.y()),
         )
         bar = self._bar_place
         painter.drawLine(bar.bottomLeft(), bar.bottomRight())
         for x in (bar.left(), bar.right()):
             painter.drawLine(QPointF(x, bar.bottom() - 8 * self.unit), QPointF(x, bar.bottom()))
 
-    def _draw_round(self, painter: QPainter, round_: Roundness) -> None:
-        theme, (low, high) = current(), round_.between
+    def _draw_round(self, painter: QPainter, estimate: RadiusEstimate) -> None:
+        theme, (low, high) = current(), estimate.interval
         band = QPainterPath()
-        band.addRect(QRectF(0, 0, self.width(), self.foot.y())) if high == math.inf else (
+        band.addRect(QRectF(0, 0, self.width(), self.contact_point.y())) if high == math.inf else (
             band.addEllipse(self.circle(high))
         )
         inner = QPainterPath()
@@ -398,18 +397,18 @@ class RoundView(Board):
         painter.fillPath(band.subtracted(inner), self.clear(theme.accent, 0.45))
         painter.setBrush(Qt.BrushStyle.NoBrush)
         width = max(2.0, 4 * self.unit)
-        if math.isfinite(round_.radius):
+        if math.isfinite(estimate.value):
             painter.setPen(QPen(QColor(theme.accent), width))
-            painter.drawEllipse(self.circle(round_.radius))
+            painter.drawEllipse(self.circle(estimate.value))
         elif high < math.inf:
             painter.setPen(QPen(QColor(theme.accent), width, Qt.PenStyle.DashLine))
             painter.drawEllipse(self.circle(high))
 
     def _draw_edge(self, painter: QPainter) -> None:
-        foot, high = self.foot, _SHARP * self.height()
+        at, high = self.contact_point, _EDGE_HEIGHT * self.height()
         painter.setPen(QPen(QColor(current().accent), max(2.0, 4 * self.unit)))
         for side in (-1, 1):
-            painter.drawLine(foot, QPointF(foot.x() + side * high, foot.y() - high))
+            painter.drawLine(at, QPointF(at.x() + side * high, at.y() - high))
 
     @property
     def _bar_place(self) -> QRectF:

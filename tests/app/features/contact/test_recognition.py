@@ -1,4 +1,4 @@
-"""What touches the skin, in words, beside the picture."""
+"""Object recognition: its text in the status bar."""
 
 import threading
 import time
@@ -6,8 +6,8 @@ import time
 import pytest
 
 from kappaskin import Pipeline, PointLoad, Setup, Simulator, load_scene
-from kappaskin_app.features.contact import naming
-from kappaskin_app.features.contact.naming import curved
+from kappaskin_app.features.contact import recognition
+from kappaskin_app.features.contact.recognition import curvature_text
 
 
 def _estimate(*loads):
@@ -15,19 +15,19 @@ def _estimate(*loads):
     return Pipeline(scene.sensor(), Setup())(Simulator(scene).frame(0, time.monotonic))
 
 
-def test_the_curvature_at_a_contact_is_told_with_its_error_bars():
-    words = curved(_estimate(PointLoad(0.05, 0.05, 0.15)))
+def test_the_text_gives_the_principal_curvatures_with_error_bars():
+    words = curvature_text(_estimate(PointLoad(0.05, 0.05, 0.15)))
 
     assert words.startswith("principal curvatures \N{MINUS SIGN}")
     assert words.endswith("1/m")
     assert words.count("\N{PLUS-MINUS SIGN}") == 2
 
 
-def test_nothing_is_told_of_a_skin_that_nothing_touches():
-    assert curved(_estimate()) == ""
+def test_the_text_is_empty_without_a_contact():
+    assert curvature_text(_estimate()) == ""
 
 
-def test_the_window_says_what_touches_the_skin(window, until):
+def test_the_window_describes_the_object_in_contact(window, until):
     ends = {"x": 0.04, "y": 0.05, "x_end": 0.06, "y_end": 0.05}  # of a rigid blade
     window.history.change("Blade", -1, load_case="two-points", force=0.2, **ends)
     assert len(window.session.scene.loads) == 2
@@ -39,24 +39,24 @@ def test_the_window_says_what_touches_the_skin(window, until):
     until(lambda: not window.display.status_bar.object.text())
 
 
-def test_what_is_not_yet_known_of_a_skin_is_said_to_be_computed(window, until, monkeypatch):
+def test_a_new_skin_shows_that_the_finder_is_being_computed(window, until, monkeypatch):
     until(lambda: "curvatures" in window.display.status_bar.object.text())
-    made, seen = naming.ObjectFinder, threading.Event()
-    monkeypatch.setattr(naming, "ObjectFinder", lambda *of: seen.wait(60) and made(*of))
+    made, seen = recognition.ObjectFinder, threading.Event()
+    monkeypatch.setattr(recognition, "ObjectFinder", lambda *of: seen.wait(60) and made(*of))
     window.requests.set("shape", "cylinder")
-    until(lambda: "computing what objects read like" in window.display.status_bar.object.text())
+    until(lambda: "computing the readings of objects" in window.display.status_bar.object.text())
     seen.set()
     until(lambda: "curvatures" in window.display.status_bar.object.text())
 
 
-def test_a_skin_that_objects_cannot_be_told_on_says_so(window, until):
+def test_a_skin_without_object_recognition_shows_the_reason(window, until):
     window.history.change("Elements", -1, elements_x=50, elements_y=50)
 
     until(lambda: "at most 2000 elements" in window.display.status_bar.object.text())
 
 
 @pytest.mark.fails_inside
-def test_what_fails_once_is_told_once_and_the_next_estimate_is_named(
+def test_a_failure_is_reported_once_and_the_next_estimate_is_described(
     window, until, monkeypatch
 ) -> None:
     until(lambda: "curvatures" in window.display.status_bar.object.text())
@@ -67,10 +67,10 @@ def test_what_fails_once_is_told_once_and_the_next_estimate_is_named(
         monkeypatch.undo()
         raise ZeroDivisionError("once")
 
-    monkeypatch.setattr("kappaskin_app.features.contact.naming.curved", fail_once)
+    monkeypatch.setattr("kappaskin_app.features.contact.recognition.curvature_text", fail_once)
     until(lambda: told)
-    named: list[str] = []
-    window.naming.named.connect(named.append)
-    until(lambda: named)
+    described: list[str] = []
+    window.recognition.described.connect(described.append)
+    until(lambda: described)
 
     assert told == ["Something went wrong: once"]

@@ -1,4 +1,4 @@
-"""The picked element: its facts, its readings of the last seconds, and traces."""
+"""Selected element: facts, history, spectrum and traces."""
 
 import math
 import time
@@ -13,7 +13,7 @@ from kappaskin.frames import COMPONENTS, Estimate
 from kappaskin.live import Status
 from kappaskin.pipeline import REPORTED, Reported, ReportedQuantity
 from kappaskin.sensing import Sensor
-from kappaskin_app.features.traces.element_card import TRACED, ElementCard, Traces
+from kappaskin_app.features.traces.element_panel import TRACED, ElementPanel, Traces
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.history import History
@@ -25,39 +25,39 @@ from kappaskin_app.widgets.parts import with_error
 Array = NDArray[np.float64]
 
 SECONDS = 10.0
-"""How far back it reaches."""
-_LEAST = 0.002  # s between two that are kept
-_ROUNDING = 1e-6  # of a step: frames at just that rate are all kept
-_LARGEST = 24e6  # bytes: of a large skin they are kept farther apart
+"""Length of the history."""
+_LEAST_PERIOD = 0.002  # s between two stored frames
+_ROUNDING = 1e-6  # of a period: at exactly that rate all frames are stored
+_MOST_BYTES = 24e6  # of the buffer: with many elements fewer frames are stored
 
 
-class Past:
-    """Readings as they come, written round and round."""
+class ReadingBuffer:
+    """Ring buffer of the readings of the last seconds."""
 
     def __init__(self) -> None:
-        self.forget(0)
+        self.clear(0)
 
-    def forget(self, elements: int) -> None:
-        """Begin anew with so many `elements`."""
+    def clear(self, elements: int) -> None:
+        """Start again, empty, for so many `elements`."""
         rows = len(COMPONENTS) * len(TRACED)
-        self._least = max(_LEAST, SECONDS * 4 * rows * elements / _LARGEST)
+        self._least = max(_LEAST_PERIOD, SECONDS * 4 * rows * elements / _MOST_BYTES)
         count = round(SECONDS / self._least) + 1
         self._times = np.full(count, np.nan)
         self._read: NDArray[np.float32] = np.empty((count, rows, elements), np.float32)
         self._next, self._last = 0, -np.inf
 
-    def take(self, times: Array, readings: Array) -> None:
-        """Keep `readings` (T, rows, P) at `times` (T,) in s, those not too near to another."""
+    def append(self, times: Array, readings: Array) -> None:
+        """Store `readings` (T, rows, P) at `times` (T,) in s, thinned to the buffer's period."""
         elements = readings.shape[2]
         for at, read in zip(times.tolist(), readings, strict=True):
             if elements != self._read.shape[2] or at < self._last:
-                self.forget(elements)  # another sensor, or one that began anew
+                self.clear(elements)  # another sensor, or a restarted one
             if at - self._last >= (1 - _ROUNDING) * self._least:
                 self._times[self._next], self._read[self._next] = at, read
                 self._next, self._last = (self._next + 1) % len(self._times), at
 
     def of(self, elements: list[int]) -> tuple[Array, Array]:
-        """Times (T,) in s before the newest, upwards, and readings (T, rows, k) of k `elements`."""
+        """Times (T,) in s relative to the newest, and readings (T, rows, k) of k `elements`."""
         order = np.roll(np.arange(len(self._times)), -self._next)
         order = order[self._times[order] > self._last - SECONDS]
         read = self._read[order[:, None], :, np.asarray(elements, np.intp)]
@@ -72,7 +72,7 @@ _HEADS = (
 
 
 def facts(element: int, sensor: Sensor, status: Status, estimate: Estimate) -> str:
-    """A table in HTML of the three channels of an element."""
+    """HTML table of the three channels of an element."""
     rows = [_row(element, number, sensor, status, estimate) for number in range(3)]
     cells = ["".join(f"<th align='left'>{head}&nbsp;&nbsp;</th>" for head in _HEADS)]
     cells += ["".join(f"<td>{cell}&nbsp;&nbsp;</td>" for cell in row) for row in rows]
@@ -83,11 +83,11 @@ def facts(element: int, sensor: Sensor, status: Status, estimate: Estimate) -> s
     )
 
 
-def title(element: int, sensor: Sensor, moved: float, moved_sd: float) -> str:
-    """Which element it is, where, and how far in mm the skin `moved` there."""
+def title(element: int, sensor: Sensor, displacement: float, sd: float) -> str:
+    """Number and position of an element, and the `displacement` of the skin there in mm."""
     x, y = 1e3 * sensor.layout.positions[element]
-    inward = with_error(moved, moved_sd, 3, "mm")
-    return f"<b>Element {element}</b> at ({x:.1f}, {y:.1f}) mm; the skin moved in by {inward} there"
+    inward = with_error(displacement, sd, 3, "mm")
+    return f"<b>Element {element}</b> at ({x:.1f}, {y:.1f}) mm; displacement {inward}"
 
 
 def _row(
@@ -95,25 +95,25 @@ def _row(
 ) -> tuple[str, ...]:
     channel = number * len(sensor.layout) + element
     found = [f for f in status.health.findings if f.channel == channel]
-    health = "; ".join(f"{f.kind}: {f.figure}" for f in found) or "well"
+    health = "; ".join(f"{f.kind}: {f.figure}" for f in found) or "OK"
     reported = Reported(estimate)
     return (
         f"<b>{COMPONENTS[number]}</b>",
         *(_read(quantity, reported, number, element) for quantity in _READ),
-        *_calibrated(status.setup.calibration, channel),
-        str(_converted(sensor, channel)),
-        "dead: the device says so" if sensor.layout.lacking[number, element] else health,
+        *_calibration_cells(status.setup.calibration, channel),
+        str(_wire_channel(sensor, channel)),
+        "dead: reported by the device" if sensor.layout.lacking[number, element] else health,
     )
 
 
 def _read(quantity: ReportedQuantity, reported: Reported, row: int, element: int) -> str:
-    """A component of a quantity of an element, with its error bar if it has one."""
+    """A component of a quantity of an element, with its standard deviation if it has one."""
     found = [of(reported) for suffix, _, of in quantity.forms if suffix != "_95"]
     value, sd = np.broadcast_arrays(*found, math.nan)[:2]
     return with_error(value[row, element], sd[row, element], quantity.shown[2], sign="+")
 
 
-def _calibrated(calibration: Calibration | None, channel: int) -> tuple[str, str]:
+def _calibration_cells(calibration: Calibration | None, channel: int) -> tuple[str, str]:
     if calibration is None:
         return "1 (nominal)", "0 (nominal)"
     c = calibration
@@ -123,26 +123,26 @@ def _calibrated(calibration: Calibration | None, channel: int) -> tuple[str, str
     )
 
 
-def _converted(sensor: Sensor, channel: int) -> int:
-    """The number on the wire of what reads this channel."""
+def _wire_channel(sensor: Sensor, channel: int) -> int:
+    """The number of this channel in the device's messages."""
     wired = sensor.channel_map
     return channel if wired is None else int(np.flatnonzero(wired == channel)[0])
 
 
-_PLOTS = 0.1  # s between two drawings of the plots
-_WORDS = 0.25  # s between two readings of the facts
-_SPECTRA = 1.0  # s between two spectra of the last ten
-_ENOUGH = 32  # readings for a spectrum
-_LINES = 160  # of it at most
+_PLOT_PERIOD = 0.1  # s between two drawings of the plots
+_FACTS_PERIOD = 0.25  # s between two readings of the facts
+_SPECTRUM_PERIOD = 1.0  # s between two spectra of the last ten
+_FEWEST = 32  # readings for a spectrum
+_MOST_LINES = 160  # of it at most
 
 
-class Picking(QObject):
-    """Shows the card of the element that is picked, and traces of those chosen.
+class SelectedElement(QObject):
+    """The selected `element` (-1: none), its `panel`, and the `traces` of plotted elements.
 
-    `picked` says that one was.
+    `selected` emits the element that a user selects.
     """
 
-    picked = Signal(int)
+    selected = Signal(int)
 
     def __init__(
         self, history: History, session: Session, display: Display, selection: Selection
@@ -150,41 +150,41 @@ class Picking(QObject):
         super().__init__(display)
         self._selection = selection
         self._history, self._session, self._display = history, session, display
-        self.card, self.traces = ElementCard(), Traces()
+        self.panel, self.traces = ElementPanel(), Traces()
         self.element = -1
-        self._past, self._connection = Past(), 0
-        self._of, self._after = (0, 0), 0
-        self._next_plots = self._next_words = self._next_spectrum = 0.0
+        self._buffer, self._connection = ReadingBuffer(), 0
+        self._key, self._last_number = (0, 0), 0
+        self._next_plots = self._next_facts = self._next_spectrum = 0.0
         session.estimated.connect(guarded(self.receive))
-        history.changed.connect(guarded(self._follow))
+        history.changed.connect(guarded(self._show_settings))
         selection.over.connect(guarded(self._point))
         selection.clicked.connect(guarded(self._click))
-        self.card.traced.connect(guarded(self._trace))
+        self.panel.plot_toggled.connect(guarded(self._toggle_plot))
         self.traces.pointed.connect(guarded(selection.point))
         selection.pointed.connect(self.traces.mark)
-        selection.chosen.connect(guarded(self._choose))
+        selection.chosen.connect(guarded(self._select_chosen))
 
-    def pick(self, element: int) -> None:
-        """Tell all about an element."""
-        self.picked.emit(element)
+    def select(self, element: int) -> None:
+        """Select an element, as an undoable step."""
+        self.selected.emit(element)
         if element != self.element:
-            self._history.step(f"pick element {element}", self._have, self.element, element)
+            self._history.step(f"select element {element}", self._set, self.element, element)
 
-    def _have(self, element: int) -> None:
-        """Tell all about an element, or about none: of another skin there may be fewer."""
+    def _set(self, element: int) -> None:
+        """Show an element; none if the connected sensor has fewer."""
         sensor = self._session.status.sensor
         self.element = element if sensor is not None and element < len(sensor.layout) else -1
-        self._next_plots = self._next_words = self._next_spectrum = 0.0
+        self._next_plots = self._next_facts = self._next_spectrum = 0.0
         if self.element < 0:
-            self.card.show_facts("", "")
-        self._show_tracing()
+            self.panel.show_facts("", "")
+        self._update_button()
 
-    def _choose(self, element: int) -> None:
-        if self._history.settings.region != "elements":  # or a click chooses what is scanned
-            self.pick(element)
+    def _select_chosen(self, element: int) -> None:
+        if self._history.settings.region != "elements":  # else a click selects the scan region
+            self.select(element)
 
     def _click(self, x: float, y: float) -> None:
-        self.pick(self._nearest((x, y)))
+        self.select(self._nearest((x, y)))
 
     def _point(self, place: "np.ndarray[tuple[int], np.dtype[np.float64]] | None") -> None:
         self._selection.point(-1 if place is None else self._nearest(place))
@@ -196,82 +196,82 @@ class Picking(QObject):
             return -1
         return int(np.argmin(np.linalg.norm(sensor.layout.positions - np.asarray(place), axis=1)))
 
-    def _trace(self) -> None:
+    def _toggle_plot(self) -> None:
         traced = self._history.settings.traced
         if self.element in traced:
-            kept = tuple(one for one in traced if one != self.element)
-            self._history.change("Trace no more", -1, traced=kept)
+            others = tuple(one for one in traced if one != self.element)
+            self._history.change("Stop plotting an element", -1, traced=others)
         elif self.element >= 0:
-            self._history.change("Trace an element", -1, traced=(*traced, self.element))
+            self._history.change("Plot an element", -1, traced=(*traced, self.element))
 
-    # What comes in.
+    # Input.
 
     def receive(self, estimate: Estimate) -> None:
-        """Keep what is read, and show it as often as it can be seen."""
+        """Store the readings of new frames, and update the visible plots."""
         status, now = self._session.status, time.monotonic()
         if status.connections != self._connection:
             self._connection, self.element = status.connections, -1
-            self._past.forget(0)  # another skin may have as many elements, on a clock that goes on
-            self.card.show_facts("", "")
+            self._buffer.clear(0)  # another sensor may have as many elements and a later clock
+            self.panel.show_facts("", "")
         key = status.connections, estimate.generation
-        if key != self._of:
-            self._of, self._after = key, 0
-        times, readings, self._after = self._session.engine.recent(status, self._after)
-        self._past.take(times, readings)
-        if self.card.isVisible() and self.element >= 0:
-            self._show_card(estimate, now)
+        if key != self._key:
+            self._key, self._last_number = key, 0
+        times, readings, self._last_number = self._session.engine.recent(status, self._last_number)
+        self._buffer.append(times, readings)
+        if self.panel.isVisible() and self.element >= 0:
+            self._show_panel(estimate, now)
         if now >= self._next_plots:
-            self._next_plots = now + _PLOTS
+            self._next_plots = now + _PLOT_PERIOD
             if self.traces.isVisible():
                 self._show_traces(estimate.curvature.shape[1])
 
-    def _show_card(self, estimate: Estimate, now: float) -> None:
+    def _show_panel(self, estimate: Estimate, now: float) -> None:
         if now >= self._next_plots:
-            times, values = self._past.of([self.element])
-            self.card.show_past(times, values[:, :, 0], SECONDS)
-        if now >= self._next_words:
-            self._next_words = now + _WORDS
+            times, values = self._buffer.of([self.element])
+            self.panel.show_history(times, values[:, :, 0], SECONDS)
+        if now >= self._next_facts:
+            self._next_facts = now + _FACTS_PERIOD
             self._show_facts(estimate)
         if now >= self._next_spectrum:
-            self._next_spectrum = now + _SPECTRA
+            self._next_spectrum = now + _SPECTRUM_PERIOD
             self._show_spectrum()
 
     def _show_facts(self, estimate: Estimate) -> None:
         status, colouring = self._session.status, self._display.colouring
         if status.sensor is None or self.element >= len(status.sensor.layout):
             return
-        moved, sure = (
+        displacement, sd = (
             float(colouring.of_elements(name, estimate)[self.element])
             for name in ("displacement", "error_bar")
         )
-        told = facts(self.element, status.sensor, status, estimate)
-        self.card.show_facts(title(self.element, status.sensor, moved, sure), told)
+        head = title(self.element, status.sensor, displacement, sd)
+        self.panel.show_facts(head, facts(self.element, status.sensor, status, estimate))
 
     def _show_spectrum(self) -> None:
-        times, values = self._past.of([self.element])
+        times, values = self._buffer.of([self.element])
         read = values[:, : len(COMPONENTS), 0]
-        # A component that a dead channel lacks is nothing; a frame that lacks any is left out.
-        there = np.isfinite(read).any(axis=0)
-        whole = np.isfinite(read[:, there]).all(axis=1)
-        if whole.sum() < _ENOUGH or not there.any():
-            self.card.show_spectrum(np.empty(0), np.empty((3, 0)))
+        # A dead channel counts as zero; frames that lack any other reading are excluded.
+        known = np.isfinite(read).any(axis=0)
+        whole = np.isfinite(read[:, known]).all(axis=1)
+        if whole.sum() < _FEWEST or not known.any():
+            self.panel.show_spectrum(np.empty(0), np.empty((3, 0)))
             return
-        times, read = times[whole], np.where(there, read[whole], 0.0)
+        times, read = times[whole], np.where(known, read[whole], 0.0)
         span = float(times[-1] - times[0])
         highest = (len(times) - 1) / span / 2
-        count = min(_LINES, max(round(highest * span), 2))
+        count = min(_MOST_LINES, max(round(highest * span), 2))
         frequencies = np.linspace(highest / count, highest, count)
-        self.card.show_spectrum(frequencies, amplitude_spectrum(times, read.T, frequencies))
+        self.panel.show_spectrum(frequencies, amplitude_spectrum(times, read.T, frequencies))
 
     def _show_traces(self, elements: int) -> None:
         traced = [one for one in self._history.settings.traced if one < elements]
-        self.traces.show_past(traced, *self._past.of(traced), SECONDS)
+        self.traces.show_history(traced, *self._buffer.of(traced), SECONDS)
 
-    # How it is shown.
+    # Display.
 
-    def _follow(self, settings: Settings) -> None:
-        self._show_tracing()
+    def _show_settings(self, settings: Settings) -> None:
+        self._update_button()
         self._next_plots = 0.0
 
-    def _show_tracing(self) -> None:
-        self.card.show_tracing(self.element in self._history.settings.traced)
+    def _update_button(self) -> None:
+        self.panel.show_plotted(self.element in self._history.settings.traced)

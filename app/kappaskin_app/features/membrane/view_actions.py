@@ -1,4 +1,4 @@
-"""How the skin is viewed: settings, and actions for colours, height and camera."""
+"""View settings of the skin, and actions for colours, exaggeration and camera."""
 
 from collections.abc import Callable
 from functools import partial
@@ -20,9 +20,9 @@ from kappaskin_app.shell.settings.shown import COLOURS
 
 
 class ViewPanel(Form):
-    """Asks for colours, height and what is drawn beside the skin."""
+    """Settings of colours, exaggeration and overlays."""
 
-    purpose = "How the skin is drawn: its colours, its height and what is drawn over it."
+    purpose = "How the skin is drawn: colours, vertical exaggeration and overlays."
     guide_page = "numbers"
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -37,12 +37,18 @@ class ViewPanel(Form):
 
 _MENU = "Sk&in"
 _COLOURS = f"{_MENU}{WITHIN}&Colour"
-_LOOKS = (
-    ("F6", "above", "The skin as a map: x to the right, y upward"),
-    ("F7", "front", "The skin from its front edge: x to the right, displacement up and down"),
-    ("F8", "side", "The skin from its side: y to the right, displacement up and down"),
-    ("Shift+F6", "below", "The skin from the side that is not touched"),
-    ("Shift+F7", "corner", "Lengths along x, y and the displacement drawn alike"),
+# The key, and the name by which a file of settings knows a changed one.
+_DIRECTIONS = (
+    ("F6", "look-from-above", "above", "From above: x to the right, y upward"),
+    ("F7", "look-along-y", "front", "From the front edge: x to the right, displacement vertical"),
+    ("F8", "look-along-x", "side", "From the side: y to the right, displacement vertical"),
+    ("Shift+F6", "look-from-below", "below", "From the side opposite the contact"),
+    (
+        "Shift+F7",
+        "look-from-a-corner,-all-sides-alike",
+        "corner",
+        "Isometric: the same scale along x, y and the displacement",
+    ),
 )
 _TOGGLES = (
     ("elements", "&elements", "Ctrl+E"),
@@ -53,16 +59,16 @@ _TOGGLES = (
     ("object", "object f&ound", "Ctrl+Alt+O"),
     ("pressed", "object &pressed", "Ctrl+Alt+P"),
 )
-_LOCK = "Keep what every colour means as it is now, or let it follow what is shown"
-_HIGHER = "Draw the displacement one more time larger; the colours stay as they are"
-_LOWER = "Draw the displacement one time less large; the colours stay as they are"
-_CAMERA = "Look at the whole skin from where it is seen at first"
-_MEASURE = "Measure between two places of the skin that you click; Escape ends"
+_LOCK = "Fix all colour ranges at their present values, or let them follow the data"
+_HIGHER = "Increase the vertical exaggeration by 1; colours do not change"
+_LOWER = "Decrease the vertical exaggeration by 1; colours do not change"
+_CAMERA = "View the whole skin from the initial direction"
+_MEASURE = "Measure the distance of two places that you click; Escape ends"
 _DIGITS = 9  # actions that may have a digit for a shortcut
 
 
-class Looking:
-    """Turns what a person asks of the `display` into requests, or moves the camera."""
+class ViewActions:
+    """Actions of the view: requests of settings, camera and measurement."""
 
     def __init__(
         self, history: History, requests: Requests, display: Display, view: SkinView
@@ -77,55 +83,57 @@ class Looking:
             key = f"Ctrl+{number}" if number <= _DIGITS else ""
             words, tip = f"Colour by {words.lower()}", SHADES[value].tip
             add(f"colour-{value}", _COLOURS, words, colour, key, tip)
-        add("lock-ranges", _MENU, "&Lock or free all ranges", self.lock_all, "Ctrl+Alt+L", _LOCK)
-        add("higher", _MENU, "Draw &higher", partial(self.exaggerate, 1), "Ctrl++", _HIGHER)
-        add("lower", _MENU, "Draw &lower", partial(self.exaggerate, -1), "Ctrl+-", _LOWER)
+        add("lock-ranges", _MENU, "Fixed or a&utomatic ranges", self.lock_all, "Ctrl+Alt+L", _LOCK)
+        add("higher", _MENU, "&Higher exaggeration", partial(self.exaggerate, 1), "Ctrl++", _HIGHER)
+        add("lower", _MENU, "&Lower exaggeration", partial(self.exaggerate, -1), "Ctrl+-", _LOWER)
         for name, words, key in _TOGGLES:
             toggle = partial(requests.toggle, f"show_{name}")
             tip = form_field(f"show_{name}").tip
             add(name, _MENU, f"Show or hide {words}", toggle, key, tip)
-        camera = self._look("Reset camera", "left")
+        camera = self._view_from("Reset camera", "left")
         add("camera", _MENU, "Reset &camera", camera, "Ctrl+R", _CAMERA)
-        for key, look, tip in _LOOKS:
-            words = f"Look {DIRECTIONS[look].words}"
-            add(words.lower().replace(" ", "-"), _MENU, words, self._look(words, look), key, tip)
-        self._view.membrane.gaze.turned.connect(guarded(self._turned))
+        for key, name, look, tip in _DIRECTIONS:
+            words = f"View {DIRECTIONS[look].words}"
+            add(name, _MENU, words, self._view_from(words, look), key, tip)
+        self._view.membrane.camera_control.turned.connect(guarded(self._store_camera))
 
-        measuring = self._view.measuring
-        self._measure = add("measure", _MENU, "&Measure", measuring.turn, "Ctrl+Alt+M", _MEASURE)
+        measurement = self._view.measurement
+        self._measure = add(
+            "measure", _MENU, "&Measure", measurement.toggle, "Ctrl+Alt+M", _MEASURE
+        )
         self._measure.setCheckable(True)
         self._escape = QShortcut(QKeySequence("Esc"), self._view.membrane.window())
         self._escape.setEnabled(False)
-        self._escape.activated.connect(guarded(measuring.end))
-        measuring.changed.connect(guarded(self._show_measuring))
+        self._escape.activated.connect(guarded(measurement.end))
+        measurement.changed.connect(guarded(self._show_measuring))
 
     def _show_measuring(self, on: bool) -> None:
         self._measure.setChecked(on)
         self._escape.setEnabled(on)
 
     def exaggerate(self, step: int) -> None:
-        """Draw the displacement larger by so many times."""
+        """Change the vertical exaggeration by `step`, within 1 to 50."""
         wanted = self._history.settings.exaggeration + step
         self._requests.set("exaggeration", float(min(max(wanted, 1), 50)))
 
-    def _look(self, words: str, look: str) -> Callable[[], None]:
+    def _view_from(self, words: str, look: str) -> Callable[[], None]:
         return partial(self._history.change, words, -1, look=look, camera=())
 
-    def _turned(self, camera: tuple[float, ...], dragged: bool) -> None:
-        """Take note of how the camera was turned: a drag is one step, as are turns of the wheel."""
+    def _store_camera(self, camera: tuple[float, ...], dragged: bool) -> None:
+        """Store the camera: each drag is a step of the history, successive wheel turns are one."""
         if dragged:
-            self._history.change("Turn the view", -1, camera=camera)
+            self._history.change("Move the camera", -1, camera=camera)
         else:
             self._history.request("camera", camera=camera)
 
     def lock(self, locked: bool) -> None:
-        """Keep the range of the skin's colours as it is, or let it follow what is shown."""
+        """Fix the colour range of the skin at its present limit, or let it follow the data."""
         limit = self._view.limit_shown() if locked else 0.0
         self._requests.set(f"range_{self._history.settings.colour_by}", limit)
 
     def lock_all(self) -> None:
-        """Keep all ranges of colours that are shown as they are, or let them go if all are kept."""
+        """Fix all visible colour ranges, or make them automatic if all are fixed."""
         settings, ranges = self._history.settings, self._display.limits_shown()
         locked = all(getattr(settings, name) for name in ranges)
-        words = "Free all ranges" if locked else "Lock all ranges"
+        words = "Automatic ranges" if locked else "Fixed ranges"
         self._history.change(words, -1, **{n: 0.0 if locked else v for n, v in ranges.items()})

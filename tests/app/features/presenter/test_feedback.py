@@ -1,4 +1,4 @@
-"""What is felt of an estimate, beside what presses in a simulation."""
+"""Feedback of an estimate, compared with the object that presses in a simulation."""
 
 import math
 import time
@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from kappaskin import ObjectFinder, Pipeline, PointLoad, Setup, Simulator, load_scene
-from kappaskin_app.features.presenter.cue import Found, Roundness, cue_of
-from kappaskin_app.features.presenter.stage import radius_in_words
+from kappaskin_app.features.presenter.feedback import RadiusEstimate, Recognised, feedback_of
+from kappaskin_app.features.presenter.view import radius_in_words
 
 
 @lru_cache(1)
@@ -28,9 +28,9 @@ def _estimate(force=0.5, x=0.05, rigid=None, functions=8):
     return pipeline(Simulator(scene).frame(0, time.monotonic))
 
 
-def _found(estimate) -> Found:
+def _recognised(estimate) -> Recognised:
     what = _finder()(estimate.curvature, estimate.noise, estimate.contact)
-    return Found(what, estimate.contact)
+    return Recognised(what, estimate.contact)
 
 
 def _of_nothing():
@@ -39,76 +39,78 @@ def _of_nothing():
 
 
 def test_nothing_is_felt_of_a_skin_that_nothing_touches() -> None:
-    assert cue_of(_of_nothing()) is None
+    assert feedback_of(_of_nothing()) is None
 
 
 @pytest.mark.parametrize("force", [0.5, 0.6])
 def test_the_force_of_a_ball_that_lies_against_the_skin_is_the_hands(force) -> None:
     estimate = _estimate(force)
 
-    cue = cue_of(estimate, _found(estimate))
+    feedback = feedback_of(estimate, _recognised(estimate))
 
-    assert cue.force == pytest.approx(force, abs=2 * cue.force_95)
-    assert cue.force_95 < 0.02 * force
-    assert abs(estimate.contact.force - force) > 2 * cue.force_95  # a point load would not tell
+    assert feedback.force == pytest.approx(force, abs=2 * feedback.force_95)
+    assert feedback.force_95 < 0.02 * force
+    assert (
+        abs(estimate.contact.force - force) > 2 * feedback.force_95
+    )  # a point load would not tell
 
 
 def test_what_was_found_a_moment_ago_corrects_the_force_of_now() -> None:
-    found = _found(_estimate(0.50))
+    recognised = _recognised(_estimate(0.50))
 
-    cue = cue_of(_estimate(0.52), found)
+    feedback = feedback_of(_estimate(0.52), recognised)
 
-    assert cue.force == pytest.approx(0.52, abs=0.006)
+    assert feedback.force == pytest.approx(0.52, abs=0.006)
 
 
 def test_a_contact_that_no_point_load_explains_has_no_error_bar_until_an_object_does() -> None:
-    cue = cue_of(_estimate(0.6))
+    feedback = feedback_of(_estimate(0.6))
 
-    assert math.isnan(cue.force_95)
-    assert math.isnan(cue.position_95)
+    assert math.isnan(feedback.force_95)
+    assert math.isnan(feedback.position_95)
 
 
 def test_the_radius_felt_is_the_balls_within_its_interval() -> None:
     estimate = _estimate(0.55)
-    cue = cue_of(estimate, _found(estimate))
-    low, high = cue.roundness.between
-    assert cue.roundness.what == "sphere"
+    feedback = feedback_of(estimate, _recognised(estimate))
+    low, high = feedback.radius.interval
+    assert feedback.radius.what == "sphere"
     assert low - 0.002 < 0.04 < high + 0.002
     assert high - low < 0.01
 
 
 def test_rolling_moves_the_contact_and_leaves_the_radius() -> None:
     left, right = (_estimate(0.55, x) for x in (0.045, 0.055))
-    was, now = (cue_of(estimate, _found(estimate)) for estimate in (left, right))
+    was, now = (feedback_of(estimate, _recognised(estimate)) for estimate in (left, right))
     assert now.position[0] - was.position[0] > 0.005
-    assert now.roundness.radius == pytest.approx(was.roundness.radius, rel=0.05)
+    assert now.radius.value == pytest.approx(was.radius.value, rel=0.05)
 
 
 def test_without_an_object_the_skin_is_what_is_round() -> None:
     estimate = _estimate(0.3)
 
-    cue = cue_of(estimate)
+    feedback = feedback_of(estimate)
 
-    assert cue.roundness.what == "skin"
+    assert feedback.radius.what == "skin"
     sharpest = np.abs(estimate.geometry.principal).max()
-    assert cue.roundness.radius == pytest.approx(1 / sharpest)
-    low, high = cue.roundness.between
-    assert low < cue.roundness.radius < high
+    assert feedback.radius.value == pytest.approx(1 / sharpest)
+    low, high = feedback.radius.interval
+    assert low < feedback.radius.value < high
 
 
 def test_a_small_contact_is_told_with_all_its_error_bars() -> None:
     scene = load_scene("centre").touched_by(PointLoad(0.04, 0.06, 0.2))
     estimate = Pipeline(scene.sensor(), Setup())(Simulator(scene).frame(0, time.monotonic))
 
-    cue = cue_of(estimate)
+    feedback = feedback_of(estimate)
 
-    assert cue.position == pytest.approx((0.04, 0.06), abs=2 * cue.position_95)
-    assert cue.force == pytest.approx(0.2, abs=2 * cue.force_95)
-    assert cue.displacement_95 > 0
+    assert feedback.position == pytest.approx((0.04, 0.06), abs=2 * feedback.position_95)
+    assert feedback.force == pytest.approx(0.2, abs=2 * feedback.force_95)
+    assert feedback.displacement_95 > 0
 
 
 @pytest.mark.parametrize(
-    ("between", "radius", "words"),
+    ("interval", "radius", "words"),
     [
         ((0.038, 0.042), 0.04, ("40.0 mm", "38.0 to 42.0 mm")),
         ((0.0, 0.0265), math.nan, ("< 26.5 mm", "press harder")),
@@ -119,19 +121,19 @@ def test_a_small_contact_is_told_with_all_its_error_bars() -> None:
         ((1.1, 1.4), 1.234, ("1234 mm", "1100 to 1400 mm")),
     ],
 )
-def test_a_radius_is_told_as_far_as_it_is_known(between, radius, words) -> None:
-    cue = replace(cue_of(_estimate(0.3)), kind="sphere")
-    told = radius_in_words(replace(cue, roundness=Roundness("sphere", radius, between)))
+def test_a_radius_is_written_as_far_as_it_is_known(interval, radius, words) -> None:
+    feedback = replace(feedback_of(_estimate(0.3)), kind="sphere")
+    told = radius_in_words(replace(feedback, radius=RadiusEstimate("sphere", radius, interval)))
     assert told == (*words, "Radius of the ball")
 
 
-def test_nobody_is_told_to_press_what_is_recorded_harder() -> None:
-    cue = replace(cue_of(_estimate(0.3)), kind="sphere")
-    light = replace(cue, roundness=Roundness("sphere", math.nan, (0.0, 0.0265)))
+def test_a_recording_has_no_hint_to_press_harder() -> None:
+    feedback = replace(feedback_of(_estimate(0.3)), kind="sphere")
+    light = replace(feedback, radius=RadiusEstimate("sphere", math.nan, (0.0, 0.0265)))
     assert radius_in_words(light)[1] == "press harder"
     assert radius_in_words(light, recorded=True)[:2] == ("< 26.5 mm", "pressed too lightly")
 
 
 def test_an_edge_has_a_length_and_no_radius() -> None:
-    cue = replace(cue_of(_estimate(0.3)), kind="edge", length=0.04, roundness=None)
-    assert radius_in_words(cue) == ("edge", "40 mm long", "What touches")
+    feedback = replace(feedback_of(_estimate(0.3)), kind="edge", length=0.04, radius=None)
+    assert radius_in_words(feedback) == ("edge", "40 mm long", "Object")

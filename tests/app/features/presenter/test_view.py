@@ -1,4 +1,4 @@
-"""The operator's view by itself: every text fits, and is read from three metres."""
+"""Presenter view: every text fits and is legible from three metres."""
 
 import math
 import os
@@ -8,10 +8,10 @@ import sys
 import pytest
 from PySide6.QtGui import QFontMetricsF
 
-from kappaskin_app.features.presenter.boards import REMEDIES, age_in_words
-from kappaskin_app.features.presenter.cue import Cue, Roundness
+from kappaskin_app.features.presenter.feedback import Feedback, RadiusEstimate
+from kappaskin_app.features.presenter.indicators import REMEDIES, age_in_words
 from kappaskin_app.features.presenter.pad import Hand
-from kappaskin_app.features.presenter.stage import Stage
+from kappaskin_app.features.presenter.view import PresenterView
 from kappaskin_app.shell.badge import GAP, LIVE, LOST, OFF, SIM, STALE, WAITING
 from kappaskin_app.theme import THEMES, apply_look
 from kappaskin_app.widgets.colour_bar import SkinScale
@@ -19,9 +19,9 @@ from kappaskin_app.widgets.lettering import CAPTION, PRIMARY
 from kappaskin_app.widgets.timeline import Clock
 
 CAPITAL = 55  # px: 15 mm on a screen of 24 inches, to be read from three metres
-LONGEST = Cue(
+LONGEST = Feedback(
     *(-12.345, 0.123, 0.03456, 0.00123, (0.1234, 0.1234), 0.00012, "cylinder", 0.06),
-    Roundness("cylinder", 0.1234, (0.1121, 0.1345)),
+    RadiusEstimate("cylinder", 0.1234, (0.1121, 0.1345)),
     near_rim=False,
 )
 WHY = (
@@ -30,14 +30,14 @@ WHY = (
 )
 
 
-def stage_of(size, qtbot, theme="light"):
-    stage = Stage(_Skin())
-    qtbot.addWidget(stage)
+def view_of(size, qtbot, theme="light"):
+    view = PresenterView(_Skin())
+    qtbot.addWidget(view)
     apply_look(THEMES[theme])
-    stage.resize(*size)
-    stage.present(True)
-    stage.show()
-    return stage
+    view.resize(*size)
+    view.present(True)
+    view.show()
+    return view
 
 
 def _Skin():
@@ -48,27 +48,28 @@ def _Skin():
     return skin
 
 
-def boards(stage):
-    return [board for board in stage.boards if board.isVisible()] + [stage.operator.told]
+def indicators(view):
+    visible = [indicator for indicator in view.indicators if indicator.isVisible()]
+    return [*visible, view.controls.hand_text]
 
 
-def test_the_scale_of_the_colours_is_read_from_afar_and_asks_for_nothing(qtbot) -> None:
-    stage, scale, clock = Stage(_Skin()), SkinScale(), Clock("Time")
-    for widget in (stage, scale, clock):
+def test_the_colour_bar_is_legible_from_afar_and_needs_no_input(qtbot) -> None:
+    view, scale, clock = PresenterView(_Skin()), SkinScale(), Clock("Time")
+    for widget in (view, scale, clock):
         qtbot.addWidget(widget)
     clock.show_text("0.50 s of 4.00 s", "0.00 s of 4.00 s")
     for part in (scale, clock):
-        stage.fitted.connect(part.show_unit)
+        view.fitted.connect(part.show_unit)
     usual = [QFontMetricsF(part.font()).capHeight() for part in (scale.bar, clock)]
     widths = scale.bar.width(), clock.width()
-    stage.resize(1920, 1080)
-    stage.present(True)
+    view.resize(1920, 1080)
+    view.present(True)
     heights = [QFontMetricsF(part.font()).capHeight() for part in (scale.bar, clock)]
     assert min(heights) >= CAPTION - 1
     assert not scale.lock.isVisibleTo(scale)
     assert scale.bar.width() > widths[0]
     assert clock.width() > widths[1]
-    stage.present(False)
+    view.present(False)
     assert [QFontMetricsF(part.font()).capHeight() for part in (scale.bar, clock)] == usual
     assert (scale.bar.width(), clock.width()) == widths
     assert scale.lock.isVisibleTo(scale)
@@ -79,70 +80,72 @@ SIZES = [(1280, 720), (1280, 800), (1920, 1080), (2560, 1440), (1024, 768)]
 
 @pytest.mark.parametrize("size", SIZES)
 def test_every_text_fits_and_is_not_made_smaller(size, qtbot) -> None:
-    stage = stage_of(size, qtbot)
-    stage.operator.show_hand(Hand(0.123, 0.123, 12.34))
-    stage.show_cue(LONGEST)
-    stage.show_felt(LONGEST, 0.0)
-    stage.strip.show_state(LIVE, "Second-generation fingertip, left hand", "1000 ms old")
-    for board in boards(stage):
-        for words in board.words():
+    view = view_of(size, qtbot)
+    view.controls.show_hand(Hand(0.123, 0.123, 12.34))
+    view.show_feedback(LONGEST)
+    view.show_graphics(LONGEST, 0.0)
+    view.strip.show_state(LIVE, "Second-generation fingertip, left hand", "1000 ms old")
+    for indicator in indicators(view):
+        for words in indicator.words():
             assert words.fits, words.text
-            assert board.rect().toRectF().adjusted(-1, -1, 1, 1).contains(words.place), words.text
-    for figure in (stage.force, stage.displacement, stage.place, stage.radius):
+            assert indicator.rect().toRectF().adjusted(-1, -1, 1, 1).contains(words.place), (
+                words.text
+            )
+    for figure in (view.force, view.displacement, view.place, view.radius):
         value = next(words for words in figure.words() if words.text == figure.value)
         assert value.font.pixelSize() == figure.letters(PRIMARY, bold=True).pixelSize()
-    for button in stage.operator.things.buttons():
+    for button in view.controls.objects.buttons():
         needed = QFontMetricsF(button.font()).horizontalAdvance(button.text())
         assert needed + 8 < button.width()
-    stage.close()
+    view.close()
 
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("state", [LOST, STALE, WAITING, OFF, GAP])
 def test_what_to_do_fits_whole(size, state, qtbot) -> None:
-    stage = stage_of(size, qtbot)
-    stage.show_trouble(state, "1234 s", WHY)
-    assert stage.pages.currentWidget() is stage.banner
-    words = stage.banner.words()
+    view = view_of(size, qtbot)
+    view.show_trouble(state, "1234 s", WHY)
+    assert view.pages.currentWidget() is view.banner
+    words = view.banner.words()
     assert [said.text for said in words] == [f"{state} 1234 s", WHY, REMEDIES[state]]
     assert all(said.fits for said in words)
     tops = [said.place.top() for said in words]
     assert tops == sorted(tops)
-    stage.close()
+    view.close()
 
 
-def test_figures_are_read_from_three_metres(qtbot) -> None:
-    stage = stage_of((1920, 1080), qtbot)
-    stage.show_cue(LONGEST)
-    stage.strip.show_state(SIM, "Simulated skin", "12 ms old")
-    large = [stage.force, stage.displacement, stage.place, stage.radius]
+def test_numbers_are_legible_from_three_metres(qtbot) -> None:
+    view = view_of((1920, 1080), qtbot)
+    view.show_feedback(LONGEST)
+    view.strip.show_state(SIM, "Simulated skin", "12 ms old")
+    large = [view.force, view.displacement, view.place, view.radius]
     texts = {figure.value for figure in large} | {SIM, "12 ms old"}
-    for board in (*large, stage.strip):
-        for words in board.words():
+    for indicator in (*large, view.strip):
+        for words in indicator.words():
             if words.text in texts:
                 assert QFontMetricsF(words.font).capHeight() >= CAPITAL, words.text
                 texts.remove(words.text)
     assert not texts
-    stage.show_trouble(LOST, "3 s", WHY)
-    head, why, remedy = stage.banner.words()
+    view.show_trouble(LOST, "3 s", WHY)
+    head, why, remedy = view.banner.words()
     assert QFontMetricsF(head.font).capHeight() >= CAPITAL
     assert min(QFontMetricsF(w.font).capHeight() for w in (why, remedy)) >= CAPITAL / 2
-    stage.close()
+    view.close()
 
 
 _AT_150 = """
 from PySide6.QtWidgets import QApplication, QWidget
 app = QApplication([]); app.setStyle("Fusion")
 import sys; sys.path[:0] = [{here!r}]
-from kappaskin_app.features.presenter.stage import Stage
-from kappaskin_app.features.presenter.cue import Cue, Roundness
-stage = Stage(QWidget()); stage.resize(1280, 720); stage.present(True); stage.show()
-assert stage.devicePixelRatioF() == 1.5
-stage.show_cue(Cue(-12.345, 0.123, 0.03456, 0.00123, (0.1234, 0.1234), 0.00012, "cylinder", 0.06,
-                   Roundness("cylinder", 0.1234, (0.1121, 0.1345)), False))
-stage.strip.show_state("LIVE", "Second-generation fingertip, left hand", "1000 ms old")
+from kappaskin_app.features.presenter.view import PresenterView
+from kappaskin_app.features.presenter.feedback import Feedback, RadiusEstimate
+view = PresenterView(QWidget()); view.resize(1280, 720); view.present(True); view.show()
+assert view.devicePixelRatioF() == 1.5
+view.show_feedback(Feedback(-12.345, 0.123, 0.03456, 0.00123, (0.1234, 0.1234), 0.00012,
+                   "cylinder", 0.06, RadiusEstimate("cylinder", 0.1234, (0.1121, 0.1345)), False))
+view.strip.show_state("LIVE", "Second-generation fingertip, left hand", "1000 ms old")
 app.processEvents()
-print([w.text for b in stage.boards if b.isVisible() for w in b.words() if not w.fits])
+print([w.text for b in view.indicators if b.isVisible() for w in b.words() if not w.fits])
 """
 
 
@@ -170,23 +173,23 @@ def contrast(one: str, other: str) -> float:
 def test_letters_stand_out_from_their_ground_without_any_colour(theme, qtbot) -> None:
     from kappaskin_app.shell.badge import colour_of
 
-    stage, colours = stage_of((1280, 720), qtbot, theme), THEMES[theme]
-    stage.show_cue(LONGEST)
-    for board in boards(stage):
-        for words in board.words():
+    view, colours = view_of((1280, 720), qtbot, theme), THEMES[theme]
+    view.show_feedback(LONGEST)
+    for indicator in indicators(view):
+        for words in indicator.words():
             ground = colours.window
-            if board is stage.strip and words.text == stage.strip.state:
+            if indicator is view.strip and words.text == view.strip.state:
                 ground = colour_of(words.text, colours)
-            assert contrast(board.ink(words), ground) >= 4.5, words.text
+            assert contrast(indicator.ink(words), ground) >= 4.5, words.text
     for state in (LIVE, SIM, LOST, STALE, WAITING, OFF):
         assert contrast("#ffffff", colour_of(state, colours)) >= 4.5
     assert contrast(colours.accent, colours.base) >= 3  # the bar
-    stage.close()
+    view.close()
 
 
 def test_the_band_holds_the_end_of_the_bar_and_never_vanishes(qtbot) -> None:
-    stage = stage_of((1280, 720), qtbot)
-    bar = stage.bar
+    view = view_of((1280, 720), qtbot)
+    bar = view.bar
     bar.show_force(0.5, 0.05, 0.0)
     low, high = bar.band()
     assert (low, high) == pytest.approx((bar.at(0.45), bar.at(0.55)))
@@ -196,18 +199,18 @@ def test_the_band_holds_the_end_of_the_bar_and_never_vanishes(qtbot) -> None:
     assert low < bar.at(0.5) < high
     bar.show_force(0.5, math.nan, 0.0)
     assert bar.band()[1] - bar.band()[0] == pytest.approx(3.0)
-    stage.close()
+    view.close()
 
 
 def test_the_circle_is_to_the_scale_of_its_scale_bar(qtbot) -> None:
-    stage = stage_of((1280, 720), qtbot)
-    view = stage.round
-    view.show_roundness(Roundness("sphere", 0.04, (0.038, 0.042)), False, 0.0)
-    assert view.circle(0.04).height() == pytest.approx(2 * 0.04 * view.per_metre)
-    assert view.bar * view.per_metre <= 0.3 * view.width()
-    assert view.circle(0.042).top() >= 0
-    assert view.circle(0.042).bottom() == pytest.approx(view.foot.y())
-    stage.close()
+    view = view_of((1280, 720), qtbot)
+    radius_view = view.radius_view
+    radius_view.show_radius(RadiusEstimate("sphere", 0.04, (0.038, 0.042)), False, 0.0)
+    assert radius_view.circle(0.04).height() == pytest.approx(2 * 0.04 * radius_view.per_metre)
+    assert radius_view.bar * radius_view.per_metre <= 0.3 * radius_view.width()
+    assert radius_view.circle(0.042).top() >= 0
+    assert radius_view.circle(0.042).bottom() == pytest.approx(radius_view.contact_point.y())
+    view.close()
 
 
 @pytest.mark.parametrize(
@@ -221,9 +224,9 @@ def test_the_circle_is_to_the_scale_of_its_scale_bar(qtbot) -> None:
         (math.inf, ""),
     ],
 )
-def test_an_age_is_told_at_a_glance(seconds, words) -> None:
+def test_an_age_is_written_in_one_number(seconds, words) -> None:
     assert age_in_words(seconds) == words
 
 
-def test_an_age_that_is_only_the_least_says_so() -> None:
+def test_an_age_that_is_a_lower_bound_is_marked() -> None:
     assert age_in_words(0.012, True) == "\N{GREATER-THAN OR EQUAL TO}\N{THIN SPACE}12 ms old"

@@ -1,4 +1,4 @@
-"""The card of one element: what it reads, read and will read by; and traces of several."""
+"""Element panel: facts, history and spectrum of one element; traces of several."""
 
 from collections.abc import Sequence
 
@@ -15,18 +15,18 @@ Array = NDArray[np.float64]
 
 TRACED = tuple(quantity for quantity in REPORTED if quantity.traced)
 _NONE = "Click an element, on the skin or in a heatmap."
-_NONE_TRACED = "Click an element and press Trace it, on its card (Ctrl+Alt+E)."
-_TRACE = "{} over the last 10 s, in every frame that was computed, up to 500 a second."
+_NONE_PLOTTED = "Click an element, then Plot in its panel (Ctrl+Alt+E)."
+_TRACE = "{} over the last 10 s, in every computed frame, up to 500 per second."
 _SPECTRUM = (
-    "The amplitude of the sine of each frequency that fits best to the last 10 s, by least squares "
-    "(Lomb and Scargle), up to half of the frames in a second: hum stands out as a line."
+    "Amplitude of the sine that fits the last 10 s best at each frequency, by least squares "
+    "(Lomb-Scargle), up to half the frame rate. Mains hum is a line."
 )
 
 
-class ElementCard(QWidget):
-    """Facts of an element beside its last seconds; `traced` asks to trace it, or no more."""
+class ElementPanel(QWidget):
+    """Facts, history and spectrum of an element; `plot_toggled` requests its trace or removal."""
 
-    traced = Signal()
+    plot_toggled = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -35,11 +35,11 @@ class ElementCard(QWidget):
             label.setTextFormat(Qt.TextFormat.RichText)
             label.setWordWrap(True)
             label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.button = QPushButton("&Trace it")
-        self.button.setToolTip("Add this element to the traces (Ctrl+Alt+T), or take it out.")
-        self.button.clicked.connect(lambda *_: self.traced.emit())
+        self.button = QPushButton("Plo&t")
+        self.button.setToolTip("Add this element to the traces (Ctrl+Alt+T), or remove it.")
+        self.button.clicked.connect(lambda *_: self.plot_toggled.emit())
         self.button.setEnabled(False)
-        self.pasts = [
+        self.histories = [
             CurvePlot(of.traced, of.unit, True, _TRACE.format(f"{of.traced} (xx, yy, xy)"))
             for of in TRACED
         ]
@@ -52,29 +52,29 @@ class ElementCard(QWidget):
         around = QHBoxLayout(self)
         around.setContentsMargins(8, 4, 8, 6)
         around.addLayout(left, 4)
-        for plot in (*self.pasts, self.spectrum):
+        for plot in (*self.histories, self.spectrum):
             around.addWidget(plot, 3)
 
     def show_facts(self, title: str, facts: str) -> None:
-        """Write what is known of the element; nothing of none."""
+        """Write the title and facts of the element; empty for none."""
         for label, text in ((self.title, title or _NONE), (self.facts, facts)):
             if text != label.text():
                 label.setText(text)
         self.button.setEnabled(bool(title))
 
-    def show_tracing(self, traced: bool) -> None:
-        self.button.setText("Do not &trace it" if traced else "&Trace it")
+    def show_plotted(self, plotted: bool) -> None:
+        self.button.setText("Stop plo&tting" if plotted else "Plo&t")
 
-    def show_past(self, times: Array, values: Array, seconds: float) -> None:
+    def show_history(self, times: Array, values: Array, seconds: float) -> None:
         """Draw `values` (T, 3 k) of k quantities at `times` (T,) in s up to now."""
-        for number, plot in enumerate(self.pasts):
+        for number, plot in enumerate(self.histories):
             curves = [
                 Curve(name, n, values[:, 3 * number + n]) for n, name in enumerate(COMPONENTS)
             ]
             plot.show_curves(times, curves, (-seconds, 0.0), "s")
 
     def show_spectrum(self, frequencies: Array, amplitudes: Array) -> None:
-        """Draw `amplitudes` (3, F) in 1/m at `frequencies` (F,) in Hz; or say so of none."""
+        """Draw `amplitudes` (3, F) in 1/m at `frequencies` (F,) in Hz, or a note without any."""
         curves = [Curve(name, n, amplitudes[n]) for n, name in enumerate(COMPONENTS)]
         if not len(frequencies):
             self.spectrum.show_curves(frequencies, (), (0.0, 1.0), "Hz", "Not enough readings yet.")
@@ -84,7 +84,7 @@ class ElementCard(QWidget):
 
 
 class Traces(QWidget):
-    """One plot for each component, with a curve for each element; `pointed` tells at which."""
+    """A plot for each component with a curve for each element; `pointed` emits the element."""
 
     pointed = Signal(int)
 
@@ -98,7 +98,7 @@ class Traces(QWidget):
             around.addWidget(plot)
             plot.pointed.connect(self.pointed)
 
-    def show_past(
+    def show_history(
         self, elements: Sequence[int], times: Array, values: Array, seconds: float
     ) -> None:
         """Draw `values` (T, plots, k) of k `elements` at `times` (T,) in s up to now."""
@@ -107,7 +107,7 @@ class Traces(QWidget):
                 Curve(str(element), n, values[:, row, n], element)
                 for n, element in enumerate(elements)
             ]
-            plot.show_curves(times, curves, (-seconds, 0.0), "s", _NONE_TRACED)
+            plot.show_curves(times, curves, (-seconds, 0.0), "s", _NONE_PLOTTED)
 
     def mark(self, element: int) -> None:
         for plot in self.plots:

@@ -1,4 +1,4 @@
-"""Estimates, taken cylinder by cylinder, to a calibration that a person may use, save or load."""
+"""Calibration controller: steps of the procedure, and the calibration to use, save or load."""
 
 import math
 import time
@@ -28,17 +28,17 @@ from kappaskin_app.shell.history import History
 
 Array = NDArray[np.float64]
 
-_SETTLE = 0.2  # s after asking for a step that its readings begin to count
-_SILENCE = 5.0  # s without a reading after which a step is given up
-_FEWEST_FRAMES = 10  # of one step, however short: their spread tells the noise
-_MOST_FRAMES = 5000  # kept of one step, evenly: more tell no more
-_LONGEST = 3600.0  # s on one step
-_STOPPED = "Cancelled while it was computed; what was taken is forgotten."
+_SETTLE = 0.2  # s from the start of a step to its first reading
+_SILENCE = 5.0  # s without a reading after which a step is aborted
+_FEWEST_FRAMES = 10  # of one step, to determine the noise
+_MOST_FRAMES = 5000  # stored of one step, evenly spaced
+_LONGEST = 3600.0  # s, longest step
+_STOPPED = "Computation cancelled; the captured steps are discarded."
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What came of a procedure with `sensor`."""
+    """Data and report of a completed procedure with `sensor`."""
 
     sensor: Sensor
     sweep: Sweep
@@ -46,26 +46,25 @@ class Result:
 
 
 def parsed_radii(text: str) -> tuple[float, ...]:
-    """Radii in m from a list in mm; refused when it is none."""
+    """Radii in m from a list in mm; raises Refusal for other text."""
     try:
         return tuple(float(word) / 1e3 for word in text.replace(",", " ").replace(";", " ").split())
     except ValueError as error:
         raise Refusal(f"expected radii in mm, such as 100, 50, 33; got {text!r:.60}") from error
 
 
-class Calibrating(QObject):
-    """A calibration as a person goes through it.
+class CalibrationController(QObject):
+    """Calibration by a user.
 
-    It has a `procedure` while steps are taken, is `computing` after the last, and then has a
-    `result`; `message` says why a step or the whole was refused, `file_refused` why a file was, and
-    `done` what else was done with the result. `changed` tells of anything new,
-    `laid` of the step that a simulated skin is to lie on, None when it need not any more, `used`
-    of a file that was loaded or saved. From the first to the last, readings are to come without
-    any calibration.
+    There is a `procedure` while steps are captured; it is `computing` after the last, and then has
+    a `result`. `message` is the reason why a step or the procedure was refused, `file_refused` that
+    of a file, and `done` what else was done with the result. `changed` reports any change,
+    `step_requested` the step for a simulated skin (None at the end), and `used` a file loaded or
+    saved. During the procedure readings are to come without a calibration.
     """
 
     changed = Signal()
-    laid = Signal(object)
+    step_requested = Signal(object)
     used = Signal(object)
 
     def __init__(
@@ -83,18 +82,18 @@ class Calibrating(QObject):
         self.procedure: Procedure | None = None
         self.result: Result | None = None
         self.message = self.done = self.file_refused = ""
-        self.unattended = False
-        self._kept: list[Estimate] | None = None  # of the step that is being taken
-        self._begun = self._heard = 0.0
+        self.automatic = False
+        self._captured: list[Estimate] | None = None  # of the present step
+        self._begin_time = self._last_time = 0.0
         self._task = BackgroundTask(
             tasks, "Computing the calibration", self._finish, self._refuse, cancelled=_STOPPED
         )
 
-    # What is so.
+    # State.
 
     @property
     def step(self) -> CylinderStep | None:
-        """What to lay the skin on now, None when nothing is to be."""
+        """The present step, None without a procedure or after the last."""
         return self.procedure.step if self.procedure else None
 
     @property
@@ -102,81 +101,81 @@ class Calibrating(QObject):
         return self._task.running
 
     @property
-    def taking(self) -> bool:
-        """Whether the readings of the present step are coming in."""
-        return self._kept is not None
+    def capturing(self) -> bool:
+        """Whether the readings of the present step are being captured."""
+        return self._captured is not None
 
     @property
     def share(self) -> float:
-        """How much of the present step's time is over, 0 to 1."""
-        if self._kept is None:
+        """Progress of the present step, 0 to 1."""
+        if self._captured is None:
             return 0.0
-        return min(1.0, max(0.0, (self._heard - self._begun) / self._wanted()))
+        return min(1.0, max(0.0, (self._last_time - self._begin_time) / self._duration()))
 
     # Requests of the user.
 
     def begin(self, radii: tuple[float, ...], seconds: float, hold: float = 0.0) -> None:
-        """Begin with cylinders of `radii` in m, and take `seconds` of each step's readings."""
+        """Start with cylinders of `radii` in m, and `seconds` of readings per step."""
         try:
             sensor = self._status.sensor
             if sensor is None or self._status.state != "streaming":
-                raise Refusal("no sensor is connected; connect one, then begin")
+                raise Refusal("no sensor is connected; connect one, then start")
             if not 0 < seconds <= _LONGEST:
                 raise Refusal(f"expected a time above zero and at most {_LONGEST:g} s")
             steps = schedule(radii, hold, sensor.layout.patch.strip)
             self.procedure = Procedure(sensor, steps)
         except Refusal as refusal:
-            self._tell(str(refusal))
+            self._report(str(refusal))
             return
         self.seconds, self._connection, self.result = seconds, self._status.connections, None
-        self._lay()
-        self._tell("")
+        self._request_step()
+        self._report("")
 
-    def take(self) -> None:
-        """Take the readings that come from now on as those of the present step."""
+    def capture(self) -> None:
+        """Capture the readings of the present step from now on."""
         step = self.step
-        if step is None or self._kept is not None:
+        if step is None or self._captured is not None:
             return
-        self._kept = []
-        # A hold counts from the moment it is laid on: how it begins shows the creep.
-        self._begun = self._clock() + (0.0 if step.hold else _SETTLE)
-        self._heard = self._clock()
+        self._captured = []
+        # A hold is captured from its beginning, which shows the creep.
+        self._begin_time = self._clock() + (0.0 if step.hold else _SETTLE)
+        self._last_time = self._clock()
         if step.hold:
-            self.laid.emit(step)
-        self._tell("")
+            self.step_requested.emit(step)
+        self._report("")
 
-    def take_all(self) -> None:
-        """Take this and all further steps, where nobody needs to lay the skin on them."""
-        self.unattended = True
-        self.take()
+    def capture_all(self) -> None:
+        """Capture all further steps automatically, for a simulated skin."""
+        self.automatic = True
+        self.capture()
 
     def pause(self) -> None:
-        """Go on step by step after this one."""
-        self.unattended = False
+        """Continue step by step after the present one."""
+        self.automatic = False
         self.changed.emit()
 
     def redo(self) -> None:
-        """Give up the present step and take the one before it again."""
+        """Abort the present step and repeat the one before it."""
         if self.procedure is None or not self.procedure.taken:
             return
-        self._kept, self.unattended = None, False
+        self._captured, self.automatic = None, False
         self.procedure.redo()
-        self._lay()
-        self._tell("")
+        self._request_step()
+        self._report("")
 
     def cancel(self, why: str = "") -> None:
-        """End the procedure, and forget what was taken."""
-        self._kept, self.unattended = None, False
+        """End the procedure, and discard the captured steps."""
+        self._captured, self.automatic = None, False
         self._task.stop()
         was, self.procedure = self.procedure, None
         if was is not None:
-            self.laid.emit(None)
-        self._tell(why)
+            self.step_requested.emit(None)
+        self._report(why)
 
-    def leave(self) -> None:
-        """Forget the result."""
+    def discard(self) -> None:
+        """Discard the result."""
         self.result = None
-        self._tell("")
+        self._report("")
 
     def use(self) -> None:
         if self.result is not None:
@@ -190,15 +189,17 @@ class Calibrating(QObject):
             try:
                 self.result.report.calibration.save(path)
                 self.used.emit(path)
-                self._tell("", f"saved as {path}")
+                self._report("", f"saved as {path}")
             except Refusal as refusal:
-                self._tell(str(refusal))
+                self._report(str(refusal))
 
     def load(self, path: Path) -> None:
-        """Use the calibration in `path`, if it is one of the sensor that is connected."""
+        """Use the calibration in `path`, if it belongs to the connected sensor."""
         try:
             if self._status.sensor is None:
-                raise Refusal(f"{path}: no sensor is connected; connect the one it is of, first")
+                raise Refusal(
+                    f"{path}: no sensor is connected; connect the one it belongs to first"
+                )
             now = datetime.now(UTC)
             calibration = load_calibration(path, self._status.sensor, now)
         except Refusal as refusal:
@@ -207,43 +208,49 @@ class Calibrating(QObject):
             return
         self._history.change("Load a calibration", calibration=calibration)
         self.used.emit(path)
-        self._tell("")
+        self._report("")
 
-    # News.
+    # Input.
 
     def follow(self, status: Status) -> None:
-        """Take note of how the engine is doing, as often as it is told."""
+        """Store the status of the engine; end or refuse what it makes impossible."""
         self._status = status
         if self.procedure is None or self.computing:
             return
         if why := self._ended_by(status):
             self.cancel(why)
-        elif self._kept is not None and self._clock() - max(self._heard, self._begun) > _SILENCE:
-            self._give_up(f"no reading came for {_SILENCE:g} s; is the device still sending?")
+        elif (
+            self._captured is not None
+            and self._clock() - max(self._last_time, self._begin_time) > _SILENCE
+        ):
+            self._refuse_step(f"no reading for {_SILENCE:g} s; is the device still sending?")
 
     def receive(self, estimate: Estimate) -> None:
-        """Take in one of the readings of the present step, and the step when it was the last."""
-        kept, status = self._kept, self._status
+        """Capture an estimate of the present step, and finish the step after its last."""
+        captured, status = self._captured, self._status
         setup = status.setup
         plain = setup.calibration is None and setup.tare is None
         nominal = plain and estimate.generation == status.generation
-        if kept is None or not nominal or estimate.host_time < self._begun:
+        if captured is None or not nominal or estimate.host_time < self._begin_time:
             return
-        after = estimate.device_time - kept[-1].device_time if kept else math.inf
+        after = estimate.device_time - captured[-1].device_time if captured else math.inf
         if after < -OVERTAKEN:
-            self.cancel("The device's clock went back: it restarted. Begin anew.")
+            self.cancel("The device's clock went back: it restarted. Start again.")
             return
-        self._heard = estimate.host_time
-        if after >= self._wanted() / _MOST_FRAMES:  # one that was overtaken is left out
-            kept.append(estimate)
-        if self._heard - self._begun >= self._wanted() and len(kept) >= _FEWEST_FRAMES:
-            self._take(kept)
+        self._last_time = estimate.host_time
+        if after >= self._duration() / _MOST_FRAMES:  # late frames are excluded
+            captured.append(estimate)
+        if (
+            self._last_time - self._begin_time >= self._duration()
+            and len(captured) >= _FEWEST_FRAMES
+        ):
+            self._finish_step(captured)
         else:
             self.changed.emit()
 
-    # How.
+    # Steps.
 
-    def _tell(self, message: str, done: str = "") -> None:
+    def _report(self, message: str, done: str = "") -> None:
         self.message, self.done, self.file_refused = message, done, ""
         self.changed.emit()
 
@@ -251,61 +258,61 @@ class Calibrating(QObject):
         self._history.change(text, calibration=report.calibration)
         self.changed.emit()
 
-    def _wanted(self) -> float:
-        """How long the readings of the present step are to be, in s."""
+    def _duration(self) -> float:
+        """Duration of the present step in s."""
         return max(self.seconds, self.step.hold if self.step else 0.0)
 
-    def _lay(self) -> None:
-        """Have the next step laid, unless it is a hold, which begins when it is taken."""
+    def _request_step(self) -> None:
+        """Request the next step, unless it is a hold, which begins with its capture."""
         step = self.step
         if step is not None and not step.hold:
-            self.laid.emit(step)
+            self.step_requested.emit(step)
 
     def _ended_by(self, status: Status) -> str:
         """Why the procedure cannot go on, or nothing."""
         if status.connections != self._connection:
             return (
-                "Another device answered, or the same one restarted or changed. What was taken is "
-                "not of this one: begin anew."
+                "Another device was connected, or the same one restarted or changed. The captured "
+                "steps do not belong to it: start again."
             )
         if status.state != "streaming":
             why = f": {status.message}" if status.message else ""
-            return f"The connection ended{why}. Once it is back, begin anew."
+            return f"The connection ended{why}. Reconnect, then start again."
         return ""
 
-    def _give_up(self, why: str) -> None:
-        self._kept, self.unattended = None, False
-        self._tell(f"{why[:1].upper()}{why[1:]} The same step again.")
+    def _refuse_step(self, why: str) -> None:
+        self._captured, self.automatic = None, False
+        self._report(f"{why[:1].upper()}{why[1:]} Repeat this step.")
 
-    def _take(self, kept: list[Estimate]) -> None:
+    def _finish_step(self, captured: list[Estimate]) -> None:
         procedure = self.procedure
         if procedure is None:
             return
-        times = np.array([estimate.device_time for estimate in kept])
-        readings = np.array([estimate.curvature.ravel() for estimate in kept])
+        times = np.array([estimate.device_time for estimate in captured])
+        readings = np.array([estimate.curvature.ravel() for estimate in captured])
         clock_went_back = bool(procedure.taken) and times[0] < procedure.taken[-1].time
         if clock_went_back:
-            self.cancel("The device's clock went back: it restarted. Begin anew.")
+            self.cancel("The device's clock went back: it restarted. Start again.")
             return
         try:
             procedure.take(times, readings)
         except Refusal as refusal:
-            self._give_up(f"{refusal}.")
+            self._refuse_step(f"{refusal}.")
             return
-        self._kept = None
+        self._captured = None
         if procedure.done:
             self._compute(procedure)
             return
-        self._lay()
-        if self.unattended:
-            self.take()
-        self._tell("")
+        self._request_step()
+        if self.automatic:
+            self.capture()
+        self._report("")
 
     def _compute(self, procedure: Procedure) -> None:
-        """Begin to work it out, beside the drawing."""
+        """Compute the calibration in the background."""
         self._task.run(calibrate, procedure.sweep(), procedure.sensor, datetime.now(UTC))
-        self.unattended = False
-        self._tell("")
+        self.automatic = False
+        self._report("")
 
     def _finish(self, report: CalibrationReport) -> None:
         if self.procedure is not None:
@@ -313,5 +320,5 @@ class Calibrating(QObject):
         self.cancel()
 
     def _refuse(self, error: Exception) -> None:
-        why = f"No calibration came of it: {error or type(error).__name__}."
+        why = f"No calibration: {error or type(error).__name__}."
         self.cancel(str(error) if isinstance(error, Cancelled) else why)

@@ -1,0 +1,73 @@
+"""Object recognition: description of the object in contact, computed in the background."""
+
+from PySide6.QtCore import QObject, Signal
+
+from kappaskin.contact import NO_OBJECT, ContactObject, ObjectFinder
+from kappaskin.frames import Estimate
+from kappaskin.live import Status
+from kappaskin_app.shell.background import BackgroundTask, Tasks
+from kappaskin_app.widgets.parts import with_error
+
+_PREPARING = "computing the readings of objects on this skin\N{HORIZONTAL ELLIPSIS}"
+
+
+def curvature_text(estimate: Estimate) -> str:
+    """Text of the principal curvatures of the skin at the contact; empty without one."""
+    if not estimate.contact.present:
+        return ""
+    found = zip(estimate.geometry.principal, estimate.geometry.principal_sd, strict=True)
+    one, other = (with_error(value, sd, 1, sign="+") for value, sd in found)
+    return f"principal curvatures {one} and {other} 1/m"
+
+
+class ObjectRecognition(QObject):
+    """Recognises the object in contact in the background, one estimate at a time.
+
+    `described` emits the text, `found` the object and the estimate that it was recognised in.
+    Estimates that arrive meanwhile are skipped.
+    """
+
+    described = Signal(str)
+    found = Signal(ContactObject, Estimate)
+
+    def __init__(self, tasks: Tasks, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        words = "Computing the readings of objects"
+        self._preparation = BackgroundTask(tasks, words, self._set_finder, self._set_finder)
+        self._recognition = BackgroundTask(tasks, "", self._finish)
+        self._key: tuple[int, str] | None = None
+        self._finder: ObjectFinder | str = ""
+
+    def start(self, status: Status, estimate: Estimate | None) -> None:
+        """Recognise the object of an estimate, once the readings of objects are computed."""
+        sensor = status.sensor
+        if estimate is None or sensor is None:
+            self._recognition.stop()
+            self.described.emit("")
+        elif self._key != (key := (status.connections, status.setup.edge or sensor.edge)):
+            self._key = key
+            self._preparation.run(ObjectFinder, sensor.plate, sensor.layout, key[1])
+        elif self._preparation.running:
+            self.described.emit(_PREPARING)
+        elif estimate.generation == status.generation and not self._recognition.running:
+            self._recognition.run(_recognise, self._finder, estimate)
+
+    def _set_finder(self, finder: ObjectFinder | Exception) -> None:
+        """Store the finder, or the reason why there is none."""
+        self._finder = str(finder) if isinstance(finder, Exception) else finder
+
+    def _finish(self, described: tuple[str, ContactObject, Estimate]) -> None:
+        words, *found = described
+        self.described.emit(words)
+        self.found.emit(*found)
+
+
+def _recognise(
+    finder: ObjectFinder | str, estimate: Estimate
+) -> tuple[str, ContactObject, Estimate]:
+    if isinstance(finder, str):
+        found, what = NO_OBJECT, finder
+    else:
+        found = finder(estimate.curvature, estimate.noise, estimate.contact)
+        what = found.describe()
+    return "; ".join(filter(None, [what, curvature_text(estimate)])), found, estimate

@@ -1,0 +1,193 @@
+"""Presenter controller: full screen, estimates, and the simulated hand."""
+
+import math
+import time
+from dataclasses import dataclass
+
+from PySide6.QtCore import QByteArray, QObject, QRect, Qt
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QToolBar, QWidget
+
+from kappaskin.contact import ContactObject
+from kappaskin.frames import Estimate
+from kappaskin.live import Status
+from kappaskin_app.features.presenter.feedback import Feedback, Recognised, feedback_of
+from kappaskin_app.features.presenter.indicators import REMEDIES, age_in_words
+from kappaskin_app.features.presenter.pad import DEMO_OBJECTS, Hand
+from kappaskin_app.features.presenter.sound import Sound
+from kappaskin_app.features.presenter.view import PresenterView
+from kappaskin_app.guard import guarded
+from kappaskin_app.shell.badge import GAP, SIM, origin
+from kappaskin_app.shell.centre import ActionBanner
+from kappaskin_app.shell.display import Display
+from kappaskin_app.shell.docks import drawn_once
+from kappaskin_app.shell.loads import loads_at, object_replaceable
+from kappaskin_app.shell.selection import LoadHandle
+from kappaskin_app.shell.session import Session
+
+TIP = "Estimates in full screen, legible from three metres; Escape ends"
+SOUND_TIP = "A tone whose pitch and loudness follow the force, while the presenter is shown"
+_FIGURES_PERIOD = 0.15  # s between two updates of the numbers: faster is illegible
+_DRAWING_PERIOD = 0.03  # s between two drawings of the force bar
+_OLD = 1.0  # s after which a recognised object is discarded
+
+
+@dataclass(frozen=True)
+class _WindowState:
+    """State of the window before full screen."""
+
+    layout: QByteArray
+    place: QRect
+    state: Qt.WindowState
+
+
+class PresenterController(QObject):
+    """Shows the `view` in full screen, with the estimates and the state of the session."""
+
+    def __init__(
+        self,
+        window: QMainWindow,
+        view: PresenterView,
+        session: Session,
+        display: Display,
+        load: LoadHandle,
+    ) -> None:
+        super().__init__(window)
+        self._window, self.view, self._session = window, view, session
+        self._display, self._load = display, load
+        self._before: _WindowState | None = None
+        self.feedback: Feedback | None = None
+        self.sound = Sound(self)
+        self._recognised: Recognised | None = None
+        self._recognised_at = -math.inf
+        self._next_figures = self._next_drawing = 0.0
+        pad = view.controls.pad
+        pad.grabbed.connect(load.grabbed)
+        pad.dragged.connect(load.dragged)
+        pad.pressed.connect(load.pressed)
+        pad.released.connect(load.released)
+        pad.given_up.connect(load.given_up)
+        view.controls.chosen.connect(guarded(self._select_object))
+
+    @property
+    def on(self) -> bool:
+        return self._before is not None
+
+    # Full screen.
+
+    def toggle(self) -> None:
+        self.leave() if self.on else self.enter()
+
+    def enter(self) -> None:
+        """Show the skin and the estimates in full screen."""
+        if self.on:
+            return
+        window = self._window
+        self._before = _WindowState(window.saveState(), window.geometry(), window.windowState())
+        with drawn_once(window):
+            for part in self._surroundings():
+                part.hide()
+            self.view.present(True)
+            self._show_hand()
+            window.showFullScreen()
+        self.view.controls.pad.setFocus()
+
+    def leave(self) -> None:
+        """Restore the window."""
+        if self._before is None:
+            return
+        window, before = self._window, self._before
+        self._before = None
+        self.view.controls.pad.release()
+        self.sound.set_level(math.nan)
+        with drawn_once(window):
+            self.view.present(False)
+            window.setWindowState(before.state)
+            if before.state == Qt.WindowState.WindowNoState:
+                window.setGeometry(before.place)
+            window.menuBar().show()
+            window.statusBar().show()
+            window.restoreState(before.layout)
+
+    def close(self) -> None:
+        """Cancel a drag and stop the sound before the window closes."""
+        self.view.controls.pad.give_up()
+        self.sound.close()
+
+    def _surroundings(self) -> list[QWidget]:
+        window = self._window
+        docks = window.findChildren(QDockWidget, options=Qt.FindChildOption.FindDirectChildrenOnly)
+        bars = window.findChildren(QToolBar, options=Qt.FindChildOption.FindDirectChildrenOnly)
+        return [
+            *docks,
+            *bars,
+            *window.findChildren(ActionBanner),
+            window.menuBar(),
+            window.statusBar(),
+        ]
+
+    # Input.
+
+    def set_object(self, what: ContactObject, within: Estimate) -> None:
+        """Store the object that was recognised `within` an estimate."""
+        self._recognised = Recognised(what, within.contact) if what.probability else None
+        self._recognised_at = time.monotonic()
+
+    def receive(self, _: Estimate) -> None:
+        """Show the present estimate, at a visible rate."""
+        now = time.monotonic()
+        if self.on and now >= self._next_drawing:
+            self._show_estimate(now)
+
+    def _show_estimate(self, now: float) -> None:
+        self._next_drawing = now + _DRAWING_PERIOD
+        estimate = self._display.estimate_shown()
+        recognised = self._recognised if now - self._recognised_at < _OLD else None
+        self.feedback = None if estimate is None else feedback_of(estimate, recognised)
+        self.view.show_graphics(self.feedback, now)
+        self.sound.set_level(self.view.bar.share)
+        if now >= self._next_figures:
+            self._next_figures = now + _FIGURES_PERIOD
+            why_none = "no reading" if estimate is None else "no contact"
+            self.view.show_feedback(self.feedback, why_none, self._session.replaying)
+
+    def follow(self, status: Status) -> None:
+        """Show the state and age of the data, and a remedy where no data arrives."""
+        if not self.on:
+            return
+        state, now = self._session.badge(), time.monotonic()
+        if state not in REMEDIES:
+            age = "" if self._display.old else age_in_words(*self._display.age())
+            self.view.show_trouble("", "", "")
+        else:
+            # Recorded data has a time in the recording, and no age.
+            age = "" if state == GAP else age_in_words(now - status.last_frame)
+            since = self._session.alarm().partition("\n")[0].removeprefix(state).strip()
+            self.view.show_trouble(state, since, status.message.replace("`", ""))
+        self._show_estimate(now)  # a paused recording, or a gap, emits no estimate
+        self.view.strip.show_state(state, _source_name(status), age)
+        self._show_hand()
+
+    def _show_hand(self) -> None:
+        """Show the position of the simulated hand, if there is one."""
+        session = self._session
+        scene, inside = session.scene, session.inside and origin(session.badge()) == SIM
+        there = loads_at(scene, session.time) if inside else []
+        self.view.show_controls(bool(there) or (inside and self.view.controls.pad.holding))
+        if there:
+            load = there[0].load
+            x, y = (float(value) for value in load.centre())
+            self.view.controls.pad.show_skin(scene.plate.patch)
+            self.view.controls.show_hand(Hand(x, y, load.force), session.refusal)
+            present = [n for n, made in enumerate(DEMO_OBJECTS) if made.is_in(scene)]
+            self.view.controls.show_objects(
+                object_replaceable(scene) and not session.refusal, (present or [-1])[0]
+            )
+
+    def _select_object(self, number: int) -> None:
+        hand = self.view.controls.pad.hand
+        if hand is not None:
+            self._load.replaced.emit(DEMO_OBJECTS[number].settings, *hand)
+
+
+def _source_name(status: Status) -> str:
+    return status.sensor.name if status.sensor is not None else status.source

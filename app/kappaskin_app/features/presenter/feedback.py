@@ -1,0 +1,98 @@
+"""Feedback to the operator: force, position and radius from the contact and the object."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from kappaskin.contact import ContactObject
+from kappaskin.frames import Contact, Estimate
+
+_95 = 1.96  # standard deviations that a 95 % interval reaches
+_ROUND = ("sphere", "cylinder")  # the kinds that have a radius
+_MOST = 10.0  # largest ratio of an object's force to that of the best point load
+
+
+@dataclass(frozen=True)
+class Recognised:
+    """The object recognised last, and the `contact` in the same estimate."""
+
+    what: ContactObject
+    contact: Contact
+
+
+@dataclass(frozen=True)
+class RadiusEstimate:
+    """Radius `value` in m of the object `what`, or of the "skin", with its 95 % `interval`.
+
+    The interval begins at zero where only an upper bound is known, and ends at infinity where the
+    object may be flat; the value may then be NaN.
+    """
+
+    what: str
+    value: float
+    interval: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Feedback:
+    """Feedback in SI units, each number with its 95 % half-width; NaN where unknown."""
+
+    force: float
+    force_95: float
+    displacement: float
+    displacement_95: float
+    position: tuple[float, float]
+    position_95: float
+    kind: str
+    length: float
+    radius: RadiusEstimate | None
+    near_rim: bool
+
+
+def feedback_of(estimate: Estimate, recognised: Recognised | None = None) -> Feedback | None:
+    """Feedback of an `estimate`; None without a contact.
+
+    A point load describes a small contact. For a large one its force is too small, and for a pipe
+    it lies at one of the ends. The object describes both, but is recognised only a few times per
+    second: the last ratio of its force to that of the point load scales the present point load.
+    """
+    contact = estimate.contact
+    if not contact.present:
+        return None
+    force, force_95 = contact.force, contact.force_95
+    place, place_95 = contact.position, float(np.max(contact.position_95))
+    if recognised is not None and 0 < recognised.what.force / recognised.contact.force < _MOST:
+        more = contact.force / recognised.contact.force
+        force, force_95 = more * recognised.what.force, abs(more) * recognised.what.force_95
+        if not contact.single:
+            place, place_95 = recognised.what.position, float(np.max(recognised.what.position_95))
+    elif not contact.single:
+        force_95 = place_95 = math.nan
+    displacement, displacement_95 = contact.displacement, contact.displacement_95
+    if not contact.single:
+        displacement, displacement_95 = float(np.nanmax(np.abs(estimate.surface))), math.nan
+    x, y = (float(value) for value in place)
+    kind, length = (recognised.what.kind, recognised.what.length) if recognised else ("", math.nan)
+    return Feedback(
+        *(force, force_95, displacement, displacement_95, (x, y), place_95),
+        *(kind, length, _radius_estimate(estimate, recognised), contact.near_rim),
+    )
+
+
+def _radius_estimate(estimate: Estimate, recognised: Recognised | None) -> RadiusEstimate | None:
+    """Radius of a round object; of the skin at the contact without an object; None of others."""
+    if recognised and (what := recognised.what).kind in _ROUND:
+        return RadiusEstimate(what.kind, what.radius, what.radius_95)
+    if recognised and recognised.what.kind:
+        return None
+    geometry = estimate.geometry
+    sharper = int(np.argmax(np.abs(geometry.principal)))
+    k = abs(float(geometry.principal[sharper]))
+    off = _95 * float(geometry.principal_sd[sharper])
+    low, high = max(k - off, 0.0), k + off
+    if not high > 0:
+        return None
+    return RadiusEstimate(
+        "skin", 1 / k if k else math.inf, (1 / high, 1 / low if low > 0 else math.inf)
+    )

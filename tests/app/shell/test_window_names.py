@@ -1,0 +1,22 @@
+"""Names in the window's file stay: changed shortcuts, layouts and settings are found by them.
+
+Add to `tests/app/window_names.json` what is new; a name that goes is lost to who has saved it.
+"""
+
+import json
+from dataclasses import fields
+from pathlib import Path
+
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.window import MainWindow
+
+STORED = json.loads(Path(__file__).parents[1].joinpath("window_names.json").read_text("utf-8"))
+
+
+def test_names_in_the_windows_file_are_those_that_were_promised(window: MainWindow) -> None:
+    assert set(STORED["actions"]) <= set(window.actions_by_name.entries)
+    assert set(STORED["docks"]) <= set(window.docks.by_name())
+
+
+def test_names_of_settings_are_those_that_were_promised() -> None:
+    assert set(STORED["settings"]) <= {field.name for field in fields(Settings)}
