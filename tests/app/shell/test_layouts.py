@@ -241,6 +241,7 @@ def test_a_window_that_was_not_asked_to_keeps_nothing(window: MainWindow, tmp_pa
 
 def test_each_ready_layout_shows_its_panels_and_a_bad_name_is_refused(window: MainWindow) -> None:
     assert set(window.docks.by_name()) == set(DOCKS)
+    assert not window.presenter.on
     for name, shown in (("Study", window.cost), ("Calibrate", window.health), ("Live", None)):
         window.layouts.choose(name)
         seen = [dock for dock in window.docks.below if not dock.isHidden()]
@@ -259,6 +260,7 @@ def test_each_ready_layout_shows_its_panels_and_a_bad_name_is_refused(window: Ma
 
 
 def test_the_skin_is_not_drawn_while_the_window_is_arranged(window: MainWindow) -> None:
+    assert not window.presenter.on
     drawn = []
     window.membrane.drawn.connect(lambda: drawn.append(None))
 
