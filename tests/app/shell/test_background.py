@@ -284,7 +284,7 @@ def test_closing_the_window_ends_what_runs(window: MainWindow) -> None:
 def test_what_is_told_at_the_foot_of_the_window_can_be_cancelled_there(
     window: MainWindow, until
 ) -> None:
-    window.measurement.watch(True)
+    window.measurement.set_active(True)
     until(lambda: window.measurement.running)
     until(lambda: "accuracy" in window.display.status_bar.activity.words.text())
     window.display.status_bar.activity.cancel.click()

@@ -148,8 +148,8 @@ def test_a_step_of_a_calibration_is_not_wider_than_its_page(large: MainWindow) -
     page = panel.parentWidget()
     while not isinstance(page, QScrollArea):
         page = page.parentWidget()
-    for phase in (panel.steps, panel.outcome, panel.start):
-        for each in (panel.start, panel.steps, panel.outcome):
+    for phase in (panel.steps, panel.result_page, panel.start):
+        for each in (panel.start, panel.steps, panel.result_page):
             each.setVisible(each is phase)
         _settle()
         assert page.minimumWidth() >= page.widget().minimumSizeHint().width()

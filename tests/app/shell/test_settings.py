@@ -166,7 +166,7 @@ def test_a_skin_that_cannot_be_is_explained_until_it_can(panels) -> None:
     shape.show_status(status, simulating=True)
     assert shape.message.text() == "The previous skin is still simulated: too small a radius."
     shape.show_status(status, simulating=False)
-    assert "Only for the simulated skin" in shape.message.text()
+    assert "only for the simulated skin" in shape.message.text()
     shape.show_refusal("")
     shape.show_status(status, simulating=True)
     assert shape.message.text() == ""

@@ -84,7 +84,7 @@ def test_each_turn_of_the_view_is_one_step_and_turns_of_the_wheel_are_one(
     _wheel(here)
     _wheel(here)
     stood.append(_camera(here))
-    assert _texts(here) == ["turn the view", "turn the view", "the view"]
+    assert _texts(here) == ["move the camera", "move the camera", "the view"]
     assert len(set(stood)) == 4
     for was in reversed(stood[:-1]):
         here.actions_by_name["undo"].trigger()
@@ -218,7 +218,7 @@ def test_with_nothing_to_undo_the_action_says_so(here: MainWindow) -> None:
     assert here.actions_by_name.why_not("undo") == "there is nothing to undo"
     here.requests.set("letters", 110.0)
     assert undo()
-    assert here.actions_by_name["undo"].text() == "&Undo: letters 100 \N{RIGHTWARDS ARROW} 110 %"
+    assert here.actions_by_name["undo"].text() == "&Undo: text size 100 \N{RIGHTWARDS ARROW} 110 %"
 
 
 def test_measuring_and_each_place_of_it_come_back(here: MainWindow) -> None:
@@ -241,12 +241,12 @@ def test_measuring_and_each_place_of_it_come_back(here: MainWindow) -> None:
 
 def test_places_beside_the_skin_that_there_is_now_do_not_come_back(here: MainWindow) -> None:
     measuring = here.view.measurement
-    measuring.have(((0.02, 0.03), (0.1, 0.1)))
+    measuring.set_places(((0.02, 0.03), (0.1, 0.1)))
     assert len(measuring.places) == 2
-    measuring.have(((0.02, 0.03), (0.11, 0.1)))
+    measuring.set_places(((0.02, 0.03), (0.11, 0.1)))
     assert measuring.places == ()
     assert "click a place" in measuring.ruler.text.input
-    measuring.have(None)
+    measuring.set_places(None)
 
 
 def test_the_element_that_was_picked_before_comes_back_and_then_its_dock_goes(

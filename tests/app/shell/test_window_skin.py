@@ -78,7 +78,7 @@ def test_a_load_too_near_the_rim_is_warned_of_and_no_more_further_inside(
 ) -> None:
     notice = window.display.notice
     window.history.change("Load", -1, load_case="point", x=0.003, y=0.05)
-    until(lambda: "too near the rim to trust" in notice.text())
+    until(lambda: "near the rim: unreliable" in notice.text())
     assert "near rim" in window.readouts.text("contact")
     assert notice.toolTip()
     window.history.change("Load", -1, x=0.05)

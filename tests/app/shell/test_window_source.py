@@ -42,7 +42,7 @@ def test_a_scene_of_its_own_is_shown_as_it_is_and_leaves_the_load_to_itself(open
     assert window.session.status.sensor.transduction.amplifier.gain == 35  # no load case has it
     until(lambda: window.display.badge.state == "SIM")
     assert not window.session.simulating
-    assert "Only for the simulated skin" in window.load.message.text()
+    assert "only for the simulated skin" in window.load.message.text()
     until(lambda: "red arrow" not in window.display.notice.text())  # there is none
     window.actions_by_name["simulate"].trigger()
     until(lambda: not window.load.message.text())

@@ -150,7 +150,7 @@ def test_the_last_events_are_listed_newest_first_and_each_is_told_once(qtbot):
     window = EventLog()
     qtbot.addWidget(window)
     told = []
-    window.told.connect(told.append)
+    window.notified.connect(told.append)
     began, now, status = time.time(), time.monotonic(), Status()
     window.follow(status)
     assert told == []
@@ -183,7 +183,7 @@ def test_what_happened_twice_at_once_is_listed_twice_and_told_once(qtbot):
     window = EventLog()
     qtbot.addWidget(window)
     told = []
-    window.told.connect(told.append)
+    window.notified.connect(told.append)
     now = time.monotonic()
     window.follow(Status().after([Event(now, "met", "a skin"), Event(now, "met", "a skin")]))
     assert told == ["A skin"]

@@ -88,7 +88,7 @@ def test_an_svg_of_a_heatmap_has_its_cells_and_a_title(window, named, tmp_path) 
 
 
 def test_the_skin_in_three_dimensions_is_no_drawing(window, tmp_path) -> None:
-    with pytest.raises(Refusal, match=r"expected a file that ends in \.png, since"):
+    with pytest.raises(Refusal, match=r"expected a file name that ends in \.png, since"):
         save_view(window.centralWidget(), tmp_path / "out.svg", "skin", "", flat=False)
     with pytest.raises(Refusal, match=r"\.png or \.svg"):
         save_view(window.centralWidget(), tmp_path / "out.jpg", "skin", "")

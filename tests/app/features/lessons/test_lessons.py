@@ -146,7 +146,7 @@ def test_a_lesson_is_taken_answered_and_left_with_the_keyboard(window: MainWindo
     window.lesson.next.setFocus()
     qtbot.keyClick(window.lesson.next, Qt.Key.Key_Space)
     asking = window.lesson.step.question_view
-    for typed, said in (("much", "Type a number"), ("2", "Not so."), ("20", "Right.")):
+    for typed, said in (("much", "Type a number"), ("2", "Not right."), ("20", "Right.")):
         asking.number.clear()
         qtbot.keyClicks(asking.number, typed)
         qtbot.keyClick(asking.number, Qt.Key.Key_Return)
