@@ -57,10 +57,18 @@ def parsed(text: str, file: Path) -> dict[str, Any]:
         raise Refusal(f"{file}: expected a scene, got tables or lists nested too deep") from error
 
 
-def json_table(text: str) -> "TomlTable":
-    """The object that the JSON `text` is; a `Refusal` for another, and for what is no number."""
+def json_table(text: str, floats_may_be_whole: bool = False) -> "TomlTable":
+    """The object that the JSON `text` is; a `Refusal` for another, and for what is no number.
+
+    With `floats_may_be_whole` a whole number may be written 16.0, as others' writers do.
+    """
+
+    def number(text: str) -> float:
+        value = _finite(text)
+        return int(value) if floats_may_be_whole and value.is_integer() else value
+
     try:
-        found = json.loads(text, parse_float=_finite, parse_constant=_finite)
+        found = json.loads(text, parse_float=number, parse_constant=_finite)
     except (ValueError, RecursionError) as error:
         raise Refusal(str(error)) from error
     if not isinstance(found, dict):

@@ -118,7 +118,7 @@ def _outline(patch: Patch) -> Any:
 def sensor_from_json(text: str) -> Sensor:
     """The sensor that `text` describes; a `SourceError` where it cannot be understood."""
     try:
-        return _sensor(json_table(text))
+        return _sensor(json_table(text, floats_may_be_whole=True))
     except (ValueError, ArithmeticError) as error:
         raise SourceError(
             f"the device's information cannot be used: {error}; its firmware must send what "

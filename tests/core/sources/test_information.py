@@ -1,6 +1,7 @@
 """What a device says it is: understood whole, or refused with a reason."""
 
 import json
+import re
 import tracemalloc
 from dataclasses import replace
 from typing import Any
@@ -130,6 +131,15 @@ def test_a_single_dead_channel_comes_back() -> None:
 def test_names_in_any_script_come_back() -> None:
     sensor = sensor_on(SensorLayout.regular(PATCH, 1, 1), name='Haut "№ 7" 皮膚', simulated=True)
     assert same(sensor_from_json(sensor_to_json(sensor)), sensor)
+
+
+def test_whole_numbers_may_be_written_with_a_point() -> None:
+    text = json.dumps(said())
+    [bits] = re.findall(r'"bits": (\d+)', text)
+    with_point = text.replace(f'"bits": {bits}', f'"bits": {bits}.0')
+
+    assert with_point != text
+    assert same(sensor_from_json(with_point), sensor_from_json(text))
 
 
 def test_keys_of_later_firmware_are_passed_over() -> None:
