@@ -138,19 +138,27 @@ class Saturation(ReadingEffect):
 
 
 @dataclass(frozen=True)
-class UniformNoise(ReadingEffect):
-    """Noise even between -sqrt(3) rms and sqrt(3) rms, in 1/m (the paper's, section 4)."""
+class _WhiteNoise(ReadingEffect):
+    """Noise of standard deviation `rms` in 1/m, independent in every reading."""
 
-    name: ClassVar = "uniform-noise"
     example: ClassVar = {"rms": 0.1}
     at_once: ClassVar = True
     formula: ClassVar = "RMS of the noise over peak curvature"
+    largest: ClassVar[float]  # deviation that is counted on, in standard deviations
 
     rms: Annotated[float, _RMS]
 
     def size(self, survey: Survey) -> Size:
         number = self.rms / survey.peak
-        return Size(number, math.sqrt(3) * number)
+        return Size(number, self.largest * number)
+
+
+@dataclass(frozen=True)
+class UniformNoise(_WhiteNoise):
+    """Noise even between -sqrt(3) rms and sqrt(3) rms, in 1/m (the paper's, section 4)."""
+
+    name: ClassVar = "uniform-noise"
+    largest: ClassVar = math.sqrt(3)
 
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
         from kappaskin.scenes.effects.at_work.noise import uniform
@@ -159,19 +167,11 @@ class UniformNoise(ReadingEffect):
 
 
 @dataclass(frozen=True)
-class GaussianNoise(ReadingEffect):
+class GaussianNoise(_WhiteNoise):
     """Normal noise of standard deviation `rms`, in 1/m."""
 
     name: ClassVar = "gaussian-noise"
-    example: ClassVar = {"rms": 0.1}
-    at_once: ClassVar = True
-    formula: ClassVar = "RMS of the noise over peak curvature"
-
-    rms: Annotated[float, _RMS]
-
-    def size(self, survey: Survey) -> Size:
-        number = self.rms / survey.peak
-        return Size(number, LARGEST * number)
+    largest: ClassVar = LARGEST
 
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
         from kappaskin.scenes.effects.at_work.noise import gaussian
