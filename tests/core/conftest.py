@@ -1,9 +1,10 @@
 """What several tests of the core use: commands, and skins held in every way that they can be."""
 
 import math
+import socket
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from multiprocessing.process import BaseProcess
@@ -137,3 +138,12 @@ def messages_of() -> Callable[..., list[EstimateMessage]]:
         return told
 
     return made
+
+
+@pytest.fixture
+def receiver() -> Iterator[socket.socket]:
+    """A program that estimates are sent to by UDP."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as made:
+        made.bind(("127.0.0.1", 0))
+        made.settimeout(30)
+        yield made

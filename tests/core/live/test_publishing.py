@@ -25,14 +25,6 @@ RECEIVERS = files("kappaskin_resources") / "publishing"
 
 
 @pytest.fixture
-def receiver() -> Iterator[socket.socket]:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as made:
-        made.bind(("127.0.0.1", 0))
-        made.settimeout(30)
-        yield made
-
-
-@pytest.fixture
 def port(receiver) -> int:
     return receiver.getsockname()[1]
 

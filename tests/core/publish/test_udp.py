@@ -32,14 +32,6 @@ def free_port(family: int = socket.AF_INET) -> int:
 
 
 @pytest.fixture
-def receiver() -> Iterator[socket.socket]:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as made:
-        made.bind(("127.0.0.1", 0))
-        made.settimeout(30)
-        yield made
-
-
-@pytest.fixture
 def message(messages_of) -> EstimateMessage:
     (made,) = messages_of(PRESSED)
     return made
