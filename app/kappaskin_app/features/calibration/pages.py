@@ -107,7 +107,7 @@ _PHASES = {
 }
 
 
-class StepPage(QWidget):
+class CylinderStepPage(QWidget):
     """Page with the present step, and the readings of the last one."""
 
     def __init__(self) -> None:

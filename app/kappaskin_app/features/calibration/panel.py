@@ -10,7 +10,7 @@ from kappaskin.errors import Refusal
 from kappaskin.live import Status
 from kappaskin.scenes.cylinders import radii_for
 from kappaskin_app.features.calibration.controller import CalibrationController, parsed_radii
-from kappaskin_app.features.calibration.pages import ResultPage, StartPage, StepPage
+from kappaskin_app.features.calibration.pages import CylinderStepPage, ResultPage, StartPage
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.settings import Settings
@@ -111,7 +111,7 @@ class CalibratePanel(Panel):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Cylinders of known radius", parent)
-        self.start, self.steps, self.result_page = StartPage(), StepPage(), ResultPage()
+        self.start, self.steps, self.result_page = StartPage(), CylinderStepPage(), ResultPage()
         for page in (self.start, self.steps, self.result_page):
             self.body.addWidget(page)
         self._controller: CalibrationController | None = None

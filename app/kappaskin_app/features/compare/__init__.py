@@ -1,6 +1,6 @@
 """Comparison of two setups on the same readings."""
 
-from kappaskin_app.features.compare.comparison import Comparison
+from kappaskin_app.features.compare.comparison import SetupComparison
 from kappaskin_app.features.compare.panel import ComparePanel
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.window import MainWindow
@@ -13,7 +13,7 @@ class CompareFeature:
 
     def install(self, shell: MainWindow) -> None:
         session, display = shell.session, shell.display
-        self.comparison = Comparison(shell.history, session, shell)
+        self.comparison = SetupComparison(shell.history, session, shell)
         self.compare = ComparePanel()
         shell.docks.put_below(
             "compare", "Compare A and B", self.compare, "Ctrl+B", _ABOUT, height=0.36

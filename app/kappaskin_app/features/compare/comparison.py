@@ -51,7 +51,7 @@ def other_setup(settings: Settings, setup: Setup) -> Setup:
     )
 
 
-class Comparison(QObject):
+class SetupComparison(QObject):
     """Computes with A and B while the panel is visible; `compared` sends each new pair.
 
     `status` is the pipeline status of B, None while the panel is hidden.

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 from kappaskin.bases import edges_of
 from kappaskin.live import PipelineStatus, Status
 from kappaskin.sensing import Sensor
-from kappaskin_app.features.compare.comparison import Comparison, Pair
+from kappaskin_app.features.compare.comparison import Pair, SetupComparison
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.colouring import SteadyRange
 from kappaskin_app.shell.form import Form
@@ -107,7 +107,7 @@ class ComparePanel(QWidget):
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
         return table
 
-    def connect_to(self, comparison: Comparison) -> None:
+    def connect_to(self, comparison: SetupComparison) -> None:
         """Show the pairs of `comparison`, and pass on the requests of the user."""
         comparison.compared.connect(guarded(self.show_pair))
         self.form.swap.clicked.connect(guarded(lambda *_: comparison.swap()))

@@ -152,7 +152,7 @@ def _radio_style() -> str:
     )
 
 
-class StepPage(QWidget):
+class LessonStepPage(QWidget):
     """A step; `pressed` brings the index of the button that was pressed."""
 
     answered = Signal(str)

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin_app.features.lessons.pages import EndPage, ListPage, StepPage
+from kappaskin_app.features.lessons.pages import EndPage, LessonStepPage, ListPage
 from kappaskin_app.features.lessons.teaching import Teaching
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import FAINT, current, follow_look
@@ -25,7 +25,7 @@ class LessonPanel(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.list, self.step, self.end = ListPage(), StepPage(), EndPage()
+        self.list, self.step, self.end = ListPage(), LessonStepPage(), EndPage()
         self.pages = QStackedWidget()
         for page in (self.step, self.end):
             self.pages.addWidget(page)
