@@ -211,7 +211,7 @@ PULLED = SEQUENTIAL[::-1]  # the same for what lies below zero
 # What is drawn over each: seen against every one of its colours.
 LIGHT_INK, DARK_INK = "#f4f6f8", "#16191d"
 
-# On the skin and beside it: an element that is left out, and one that is to be pressed.
+# In the 3-D view and its legend: an excluded element, and the element to press.
 OUT, WANTED = "#e8267d", "#ffd400"
 
 # A reading on a rail: in none of the maps above.

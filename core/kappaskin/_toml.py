@@ -290,7 +290,7 @@ def _nearest(name: str, known: list[str]) -> list[str]:
 
 
 def _dotted(place: Place) -> str:
-    """The way to a value as a person writes it, tables counted from one."""
+    """The path of a value as text: keys joined by points, tables numbered from 1."""
     text = ""
     for part in place:
         text += f"[{part + 1}]" if isinstance(part, int) else f".{part}"

@@ -184,7 +184,7 @@ class Docks:
         dock = self[name]
         if before:
             self._window.tabifyDockWidget(before[-1], dock)
-        # Wider than a column beside it.
+        # Wider than a column at its side.
         dock.setAllowedAreas(Qt.DockWidgetArea.TopDockWidgetArea | _BELOW)
         dock.hide()  # so that a small window shows the skin
 

@@ -40,7 +40,7 @@ def repaired(file: Path) -> Path:
 
 
 def repairing(file: Path) -> str:
-    """The command that repairs the recording `file` to a new one beside it."""
+    """The command that repairs the recording `file` to a new one in the same folder."""
     return f"kappaskin repair {shlex.quote(str(file))} --out {shlex.quote(str(repaired(file)))}"
 
 

@@ -84,7 +84,7 @@ class Notice(QLabel):
         super().__init__(hint, parent)
         self._hint, self.warning = hint, ""
         self.setContentsMargins(4, 0, 12, 0)
-        self.setMinimumWidth(self.sizeHint().width())  # or what stands beside it would jump
+        self.setMinimumWidth(self.sizeHint().width())  # else the widgets to its right would move
 
     def show_hint(self, hint: str) -> None:
         """Show this hint while there is no warning."""

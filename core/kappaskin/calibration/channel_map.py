@@ -15,7 +15,7 @@ from kappaskin.sensing import Sensor, SensorLayout
 OK, ELSEWHERE, NOTHING, UNCLEAR, SKIPPED = "ok", "elsewhere", "nothing", "unclear", "skipped"
 
 _BESIDE = 1.6  # distances of elements: no further apart are those beside each other
-_AS_GOOD = 0.75  # of the strongest answer: one beside it that answers so much was pressed too
+_AS_GOOD = 0.75  # of the largest response: a neighbour that responds so much was pressed too
 _ALSO = 0.8  # of the same: one elsewhere that answers so much leaves it unclear
 
 Indices = NDArray[np.intp]

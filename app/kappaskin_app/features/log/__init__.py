@@ -27,6 +27,7 @@ class LogFeature:
         display.badge.clicked.connect(guarded(self.event_log.open_list))
         self.event_log.notified.connect(guarded(shell.notify))
         show = self.event_log.open_list
+        # Saved shortcuts know the action by its first name.
         shell.actions_by_name.add("happenings", SOURCE, "E&vent log", show, "F4", _EVENTS)
         self.errors.add_actions(shell.actions_by_name, HELP)
         shell.closing.connect(guarded(self.errors.close))

@@ -132,7 +132,7 @@ class RepairDialog(WorkDialog):
         self._allow()
 
     def ask_of(self, recording: Path) -> None:
-        """Ask for the path of the repaired `recording`, by default beside it."""
+        """Ask for the path of the repaired `recording`, by default in the same folder."""
         if not self.busy:
             self.recording.setText(str(recording))
             self.to.setText(str(repaired(recording)))
