@@ -16,7 +16,7 @@ ROOMS = (
 # to have 340 modules and 32,000 statements. A feature that raises a count says why beside it.
 LIMITS = {
     "modules": 322,
-    "statements": 35_076,
+    "statements": 35_073,
     "loose modules of core": 8,
     "loose modules of the app": 8,
     "names of the library": 55,
