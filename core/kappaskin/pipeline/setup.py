@@ -43,13 +43,13 @@ SETUP = Part(
     "Setup",
     {
         "Ni": Key(
-            "Functions along x",
-            "Ni, the number of functions along x (Eq. 1). More follow finer shapes and more noise; "
-            "with more than elements both along x and along y, readings cannot decide all of them.",
+            "Basis functions in x",
+            "Ni, the number of basis functions in x (Eq. 1). More follow finer shapes and more "
+            "noise; with more than elements in both x and y, readings cannot determine them all.",
             most=_SHOWN,
             limits=_COUNT,
         ),
-        "Nj": Key("Functions along y", "Nj, the same along y (Eq. 1).", most=_SHOWN, limits=_COUNT),
+        "Nj": Key("Basis functions in y", "Nj, the same in y (Eq. 1).", most=_SHOWN, limits=_COUNT),
         "nx": Key("Points along x", "Points of the computed surface along x.", limits=_COUNT),
         "ny": Key("Points along y", "Points of the computed surface along y.", limits=_COUNT),
         "hold": Key(

@@ -112,7 +112,7 @@ def test_ten_thousand_steps_are_bounded_and_the_last_ones_stay(qapp: QApplicatio
         ("udp_to", "", "publish to 127.0.0.1:9870 > nothing"),
         ("range_xx", 3.0, "colour range"),
         ("camera", (1.0,), "the view"),
-        ("functions_x", 5, "functions along x 8 > 5"),
+        ("functions_x", 5, "basis functions in x 8 > 5"),
     ],
 )
 def test_a_change_is_told_in_its_own_words_and_unit(name: str, value: object, words: str) -> None:

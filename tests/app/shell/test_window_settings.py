@@ -21,7 +21,7 @@ from kappaskin_app.shell.window import MainWindow
 
 
 def test_ctrl_z_takes_back_a_change_of_settings(window: MainWindow, until, qtbot) -> None:
-    window.history.change("Functions along x", -1, functions_x=5)
+    window.history.change("Basis functions in x", -1, functions_x=5)
     until(lambda: window.session.estimate.coefficients.shape == (5, 8))
     qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     until(lambda: window.history.settings.functions_x == 8)
