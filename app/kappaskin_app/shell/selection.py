@@ -16,12 +16,12 @@ class LoadHandle(QObject):
     dragged = Signal(float, float)
     pressed = Signal(float)
     released = Signal()
-    given_up = Signal()
+    cancelled = Signal()
     replaced = Signal(object, float, float, float)
 
 
 class Selection(QObject):
-    """The element under the mouse, the one to be pressed (-1: none), and a mode that is shown.
+    """The element under the mouse, the target of the press test, and a mode that is shown.
 
     `chosen` brings an element that was clicked on a map, `over` and `clicked` a position (x, y) in
     m on the skin under the mouse (None: none) or clicked. `mode` (ny, nx) from -1 to 1 colours the
@@ -29,7 +29,7 @@ class Selection(QObject):
     """
 
     pointed = Signal(int)
-    asked = Signal(int)
+    target_changed = Signal(int)
     chosen = Signal(int)
     over = Signal(object)
     clicked = Signal(float, float)
@@ -38,7 +38,7 @@ class Selection(QObject):
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.load = LoadHandle(self)
-        self.element = self.asked_for = -1
+        self.element = self.target = -1
         self.mode: Any = None
         self.mode_words = ""
 
@@ -48,10 +48,10 @@ class Selection(QObject):
             self.element = element
             self.pointed.emit(element)
 
-    def ask_for(self, element: int) -> None:
-        """Mark the element to be pressed; -1 none."""
-        self.asked_for = element
-        self.asked.emit(element)
+    def mark_target(self, element: int) -> None:
+        """Mark the element to be pressed in every view; -1 none."""
+        self.target = element
+        self.target_changed.emit(element)
 
     def show_mode(self, mode: Any, words: str = "") -> None:
         """Colour the skin by a mode, or by the estimate if None."""

@@ -28,6 +28,6 @@ class HealthFeature:
             guarded(lambda *_: self.press_test.running and self.load_hold.hold())
         )
         self.press_test.changed.connect(guarded(self.load_hold.release))
-        self.press_test.target_changed.connect(guarded(selection.ask_for))
+        self.press_test.target_changed.connect(guarded(selection.mark_target))
         self.health.pointed.connect(guarded(selection.point))
         self.health.connect_to(self.press_test)

@@ -46,7 +46,7 @@ class HeatmapsFeature:
             heatmap.chosen.connect(selection.chosen)
             heatmap.lock_wanted.connect(guarded(partial(shell.requests.set, f"range_{name}")))
             selection.pointed.connect(guarded(heatmap.show_element))
-            selection.asked.connect(guarded(heatmap.show_target))
+            selection.target_changed.connect(guarded(heatmap.show_target))
 
     def _show_settings(self, settings: Settings) -> None:
         self._settings = settings

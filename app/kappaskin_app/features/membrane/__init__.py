@@ -60,4 +60,4 @@ class MembraneFeature:
         drag.grabbed.connect(load.grabbed)
         drag.dragged.connect(load.dragged)
         drag.released.connect(load.released)
-        drag.given_up.connect(load.given_up)
+        drag.cancelled.connect(load.cancelled)

@@ -25,7 +25,7 @@ class LoadDrag(QObject):
     grabbed = Signal(float, float)
     dragged = Signal(float, float)
     released = Signal()
-    given_up = Signal()
+    cancelled = Signal()
 
     def __init__(self, plotter: QtInteractor) -> None:
         super().__init__(plotter)
@@ -93,7 +93,7 @@ class LoadDrag(QObject):
     def _give_up(self) -> None:
         if self._dragging:
             self._dragging = False
-            self.given_up.emit()
+            self.cancelled.emit()
 
     def _move(self, at: QPointF) -> bool:
         if not self._pressed:

@@ -53,7 +53,7 @@ class SkinView(QObject):
         display.shown.connect(guarded(self._show))
         display.object_found.connect(guarded(self._show_object))
         selection.pointed.connect(guarded(self.membrane.point))
-        selection.asked.connect(guarded(lambda *_: self._show_marked()))
+        selection.target_changed.connect(guarded(lambda *_: self._show_marked()))
         selection.mode_changed.connect(guarded(self._show_mode))
 
     def _show_object(self, what: ContactObject, _: Estimate) -> None:
@@ -121,7 +121,7 @@ class SkinView(QObject):
             self._show_marked()
 
     def _show_marked(self) -> None:
-        self.membrane.show_marked(self._excluded, self._selection.asked_for)
+        self.membrane.show_marked(self._excluded, self._selection.target)
 
     def _colour(self, shown: Shown) -> None:
         name, times, display = self._settings.colour_by, self._times(), self._display

@@ -65,7 +65,7 @@ class PresenterController(QObject):
         pad.dragged.connect(load.dragged)
         pad.pressed.connect(load.pressed)
         pad.released.connect(load.released)
-        pad.given_up.connect(load.given_up)
+        pad.cancelled.connect(load.cancelled)
         view.controls.chosen.connect(guarded(self._select_object))
 
     @property

@@ -106,15 +106,15 @@ class Pad(Indicator):
     """Pad to move and press the object.
 
     Dragging emits `dragged` to (x, y) in m; the wheel, or Shift and drag, `pressed` with the factor
-    of the force. `grabbed` comes before them, `released` after; Escape emits `given_up`. Arrow keys
-    move, Page Up and Page Down press.
+    of the force. `grabbed` comes before them, `released` after; Escape emits `cancelled`. Arrow
+    keys move, Page Up and Page Down press.
     """
 
     grabbed = Signal(float, float)
     dragged = Signal(float, float)
     pressed = Signal(float)
     released = Signal()
-    given_up = Signal()
+    cancelled = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -236,7 +236,7 @@ class Pad(Indicator):
         self._timer.stop()
         if self.holding:
             self.holding = False
-            self.given_up.emit()
+            self.cancelled.emit()
 
     def _press(self, times: float) -> None:
         self._factor *= times

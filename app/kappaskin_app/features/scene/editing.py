@@ -32,7 +32,7 @@ class SceneEditing:
         load.dragged.connect(guarded(self.drag))
         load.pressed.connect(guarded(self.press))
         load.released.connect(guarded(self.release))
-        load.given_up.connect(guarded(self.cancel))
+        load.cancelled.connect(guarded(self.cancel))
         load.replaced.connect(guarded(self.replace_object))
 
     # Scene texts

@@ -142,7 +142,7 @@ def test_a_simulated_skin_is_pressed_by_dragging_its_load(window: MainWindow, un
     assert [p.verdict for p in window.press_test.test.done] == ["skipped", "nothing"]
     page.stop.click()
     assert not window.press_test.running
-    assert not window.membrane.target.actor.visibility or window.selection.asked_for == -1
+    assert not window.membrane.target.actor.visibility or window.selection.target == -1
 
 
 def test_a_test_that_is_over_has_a_verdict_and_ends_with_its_device(

@@ -20,7 +20,7 @@ def pad(qtbot):
     pad.show_skin(Patch(0.1, 0.1))
     pad.show_hand(Hand(0.05, 0.05, 0.5))
     pad.said = []
-    for name in ("grabbed", "dragged", "pressed", "released", "given_up"):
+    for name in ("grabbed", "dragged", "pressed", "released", "cancelled"):
         getattr(pad, name).connect(lambda *said, name=name: pad.said.append((name, *said)))
     pad.show()
     yield pad
@@ -103,7 +103,7 @@ def test_keys_move_and_press(pad, qtbot, until) -> None:
 def test_escape_gives_up_what_is_held_and_else_is_anothers(pad, qtbot) -> None:
     qtbot.keyClick(pad, Qt.Key.Key_Left)
     qtbot.keyClick(pad, Qt.Key.Key_Escape)
-    assert pad.said[-1] == ("given_up",)
+    assert pad.said[-1] == ("cancelled",)
     pad.said.clear()
     qtbot.keyClick(pad, Qt.Key.Key_Escape)
     qtbot.wait(500)

@@ -67,7 +67,7 @@ def test_a_touch_of_a_written_scene_is_dragged_in_the_picture_and_in_the_text(
         drag.dragged.emit(x + 1e-3 * step, y)
     there = np.array([x + 0.01, y])
     until(lambda: np.abs(window.session.estimate.true_contact - there).max() < 2e-3)
-    drag.given_up.emit()
+    drag.cancelled.emit()
     until(lambda: window.session.scene.stimuli == scene.stimuli)
     drag.grabbed.emit(x, y)
     drag.dragged.emit(x + 0.01, y)
