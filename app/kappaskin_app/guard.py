@@ -27,7 +27,7 @@ def failed(error: Exception, where: object) -> None:
     """Log an exception, and report it."""
     log.error("in %s", where, exc_info=error)
     for listener in list(_listeners):
-        listener(f"Something went wrong: {error or type(error).__name__}")
+        listener(f"Error in the program: {error or type(error).__name__}")
 
 
 def guarded(slot: Callable[..., Any]) -> Callable[..., Any]:

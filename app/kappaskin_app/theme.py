@@ -2,7 +2,7 @@
 
 The palette of the application says which theme is in use. Qt repaints every widget when it
 changes: what is painted with the colours of `current` follows by itself, and so do labels whose
-foreground role is `FAINT` or `ALERT`. What holds other colours uses `follow_look`.
+foreground role is `FAINT` or `ALERT`. Widgets with other colours use `follow_look`.
 """
 
 from collections.abc import Callable

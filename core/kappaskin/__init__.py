@@ -1,7 +1,7 @@
 """Kappaskin: shape and contact from curvature-sensing tactile skins, live and with error bars.
 
-A room is imported when a name of it is first asked for. What checks types sees the first list, what
-runs the second: a `__getattr__` seen by both would let every misspelt name pass.
+A room is imported when one of its names is first used. Type checkers see the first list, what
+runs uses the second: a `__getattr__` visible to both would hide every misspelt name.
 """
 
 from typing import TYPE_CHECKING

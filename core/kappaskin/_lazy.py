@@ -1,4 +1,4 @@
-"""Packages whose names are imported when they are first asked for."""
+"""Packages whose names are imported when they are first used."""
 
 import sys
 from collections.abc import Callable

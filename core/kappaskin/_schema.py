@@ -1,4 +1,4 @@
-"""Schemas: what is declared of the keys of a file, of its tables, and of the kinds of these.
+"""Schemas: the declared keys of a file, of its tables, and of the kinds of tables.
 
 A key that becomes a field of a class has that field's kind and default, and its range and unit
 where the field is annotated with them.

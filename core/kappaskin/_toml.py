@@ -1,4 +1,4 @@
-"""TOML and JSON read strictly, with the line of what is refused; TOML written as people would."""
+"""TOML and JSON read strictly, with line numbers in refusals; readable TOML written."""
 
 import difflib
 import json
@@ -52,7 +52,7 @@ def parsed(text: str, file: Path) -> dict[str, Any]:
             raise RecursionError
         return tomllib.loads(text)
     except ValueError as error:  # a whole number of thousands of digits is one of these, too
-        raise Refusal(f"{file}: expected a scene in TOML, got a mistake in it: {error}") from error
+        raise Refusal(f"{file}: expected a scene in TOML, got an error in it: {error}") from error
     except RecursionError as error:
         raise Refusal(f"{file}: expected a scene, got tables or lists nested too deep") from error
 
@@ -276,7 +276,7 @@ class TomlTable:
                 near = "".join(
                     f"; did you mean {one}?" for one in _nearest(key, [*self._asked, *others])
                 )
-                known = near or f"; known are {', '.join(sorted(self._asked))}"
+                known = near or f"; valid keys are {', '.join(sorted(self._asked))}"
                 raise self.refusal(f"expected no such key{known}", key)
 
 

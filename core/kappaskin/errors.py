@@ -1,4 +1,4 @@
-"""What the library raises when it cannot do what was asked."""
+"""Errors: refusals of requests, and missing optional packages."""
 
 import sys
 
@@ -25,6 +25,6 @@ class Damaged(Refusal):
 
 def lacking(extra: str, purpose: str, error: ImportError) -> Refusal:
     """What to say where a package of an optional `extra` is missing, which a `purpose` needs."""
-    where = ", which this bundle has not; in a Python of your own" if hasattr(sys, "frozen") else ""
+    where = ", which is not in this bundle; in your own Python" if hasattr(sys, "frozen") else ""
     what = error.name or error
     return Refusal(f"{purpose} needs {what}{where}: pip install 'kappaskin[{extra}]'")

@@ -1,4 +1,4 @@
-"""The values that travel: a frame of counts in, an estimate of shape and contact out."""
+"""Frames of counts, and the estimates of shape and contact computed from them."""
 
 import math
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """The features: one folder for each thing a person does.
 
 Each is a class with one method, `install(shell)`, and its parts as attributes. They never import
-each other. Taking a line out of `FEATURES` leaves an app without that feature. They stand in the
+each other. Removing a line of `FEATURES` leaves an app without that feature. They stand in the
 order in which their panels, docks and actions do.
 """
 

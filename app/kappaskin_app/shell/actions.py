@@ -178,10 +178,10 @@ class Actions:
             return ""
         wanted = QKeySequence(key)
         if wanted.count() != 1 or not _TYPES_NOTHING.fullmatch(key):
-            return f"{key} is for typing: use a key with Ctrl or Alt, or a function key"
+            return f"{key} is needed for typing: use a key with Ctrl or Alt, or a function key"
         for other, entry in self.entries.items():
             if other != name and entry.action.shortcut() == wanted:
-                return f"{key} is the shortcut of {plain(entry.action.text())}: change that first"
+                return f"{key} belongs to {plain(entry.action.text())}: change that shortcut first"
         return ""
 
     def take_keys(self, changed: dict[str, str]) -> list[str]:

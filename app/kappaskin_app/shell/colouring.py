@@ -25,10 +25,10 @@ Mask = NDArray[np.bool_]
 _UNITS = {"m": (1e3, "mm"), "1/m": (1.0, "1/m"), "1/m^2": (1.0, "1/m\u00b2"), "": (1.0, "")}
 _DIGITS = {"mm": ".3f", "1/m": ".2f", "1/m\u00b2": ".3g"}
 
-HEALTH_WORDS = ("well", *("on a rail" if kind == "saturated" else kind for kind in FAULTS[1:]))
+HEALTH_WORDS = ("OK", *FAULTS[1:])
 
 
-# In the order of `WHY`: what is well recedes, and of the others each has another lightness too.
+# In the order of `FAULTS`: OK is inconspicuous, and each fault has another lightness too.
 HEALTH_COLOURS = rgb_of(
     *("#5f7f8c", "#f0e060", "#d55e00", "#cc79a7", "#56b4e9"),
     *("#e69f00", "#1a1c20", "#9b30d0", "#00a070"),

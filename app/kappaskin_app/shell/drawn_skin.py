@@ -213,4 +213,4 @@ class DrawnSkin:
 
 
 NO_SKIN = DrawnSkin(Patch(0.1, 0.1), 2, 2)
-"""What there is before a sensor has said what it is."""
+"""The skin drawn before a sensor has sent its description."""

@@ -298,7 +298,7 @@ class Layouts(QObject):
         """Rename a layout."""
         new = new.strip()
         if new in self.own or new in self._ready or not 0 < len(new) <= _LONGEST:
-            self.notified.emit(f"{new!r:.80} cannot be its name, or is in use: choose another")
+            self.notified.emit(f"{new!r:.80} is not a valid name, or is in use: choose another")
             return
         renamed = {new if name == old else name: each for name, each in self.own.items()}
         self._step(f"rename the layout {old} to {new}", renamed)

@@ -49,7 +49,7 @@ class LogFiles:
             handler.setFormatter(logging.Formatter(_LINE))
             logging.getLogger().addHandler(handler)
         self._crashes = (folder / CRASHES).open("a", encoding="utf-8")
-        self._crashes.write(f"{datetime.now():%Y-%m-%d %H:%M:%S} begun as {os.getpid()}\n")
+        self._crashes.write(f"{datetime.now():%Y-%m-%d %H:%M:%S} started, process {os.getpid()}\n")
         self._crashes.flush()
         faulthandler.enable(self._crashes)
         self._hooks = sys.excepthook, threading.excepthook

@@ -118,7 +118,7 @@ _FILES = "window-*.json"
 _EVERY = 1.0  # s between two saves
 _TIP = (
     "The program ended before its window was closed. What you restore can be undone (Ctrl+Z); "
-    "Report saves a file for finding the cause."
+    "Report saves a file that helps to find the cause."
 )
 _SETTINGS = "All settings of that session except a sensor's calibration and tare."
 

@@ -41,7 +41,7 @@ class Activity(QWidget):
 
 
 _TIP = (
-    "Near the rim: a held edge does not move, so a light touch inside and a hard one at the rim "
+    "Near the rim: a held edge does not move, so a small force inside and a large one at the rim "
     "give the same readings; select an elastic edge if the edge is elastic (Basis). "
     "Strain: beyond 1 % a metal gage is not elastic; these elements are crossed out in the "
     "heatmaps. Excluded: elements, counted from 0, that are inconsistent with the others, or have "

@@ -38,7 +38,7 @@ class Welcome(QObject):
             BannerAction("Recentl&y opened", "Files opened or recorded last.", recent),
             BannerAction(
                 "Do not sho&w again",
-                "Open without this line from now on; Settings > View turns it on again.",
+                "Do not show this banner when the window opens; Settings > View turns it on again.",
                 lambda: requests.set("show_start", False),
             ),
         ]

@@ -26,7 +26,7 @@ FORMAT = 1
 _LONGEST = 200  # characters of a name
 _MOST = 100  # of anything that is listed
 _PX = 100_000  # px, larger than any screen
-_HEAD = "What the window of Kappaskin was like. It may be edited while no window is open."
+_HEAD = "The state of Kappaskin's window. It may be edited while no window is open."
 _WAYS, _SHARES = ("tabbed", "front", "beside"), ("share", "along")
 _Some = TypeVar("_Some")
 
@@ -122,9 +122,9 @@ def from_text(text: str) -> WindowState:
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise Refusal(f"it is no TOML ({error})") from error
+        raise Refusal(f"it is not TOML ({error})") from error
     if (version := document.get("format")) != FORMAT:
-        raise Refusal(f"expected format {FORMAT}, got {version!r}: another version wrote it")
+        raise Refusal(f"expected format {FORMAT}, got {version!r}: written by another version")
     window = _part(document, "window", dict, {})
     return WindowState(
         _one_of(_part(window, "theme", str, ""), ("", *THEMES)),
@@ -152,13 +152,13 @@ def _letters(window: Mapping[str, Any]) -> float:
     if type(percent) not in (int, float) or not (
         isinstance(how, Range) and how.least <= percent <= how.most
     ):
-        raise Refusal(f"expected letters from 80 to 200 %, got {percent!r:.60}")
+        raise Refusal(f"expected a text size from 80 to 200 %, got {percent!r:.60}")
     return float(percent)
 
 
 def _few(values: Any) -> Any:
     if len(values) > _MOST:
-        raise Refusal(f"expected at most {_MOST} of a kind, got {len(values)}")
+        raise Refusal(f"expected at most {_MOST} entries of each kind, got {len(values)}")
     return values
 
 

@@ -116,7 +116,7 @@ class LockButton(QToolButton):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setCheckable(True)
-        self.setToolTip("Fix the range of the colours; else it follows the values shown.")
+        self.setToolTip("Fix the colour range; otherwise it follows the values shown.")
         self.clicked.connect(self._ask)
         self.show_locked(False)
 
@@ -126,7 +126,7 @@ class LockButton(QToolButton):
 
     def show_locked(self, locked: bool) -> None:
         self.setChecked(locked)
-        self.setText("Locked" if locked else "Lock")
+        self.setText("Fixed" if locked else "Fix")
 
 
 class SkinScale(QWidget):
@@ -143,7 +143,7 @@ class SkinScale(QWidget):
         self._symbol = ""
         self.times = QLabel(alignment=Qt.AlignmentFlag.AlignHCenter)  # pyright: ignore[reportCallIssue]
         self.times.setToolTip(
-            "Vertical exaggeration: that set as Height, or as much of it as fits the view."
+            "Vertical exaggeration in use: the one set under View, or less where it would not fit."
         )
         around = QVBoxLayout(self)
         around.setContentsMargins(0, 4, 0, 4)

@@ -59,5 +59,5 @@ class Tint:
             return tuple((f"#{self.colours[k].tobytes().hex()}", self.kinds[k]) for k in seen)
         gone = ~np.isfinite(values)
         on_rail = np.zeros(len(values), bool) if railed is None else railed
-        beside = (on_rail.any(), SATURATED, "on rail"), ((gone & ~on_rail).any(), missing, "none")
+        beside = (on_rail.any(), SATURATED, "saturated"), ((gone & ~on_rail).any(), missing, "none")
         return tuple((colour, words) for there, colour, words in beside if there)

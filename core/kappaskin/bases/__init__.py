@@ -35,7 +35,7 @@ EDGES = tuple(_MAKERS[Patch])
 """Boundary conditions by name.
 
 `hinged`, with the ends of an arc pinned; `sliding`, with these free to slide; `clamped`, which
-holds the slope too; `elastic`, a flat rectangle whose rim gives.
+fixes the slope too; `elastic`, a flat rectangle on an elastic rim.
 """
 
 

@@ -69,7 +69,7 @@ def triangulated(line: Outline, spacing: float, blunt: float) -> TriangleMesh:
             return TriangleMesh(points, triangles, len(rim))
         inner, smoothed = _smoothed(line, points, triangles)[len(rim) :], smoothed + 1
     raise Refusal(
-        f"an outline of {len(line.corners)} corners could not be divided into triangles; leave out "
+        f"an outline of {len(line.corners)} corners could not be divided into triangles; remove "
         "its finest details"
     )
 

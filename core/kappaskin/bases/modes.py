@@ -253,8 +253,8 @@ class PolygonBasis(ModeBasis):
         if blunt.any() and not self.clamped:
             raise Refusal(
                 f"the outline turns by only {math.degrees(angle[blunt][0]):.3g} degrees at vertex "
-                f"{int(np.argmax(blunt))}: hinged there it would be as stiff as clamped; take a "
-                "disk, fewer corners, or clamp its edges"
+                f"{int(np.argmax(blunt))}: hinged there it would be as stiff as clamped; use a "
+                "disk, fewer corners, or clamped edges"
             )
 
     @property

@@ -42,7 +42,7 @@ class ProductBasis(FunctionBasis):
             raise Refusal(f"expected at least 1 x 1 functions, got {self.Ni} x {self.Nj}")
         if self.patch.strip and self.Nj != 1:
             raise Refusal(
-                f"a strip is alike along y: expected {self.Ni} x 1 functions, got "
+                f"a strip is constant along y: expected {self.Ni} x 1 functions, got "
                 f"{self.Ni} x {self.Nj}"
             )
 
@@ -151,7 +151,7 @@ class SineBasis(ProductBasis):
         super().__post_init__()
         if self._pinned and self.Ni < 2:
             raise Refusal(
-                "a pinned inextensible arc cannot bend in its first function alone: expected at "
+                "a pinned inextensible arc cannot bend with one function only: expected at "
                 "least 2 functions along x, got 1; use more, or let the ends slide"
             )
 
@@ -242,7 +242,7 @@ class ClampedBasis(JetProductBasis):
         super().__post_init__()
         if self.patch.base_curvature and self.Ni < 2:
             raise Refusal(
-                "a clamped inextensible arc cannot bend in its first function alone: expected at "
+                "a clamped inextensible arc cannot bend with one function only: expected at "
                 "least 2 functions along x, got 1"
             )
 
@@ -334,13 +334,13 @@ class ElasticBasis(JetProductBasis):
         super().__post_init__()
         if self.patch.base_curvature:
             raise Refusal(
-                f"expected a flat skin for a rim that gives, got a base radius of "
-                f"{self.patch.radius:g} m; hold its edges, or let its ends slide"
+                f"expected a flat skin for an elastic rim, got a base radius of "
+                f"{self.patch.radius:g} m; select hinged, clamped or sliding edges"
             )
         least = (3, 1) if self.patch.strip else (2, 2)
         if self.Ni < least[0] or self.Nj < least[1]:
             raise Refusal(
-                "a translation and a tilt bend nothing: expected at least "
+                "a translation and a tilt have no curvature: expected at least "
                 f"{least[0]} x {least[1]} functions, got {self.Ni} x {self.Nj}"
             )
 

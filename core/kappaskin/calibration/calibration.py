@@ -26,7 +26,7 @@ _REST = 1e-6  # 1/m, as near as it need be
 
 FORMAT = 1
 OLDEST = timedelta(days=180)
-"""Age beyond which a calibration is not trusted: glue and bonding go on changing."""
+"""Age beyond which a calibration is not trusted: the adhesive keeps changing."""
 
 _AHEAD = timedelta(days=1)  # that the clock of the machine that calibrated may have been ahead
 _LARGEST = 2**26  # bytes
@@ -84,7 +84,7 @@ class Calibration:
         shapes += [self.creep.share.shape] if self.creep else []
         if not 0 < C <= _MOST_CHANNELS or set(shapes) != {(C,)}:
             raise Refusal(
-                f"expected numbers for 1 to {_MOST_CHANNELS} channels, as many of each kind; got "
+                f"expected arrays of equal length for 1 to {_MOST_CHANNELS} channels, got "
                 f"shapes {shapes}"
             )
         good = np.isfinite(self.gain)
@@ -134,13 +134,13 @@ class Calibration:
         """Refuse a sensor that is not the one that was calibrated."""
         if sensor.serial_number != self.serial_number:
             raise Refusal(
-                f"this calibration is of {self.name} {self.serial_number}, the sensor is "
+                f"this calibration belongs to {self.name} {self.serial_number}, the sensor is "
                 f"{sensor.name} {sensor.serial_number}; choose the file of this sensor, or "
                 "calibrate it"
             )
         if (fingerprint(sensor.layout), sensor.channels) != (self.layout, len(self.gain)):
             raise Refusal(
-                f"{sensor.name} {sensor.serial_number} has {sensor.layout} in other places than "
+                f"{sensor.name} {sensor.serial_number} has {sensor.layout} at other positions than "
                 "when it was calibrated; calibrate it again"
             )
 
@@ -293,14 +293,14 @@ def _parsed(path: Path, data: bytes) -> dict[str, Any]:
             raise ValueError(f"it has more than {_LARGEST} bytes")
         return tomllib.loads(data.decode())
     except (ValueError, RecursionError) as error:
-        raise Refusal(f"{path}: is no calibration file ({error!s:.120}); {_AGAIN}") from error
+        raise Refusal(f"{path}: is not a calibration file ({error!s:.120}); {_AGAIN}") from error
 
 
 def _checked(path: Path, content: dict[str, Any]) -> dict[str, Any]:
     """The headings of a file of this format, complete and as it was written."""
     version = content.pop("format", None)
     if type(version) is not int or version < 1:
-        raise Refusal(f"{path}: has no format of a calibration, got {version!r:.40}; {_AGAIN}")
+        raise Refusal(f"{path}: expected a calibration format, got {version!r:.40}; {_AGAIN}")
     if version > FORMAT:
         raise Refusal(
             f"{path}: has format {version}, this program reads up to {FORMAT}; update kappaskin"
@@ -308,13 +308,13 @@ def _checked(path: Path, content: dict[str, Any]) -> dict[str, Any]:
     stated = content.pop("sha256", None)
     expected = set(_KEYS) | {"failures"}
     if unknown := set(content) - expected:
-        raise Refusal(f"{path}: has unknown headings {sorted(unknown)}; {_AGAIN}")
+        raise Refusal(f"{path}: has unknown tables {sorted(unknown)}; {_AGAIN}")
     if missing := expected - _OPTIONAL - set(content):
-        raise Refusal(f"{path}: lacks the headings {sorted(missing)}; {_AGAIN}")
+        raise Refusal(f"{path}: lacks the tables {sorted(missing)}; {_AGAIN}")
     for heading, keys in _KEYS.items():
         found: Any = content.get(heading, dict.fromkeys(keys))
         if not isinstance(found, dict):
-            raise Refusal(f"{path}: {heading} is no heading; {_AGAIN}")
+            raise Refusal(f"{path}: {heading} is not a table; {_AGAIN}")
         names = set(cast("dict[str, Any]", found))
         if names != keys:
             raise Refusal(
@@ -342,12 +342,12 @@ def load_calibration(
     age = now - calibration.date
     if age > oldest:
         raise Refusal(
-            f"{path}: is of {calibration.date:%Y-%m-%d}, {age.days} days old; expected at most "
+            f"{path}: dated {calibration.date:%Y-%m-%d}, {age.days} days old; expected at most "
             f"{oldest.days} days; calibrate again"
         )
     if age < -_AHEAD:
         raise Refusal(
-            f"{path}: is of {calibration.date:%Y-%m-%d %H:%M}, in the future of "
+            f"{path}: dated {calibration.date:%Y-%m-%d %H:%M}, later than now, "
             f"{now:%Y-%m-%d %H:%M}; set this machine's clock, or calibrate again"
         )
     return calibration

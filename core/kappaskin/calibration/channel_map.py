@@ -43,10 +43,10 @@ class PressResult:
             return f"element {self.element} responds in place of element {self.target}"
         words = {
             OK: "responds",
-            NOTHING: "does not respond, nor does any other",
+            NOTHING: "does not respond, and no other does",
             SKIPPED: "was not pressed",
         }
-        return f"element {self.target} {words.get(self.verdict, f'is not clear: {self.why}')}"
+        return f"element {self.target} {words.get(self.verdict, f'is ambiguous: {self.why}')}"
 
 
 def judge_press(layout: SensorLayout, target: int, answer: Array) -> PressResult:
@@ -62,7 +62,7 @@ def judge_press(layout: SensorLayout, target: int, answer: Array) -> PressResult
     near = distance <= _BESIDE * _pitch(layout)
     also = np.where(near, 0.0, strength)
     if also.max() > _ALSO * strength[peak]:
-        why = f"elements {peak} and {int(also.argmax())} respond alike"
+        why = f"elements {peak} and {int(also.argmax())} respond equally"
         return PressResult(target, UNCLEAR, peak, answer, why)
     if near[target] and strength[target] >= _AS_GOOD * strength[peak]:
         peak = target

@@ -266,7 +266,7 @@ def identify_creep(moments: Array, course: Array, least: float) -> StandardLinea
 
     known = np.isfinite(course).all(axis=0)
     if not known.any():
-        raise Refusal("every channel was on a rail during the hold; lower the amplifier's gain")
+        raise Refusal("every channel was saturated during the hold; lower the amplifier's gain")
     bent = _bent_at(course[:, known])
     t = moments - moments[bent]
     length = float(t[-1])
@@ -276,7 +276,7 @@ def identify_creep(moments: Array, course: Array, least: float) -> StandardLinea
     if n < 10:
         raise Refusal(
             f"expected a hold spent mostly on the cylinder, got {n} readings after the skin was "
-            "bent; begin the hold, then bend it at once"
+            "bent; start the hold, then bend the skin at once"
         )
 
     def solved(log_tau: float) -> tuple[Array, Array]:
@@ -296,8 +296,8 @@ def identify_creep(moments: Array, course: Array, least: float) -> StandardLinea
     tau = float(np.exp(best.x))
     if tau > 0.95 * length:
         raise Refusal(
-            f"the hold of {length:.3g} s is too short to tell the creep: its time constant is no "
-            "shorter; hold longer, or not at all"
+            f"the hold of {length:.3g} s is too short for the creep, whose time constant is not "
+            "shorter; use a longer hold, or none"
         )
     share = np.zeros(course.shape[1])
     at_once = np.where(A + B == 0, 1.0, A + B)

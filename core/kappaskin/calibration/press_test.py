@@ -170,8 +170,8 @@ class PressTest:
             chosen = some[live[some]]
         if not 0 < len(chosen) <= _MOST_ELEMENTS:
             raise Refusal(
-                f"expected 1 to {_MOST_ELEMENTS} elements to press, got {len(chosen)}; of a grid "
-                "a few will do"
+                f"expected 1 to {_MOST_ELEMENTS} elements to press, got {len(chosen)}; on a grid, "
+                "a few are enough (--quick)"
             )
         return tuple(chosen.tolist())
 
@@ -243,7 +243,7 @@ def _announce(test: PressTest, report: Report) -> None:
     if target is not None:
         x, y = layout.positions[target] * 1e3
         number = f"{len(test.done) + 1}/{len(test.elements)}"
-        report(f"{number}  press element {target}, at ({x:.1f}, {y:.1f}) mm, and let go")
+        report(f"{number}  press element {target}, at ({x:.1f}, {y:.1f}) mm, and release it")
 
 
 def _take_frames(test: PressTest, sensor: Sensor, frames: list[Frame], report: Report) -> None:
@@ -328,7 +328,7 @@ def press_elements(
     """
     if not 0 < patience <= _LONGEST:
         raise Refusal(
-            f"expected a patience above zero and at most {_LONGEST:g} s, got {patience:g}"
+            f"expected a waiting time above zero and at most {_LONGEST:g} s, got {patience:g}"
         )
     if name.startswith(SimulatedSource.SCHEME):
         test = _simulated(name.removeprefix(SimulatedSource.SCHEME), quick, report)

@@ -22,7 +22,7 @@ from kappaskin.scenes.cylinders import FACES, FEWEST_RADII, CylinderStep, check_
 from kappaskin.scenes.effects import RunningEffect
 from kappaskin.sensing import PrandtlIshlinskii, Sensor, StandardLinearSolid
 
-DEAD = "dead, as the device itself says"
+DEAD = "dead, reported by the device"
 
 _Part = TypeVar("_Part", LineFits, PrandtlIshlinskii)
 _WORST = 5  # channels that are named
@@ -55,8 +55,8 @@ class ChannelLimits:
         judged = (
             (
                 self.least_gain <= gain <= self.most_gain,
-                f"gain {gain:.3g}, expected {self.least_gain:g} to {self.most_gain:g}; is the gage "
-                "broken, wired in reverse, or were the faces swapped?",
+                f"gain {gain:.3g}, expected {self.least_gain:g} to {self.most_gain:g}; check for a "
+                "broken gage, reversed wires or swapped faces",
             ),
             (
                 abs(offset) <= offset_limit,
@@ -64,8 +64,8 @@ class ChannelLimits:
             ),
             (
                 error <= error_limit,
-                f"error {error:.3g} 1/m, expected at most {error_limit:.3g}; is the gage bonded, "
-                "and did the skin follow the cylinders?",
+                f"error {error:.3g} 1/m, expected at most {error_limit:.3g}; check the bond of the "
+                "gage, and that the skin lay flat on the cylinders",
             ),
             (
                 noise <= noise_limit,
@@ -73,8 +73,8 @@ class ChannelLimits:
             ),
             (
                 linear >= self.linear,
-                f"shows {100 * linear:.0f} % of a small change, expected at least "
-                f"{100 * self.linear:.0f} %; the rest hides in its loops",
+                f"reads {100 * linear:.0f} % of a small change at once, expected at least "
+                f"{100 * self.linear:.0f} %; the rest is hysteresis",
             ),
         )
         return next((why for fine, why in judged if not fine), None)
@@ -99,7 +99,7 @@ def failures_of(
             found[c] = DEAD
         elif len(missing):
             found[c] = (
-                f"on a rail or not read on {len(missing)} of {len(sweep.steps)} steps, first on "
+                f"saturated or not read on {len(missing)} of {len(sweep.steps)} steps, first on "
                 f"step {missing[0] + 1}; lower the amplifier's gain"
             )
         elif why := limits.reason(*(float(values[c]) for values in numbers)):
@@ -215,8 +215,8 @@ def _check_way(steps: tuple[CylinderStep, ...], x: Array, face: int, what: str) 
     k = np.unique((face * x[face * x > 0]).round(9))
     if not len(k):
         raise Refusal(
-            f"no cylinder bends {what}; a calibration needs both faces, since one alone cannot "
-            "tell the offset from the loops"
+            f"no cylinder bends {what}; a calibration needs both faces, since one alone does not "
+            "separate the offset from the hysteresis"
         )
     if len(k) < FEWEST_RADII:
         raise Refusal(
@@ -224,8 +224,8 @@ def _check_way(steps: tuple[CylinderStep, ...], x: Array, face: int, what: str) 
         )
     if not step_pairs(steps, x, face):
         raise Refusal(
-            f"no cylinder that bends {what} was taken again on the way back; without it the loops "
-            "cannot be seen"
+            f"no cylinder that bends {what} was captured with rising radius; without it hysteresis "
+            "cannot be measured"
         )
 
 
@@ -243,7 +243,7 @@ def _check(sweep: Sweep, sensor: Sensor) -> None:
             _check_way(sweep.steps, x, face, f"{name} with the {called}")
     if not np.isfinite(sweep.readings).all(axis=0).any():
         raise Refusal(
-            "every channel was dead or on a rail on some step; lower the amplifier's gain, or "
+            "every channel was dead or saturated on some step; lower the amplifier's gain, or "
             "leave out the smallest cylinders"
         )
 
@@ -263,7 +263,7 @@ def _creep(sweep: Sweep, least: float) -> tuple[StandardLinearSolid | None, Arra
     if not len(sweep.moments):
         return None, sweep.readings
     if not sweep.steps[0].flat:
-        raise Refusal("expected a hold to begin from a flat table, got a cylinder as first step")
+        raise Refusal("expected a hold after a flat table, got a cylinder as first step")
     rest = sweep.readings[0]
     creep = identify_creep(sweep.moments, sweep.course - rest, least)
     if creep is None:

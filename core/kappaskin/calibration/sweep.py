@@ -64,7 +64,7 @@ class StepReadings:
         missing = int(np.isnan(self.mean).sum())
         return (
             f"{', '.join(parts)} 1/m, noise {_median(noise.ravel()):.2g} 1/m in "
-            f"{self.frames} frames" + (f"; {missing} channels dead or on a rail" if missing else "")
+            f"{self.frames} frames" + (f"; {missing} channels dead or saturated" if missing else "")
         )
 
 
@@ -94,12 +94,12 @@ class Sweep:
         shapes = (self.readings.shape, self.noise.shape, self.times.shape)
         if shapes != ((S, C), (S, C), (S,)) or self.course.shape != (len(self.moments), C):
             raise Refusal(
-                f"expected readings and noise ({S}, C), times ({S},) and a course (T, C) for {S} "
+                f"expected readings and noise ({S}, C), times ({S},) and a hold (T, C) for {S} "
                 f"steps, got {shapes} and {self.course.shape}"
             )
         parts = (self.readings, self.noise, self.times, self.course)
         if any(np.isinf(part).any() for part in parts) or np.isnan(self.times).any():
-            raise Refusal("expected finite readings, or NaN for those on a rail; got infinity")
+            raise Refusal("expected finite readings, or NaN for saturated ones; got infinity")
 
     @property
     def curvature(self) -> Array:
@@ -133,7 +133,7 @@ class Procedure:
         """
         step = self.step
         if step is None:
-            raise Refusal("every step is done; go back one to take it again")
+            raise Refusal("all steps are captured; go back by one step to repeat it")
         self._check(step, times, readings)
         late = times >= times[-1] - _SETTLED if step.hold else np.ones(len(times), bool)
         if np.count_nonzero(late) < _FEWEST_FRAMES:
@@ -165,20 +165,20 @@ class Procedure:
             )
         if np.isnan(readings).any(axis=0).all():
             raise Refusal(
-                f"on step {step.number} every channel is dead or on a rail ({step}); lower the "
+                f"on step {step.number} every channel is dead or saturated ({step}); lower the "
                 "amplifier's gain, or leave out the smallest cylinders"
             )
 
     def redo(self) -> None:
         """Go back by one step."""
         if not self.taken:
-            raise Refusal("there is no step to take again: this is the first")
+            raise Refusal("there is no step to repeat: this is the first")
         self.taken.pop()
 
     def sweep(self) -> Sweep:
         """All that was read, once every step is done."""
         if not self.done:
-            raise Refusal(f"{len(self.steps) - len(self.taken)} steps are still to be taken")
+            raise Refusal(f"{len(self.steps) - len(self.taken)} steps are not captured yet")
         return Sweep(
             self.steps,
             np.stack([taken.mean for taken in self.taken]),
@@ -248,9 +248,9 @@ class DeviceReadings:
         while not found:
             found = self._read()
             if not found and time.monotonic() - begun > _SILENCE:
-                raise Refusal(f"no frame came for {_SILENCE:g} s; is the device still sending?")
+                raise Refusal(f"no frame for {_SILENCE:g} s; check that the device is sending")
         if self._source.sensor is not self.sensor:
-            raise Refusal("another device answered in the middle; start again with this one")
+            raise Refusal("another device was connected meanwhile; start again with it")
         return found
 
     def read(self, frames: list[Frame]) -> tuple[Array, Array]:
@@ -284,7 +284,7 @@ def _follow(
                 return
             if index != step.number - 1:
                 raise Refusal(
-                    f"step {step.number} was not seen: the device presents step {index + 1}; "
+                    f"step {step.number} was missed: the device is at step {index + 1}; "
                     "restart it, then run this command at once"
                 )
             if laid.settled(frame.device_time):
@@ -304,8 +304,8 @@ def _recorded(listener: DeviceReadings, seconds: float) -> list[Frame]:
 
 
 def _prompt(step: CylinderStep, total: int, again: bool) -> str:
-    then = "press Enter, then lay it on" if step.hold else "press Enter when it lies still"
-    redo = ", or r and Enter to take the last one again" if again else ""
+    then = "press Enter, then lay the skin on" if step.hold else "press Enter when at rest"
+    redo = ", or r and Enter to repeat the last step" if again else ""
     return f"{step.number}/{total}  {step}: {then}{redo}: "
 
 
@@ -323,7 +323,7 @@ def _prompt_steps(
         try:
             report(f"    {procedure.take(*listener.read(frames))}")
         except Refusal as refusal:
-            report(f"    {refusal}; the same step again")
+            report(f"    {refusal}; repeat this step")
 
 
 def take_sweep(

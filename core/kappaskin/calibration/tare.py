@@ -1,8 +1,8 @@
-"""Tare: the reading of a skin at rest, taken as its zero, and how far it has drifted since.
+"""Tare: the reading of a skin at rest, taken as its zero, and the drift since then.
 
-A tare is refused while the skin moves or is loaded. `LoadSeeker` says how small a load is found:
-against the tare before, or a calibration, a load need only stand out of the drift since. Where
-neither is known, it must stand out of the offsets of the elements: a fainter one is taken for them.
+A tare is refused while the skin moves or is loaded. `LoadDetector` documents the smallest load:
+against the previous tare, or a calibration, a load need only exceed the drift since then. Where
+neither is known, it must exceed the offsets of the elements: a smaller one is taken for offsets.
 """
 
 import math
@@ -24,7 +24,7 @@ _MOST_CHANNELS = 2**16  # whose numbers the engine can send with every status
 _PLAIN = ("name", "serial_number", "layout", "date", "temperature", "frames", "seconds")
 
 SECONDS = 1.0
-"""How long the readings of a tare are averaged, by the device's clock."""
+"""Averaging time of a tare in s, by the device's clock."""
 
 _PATIENCE = 5.0  # s after which a tare is given up
 _FEWEST = 20  # frames
@@ -107,12 +107,12 @@ class Tare:
         """Refuse a sensor that is not the one that was tared."""
         if sensor.serial_number != self.serial_number:
             raise Refusal(
-                f"this tare is of {self.name} {self.serial_number}, the sensor is {sensor.name} "
-                f"{sensor.serial_number}; tare this one"
+                f"this tare belongs to {self.name} {self.serial_number}, not to {sensor.name} "
+                f"{sensor.serial_number}; tare this sensor"
             )
         if (fingerprint(sensor.layout), sensor.channels) != (self.layout, len(self)):
             raise Refusal(
-                f"{sensor.name} {sensor.serial_number} has {sensor.layout} in other places than "
+                f"{sensor.name} {sensor.serial_number} has {sensor.layout} at other positions than "
                 "when it was tared; tare it again"
             )
 
@@ -165,8 +165,8 @@ class TareMeasurement:
         n = len(self._times)
         if n < _FEWEST:
             raise Refusal(
-                f"expected at least {_FEWEST} frames within {_PATIENCE:g} s, got {n}; is the "
-                "device still sending? Then tare again"
+                f"expected at least {_FEWEST} frames within {_PATIENCE:g} s, got {n}; make "
+                "sure that the device is sending, then tare again"
             )
         readings = _known(self.sensor, np.array(self._readings))
         found = _still(self.sensor, seeker, readings)
@@ -192,7 +192,7 @@ def _known(sensor: Sensor, readings: Array) -> Array:
     if np.count_nonzero(blind & live) > _BLIND * np.count_nonzero(live):
         raise Refusal(
             f"{np.count_nonzero(blind & live)} of {np.count_nonzero(live)} channels read nothing, "
-            f"expected at most {100 * _BLIND:.0f} %: they are on a rail, or not scanned; lift what "
+            f"expected at most {100 * _BLIND:.0f} %: they are saturated, or not scanned; lift what "
             "touches the skin, scan all elements, or lower the amplifier's gain"
         )
     return np.where(blind | ~live, np.nan, readings)
@@ -240,7 +240,7 @@ def _check_still(
         channel = int(np.nanargmax(np.abs(part)))
         raise Refusal(
             f"the readings move: {_named(sensor, channel)} was off its mean by "
-            f"{abs(part[channel]):.2g} 1/m for {SECONDS / len(off):.2g} s, where noise explains "
+            f"{abs(part[channel]):.2g} 1/m for {SECONDS / len(off):.2g} s, where noise causes "
             f"{by_noise:.2g}; let the skin come to rest, then tare again"
         )
 
@@ -260,8 +260,8 @@ def _check_unloaded(sensor: Sensor, seeker: LoadDetector, found: _Found, rest: R
     then = f"{simulated if sensor.simulated else 'lift what touches the skin'}, then tare again"
     if rest.tare is not None:
         then += (
-            "; if nothing does, it was bent or mounted again since the tare of "
-            f"{rest.tare.date:%Y-%m-%d %H:%M}: undo that one first"
+            "; if nothing touches it, it was bent or mounted again since the tare of "
+            f"{rest.tare.date:%Y-%m-%d %H:%M}: undo that tare first"
         )
     raise Refusal(
         f"the skin is loaded: {_force(load.force)} at ({x:.0f}, {y:.0f}) mm; this contact explains "

@@ -78,8 +78,7 @@ class TareStore:
             return _parsed(data, serial_number)
         except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
             raise Refusal(
-                f"{path}: holds no tares that can be used ({error!s:.120}); delete it, then tare "
-                "again"
+                f"{path}: contains no valid tares ({error!s:.120}); delete it, then tare again"
             ) from error
 
     def add(self, tare: Tare) -> None:
@@ -113,7 +112,7 @@ class TareStore:
         except (OSError, UnicodeEncodeError) as error:
             part.unlink(missing_ok=True)
             raise Refusal(
-                f"{path}: cannot be written ({error}); make room, or check its permissions"
+                f"{path}: cannot be written ({error}); free disk space, or check its permissions"
             ) from error
 
     @staticmethod
@@ -128,7 +127,7 @@ class TareStore:
             saved = _parsed(data, None)
         except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
             raise Refusal(
-                f"{name}: is no tare ({error!s:.120}); expected it as it was made"
+                f"{name}: is not a tare ({error!s:.120}); expected an unchanged file"
             ) from error
         if saved.used is None:
             raise Refusal(f"{name}: expected one tare that is in use, got {len(saved.tares)}")
@@ -160,7 +159,7 @@ def _parsed(data: bytes, serial_number: str | None) -> SavedTares:
         raise ValueError("it is damaged or was edited, its SHA-256 differs")
     tares = tuple(_tare(one) for one in content["tare"])
     if serial_number is not None and any(t.serial_number != serial_number for t in tares):
-        raise ValueError("it is of another sensor")
+        raise ValueError("it belongs to another sensor")
     return SavedTares(tares, next((tare for tare in tares if tare.digest == values["used"]), None))
 
 

@@ -82,7 +82,7 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"kappaskin: {error} See `{named} --help`.", file=sys.stderr)
         return REFUSED
     except MemoryError as error:
-        print(f"kappaskin: {error}; ask for less of it, or of finer things", file=sys.stderr)
+        print(f"kappaskin: {error}; reduce the requested size, or the resolution", file=sys.stderr)
         return REFUSED
     except BrokenPipeError:
         # Whoever read our output has gone; what is still buffered must have somewhere to go.

@@ -1,4 +1,4 @@
-"""What commands share: exit codes, stop signals, pairs of numbers, progress, JSON and files."""
+"""Common parts of commands: exit codes, stop signals, pairs of numbers, progress, JSON, files."""
 
 import json
 import math
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 _Kind = TypeVar("_Kind")
 
 FAILED = 1
-"""Exit code of a command that was done, with something in the result that failed."""
+"""Exit code of a command that was completed, but part of its result failed."""
 
 REFUSED = 2
-"""Exit code of a command that cannot be done, with the reason on standard error."""
+"""Exit code of a command that was refused, with the reason on standard error."""
 
 Switch = Annotated[bool, Parameter(negative="")]
 """An option that is there or not."""
@@ -37,7 +37,7 @@ def _whole(_: type, tokens: Sequence[Token]) -> int:
 
 
 Whole = Annotated[int, Parameter(converter=_whole)]
-"""A whole number; of itself the command line would take 2.5 for 2."""
+"""A whole number; without the converter the command line would accept 2.5 as 2."""
 
 Pair = Annotated[str, Parameter(allow_leading_hyphen=True)]
 """Two numbers such as 8x8; a leading hyphen is accepted so that -1x8 is refused clearly."""
@@ -63,7 +63,7 @@ def stops() -> list[int]:
 def check_time(seconds: float, what: str) -> None:
     """Raise a `Refusal` unless there is time to do `what`."""
     if not seconds > 0:
-        raise Refusal(f"expected a time above 0 s to {what}, got {seconds:g}")
+        raise Refusal(f"expected a time above 0 s ({what}), got {seconds:g}")
 
 
 class ProgressLine:
@@ -98,7 +98,7 @@ def result_of(items: Iterable[object], kind: type[_Kind]) -> _Kind:
             if isinstance(item, kind):
                 return item
             show_progress(f"{item:4.0%}")
-    raise Refusal("the work ended without a result; try again")
+    raise Refusal("the task ended without a result; try again")
 
 
 def print_json(value: Any) -> None:

@@ -54,7 +54,7 @@ def publish(
     targets = [f"udp://{place}" for place in udp or ()]
     targets += [f"foxglove://{place}" for place in places or ()]
     if not targets:
-        raise Refusal("expected somebody to send to: give --udp HOST:PORT, or --foxglove")
+        raise Refusal("expected a receiver: give --udp HOST:PORT, or --foxglove")
     targets_of(targets)  # or refused here
     if source.startswith(SimulatedSource.SCHEME):
         load_scene(source.removeprefix(SimulatedSource.SCHEME))  # or refused here
@@ -105,7 +105,7 @@ _READ = 0.1  # s
 
 
 def listen(*, udp: Whole = 9870, seconds: float = math.inf, json: Switch = False) -> int:
-    """Print what is published to a UDP port of this machine, until stopped (Ctrl+C).
+    """Print the messages received on a UDP port of this machine, until stopped (Ctrl+C).
 
     Contacts (ten a second) with their error bars and their age when sent, every loss on the
     network, the state of the source, and a summary. Exit code 1 if no contact came.
@@ -119,7 +119,7 @@ def listen(*, udp: Whole = 9870, seconds: float = math.inf, json: Switch = False
     seconds
         How long to listen; until stopped when left out.
     json
-        Print every message as it came, one a line.
+        Print every message as received, one per line.
     """
     from kappaskin.publish import UdpListener
 

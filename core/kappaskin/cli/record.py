@@ -105,7 +105,7 @@ def _recorded(
         if status.state == LOST and known is None:
             raise Refusal(status.message)
         if status.state != STREAMING and known is None and now - began > _BEGIN:
-            raise Refusal(f"{status.source}: nothing came within {_BEGIN:g} s")
+            raise Refusal(f"{status.source}: no readings within {_BEGIN:g} s")
         show_progress(_line(status))
         time.sleep(_POLL)
 
@@ -161,7 +161,7 @@ def info(file: Path, *, json: Switch = False) -> None:
 
 
 def _contents_text(file: Path, contents: dict[str, Any]) -> str:
-    whole = "" if contents["whole"] else " (not ended: see `kappaskin repair`)"
+    whole = "" if contents["whole"] else " (unfinished: see `kappaskin repair`)"
     seconds, began, library = (contents[name] for name in ("seconds", "began", "library"))
     lines = [f"{file}: {seconds:.1f} s from {began}, by {library}{whole}"]
     for name in ("devices", "setups", "attachments", "events"):

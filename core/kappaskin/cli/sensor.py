@@ -33,7 +33,7 @@ def _answer_to(question: str) -> str:
     print(file=sys.stderr)
     raise Refusal(
         "standard input ended before the last step, nothing was written; run this in a terminal, "
-        "or give --dwell if the device is laid on the cylinders by itself"
+        "or give --dwell if the device moves to the cylinders automatically"
     )
 
 
@@ -61,7 +61,7 @@ def calibrate(
     out
         The file to write.
     radii
-        Radii of the cylinders in millimetres; those that the sensor can read when left out.
+        Radii of the cylinders in millimetres; by default those that the sensor can read.
     seconds
         Averaging time on each cylinder, in seconds.
     hold
@@ -103,7 +103,7 @@ def tare(source: str, *, undo: Switch = False) -> None:
     """Tare a sensor: take its readings at rest as its zero.
 
     Refused, with the reason, while the skin is loaded or moves. The tare is saved under the
-    sensor's serial number and used whenever it is connected; a simulated sensor's is only printed.
+    sensor's serial number and used whenever it is connected; a simulated one is only printed.
 
     Example: `kappaskin tare /dev/ttyACM0`
 
@@ -153,7 +153,7 @@ def _take_readings(source: "Source", sensor: "Sensor", taring: "TareMeasurement"
         for frame in source.read(_READ):
             taring.take(frame.device_time, frame.host_time, sensor.nominal(frame))
         if source.sensor is not sensor:
-            raise Refusal("another device answered, or the same one anew; tare again")
+            raise Refusal("another device was connected, or the same one restarted; tare again")
 
 
 def _rest(sensor: "Sensor", used: "Tare | None") -> "Rest":

@@ -142,8 +142,8 @@ def cost(
     effects
         Measure the effects alone, which takes seconds.
     within
-        Instead of a table, name the setting that reaches this RMS error in the least time,
-        conversion included, such as 0.02mm or 20um; or say what is missing, with exit code 1.
+        Instead of a table, print the setting that reaches this RMS error in the least time,
+        conversion included, such as 0.02mm or 20um; or what is missing, with exit code 1.
     plot
         The file, SVG or PNG, to draw error against time into.
     json
@@ -325,7 +325,7 @@ def tables(
     json
         Print one JSON list of rows instead of tables.
     as_printed
-        Instead, list the paper's misprints, what they would give and why they are not meant.
+        Instead, list the paper's misprints, what they would give and why they cannot be meant.
     """
     from kappaskin.studies import misprints, misprints_text, paper_tables, tables_text
 
@@ -340,7 +340,7 @@ def figures(
     only: Some = tuple(FIGURES),
     json: Switch = False,
 ) -> None:
-    """Draw the paper's figures, from runs of our own, as SVG and PNG.
+    """Draw the paper's figures, from our own runs, as SVG and PNG.
 
     Example: `kappaskin figures --out figures --only fig6 fig9`
 
@@ -351,7 +351,7 @@ def figures(
     only
         The figures to draw; all when left out.
     json
-        Print one JSON list of the files instead of one a line.
+        Print one JSON list of the files instead of one per line.
     """
     from kappaskin.studies import write_figures
 

@@ -102,8 +102,8 @@ def doctor(port: str = "", *, json: Switch = False) -> int:
     """Show what this machine has, what is missing, and the command that installs it.
 
     Or examine one port for a few seconds: whether it is absent, busy, not permitted, silent, at
-    another baud rate or not a sensor; else which device it is, its frame rate and its losses. The
-    exit code is 1 where no readings come.
+    another baud rate or not a sensor; otherwise its device, frame rate and losses. The
+    exit code is 1 if no readings arrive.
 
     Example: `kappaskin doctor /dev/ttyACM0`
 
@@ -155,7 +155,7 @@ def _machine_text(found: dict[str, Any]) -> str:
     lines = [_line(name, found[name]) for name in ("kappaskin", "python", "system")]
     for package, version in found["packages"].items():
         lines.append(_line(package, version or "not installed"))
-    lines.append(_line("display", found["display"] or "none (`xvfb-run` gives a virtual one)"))
+    lines.append(_line("display", found["display"] or "none (`xvfb-run` provides a virtual one)"))
     for port in (Port(**port) for port in found["serial_ports"]):
         may = "" if port.opened else f"  no permission. {port.permission_help}"
         lines.append(_line("serial port", f"{port.words}{may}"))
@@ -201,14 +201,14 @@ def install_completion(
 ) -> None:
     """Install completion of commands and options for your shell.
 
-    Writes a file of the shell's own, and a line that loads it into the shell's start-up file.
+    Writes a completion file, and a line that loads it into the shell's start-up file.
 
     Example: `kappaskin --install-completion --shell zsh`
 
     Parameters
     ----------
     shell
-        The shell; the one that this is run from when left out.
+        The shell; the present one when left out.
     """
     from cyclopts.completion import ShellDetectionError
 
@@ -217,7 +217,7 @@ def install_completion(
     try:
         file = app.install_completion(shell=shell)
     except ShellDetectionError as error:
-        raise Refusal(f"expected to be run from a shell ({error}); name it by --shell") from error
+        raise Refusal(f"the shell was not detected ({error}); give it with --shell") from error
     except OSError as error:
-        raise Refusal(f"completion cannot be written ({error}); make the place writable") from error
+        raise Refusal(f"completion cannot be written ({error}); check the permissions") from error
     print(f"{file}: installed; open a new shell to use it")

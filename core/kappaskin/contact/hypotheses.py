@@ -210,7 +210,7 @@ def fitted_cylinder(skin: ElasticSkin, cylinder: Optimum) -> Hypothesis:
 
 
 SHARE = 0.2
-"""Prior standard deviation of the inequality of the forces on two ends."""
+"""Prior standard deviation of the difference between the forces on two ends."""
 _ANGLE = 0.9  # rad, of an axis that is not known
 
 _INEXACT = 0.02  # of a reading: that closely does a skin behave like a plate at best

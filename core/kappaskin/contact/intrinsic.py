@@ -1,7 +1,7 @@
 """Intrinsic contact sensing: the contact from a force and a moment at the fingertip's base.
 
-What touches a fingertip at one place exerts a force p there and, when it is soft, a torque q about
-the normal. Their wrench at the base and the known surface decide the place (Bicchi, Salisbury and
+An object that touches a fingertip exerts a force p there and, when it is soft, a torque q about
+the normal. Their wrench at the base and the known surface give the position (Bicchi, Salisbury and
 Brock 1993, doi:10.1177/027836499301200306). Axes are those of `Patch`: x along the skin, z along
 the outward normal at its middle, where z = 0. Of several contacts it finds a centroid.
 """
@@ -134,7 +134,7 @@ class IntrinsicContact:
         if F.shape != (3,) or M.shape != (3,):
             raise Refusal(f"expected force and moment of shape (3,), got {F.shape} and {M.shape}")
         if not (np.isfinite(F).all() and np.isfinite(M).all()):
-            return _no_touch("the force/torque sensor gives no number")
+            return _no_touch("the force/torque sensor reports NaN or infinity")
         flat = math.isinf(self.patch.radius)
         most = -float(F[2]) if flat else math.hypot(F[0], F[2])
         if not most > self._least:
@@ -145,7 +145,7 @@ class IntrinsicContact:
         return self._judged(place, F, M)
 
     def _no_press(self, pressure: float) -> IntrinsicEstimate:
-        return _no_touch(f"expected a press above {self._least:.3g} N, got {pressure:.3g} N")
+        return _no_touch(f"expected a normal force above {self._least:.3g} N, got {pressure:.3g} N")
 
     def _place(self, F: Array, M: Array, most: float) -> Array | None:
         """Position (2,) in m on the extended surface for the wrench about the patch's origin.
@@ -178,7 +178,7 @@ class IntrinsicContact:
         if (sd[:2] > _VAGUE * self._side).any():
             x, y = 1e3 * sd[:2]
             return _no_touch(
-                f"{pressure:.3g} N tell the place within +-{x:.3g} and {y:.3g} mm only"
+                f"{pressure:.3g} N determine the position only to +-{x:.3g} and {y:.3g} mm"
             )
         inside = np.clip(place, 0, self._side)
         # A rounding error beside the skin is none, even of a sensor without noise.

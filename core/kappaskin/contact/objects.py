@@ -70,7 +70,7 @@ class ContactObject:
             return "no contact"
         (likeliest, first), (second, chance) = self.ranked[:2]
         if not self.kind and first >= _SURE:
-            return f"undetermined: fits none of these objects, {likeliest} best"
+            return f"undetermined: no object fits, {likeliest} is nearest"
         if not self.kind:
             odds = f"{100 * first:.0f} % to {100 * chance:.0f} %"
             return f"{likeliest} or {second}: undetermined ({odds})"

@@ -80,7 +80,7 @@ class Estimator(ABC):
     RIM_SD: ClassVar = 0.2e-3
     """Default standard deviation in m of the movement of an elastic rim."""
     has_matrix: ClassVar = True
-    """Whether it makes the curvature operator M, 3 P x Ni Nj numbers."""
+    """Whether it uses the curvature operator M as a matrix, 3 P x Ni Nj numbers."""
     has_prior: ClassVar = False
     """Whether a prior decides what the readings do not, so that no basis is too large."""
     has_memory: ClassVar = False
@@ -115,7 +115,7 @@ class Estimator(ABC):
         """Which readings (3 P,) are used when they are present."""
         self._all_readable = bool(self.readable.all())
         self.unknowns = basis.size if basis.free is None else basis.free.shape[1]
-        """Number of unknowns: the coefficients less what the boundary conditions decide."""
+        """Number of unknowns: the coefficients minus those fixed by the boundary conditions."""
         self._set_up()
 
     @abstractmethod
@@ -251,14 +251,14 @@ class Estimator(ABC):
         missing = channels - readings
         if self._moves_as_a_whole():
             return RankDeficient(
-                f"{what}: a function moves the skin as a whole and bends it nowhere; hold the "
-                "edges so that it cannot (pin the ends of the arc)"
+                f"{what}: one function is a rigid motion without curvature; hold the "
+                "edges so that it is not possible (pin the ends of the arc)"
             )
         if layout.shape and not missing:
             m, n = layout.shape
             # Along each direction, mode m + q equals m - q at the cell centres.
             return RankDeficient(
-                f"{what}: functions finer than the elements read as coarser ones; "
+                f"{what}: functions finer than the elements have the readings of coarser ones; "
                 f"use at most {min(Ni, m)} x {min(Nj, n)} functions, or more elements, or a prior "
                 "(bayes)"
             )

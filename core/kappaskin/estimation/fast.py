@@ -161,7 +161,7 @@ def grid_cells(layout: SensorLayout) -> tuple[int, int, NDArray[np.intp] | None]
     if not there or _FEW * m * n > len(P):
         raise Refusal(
             f"expected elements at the cell centres of a regular grid, {_OFF:g} of a cell off at "
-            f"most, got {layout} that stand otherwise; use least-squares"
+            f"most, got {layout} at other positions; use least-squares"
         )
     in_order = len(P) == m * n and bool(np.all(cells == np.arange(m * n)))
     return m, n, None if in_order else cells
@@ -296,7 +296,7 @@ class _GridUncertainty:
         if k > _MISSING:
             raise Refusal(
                 f"expected at most {_MISSING} of {self._readings} readings to be missing or to "
-                f"weigh other than most when error bars are requested, got {k}; request the "
+                f"differ in weight when error bars are requested, got {k}; request the "
                 "coefficients alone"
             )
         G, unit = np.empty((k, k)), np.eye(k)
@@ -437,8 +437,8 @@ class Fast(Estimator):
     def _hardly(self, readings: int) -> RankDeficient:
         (Ni, Nj), total = self.basis.shape, 3 * len(self.layout)
         return RankDeficient(
-            f"{self.layout} with {readings} readings hardly determine some of the {self.unknowns} "
-            f"coefficients of a {Ni} x {Nj} basis: of some shape they see less than a share of "
+            f"{self.layout} with {readings} readings barely determine some of the {self.unknowns} "
+            f"coefficients of a {Ni} x {Nj} basis: for some shape their sensitivity is below "
             f"{self._least:.1g}, as {total - readings} of {total} readings are missing; use a "
             "smaller basis, more elements, least-squares, or a prior (bayes)"
         )
@@ -465,8 +465,8 @@ def _sines(basis: Basis, layout: SensorLayout) -> SineBasis:
         )
     if basis.patch.base_curvature:
         raise Refusal(
-            f"expected a flat skin for the fast transforms, got a {basis.patch.name}: on a bent "
-            "one functions are not orthogonal; use least-squares"
+            f"expected a flat skin for the fast transforms, got a {basis.patch.name}: on a "
+            "bent skin the functions are not orthogonal; use least-squares"
         )
     if basis.patch != layout.patch:
         raise Refusal(f"the layout is on {layout.patch}, the basis on {basis.patch}; use one")

@@ -137,7 +137,7 @@ class Fit:
         """Covariance (..., Ni Nj, Ni Nj) of the flattened coefficients in m^2."""
         if (N := self.estimator.basis.size) > _MOST:
             raise Refusal(
-                f"expected at most {_MOST} coefficients whose covariance is made, got {N} x {N} "
+                f"expected at most {_MOST} coefficients for a covariance matrix, got {N} x {N} "
                 "numbers; use covariance_of with the rows that are needed"
             )
         return self.covariance_of(np.eye(N))

@@ -135,7 +135,7 @@ class AsPrinted(_PerFrame):
         except np.linalg.LinAlgError as error:
             raise RankDeficient(
                 "Eq. 6 as printed divides by zero: M^T M has no inverse; use least-squares, which "
-                "reports what is not determined"
+                "refuses with the cause"
             ) from error
 
         def covariance() -> Array:

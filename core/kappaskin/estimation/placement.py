@@ -98,9 +98,9 @@ PLACEMENTS: dict[str, Placement] = {
 def check_placement(layout: SensorLayout, by: str) -> None:
     """Raise a `Refusal` for a layout whose elements cannot be placed `by` this name."""
     if by != "scene" and layout.patch.strip:
-        raise Refusal("expected a skin with two sides to place elements on, got a strip")
+        raise Refusal("expected a 2-D skin to place elements on, got a strip")
     if by != "scene" and not layout.live.all():
-        raise Refusal("expected live elements where they are placed anew, got dead ones among them")
+        raise Refusal("expected only live elements for a new placement, got dead ones among them")
 
 
 def place_elements(layout: SensorLayout, basis: Basis, by: str, spacing: float) -> SensorLayout:

@@ -65,7 +65,7 @@ class Region:
         if self.by_channel and not self.share:
             raise Refusal(f"expected Region.share above zero for {self.around}, got 0")
         if self.around == self.ELEMENTS and not self.elements:
-            raise Refusal("expected at least one element in the region, got none; choose some")
+            raise Refusal("expected at least one element in the region, got none; select some")
 
     @property
     def by_channel(self) -> bool:

@@ -252,7 +252,7 @@ class _Residuals:
         r = K - self._Uw @ (K @ U)
         self.amounts = self._inverse @ (free.T @ r)
         self.explained = free @ self.amounts
-        """The part of K (3 P,) in the free directions, `amounts` (f,) in each."""
+        """The part of K (3 P,) along the free directions, with `amounts` (f,)."""
         self.r = r - self._QF @ self.amounts
         """Q K (3 P,) without its free part."""
 

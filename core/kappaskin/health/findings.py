@@ -98,17 +98,17 @@ def findings(
 def _figure(kind: str, first: float, second: float, elements: int) -> str:
     """The figures of `classify_faults` in words and units."""
     if math.isnan(first):
-        return "the device says so"
+        return "reported by the device"
     if kind in ("dead", "stuck"):
-        return f"reads {first:+.2f} 1/m while its neighbours predict {second:.2f} 1/m of motion"
+        return f"reads {first:+.2f} 1/m while its neighbours predict {second:.2f} 1/m of change"
     if kind == "noisy":
         return f"noise {first:.2g} 1/m, other channels {second:.2g} 1/m"
     if kind == "saturated":
-        return f"on a rail for {100 * first:.0f} % of the last second"
+        return f"saturated for {100 * first:.0f} % of the last second"
     if kind == "swapped":
         other = int(first)
-        return f"reads what {COMPONENTS[other // elements]} of element {other % elements} should"
-    trend = f", drifting by {second:+.2g} 1/m a minute" if kind == "drifting" else ""
+        return f"has the readings of {COMPONENTS[other // elements]} of element {other % elements}"
+    trend = f", drifting by {second:+.2g} 1/m per minute" if kind == "drifting" else ""
     return f"{first:+.2f} 1/m off the prediction of its neighbours{trend}"
 
 

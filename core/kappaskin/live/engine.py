@@ -45,8 +45,8 @@ _AGAIN = "the engine process ended unexpectedly and was started again"
 _DIED = "the engine process ended unexpectedly; connect again to restart it"
 _GIVEN_UP = (
     f"the engine process ended {_DEATHS} times within {_WITHIN:g} s and is not started again by "
-    "itself; choose a simpler scene or fewer functions, then connect again; why it ended is on "
-    "the terminal that the program was started from"
+    "itself; choose a simpler scene or fewer functions, then connect again; the cause is on "
+    "the terminal from which the program was started"
 )
 
 
@@ -233,7 +233,7 @@ class Engine:
         """Add `text` to the events, and record it with them."""
         if len(text) > LONGEST_NOTE:
             raise Refusal(
-                f"expected a note of at most {LONGEST_NOTE} characters, got {len(text)}; write two"
+                f"expected a note of at most {LONGEST_NOTE} characters, got {len(text)}; split it"
             )
         self._requests.act(Note(text))
 

@@ -316,7 +316,7 @@ class EngineLoop:
 
     def _connected(self, sensor: Sensor | None) -> None:
         """A device is connected, or none any more: build the pipelines for it."""
-        self._tare.cancel("another device answered, or the same one anew; tare again")
+        self._tare.cancel("another device was connected, or the same one restarted; tare again")
         self._health.connect(sensor)
         self._status = replace(
             self._status,

@@ -9,8 +9,8 @@ from kappaskin.sources import SerialSource, SimulatedSource, Source
 
 _NOT_ON_A_LINE = {
     Region.INTRINSIC: "a serial device does not report a force/torque sensor at its base",
-    Region.TURNS: "turns need a new scan list in every frame; a serial device takes 20 a second",
-    Region.ADAPTIVE: "it needs a new scan list in every frame; a serial device takes 20 a second",
+    Region.TURNS: "turns need a new scan list for every frame; a device accepts 20 per second",
+    Region.ADAPTIVE: "it needs a new scan list for every frame; a device accepts 20 per second",
 }
 
 

@@ -2,7 +2,7 @@
 
 The window holds one frozen value, `Requested`, and the engine another; each change at the window
 makes the next one and sends what the engine is not known to have. Every value has a number and the
-newest wins, so that a message that is dropped, late or doubled changes nothing in the end.
+newest wins, so that a dropped, late or duplicated message does not change the final state.
 """
 
 import math

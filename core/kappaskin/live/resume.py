@@ -1,7 +1,7 @@
 """A recording engine that outlives its window, and the next window that resumes it.
 
-The engine that was left alone listens where a note says, with a key that only this user can read.
-Nothing is unpickled before both sides have shown that they have it.
+The engine without a window listens at the address in a file, with a key that only this user reads.
+Nothing is unpickled before both sides have proved that they have the key.
 """
 
 import os

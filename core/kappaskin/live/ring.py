@@ -1,7 +1,7 @@
 """Estimates and status from the engine's process to another, through shared memory.
 
-One block, owned by the process that shows: a status of any kind, then as many slots of equal size
-as fit, written round and round. Neither side ever waits: each value carries a count that the
+One block, owned by the window's process: a status of any kind, then as many slots of equal size
+as fit, written cyclically. Neither side ever waits: each value carries a count that the
 writer makes odd, or changes, while it writes, and a reader that saw it change reads again.
 """
 

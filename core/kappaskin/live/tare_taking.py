@@ -45,12 +45,12 @@ class TareCapture:
         self._found: Future[Tare] | None = None
         self.status = before
         if before.taking:
-            self._end("the engine ended while it was taken; tare again")
+            self._end("the engine ended during the tare; tare again")
 
     def begin(self, sensor: Sensor | None) -> None:
         """Take a tare of `sensor` from the next frames; None when nothing streams."""
         if sensor is None:
-            self._end("nothing streams: connect a sensor, then tare")
+            self._end("no readings arrive: connect a sensor, then tare")
             return
         self._taring, self._found = TareMeasurement(sensor, self._clock()), None
         self.status = TareStatus(True, self.status.ended)

@@ -132,8 +132,8 @@ class _ContactProblem:
         _, solved, failed = lapack.dposv(places.gives, both, lower=True)
         if failed:
             raise Refusal(
-                "the skin gives so unevenly that rounding hides how; press with fewer nodes, or "
-                "with a thicker layer"
+                "the compliance of the skin is too ill-conditioned to invert; use fewer nodes, or "
+                "a thicker layer"
             )
         per_depth, for_height = solved.T
         d = self.depth
@@ -206,8 +206,8 @@ def solve_contact(
             break
         places, forces = places.joined(support, more), np.append(target, np.zeros(len(more)))
     raise Refusal(
-        f"the object bears on more than {_MOST_PLACES} places or takes more than {_MOST_STEPS} "
-        "steps to settle; press less deep, a smaller object, or with fewer nodes"
+        f"the object touches more than {_MOST_PLACES} nodes or needs more than {_MOST_STEPS} "
+        "steps to converge; use a smaller depth, a smaller object or fewer nodes"
     )
 
 
@@ -221,7 +221,7 @@ def layer_compliance(plate: Plate) -> float:
     D, C = plate.rigidity, plate.stretching
     if not (D and C):
         raise Refusal(
-            "a skin without rigidity or without axial stiffness does not tell how thick it is; "
+            "a skin without rigidity or without axial stiffness does not determine its thickness; "
             "give the layer, its thickness over its Young's modulus, in m^3/N"
         )
     return 12 * (1 - plate.poisson**2) * D / C**2

@@ -76,7 +76,7 @@ class HeightMap:
         if not np.isfinite(high - low):
             raise Refusal(f"expected pixels of one size, got {low:g} to {high:g} in {path}")
         if low == high and relief:
-            raise Refusal(f"{path} has no relief: all its pixels are {low:g}; give 0 m for a flat")
+            raise Refusal(f"{path} has no relief: all its pixels are {low:g}; give 0 m if flat")
         # Not times relief / (high - low): of the smallest differences that is infinite.
         return cls((high - pixels) / ((high - low) or 1.0) * relief, length, width)
 
@@ -212,7 +212,7 @@ class Mesh:
                 f"expected 4 to {_MOST_TRIANGLES} triangles, got {len(self.faces)}; simplify it"
             )
         if not 0 <= self.faces.min() <= self.faces.max() < len(self.vertices):
-            raise Refusal(f"expected faces of {len(self.vertices)} vertices, got others' numbers")
+            raise Refusal(f"expected faces of {len(self.vertices)} vertices, got other numbers")
         if not np.isfinite(self.vertices).all():
             raise Refusal("expected finite vertices in m, got NaN or infinity")
         self._check_closed()
@@ -229,7 +229,7 @@ class Mesh:
         if (count % 2).any():
             raise Refusal(
                 f"the mesh is not closed: {np.count_nonzero(count % 2)} of its edges have a face "
-                "on one side only; fill its holes, as a program for meshes can"
+                "on one side only; fill its holes in a mesh program"
             )
 
     @classmethod
@@ -280,7 +280,7 @@ def _lowest(triangles: Array, nx: int, ny: int) -> Array:
     pixels = across * up
     if pixels.sum() > _TRIED:
         raise Refusal(
-            f"the mesh lies in too many layers: its triangles cover {pixels.sum() / (nx * ny):.0f} "
+            f"the mesh has too many layers: its triangles cover {pixels.sum() / (nx * ny):.0f} "
             f"times the map, expected {_TRIED / (nx * ny):.0f} at most; simplify it"
         )
     batch = np.cumsum(pixels) // _AT_ONCE

@@ -1,9 +1,9 @@
 """Indentation: a rigid object pressed into a skin, to a given depth or by a given force.
 
-The skin is the plate of `kappaskin.mechanics.plate`, whose midsurface gives at the nodes of a grid
+The skin is the plate of `kappaskin.mechanics.plate`, whose midsurface yields at the nodes of a grid
 and below the object's keel by w = Phi C Phi' F. A Kirchhoff plate meets a rigid object with forces
-along lines and at points, of no width; what gives them one is the skin's own thickness h, which
-they compress by about h/E per pressure: a thin layer, Winkler's, exact to its part of the answer.
+along lines and at points, of zero width; their width comes from the skin's own thickness h, which
+they compress by about h/E per pressure, modelled as a thin Winkler layer.
 """
 
 import math
@@ -189,7 +189,7 @@ class IndentationSolver:
         self, x: float, y: float, turn: float, depth: float | None, force: float | None
     ) -> None:
         if not all(map(math.isfinite, (x, y, turn))):
-            raise Refusal(f"expected a place in m and a turn in rad, got ({x}, {y}) and {turn}")
+            raise Refusal(f"expected a position in m and angle in rad, got ({x}, {y}) and {turn}")
         if (depth is None) == (force is None):
             raise Refusal(f"expected either a depth or a force, got {depth} and {force}")
         if force is not None and not 0 <= force < math.inf:
@@ -217,7 +217,7 @@ class IndentationSolver:
     ) -> Indentation:
         if abs(found.depth) > self._deepest:
             raise Refusal(
-                f"so hard a push would press the object {found.depth:.3g} m deep, further than the "
+                f"this force would press the object {found.depth:.3g} m deep, further than the "
                 f"skin's shorter side of {self._deepest:g} m; press with less force"
             )
         F, most = found.forces, float(found.forces.max())

@@ -177,16 +177,14 @@ class DistributedLoad(CentredLoad, ABC):
         points, weights = self._quadrature(max(basis.shape))
         felt = weights @ basis.at(self.centre() + points)
         if np.isnan(felt).any():  # a notch in the outline that passes between the rim's points
-            raise Refusal(
-                f"expected a load that lies wholly on the skin, got {self}; make it smaller"
-            )
+            raise Refusal(f"expected a load completely on the skin, got {self}; make it smaller")
         return self.force * felt.reshape(basis.shape)
 
 
 def _check_size(load: DistributedLoad, *sizes: float) -> None:
     if not all(0 < size < math.inf for size in sizes):
         raise Refusal(
-            f"expected a load of a size above zero in metres, got {load}; for one of no size take "
+            f"expected a load of a size above zero in metres, got {load}; without a size use "
             "a point or a line"
         )
 

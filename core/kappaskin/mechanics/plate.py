@@ -87,8 +87,8 @@ class Plate:
                 raise Refusal(f"expected {expected}, got {value}")
         if not (0 < self.rigidity < np.inf or (self.rigidity == 0 and self.tension)):
             raise Refusal(
-                f"expected a rigidity above zero in N m, got {self.rigidity}; a drum head, with a "
-                "tension above zero, may have a rigidity of zero"
+                f"expected a rigidity above zero in N m, got {self.rigidity}; with a "
+                "tension above zero, zero is allowed too"
             )
         if not -1 < self.poisson <= 0.5:
             raise Refusal(f"expected -1 < Poisson's ratio <= 0.5, got {self.poisson}")
@@ -118,7 +118,7 @@ class Plate:
         load.check(self.patch)
         if self.rigidity == 0 and is_point(load) and not self.patch.strip:
             raise Refusal(
-                f"a drum head without rigidity gives way without limit under a point: expected a "
+                f"a skin without rigidity deflects without limit under a point load: expected a "
                 f"distributed load (a disc, a rectangle, a Gaussian), got {load}"
             )
 
@@ -184,8 +184,8 @@ class Plate:
         if not values[0] > 1e-13 * values[-1]:
             raise Refusal(
                 "the skin moves as a whole without bending: expected edges that hold it; pin the "
-                "ends of the arc, open it by less than 180 degrees, put springs below a rim that "
-                "gives, or foam below the skin"
+                "ends of the arc, use an opening angle below 180 degrees, springs below an elastic "
+                "rim, or foam below the skin"
             )
         V = W @ (vectors / scale[:, None])
         return (V / values) @ V.T

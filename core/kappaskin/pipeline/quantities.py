@@ -94,7 +94,7 @@ class Quantities:
         """The values (ny, nx) in SI units; NaN off the skin and where they are not known."""
         of = skin_colours()[name].on_surface
         if of is None:
-            raise Refusal(f"expected a quantity that a surface has, got {name!r}; ask of_elements")
+            raise Refusal(f"expected a quantity that a surface has, got {name!r}; use of_elements")
         return of(Reported(estimate, skin=self))
 
     def of_elements(self, name: str, estimate: Estimate) -> Array:

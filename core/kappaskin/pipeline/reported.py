@@ -1,6 +1,6 @@
-"""The table of what an estimate reports, from which files, messages and the screen are made.
+"""The reported quantities of an estimate: one table for files, messages and the screen.
 
-It is in this room, with the pipeline, since some error bars need the fit that it comes
+The table is in this room, with the pipeline, since some error bars need the fit that it comes
 from, and since all that shows, sends or writes an estimate lies above. Another quantity is one
 entry of `REPORTED` and the function that computes it.
 """
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from kappaskin.pipeline.quantities import Quantities
 
 UNKNOWN = math.pi / math.sqrt(12)
-"""In rad, the spread of a line that may point anywhere: an error bar of a direction at most."""
+"""In rad, the standard deviation of an unknown direction, the largest error bar of a direction."""
 
 ELEMENT, ALONG, ACROSS, ROW, COLUMN = "element", "along", "across", "row", "column"
 """Axes of a quantity whose length depends on the skin, the functions and the surface's points."""
@@ -126,7 +126,7 @@ def _root(C: list[list[float]], xx: float, yy: float, xy: float) -> float:
 
 Getter = Callable[[Reported], Any]
 Step = tuple[bool, str | Getter]
-"""What gets numbers: whether several, as a list, and how."""
+"""A function that returns numbers: whether several, as a list, and which."""
 
 
 def _got(*of: str | Getter) -> Getter:
@@ -366,7 +366,7 @@ _FRAME = (
     ReportedQuantity(
         "device_time",
         "s",
-        "on the device's clock",
+        "start of the scan, device's clock",
         "device_time",
         symbol="t",
         group="frame",
@@ -376,7 +376,7 @@ _FRAME = (
     ReportedQuantity(
         "host_time",
         "s",
-        "when it came, monotonic clock",
+        "arrival time, monotonic clock",
         "host_time",
         group="frame",
         keys=(),
@@ -384,7 +384,7 @@ _FRAME = (
     ReportedQuantity(
         "taken",
         "s",
-        "when it was taken, monotonic clock",
+        "start of the scan, monotonic clock",
         "taken",
         group="frame",
         sd="taken_sd",
@@ -395,7 +395,7 @@ _FRAME = (
     ReportedQuantity(
         "ready_time",
         "s",
-        "when the estimate was done, monotonic clock",
+        "completion of the estimate, monotonic clock",
         "ready_time",
         group="frame",
         columns=(),
@@ -403,7 +403,7 @@ _FRAME = (
     ),
 )
 _KAPPA, _SIGMA, _DELTA = "\N{GREEK SMALL LETTER KAPPA}", "\u03c3", "\u0394"
-_OWN = "of the skin itself, its bend at rest included"
+_OWN = "of the skin, its curvature at rest included"
 _WHITE = "White is a skin at rest."
 _ROOT = "\u221a(((xx \u2212 yy) / 2)\u00b2 + xy\u00b2)"
 
@@ -425,7 +425,7 @@ def _changes(*tips: tuple[str, str]) -> tuple[SkinColour, ...]:
 
 def _skin(reported: Reported) -> "Quantities":
     if reported.skin is None:
-        raise Refusal("expected a skin, which a quantity on its surface is computed of, got none")
+        raise Refusal("expected a skin to compute a quantity on its surface, got none")
     return reported.skin
 
 
@@ -483,7 +483,7 @@ _FIT = (
                 "displacement",
                 "Displacement",
                 "w",
-                "How far the skin moved in along its normal: w (Eq. 1).",
+                "Inward displacement of the skin along its normal: w (Eq. 1).",
                 signed=False,
                 least=1e-3,
             ),
@@ -492,7 +492,7 @@ _FIT = (
     ReportedQuantity(
         "nominal",
         "1/m",
-        f"Eq. 8; {_MISSING}",
+        f"nominal curvature (Eq. 8); {_MISSING}",
         "nominal",
         parts=(COMPONENTS, ELEMENT),
         group="fit",
@@ -500,7 +500,7 @@ _FIT = (
     ReportedQuantity(
         "curvature",
         "1/m",
-        f"as calibration and tare make it; {_MISSING}",
+        f"corrected by calibration and tare; {_MISSING}",
         "curvature",
         symbol=_KAPPA,
         parts=(COMPONENTS, ELEMENT),
@@ -511,9 +511,9 @@ _FIT = (
         element_head="reading",
         traced="Curvature",
         colours=_changes(
-            ("Curvature xx", "Bending along x as each element reads it: w_xx (Eq. 3)."),
-            ("Curvature yy", "Bending along y as each element reads it: w_yy (Eq. 4)."),
-            ("Twist xy", "Twist as each element reads it: w_xy (Eq. 5)."),
+            ("Curvature xx", "Curvature along x, as elements read it: w_xx (Eq. 3)."),
+            ("Curvature yy", "Curvature along y, as elements read it: w_yy (Eq. 4)."),
+            ("Twist xy", "Twist, as elements read it: w_xy (Eq. 5)."),
         ),
     ),
     _invariant(
@@ -545,14 +545,14 @@ _FIT = (
         "1/m^2",
         "Gaussian curvature",
         "K",
-        f"The Gaussian curvature {_OWN}: xx yy \u2212 xy\u00b2. Above zero like a ball or a "
-        "bowl, below like a saddle; a sheet that only bends keeps zero.",
+        f"The Gaussian curvature {_OWN}: xx yy \u2212 xy\u00b2. Positive on a ball or a "
+        "bowl, negative on a saddle, zero where the skin bends in one direction only.",
         least=1.0,
     ),
     ReportedQuantity(
         "fresh",
         "",
-        "whether the frame brought it",
+        "whether the reading is new in this frame",
         "fresh",
         parts=(COMPONENTS, ELEMENT),
         kind="?",
@@ -561,7 +561,7 @@ _FIT = (
     ReportedQuantity(
         "residual",
         "1/m",
-        "reading less fit",
+        "reading minus fitted value",
         "residual",
         parts=(COMPONENTS, ELEMENT),
         group="fit",
@@ -572,8 +572,8 @@ _FIT = (
                 f"residual_{name}",
                 f"Residual {name}",
                 f"r<sub>{name}</sub>",
-                f"What the shape leaves of each reading of {name}: reading less fit. Noise alone "
-                "has no pattern; one that stays indicates too few functions or a wrong edge.",
+                f"Residual of each reading of {name}: reading minus fitted value. Noise alone "
+                "has no pattern; a lasting pattern indicates too few functions or a wrong edge.",
                 least=0.1,
                 group="residual",
             )
@@ -593,10 +593,10 @@ _FIT = (
                 "error_bar",
                 "Error bar",
                 f"{_SIGMA}<sub>w</sub>",
-                "The standard deviation of the displacement that the noise of the readings leads "
-                "to: \u221a(b' C b), with the functions b there and the covariance C of their "
-                "coefficients. Of Tracking, as one frame by itself would have it.",
-                unknown="Computing how sure the surface is\N{HORIZONTAL ELLIPSIS}",
+                "The standard deviation of the displacement due to the noise of the readings"
+                ": \u221a(b' C b), with the functions b there and the covariance C of their "
+                "coefficients. For Tracking, that of a single frame.",
+                unknown="Computing the standard deviation\N{HORIZONTAL ELLIPSIS}",
                 signed=False,
                 least=1e-5,
             ),
@@ -605,7 +605,7 @@ _FIT = (
     ReportedQuantity(
         "surface_error",
         "m",
-        "displacement less the true one; NaN without a simulation",
+        "displacement minus the true one; NaN without a simulation",
         lambda r: r.estimate.surface - r.estimate.true_surface,
         symbol=f"{_DELTA}w",
         parts=(ROW, COLUMN),
@@ -613,9 +613,9 @@ _FIT = (
         colours=(
             SkinColour(
                 "difference",
-                "Difference to the truth",
+                "Difference from the truth",
                 f"{_DELTA}w",
-                "The displacement found less the true one, which only a simulation knows.",
+                "Estimated minus true displacement, known in simulations only.",
                 unknown="No simulation: the true surface is not known",
                 least=1e-5,
             ),
@@ -624,7 +624,7 @@ _FIT = (
     ReportedQuantity(
         "suspect",
         "",
-        "why an element is left out, 0 if it is not",
+        "fault for which an element is excluded, 0 if it is not",
         "suspect",
         parts=(ELEMENT,),
         kind="|u1",
@@ -634,8 +634,7 @@ _FIT = (
                 "health",
                 "Health",
                 "Health",
-                "What is wrong with each element (F3): any of its three channels that is left out, "
-                "and why.",
+                "Fault of each element (F3): the reason why any of its three channels is excluded.",
                 signed=False,
             ),
         ),
@@ -643,7 +642,7 @@ _FIT = (
     ReportedQuantity(
         "coefficients",
         "m",
-        "of the functions; NaN where the settings have fewer",
+        "of the basis functions; NaN where the settings have fewer",
         "coefficients",
         symbol="c",
         parts=(ALONG, ACROSS),
@@ -664,14 +663,14 @@ _FIT = (
     ReportedQuantity(
         "converged",
         "",
-        "whether the fit did",
+        "whether the fit converged",
         "converged",
         kind="?",
         group="fit",
         keys=(),
     ),
     ReportedQuantity(
-        "fit_time", "s", "what the fit took", "fit_time", group="fit", columns=(), keys=()
+        "fit_time", "s", "computing time of the fit", "fit_time", group="fit", columns=(), keys=()
     ),
 )
 _CONTACT = (
@@ -681,9 +680,7 @@ _CONTACT = (
         "whether there is a contact",
         "contact.present",
         kind="?",
-        keys=(
-            ("present", "whether the readings hold a contact; without one its numbers are null"),
-        ),
+        keys=(("present", "whether there is a contact; without one its numbers are null"),),
     ),
     ReportedQuantity(
         "single",
@@ -696,18 +693,18 @@ _CONTACT = (
     ReportedQuantity(
         "near_rim",
         "",
-        "whether it is too near a held edge",
+        "whether the contact is too near a held edge",
         "contact.near_rim",
         kind="?",
         keys=(
             (
                 "near_rim",
-                "whether it is too near a held edge for a reliable position and force",
+                "whether it is too near a held edge for position and force to be reliable",
             ),
         ),
     ),
     ReportedQuantity(
-        "spare", "", "readings more than needed", "contact.spare", kind="<i8", keys=()
+        "spare", "", "readings in excess of the unknowns", "contact.spare", kind="<i8", keys=()
     ),
     ReportedQuantity(
         "position",
@@ -721,8 +718,8 @@ _CONTACT = (
         labels_shown=("Contact x", "Contact y"),
         shown=("mm", 1e3, 2),
         keys=(
-            ("x_m", "where the contact is, along the skin"),
-            ("y_m", "where the contact is, across the skin"),
+            ("x_m", "position of the contact along the skin"),
+            ("y_m", "position of the contact across the skin"),
         ),
         form="%.7g",
     ),
@@ -737,7 +734,7 @@ _CONTACT = (
         keys=(("force_N", "of the contact, above zero where it presses"),),
         labels_shown=("Force",),
         shown=("mN", 1e3, 1),
-        header=HeaderNumber("force", 14, "How hard that load presses, with its error bar."),
+        header=HeaderNumber("force", 14, "Force of that point load, with its error bar."),
     ),
     ReportedQuantity(
         "displacement",
@@ -752,7 +749,7 @@ _CONTACT = (
         labels_shown=("Depth",),
         shown=("mm", 1e3, 3),
         header=HeaderNumber(
-            "depth", 15, "Displacement at the contact, with its error bar; positive is in."
+            "depth", 15, "Displacement at the contact, with its error bar; positive is inward."
         ),
     ),
 )
@@ -803,7 +800,7 @@ _GEOMETRY = (
     ReportedQuantity(
         "metric",
         "",
-        "what a step along x, y is along the frame",
+        "steps along the frame for unit steps in x and y",
         "geometry.metric",
         parts=(("t", "s"), ("x", "y")),
         keys=(),
@@ -870,7 +867,7 @@ _GEOMETRY = (
         sd_keys=(
             (
                 "direction_sd_rad",
-                "standard deviation of both about the normal; at most 0.907",
+                "standard deviation of both directions about the normal; at most 0.907",
             ),
         ),
         form="%.6f",
@@ -879,7 +876,7 @@ _GEOMETRY = (
     ReportedQuantity(
         "angle",
         "rad",
-        "from x to the first principal curvature",
+        "from x to the direction of principal curvature 1",
         "geometry.angle",
         keys=(),
     ),
@@ -897,7 +894,7 @@ _TRUTH = (
     ReportedQuantity(
         "true_contact",
         "m",
-        "the true place of the contact",
+        "the true position of the contact",
         "true_contact",
         parts=(("x", "y"),),
         group="truth",
@@ -905,7 +902,7 @@ _TRUTH = (
     ReportedQuantity(
         "error_at_load",
         "m",
-        "displacement less the true one at the true contact",
+        "displacement minus the true one at the true contact",
         "error_at_load",
         group="truth",
         labels_shown=("Error at load",),
@@ -913,20 +910,20 @@ _TRUTH = (
         header=HeaderNumber(
             "error",
             10,
-            "Reconstructed minus true displacement there (simulated only).",
+            "Estimated minus true displacement at the load (simulations only).",
             signed=True,
         ),
     ),
     ReportedQuantity(
         "error_rms",
         "m",
-        "root mean square of that over the skin",
+        "RMS over the skin of displacement minus the true one",
         "error_rms",
         group="truth",
         labels_shown=("RMS error",),
         shown=("mm", 1e3, 3),
         header=HeaderNumber(
-            "rms", 9, "Root mean square error over the whole skin (simulated only)."
+            "rms", 9, "Root mean square error over the whole skin (simulations only)."
         ),
     ),
 )

@@ -60,33 +60,33 @@ SETUP = Part(
         ),
         "rim_sd": Key(
             "Rim movement",
-            "Standard deviation expected of the movement of a rim that gives.",
+            "Standard deviation expected of the movement of an elastic rim.",
             Unit("m", "mm", 1e-3),
             limits=Within(0.0),
         ),
         "edge": Key(
             "Boundary condition",
-            "The boundary condition that the fit assumes. Another than the skin's own shows what a "
-            "wrong assumption costs.",
+            "The boundary condition that the fit assumes. Another one shows the error that a "
+            "wrong assumption causes.",
             choices=(("", "From sensor"), *((edge, edge.capitalize()) for edge in EDGES)),
         ),
         "method": Key(
             "Estimator",
-            "How the shape is found from the readings. Every estimator reports its error bars; "
-            "Cost of accuracy (F9) shows what each takes and gives.",
+            "Method that computes the shape from the readings. All report error bars; "
+            "Cost of accuracy (F9) compares their errors and computing times.",
             choices=(
                 ("least-squares", "Least squares"),
                 ("as-printed", "As printed (Eq. 6)"),
-                ("direct", "Direct, each frame anew"),
-                ("fast", "Fast, a regular grid"),
+                ("direct", "Direct, solved in each frame"),
+                ("fast", "Fast, for regular grids"),
                 ("tracking", "Tracking, from frame to frame"),
-                ("bayes", "Bayes, a plate's prior"),
+                ("bayes", "Bayes, with a plate's prior"),
                 ("finite-slope", "Finite slope"),
-                ("robust", "Robust, leaves out bad elements"),
+                ("robust", "Robust, excludes faulty elements"),
             ),
         ),
-        "calibration": Key("Calibration", "The file that readings are corrected by.", kind=str),
-        "tare": Key("Tare", "The file of the zero that readings are relative to.", kind=str),
+        "calibration": Key("Calibration", "File of the calibration of the readings.", kind=str),
+        "tare": Key("Tare", "File of the tare, the zero of the readings.", kind=str),
     },
     (Setup,),
 )

@@ -1,8 +1,8 @@
 """Foxglove transport: a WebSocket server for Foxglove and others that speak its protocol.
 
 The protocol is foxglove.websocket.v1, and foxglove.sdk.v1, its name since 2025. The thread that
-computes writes a message straight into the socket of each client that request for it; what a client
-leaves no room for is dropped. Another thread accepts clients, reads what they send, and computes
+computes writes a message straight into the socket of each client that requests it; what a client
+does not accept is dropped. Another thread accepts clients, reads what they send, and computes
 the skin as a cloud of points, when one of them shows it.
 """
 
@@ -254,7 +254,7 @@ def opened(target: Target) -> "Foxglove":
         server = _listening(family, address)
     except OSError as error:
         raise Refusal(
-            f"{target}: cannot be listened on ({reason(error)}); choose another port, or "
+            f"{target}: cannot be opened for listening ({reason(error)}); choose another port, or "
             "an address of this machine"
         ) from error
     return Foxglove(server)

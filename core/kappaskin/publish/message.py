@@ -17,13 +17,13 @@ from kappaskin.pipeline import REPORTED, Number, Pipeline, Reported, ReportedQua
 from kappaskin.sensing import Sensor
 
 VERSION = 1
-"""Of the format: another one where a key of this one says something else."""
+"""Version of the format; it changes when the meaning of a key changes."""
 
 LARGEST = 2000
-"""Bytes of a datagram at most: PlotJuggler reads 2048, and what is longer is cut off."""
+"""Largest datagram in bytes: PlotJuggler reads 2048 and discards the rest."""
 
 MOST_FUNCTIONS = 80
-"""So many coefficients with their error bars are sure to fit into a datagram."""
+"""Largest number of coefficients with error bars that always fit into a datagram."""
 
 _LONGEST = 300  # characters of a text
 
@@ -34,11 +34,11 @@ _HEAD = (
         "%.6f",
         "when the scan began or, if unknown, when it was read; s since 1970 by the sender's clock",
     ),
-    Number("number", "%d", "counts the messages about contacts; a gap was lost on the network"),
-    Number("sequence", "%d", "of the scan, as the device counts; a gap was lost or not computed"),
-    Number("generation", "%d", "of the settings that it was computed with"),
+    Number("number", "%d", "count of the messages about contacts; a gap is a loss on the network"),
+    Number("sequence", "%d", "scan number of the device; a gap was lost or not computed"),
+    Number("generation", "%d", "number of the settings used"),
 )
-_AGE = Number("age_s", "%.6f", "from timestamp until this was sent")
+_AGE = Number("age_s", "%.6f", "time from timestamp until this message was sent")
 
 
 def _published(group: str) -> tuple[ReportedQuantity, ...]:

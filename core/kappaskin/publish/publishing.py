@@ -197,8 +197,8 @@ class _OpenTarget:
                 self.refusal = str(refusal)
         elif self._clock() > self._until and self._opening.cancel():
             self.refusal = (
-                f"{self.target}: it was not found out within {_PATIENCE:g} s where that is; give "
-                "its address instead of its name"
+                f"{self.target}: its address was not found within {_PATIENCE:g} s; give "
+                "the address instead of the name"
             )
 
     def status(self) -> TargetStatus:

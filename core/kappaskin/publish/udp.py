@@ -202,7 +202,7 @@ def _bound(port: int) -> socket.socket:
         made.bind(("::" if both else "", port))
     except OSError as error:
         made.close()
-        raise Refusal(f"port {port} cannot be listened on ({error}); choose another") from error
+        raise Refusal(f"port {port} is not available ({error}); choose another") from error
     return made
 
 
@@ -243,7 +243,7 @@ def _words(message: JsonMessage) -> str:
         value, sd = (_figure(message, k, scale, how) for k in (f"{key}_{unit}", sd_key))
         return f"{value} +- {sd}"
 
-    doubt = "" if message.get("single") else "  more than one load?"
+    doubt = "" if message.get("single") else "  not a single point load"
     rim = "  near the rim" if message.get("near_rim") else ""
     return (
         f"{head}  x {bar('x', 'm', 1e3, '.2f')} mm  y {bar('y', 'm', 1e3, '.2f')} mm  "

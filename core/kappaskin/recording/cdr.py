@@ -1,4 +1,4 @@
-"""ROS 2 messages to bytes and back (CDR, little endian), from the text that defines them.
+"""ROS 2 messages to bytes and back (CDR, little endian), from their definitions as text.
 
 A message type is its `ros2msg` text: fields of a primitive type, a text or another message, alone,
 as `type[N]`, or as `type[]` of any length.

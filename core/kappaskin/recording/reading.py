@@ -258,8 +258,8 @@ class Recording:
             )
         if not self._topics and self.library.startswith("kappaskin"):
             raise Damaged(
-                f"{self.path}: expected messages, got none up to where it breaks off; `kappaskin "
-                "repair` saves what is whole beyond"
+                f"{self.path}: expected messages, got none before the damaged part; `kappaskin "
+                "repair` saves the intact messages after it"
             )
         if not self._topics:
             raise Refusal(
@@ -422,13 +422,13 @@ class Recording:
             yield from self._messages_in(unpacked(record.body))
         except OSError as error:
             raise Refusal(
-                f"{self.path}: cannot be read any more ({error.strerror or error}); is it still "
-                "there?"
+                f"{self.path}: can no longer be read ({error.strerror or error}); check that it "
+                "still exists"
             ) from error
         except CorruptRecord as fault:
             raise Damaged(
                 f"{self.path}: is damaged at byte {chunk.at} ({fault}); `kappaskin repair` saves "
-                "what is whole"
+                "the intact messages"
             ) from fault
 
     def _messages_in(self, data: bytes) -> Iterator[RecordedMessage]:

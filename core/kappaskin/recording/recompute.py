@@ -201,7 +201,7 @@ class Recomputation:
         if self.sensor is None:
             raise Refusal(
                 f"{self._recording.path}: expected a device before a setup; `kappaskin repair` "
-                "saves what is whole"
+                "saves the intact messages"
             )
         self._pass_over(len(self._waiting))
         was, made = self.pipeline, Pipeline(self.sensor, setup, self._made)
@@ -329,7 +329,7 @@ class Verification:
             parts.append(f"{self.different:,} differ, by {self.largest:.1g} of the largest number")
             parts.append(f"first difference: {self.first}")
         if self.missing:
-            parts.append(f"the frames of {self.missing:,} more are missing")
+            parts.append(f"the frames of {self.missing:,} further results are missing")
         return "; ".join(parts)
 
     @staticmethod

@@ -83,7 +83,7 @@ class ReplayedSource:
         recording = self._recording
         if not recording.counts.get(m.LINES.name):
             raise Refusal(
-                f"{recording.path}: expected bytes of a device, got a recording without any"
+                f"{recording.path}: expected a recording with bytes of a device, got none in it"
             )
         self._first = recording.first
         self.length = recording.seconds(recording.last)

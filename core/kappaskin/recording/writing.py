@@ -1,4 +1,4 @@
-"""MCAP writer in a thread of its own."""
+"""MCAP writer in a separate thread."""
 
 import itertools
 import threading
@@ -161,7 +161,7 @@ class RecordingFile:
             raise OSError(f"{self.path.name} has been created meanwhile")
         self.part.rename(self.path)
         trouble = self._disk.trouble
-        self._stop(f"{self.path}: {trouble}; it is whole up to then" if trouble else "")
+        self._stop(f"{self.path}: {trouble}; it is complete up to that time" if trouble else "")
 
     def _stop(self, trouble: str) -> None:
         self.written = replace(self.written, active=False, trouble=trouble)

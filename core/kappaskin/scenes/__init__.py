@@ -1,4 +1,4 @@
-"""Scenes: a skin, what touches it, and which effects its readings call for; scene to frames."""
+"""Scenes: a skin, its loads and objects, and the effects on its readings; scene to frames."""
 
 from kappaskin.scenes.effect_plan import Plan as Plan
 from kappaskin.scenes.effect_plan import kept_effects as kept_effects

@@ -24,15 +24,15 @@ FACES = {1: "inner face", -1: "outer face"}
 """Which side of the skin lies on the cylinder, by the sign of the curvature."""
 
 ADVICE = (
-    "What the skin reads depends on the way it came: slide it from each cylinder to the next "
+    "Readings depend on the previous curvature: slide the skin from each cylinder to the next "
     "without letting it spring back, and wait until it lies still."
 )
 """Instructions before the first step."""
 
 WAYS = {
-    "there": "on the way there",
-    "back": "on the way back",
-    "first": "first of all, to wipe out its past",
+    "there": "falling radius",
+    "back": "rising radius",
+    "first": "preconditioning",
 }
 
 _BENT = {
@@ -100,8 +100,8 @@ def schedule(
         raise Refusal(f"expected radii above zero in m, got {radii}")
     if len(radii) < FEWEST_RADII:
         raise Refusal(
-            f"expected at least {FEWEST_RADII} different radii, got {len(radii)}; a line through "
-            "fewer leaves nothing to judge it by"
+            f"expected at least {FEWEST_RADII} different radii, got {len(radii)}; with fewer, "
+            "the error of a line through them cannot be estimated"
         )
     if not 0 <= hold < math.inf:
         raise Refusal(f"expected a hold of at least 0 s, got {hold}")

@@ -125,7 +125,7 @@ def _reasons(
             left = choice.accuracy - spent
             found[name] = (
                 True,
-                f"up to {_percent(error)} of the peak, where {_percent(left)} may be left out",
+                f"up to {_percent(error)} of the peak, where {_percent(left)} may be omitted",
             )
     return found
 

@@ -119,7 +119,7 @@ def scene_of(top: TomlTable, file: Path) -> Scene:
     name, folder = file.stem.removesuffix(".scene"), file.parent
     if (version := SCENE.value(top, "format")) != FORMAT:
         raise top.refusal(
-            f"expected a scene of format {FORMAT}, got {version}; get a newer kappaskin"
+            f"expected a scene of format {FORMAT}, got {version}; update kappaskin"
             if version > FORMAT
             else f"expected format = {FORMAT}, got {version}",
             "format",
@@ -159,13 +159,13 @@ def scene_of(top: TomlTable, file: Path) -> Scene:
         if "cylinders" in top:
             if stimuli:
                 touch = top.tables("touch")[0]
-                raise touch.refusal("expected none on a skin that lies on cylinders")
+                raise touch.refusal("expected no touch on a skin that lies on cylinders")
             scene = scene.laid_on(_cylinders(top.table("cylinders"), scene))
     top.done()
     if absent := sorted(_wanted(top.table("effects")) - effects_of(scene).keys()):
         raise top.table("effects").refusal(
-            f"expected effects that there is something of in this scene, got {', '.join(absent)}; "
-            "say how large they are, or leave them out"
+            f"expected effects that occur in this scene, got {', '.join(absent)}; "
+            "define their parameters, or omit them"
         )
     return scene
 
@@ -245,7 +245,7 @@ def _effects(
         if name in table:
             own = table.table(name)
             if kind.elsewhere:
-                raise own.refusal(f"expected no such table; {kind.elsewhere}")
+                raise own.refusal(f"expected no table for this effect; {kind.elsewhere}")
             if name == "hysteresis" and "like" in own:
                 found.append(own.choose("like", LOOPS))
             elif kind is StrainLimit:
@@ -362,7 +362,7 @@ def _recorded(file: Path) -> RecordedMotion:
     """A motion from a CSV file with the columns time, dx, dy and amount."""
     try:
         if file.stat().st_size > _LARGEST_RECORD:
-            raise OSError(f"it has more than {_LARGEST_RECORD} bytes; thin it out")
+            raise OSError(f"it has more than {_LARGEST_RECORD} bytes; keep fewer lines")
         heading, *lines = file.read_text(encoding="utf-8-sig").splitlines() or [""]
         rows = np.array([line.split(",") for line in lines if line.strip()], float)
     except (OSError, ValueError) as error:
@@ -372,7 +372,7 @@ def _recorded(file: Path) -> RecordedMotion:
     if heading.replace(" ", "") != "time,dx,dy,amount":
         raise Refusal(f"{file}: expected a first line time,dx,dy,amount, got {heading!r:.80}")
     if rows.shape[1:] != (4,):
-        raise Refusal(f"{file}: expected lines of four numbers, got those of {rows.shape}")
+        raise Refusal(f"{file}: expected lines of four numbers, got an array of {rows.shape}")
     return RecordedMotion(rows[:, 0], rows[:, 1:])
 
 

@@ -1,4 +1,4 @@
-"""A scene: a skin, what touches it and what disturbs its readings; its loads over time."""
+"""A scene: a skin, its stimuli, the effects on its readings, and its loads over time."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -84,8 +84,8 @@ class Scene:
             raise Refusal(f"expected each effect once, got {', '.join(twice)} more than once")
         if self.indenter and len(self.stimuli) > 1:
             raise Refusal(
-                f"expected a rigid object to press alone, got {len(self.stimuli)} stimuli; what "
-                "else presses would bend the skin below it: take loads, or one object"
+                f"expected a rigid object to press alone, got {len(self.stimuli)} touches; any "
+                "other one would bend the skin below it: use loads only, or one object"
             )
         for stimulus in self.stimuli:
             stimulus.check(self.plate)
@@ -178,8 +178,8 @@ def scaled_to(plate: Plate, load: Load, displacement: float, basis: Basis) -> Lo
     at = float(basis.at(load.centre()[None])[0] @ compliance(load.modal(basis)).ravel())
     if not at / load.force > 1e-12 * np.max(compliance.values):
         raise Refusal(
-            f"expected a load that moves the skin where it presses, got {load}; the edges are "
-            "held, press further inside"
+            f"expected a load that moves the skin at its position, got {load}; the edges are "
+            "held: choose a position further inside"
         )
     return load.scaled(displacement / at)
 

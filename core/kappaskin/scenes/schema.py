@@ -1,4 +1,4 @@
-"""The schema of a scene file: every key with its kind, default, limits, unit and words.
+"""The schema of a scene file: every key with its kind, default, limits, unit and label.
 
 `PARTS` declares each table of a file once. Reading and writing, the app's forms and the tables of
 the guide come from it.
@@ -239,7 +239,7 @@ BRIDGE = Part(
             most=1.0,
             example=0.0001,
         ),
-        "dummy_resistance": Key("Dummy", "Lower arm of the dummy half-bridge.", _OHM, 0.0),
+        "dummy_resistance": Key("Dummy", "Resistance of the dummy's lower arm.", _OHM, 0.0),
         "balance_voltage": Key(
             "Balance", "Voltage of the middle of the dummy.", _VOLT, 0.0, example=2.5
         ),
@@ -319,7 +319,7 @@ LOADS = {
         _ALONG_X,
     ),
     "gaussian": PartKind(
-        "Soft round load", GaussianLoad, _IN_THE_MIDDLE | {"sd": 0.003} | _FORCE, ("displacement",)
+        "Gaussian load", GaussianLoad, _IN_THE_MIDDLE | {"sd": 0.003} | _FORCE, ("displacement",)
     ),
 }
 OBJECTS = {
@@ -366,8 +366,8 @@ TOUCH = Part(
     "Touch",
     {
         "what": Key(
-            "What",
-            "The load or the object. For a load the pressure is given; for a rigid object it is "
+            "Kind",
+            "Kind of load or object. For a load the pressure is given; for a rigid object it is "
             "computed.",
             kind=str,
             offered=False,
@@ -467,14 +467,14 @@ STEP = Part(
             offered=False,
         ),
         "seconds": Key("Duration", "Duration of the step.", _SECOND, 0.0),
-        "by": Key("By", "Distance along x and y.", _MM),
+        "by": Key("Distance", "Distance along x and y.", _MM),
         "to": Key(
-            "To share",
+            "Final share",
             "Final share of the force or depth.",
             Unit("", "of full"),
             0.0,
         ),
-        "times": Key("Times", "Number of taps.", Unit("", "times"), 1, 1000),
+        "times": Key("Taps", "Number of taps.", Unit("", "times"), 1, 1000),
         "ease": Key(
             "Ease",
             "Smooth: the motion starts and ends at rest, without a step in acceleration.",
@@ -494,7 +494,7 @@ STEP = Part(
             "Turn",
             TurnStep,
             {"by": 1.5707963, "seconds": 1.0},
-            keys={"by": Key("By", "About the skin's normal, from x to y.", _DEGREE)},
+            keys={"by": Key("Angle", "About the skin's normal, from x to y.", _DEGREE)},
         ),
         "tap": PartKind("Tap", TapStep, {"times": 3, "seconds": 1.0}),
     },
@@ -523,7 +523,7 @@ CYLINDERS = Part(
             limits=Within(1e-4, 1e3, "m"),
         ),
         "hold": Key(
-            "First hold",
+            "Initial hold",
             "Time on the smallest cylinder at the start, to measure creep.",
             _SECOND,
             kind=float,
@@ -554,7 +554,7 @@ _EFFECT_KEYS: dict[str, dict[str, Key]] = {
     },
     "cross-talk": {"share": Key("Share", "Share of the previous channel in a reading.")},
 }
-"""Keys that mean something else in one effect than in others."""
+"""Keys whose meaning differs between effects."""
 
 
 def _kind_of(effect: type[Effect]) -> PartKind:
@@ -573,7 +573,7 @@ EFFECT = Part(
     "Effects",
     {
         "choose": Key(
-            "Choose",
+            "Selection",
             "Which effects are simulated: auto, all, linear or a list.",
             kind=str | tuple[str, ...],
             default="auto",
@@ -603,7 +603,7 @@ EFFECT = Part(
         ),
         "low": Key("Lowest frequency", "Lower limit of the noise band."),
         "high": Key("Highest frequency", "Upper limit of the noise band."),
-        "since": Key("Since", "Time of the failure.", example=1.0),
+        "since": Key("Failure time", "Time of the failure.", example=1.0),
     },
     kinds={effect.name: _kind_of(effect) for effect in EFFECTS.values() if effect.example},
 )

@@ -1,4 +1,4 @@
-"""Simulator: the counts that a real device would send of a scene, and the truth."""
+"""Simulator: the counts that a real device would send for a scene, and the truth."""
 
 import math
 import zlib

@@ -1,4 +1,4 @@
-"""What touches a skin, a load or a rigid object, and how it moves."""
+"""Stimuli: loads and rigid objects on a skin, and their motion."""
 
 import math
 from abc import ABC, abstractmethod
@@ -167,7 +167,7 @@ class SlideStep(MotionStep):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not all(map(math.isfinite, self.by)):
-            raise Refusal(f"expected two finite numbers of metres to slide by, got {self.by}")
+            raise Refusal(f"expected a finite distance (dx, dy) in m to slide, got {self.by}")
 
     def end(self, pose: Pose) -> Pose:
         return replace(pose, dx=pose.dx + self.by[0], dy=pose.dy + self.by[1])
@@ -182,7 +182,7 @@ class TurnStep(MotionStep):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not math.isfinite(self.by):
-            raise Refusal(f"expected a finite angle in rad to turn by, got {self.by}")
+            raise Refusal(f"expected a finite angle in rad to turn, got {self.by}")
 
     def end(self, pose: Pose) -> Pose:
         return replace(pose, turn=pose.turn + self.by)
@@ -225,13 +225,13 @@ class MotionPath:
         if not 1 <= len(self.steps) <= _MOST_STEPS:
             raise Refusal(
                 f"expected a path of at least one step and {_MOST_STEPS} at most, got "
-                f"{len(self.steps) or 'none'}; more are a recorded motion's"
+                f"{len(self.steps) or 'none'}; use a recorded motion for more"
             )
         first, last = self._poses[0], self._poses[-1]
         if last.amount and last != first:
             raise Refusal(
-                f"expected a path that ends lifted or where it began, got an end {last.dx:g} and "
-                f"{last.dy:g} m away that presses {last.amount:g} times; end with a release"
+                f"expected a path that ends lifted or at its start, got an end {last.dx:g} and "
+                f"{last.dy:g} m away with {last.amount:g} of the load; end with a release"
             )
 
     @cached_property
@@ -279,9 +279,9 @@ class RecordedMotion:
                 f"expected at least two times (T,) and poses (T, 3), got {t.shape}, {poses.shape}"
             )
         if len(t) > _MOST_POSES:
-            raise Refusal(f"expected at most {_MOST_POSES} poses, got {len(t)}; thin them out")
+            raise Refusal(f"expected at most {_MOST_POSES} poses, got {len(t)}; use fewer")
         if not (np.isfinite(poses).all() and t[0] == 0 and (np.diff(t) > 0).all()):
-            raise Refusal("expected finite poses at times in s that begin with 0 and rise")
+            raise Refusal("expected finite poses at increasing times in s that begin with 0")
         if self.duration not in _SECONDS:
             raise Refusal(f"expected a record of {_SECONDS}, got {self.duration:g} s")
         if not (0 <= poses[:, 2].min() <= poses[:, 2].max() <= _AMOUNT.most):
@@ -324,15 +324,15 @@ class Indenter:
     def __post_init__(self) -> None:
         if (self.force is None) == (self.depth is None):
             raise Refusal(
-                f"expected a force in N or a depth in m to press an object by, got {self.force} "
+                f"expected either a force in N or a depth in m for an object, got {self.force} "
                 f"and {self.depth}"
             )
         for value, what in ((self.force, "a force in N"), (self.depth, "a depth in m")):
             if value is not None and not 0 < value < math.inf:
-                raise Refusal(f"expected {what} above zero to press an object by, got {value}")
+                raise Refusal(f"expected {what} above zero for an object, got {value}")
         if not all(map(math.isfinite, (self.x, self.y, self.turn))):
             raise Refusal(
-                f"expected a finite place in m and turn in rad, got ({self.x}, {self.y}) and "
+                f"expected a finite position in m and angle in rad, got ({self.x}, {self.y}) and "
                 f"{self.turn}"
             )
 

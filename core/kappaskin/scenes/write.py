@@ -102,8 +102,8 @@ def _elements(layout: SensorLayout) -> dict[str, Any]:
     dead = np.flatnonzero(~layout.live.any(axis=0)).tolist()
     if made.shape != layout.shape or (made.without(dead).live != layout.live).any():
         raise Refusal(
-            "expected elements of which a scene file can tell, got a grid that is not regular, or "
-            "elements of which some channels are dead; those that are dead are so as a whole"
+            "expected elements that a scene file can describe, got a grid that is not regular, or "
+            "elements with some dead channels; all channels of a dead element must be dead"
         )
     placed = {"positions": layout.positions.tolist()} if grid is None else {"grid": list(grid[0])}
     gages = _fields(layout, without=("patch", "positions", "live", "shape"))
@@ -154,7 +154,7 @@ def _cylinders(laid: Presentation, patch: Patch) -> dict[str, Any]:
         usual = schedule(radii, hold, patch.strip)
     if laid.steps != usual:
         raise Refusal(
-            "expected cylinders in the order of a schedule, which is what a scene file can tell, "
+            "expected cylinders in the order of a schedule, as in a scene file, "
             f"got {len(laid.steps)} other steps; take those of kappaskin.scenes.schedule"
         )
     values = {"radii": list(radii)} if radii != RADII else {}
@@ -165,7 +165,7 @@ def _effects(scene: Scene) -> list[str]:
     names = [effect.name for effect in scene.effects]
     if names != (ordered := [name for name in EFFECTS if name in names]):
         raise Refusal(
-            "expected known effects in the order in which they come about, which is that of a "
+            "expected known effects in the order in which they act, which is that of a "
             f"scene file, {', '.join(ordered)}; got {', '.join(names)}"
         )
     choice = _choice(scene)
@@ -178,13 +178,13 @@ def _effects(scene: Scene) -> list[str]:
 
 def _effect(effect: Effect, scene: Scene) -> dict[str, Any]:
     if type(effect) is not EFFECTS[effect.name] or effect.elsewhere:
-        why = effect.elsewhere or "it is none of those known"
+        why = effect.elsewhere or "it is not a known effect"
         raise Refusal(f"expected no {effect!r:.80} among the effects of a scene file: {why}")
     for name, loops in LOOPS.items():
         if effect == loops:
             return {"like": name}
     if isinstance(effect, StrainLimit) and effect.transduction != scene.transduction:
-        raise Refusal("expected a strain limit of the scene's own electronics, got another's")
+        raise Refusal("expected a strain limit of the scene's own electronics, got another one")
     return _fields(effect, without=("transduction",))
 
 
@@ -237,7 +237,7 @@ def _object(rigid: RigidObject) -> str:
     if name in ("mesh", "heights"):
         raise Refusal(
             f"expected an object that a scene file describes, got a {type(rigid).__name__}, which "
-            f"does not tell its file any more; write [[touch]] with what = {name!r} and the file "
+            f"has no record of its file; write [[touch]] with what = {name!r} and the file "
             "by hand"
         )
     return name
@@ -254,7 +254,7 @@ def _motion(motion: Motion | None) -> dict[str, Any]:
         case _:
             raise Refusal(
                 f"expected an orbit or a path to write in a scene file, got a "
-                f"{type(motion).__name__}, which does not tell its file any more; write "
+                f"{type(motion).__name__}, which has no record of its file; write "
                 "[[touch]] with recorded = the file by hand"
             )
 

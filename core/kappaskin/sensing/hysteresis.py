@@ -39,9 +39,9 @@ class PrandtlIshlinskii:
         if not all(np.isfinite(part).all() for part in (r, p, q, a)):
             raise Refusal("expected finite thresholds, weights, linear parts and stretches")
         if not (np.diff(r, axis=0, prepend=0.0) > 0).all():
-            raise Refusal("expected thresholds above zero that rise")
+            raise Refusal("expected increasing thresholds above zero")
         if not ((self._slopes > 0).all() and (a > 0).all()):
-            raise Refusal("expected weights and a stretch with which the reading always rises")
+            raise Refusal("expected weights and a stretch for which the reading always increases")
 
     @property
     def _slopes(self) -> Array:

@@ -132,7 +132,7 @@ class SensorLayout:
             if float(f"{longest:.4g}") > longest * (1 + _ROUNDING):
                 longest *= 1 - 5e-4  # which is rounded down to no more than it was
             raise Refusal(
-                f"gages of {L:g} m reach over the rim of the {self.patch.name}: element {least} is "
+                f"gages of {L:g} m go over the rim of the {self.patch.name}: element {least} is "
                 f"{depth[least]:.4g} m inside; expected a gage length of at most "
                 f"{longest:.4g} m"
             )

@@ -30,7 +30,7 @@ class Scan:
         if channels.ndim != 1 or not channels.size:
             raise Refusal(
                 f"expected at least one channel in a row, got an array of shape {channels.shape}; "
-                "choose what to scan"
+                "select channels to scan"
             )
         in_order = np.sort(channels)
         if in_order[0] < 0 or (np.diff(in_order) == 0).any():
@@ -87,8 +87,8 @@ class Sensor:
         wired = self.channel_map
         if wired is not None and not np.array_equal(np.sort(wired), np.arange(self.channels)):
             raise Refusal(
-                f"expected a channel map that names each number from 0 to {self.channels - 1} "
-                f"once, got {len(wired)} numbers that do not"
+                f"expected a channel map with each number from 0 to {self.channels - 1} "
+                f"once, got {len(wired)} numbers"
             )
         scan_time = self.transduction.scan_time(self.channels)
         if not 0 < self.rate <= 1 / scan_time * (1 + 1e-9):

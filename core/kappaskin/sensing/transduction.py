@@ -179,7 +179,7 @@ class Transduction:
     def __post_init__(self) -> None:
         if not (0 < self.sensitivity < math.inf and 0 < self.resolution < math.inf):
             raise Refusal(
-                f"expected electronics that turn 1/m into volts, got {self.sensitivity} V per 1/m "
+                f"expected electronics that convert 1/m to volts, got {self.sensitivity} V per 1/m "
                 f"with steps of {self._step} V; check thicknesses, gain and excitation"
             )
         out, rail = self._resting, self.amplifier.rail
@@ -262,7 +262,7 @@ class Transduction:
         """Counts for `curvature` in 1/m, clipped at the rails; raises a `Refusal` for NaN."""
         volts = self.sensitivity * curvature + self.offset
         if np.isnan(volts).any():
-            raise Refusal("expected numbers of curvature, got NaN; a converter always reads one")
+            raise Refusal("expected curvature without NaN; a converter always returns a count")
         return np.clip(np.rint(volts / self._step), *self.limits).astype(np.int32)
 
     def curvature(self, counts: Counts) -> Array:

@@ -134,7 +134,7 @@ def _check_corners(line: Outline) -> None:
     if sharp.any():
         raise Refusal(
             f"the corner at vertex {int(np.argmax(sharp))} of the outline is sharper than "
-            f"{math.degrees(_SHARPEST):.0f} degrees; blunt it with one more vertex"
+            f"{math.degrees(_SHARPEST):.0f} degrees; round it with one more vertex"
         )
 
 
@@ -169,7 +169,7 @@ class Patch:
             )
         if not self.radius >= self.a / (2 * math.pi):  # NaN too
             raise Refusal(
-                f"an arc of {self.a:g} m goes once round at a radius of {self.a / 2 / math.pi:.4g} "
+                f"an arc of {self.a:g} m is a full circle at radius {self.a / 2 / math.pi:.4g} "
                 f"m: expected a larger base radius, or infinity for a flat skin, got {self.radius}"
             )
 

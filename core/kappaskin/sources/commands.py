@@ -36,8 +36,8 @@ _PAUSE = 1 / SCAN_LISTS_PER_SECOND
 _AGAIN = 0.5  # s after which a command without a reply is sent again
 _REPLY_TIMEOUT = 2.0  # s after which a device is taken for one that obeys no command
 _NO_REPLY = (
-    "expected a device that takes commands, got no reply to them; it goes on scanning what it "
-    "chooses: update its firmware, or check the line from the host to it"
+    "expected a device that replies to commands, got no reply; it scans the channels that it "
+    "selects: update its firmware, or check the line from the host to it"
 )
 
 SendCommand = Callable[[Operation, float, bytes], int]
@@ -87,7 +87,7 @@ class DeviceCommands:
         if reply.fault:
             self.refusal = f"the device refused {operation_name(reply.operation)}: {reply.reason}"
             if reply.fault == Fault.NO_COMMON_VERSION:
-                self.refusal += f"; this program speaks {VERSION}: update the older of the two"
+                self.refusal += f"; this program uses {VERSION}: update the older of the two"
             return
         sent = self._pings.pop(reply.command, None)
         if reply.operation != Operation.PING or sent is None or len(reply.data) != _PING_REPLY.size:

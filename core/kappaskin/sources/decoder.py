@@ -380,7 +380,7 @@ class Interpreter:
             return None
         if self.is_of_another(message):
             self.unusable = (
-                f"{self._url}: the device sends channel {self._highest(message)} but says it has "
+                f"{self._url}: the device sends channel {self._highest(message)} but reports "
                 f"{sensor.channels}; its firmware and its information disagree"
             )
             return None

@@ -83,7 +83,7 @@ def _diagnosed(source: SerialSource, plug: str, clock: Callable[[], float]) -> D
     rate, clock_sd = _frame_rate(frames)
     why = source.trouble
     if sensor is not None and not frames:
-        why = why or f"{source.url}: the device says what it is but sends no readings; restart it"
+        why = why or f"{source.url}: the device sends its description but no readings; restart it"
     return Diagnosis(
         source.url,
         plug,
@@ -192,9 +192,9 @@ class WireMonitor:
         if now.duplicate > was.duplicate:
             lines.append(f"duplicate    {now.duplicate - was.duplicate} duplicate messages")
         if now.restarts > was.restarts:
-            lines.append("restart      the device counts from another number")
+            lines.append("restart      the device started a new count")
         if now.other_version is not None and was.other_version is None:
-            lines.append(f"version      the device speaks {now.other_version}, this is {VERSION}")
+            lines.append(f"version      the device uses {now.other_version}, this is {VERSION}")
         return lines
 
     def _hints(self, now: float) -> list[str]:
@@ -206,8 +206,8 @@ class WireMonitor:
         self._tuned_at = now
         self._commands.greet(now)
         return [
-            f"no bytes for {_SILENCE:g} s. Is the device powered, and its firmware started "
-            "(--reset pulses DTR and RTS)? On a UART: are TX and RX crossed, and ground joined?"
+            f"no bytes for {_SILENCE:g} s. Check that the device is powered and its firmware runs "
+            "(--reset pulses DTR and RTS); on a UART, that TX and RX are crossed, ground joined"
         ]
 
     def _other_rate(self, now: float) -> str:
@@ -215,7 +215,7 @@ class WireMonitor:
         self._tuned_at = now
         self._commands.greet(now)
         return (
-            f"bytes come, but no message of wire version {VERSION}: trying "
+            f"bytes arrive, but no message of wire version {VERSION}: trying "
             f"{self._connection.baud_rate} baud"
         )
 
@@ -252,7 +252,7 @@ def _device_text(text: str) -> str:
     try:
         sensor = information.sensor_from_json(text)
     except SourceError as error:
-        return f"{len(text)} characters that cannot be used: {error}"
+        return f"an invalid description of {len(text)} characters: {error}"
     return (
         f"{sensor.name}, serial number {sensor.serial_number}, firmware {sensor.firmware}, "
         f"{sensor.layout}, {sensor.channels} channels, at most {sensor.rate:g} scans/s"
@@ -274,5 +274,5 @@ def _samples_text(samples: Samples) -> str:
     more = " ..." if len(counts) > _COUNTS_SHOWN else ""
     return (
         f"{len(counts)} channels from {channels[0]} to {channels[-1]}: {first}{more}, "
-        f"least {np.min(counts)}, most {np.max(counts)}"
+        f"min {np.min(counts)}, max {np.max(counts)}"
     )

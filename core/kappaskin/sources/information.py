@@ -23,8 +23,8 @@ _METRE, _PER_METRE = Unit("m", "mm", 1e-3), Unit.same("1/m")
 SENSOR = Part(
     "Sensor",
     {
-        "name": Key("Name", "What the sensor is called.", kind=str),
-        "serial_number": Key("Serial number", "Calibrations and tares are stored by it.", kind=str),
+        "name": Key("Name", "Name of the sensor.", kind=str),
+        "serial_number": Key("Serial number", "Key of its calibrations and tares.", kind=str),
         "firmware": Key("Firmware", "Version of the firmware.", kind=str),
         "simulated": Key("Simulated", "Whether the sensor is simulated.", kind=bool),
         "rate": Key(
@@ -50,7 +50,7 @@ SENSOR = Part(
         ),
         "outline": Key(
             "Outline",
-            "For a skin that is no rectangle: `disk`, or x, y of each corner, in order.",
+            "For a skin that is not a rectangle: `disk`, or x, y of each corner, in order.",
             _METRE,
             kind=str | tuple[tuple[float, float], ...],
             default=None,
@@ -72,7 +72,7 @@ SENSOR = Part(
         ),
         "channel_map": Key(
             "Channel map",
-            "The reading that each channel of the wire measures; the same number if omitted.",
+            "Number of the reading that each wire channel measures; the same number if omitted.",
             kind=tuple[int, ...],
             default=None,
         ),
@@ -83,7 +83,7 @@ SENSOR = Part(
     },
     either=(("grid", "positions"),),
 )
-"""All that a sensor's description says, in the order in which it is written."""
+"""All keys of a sensor's description, in the order in which they are written."""
 
 _READS = Within(1e-3, 1e9, "1/m")
 
@@ -122,7 +122,7 @@ def sensor_from_json(text: str) -> Sensor:
     except (ValueError, ArithmeticError) as error:
         raise SourceError(
             f"the device's information cannot be used: {error}; its firmware must send what "
-            "version 1 of the wire format says"
+            "version 1 of the wire format specifies"
         ) from error
 
 
@@ -185,7 +185,7 @@ def _transduction(table: TomlTable) -> Transduction:
     reads = abs(found.resolution) * max(map(abs, found.limits))
     if reads not in _READS:
         raise Refusal(
-            f"expected electronics that read up to {_READS}, got {reads:g}; give bridge, "
+            f"expected electronics with a range of {_READS}, got {reads:g}; give bridge, "
             "amplifier and converter in SI units"
         )
     return found

@@ -21,13 +21,13 @@ from serial.urlhandler import protocol_socket
 from kappaskin.errors import SourceError
 
 BAUD_RATE = 2_000_000
-"""What a UART must run at for 300 channels at 300 frames/s; USB ports ignore it."""
+"""Baud rate that 300 channels at 300 frames/s need on a UART; USB ports ignore it."""
 
 _SENT = 0.05  # s that a command may wait for room
 _HOLDERS_NAMED = 3
 
 BAUD_RATES = (BAUD_RATE, 1_000_000, 921_600, 500_000, 460_800, 230_400, 115_200)
-"""Rates that a device may speak at, the usual one first."""
+"""Baud rates that a device may use, the usual one first."""
 
 _BLOCK = 65536
 _BACKLOG = 2**24  # bytes that may wait to be taken; beyond it they are discarded, and counted
@@ -124,14 +124,14 @@ def _why_not(url: str, error: Exception) -> str:
     if code in (errno.EACCES, errno.EPERM):
         return f"{url}: no permission to open it. {Port(url).permission_help}"
     if code in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in str(error):
-        return f"{url}: busy, {_holders_text(url)} has it open; close that program"
+        return f"{url}: busy, opened by {_holders_text(url)}; close that program"
     if code in (errno.ENOENT, errno.ENXIO, errno.ENODEV, errno.EIO):
         return (
             f"{url}: there is no such port; plug the sensor in, or choose one of the ports found "
             "(`kappaskin doctor` lists them)"
         )
     if code == errno.ECONNREFUSED or "refused" in str(error):
-        return f"{url}: nothing listens there; start the server"
+        return f"{url}: no server listens at this address; start it"
     return (
         f"{url}: cannot be opened ({error}); expected a port such as /dev/ttyACM0 or COM3, or a "
         "URL such as socket://host:port"
@@ -207,7 +207,7 @@ class BaudRateSearch:
         if len(self._tried) == len(BAUD_RATES):
             return f"at any baud rate from {BAUD_RATES[-1]} to {BAUD_RATES[0]}:"
         tried = ", ".join(str(rate) for rate in BAUD_RATES if rate in self._tried)
-        return f"at {tried} baud; as bytes come other rates are tried, or"
+        return f"at {tried} baud; other rates are tried as bytes arrive, or"
 
 
 class SerialConnection:

@@ -99,7 +99,7 @@ class SerialSource:
         self._lost_at = self._clock()
         self._recording.disconnected(self._lost_at)
         self._disconnected = (
-            f"{self.url}: connection lost: the device was unplugged, or stopped; plug it in to "
+            f"{self.url}: connection lost: the device was unplugged or stopped; plug it in to "
             "continue"
         )
         self._events.add("gone", self._disconnected)
@@ -318,19 +318,19 @@ class SerialSource:
         arrived = counts.bytes_in - self._bytes_before
         if not arrived or (known and now - self._received_at >= _PATIENCE):
             return (
-                f"{self.url}: silent for more than {_PATIENCE:g} s; is the device on, and is this "
-                "its port?"
+                f"{self.url}: silent for more than {_PATIENCE:g} s; check the power, and that this "
+                "is its port"
             )
         if self._good_at > self._opened and not known:
             return (
-                f"{self.url}: messages come, but for more than {_PATIENCE:g} s none said what the "
-                "device is; its firmware must send an information message every second"
+                f"{self.url}: messages arrive, but in {_PATIENCE:g} s none described the "
+                "device; its firmware must send an information message every second"
             )
         others = ", ".join(self._holders)
         return (
             f"{self.url}: {arrived} bytes came but no message of wire version {VERSION} "
             f"{self._rates.tried} it is another kind of device"
-            + (f", or {others} takes its bytes" if others else "")
+            + (f", or {others} reads its bytes" if others else "")
         )
 
 
@@ -361,14 +361,14 @@ class _EventLog:
         elif now.firmware != before.firmware:
             self.add("firmware", f"firmware {now.firmware} instead of {before.firmware}")
         elif now is not before:
-            self.add("changed", f"{name} sent another description of itself than before")
+            self.add("changed", f"{name} sent a different description than before")
 
     def reconnected(self, sensor: Sensor, away: float, same: bool, lost: int) -> None:
         """Report that the `same` device is back after `away` s, in which so many were `lost`."""
         restarted = "" if self._sequence.restarts == self._restarts else ", restarted"
         self._lost, self._restarts = self._lost + lost, self._sequence.restarts
         if same:
-            text = f"{_device_name(sensor)} is back after {away:.1f} s{restarted}"
+            text = f"{_device_name(sensor)} is connected again after {away:.1f} s{restarted}"
             self.add("back", f"{text}: {lost} messages lost")
 
     def restarted(self) -> bool:

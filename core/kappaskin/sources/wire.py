@@ -31,7 +31,7 @@ CHECKED = HEAD - 2
 CHECKSUM = struct.Struct("<I")
 
 RATE_UNIT = 1000
-"""Seconds in which the frames are counted that a rate on the wire gives."""
+"""Unit of a rate on the wire: frames in so many seconds."""
 
 UNKNOWN_TEMPERATURE = -(2**15)
 

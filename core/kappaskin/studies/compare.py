@@ -127,7 +127,7 @@ class ConstrainedSystem:
         self._free = np.setdiff1d(np.arange(int(K.shape[0])), held)
         self._factors = cast("SuperLU", splu(K[self._free][:, self._free].tocsc()))
         self.kept = 12 * self._factors.nnz
-        """Bytes of the factors, which SuperLU holds: a number and a place for each."""
+        """Bytes of the factors, which SuperLU holds: a number and an index for each."""
 
     def __call__(self, force: Array) -> Array:
         """The unknowns (N,) or (N, T) that K makes of `force`, of the same shape."""
@@ -332,7 +332,7 @@ _PLATES: dict[str, tuple[Callable[[Plate, int], Solver], range]] = {
     "scikit-fem Argyris, {0} x {0}": (lambda p, n: plate_solver(p, "Argyris", n), range(2, 13)),
     "scikit-fem Morley, {0} x {0}": (lambda p, n: plate_solver(p, "Morley", n), range(20, 65, 4)),
 }
-"""Ours by its functions along each side, theirs by their squares; the coarser ones first."""
+"""Kappaskin by its functions along each side, the others by their cells; coarse ones first."""
 
 
 def _pressed() -> Comparison:
@@ -481,7 +481,7 @@ E        signed error at the load; with noise the mean +- standard deviation of 
 RMS      error over the skin; with noise the mean of the draws
 bars     error bars available
 set-up   until the first answer; answer: median of the next ones, and its ratio to the first row
-held     most memory at once in both, with what SuperLU holds"""
+held     peak memory of both, with that of SuperLU"""
 
 
 def errors_text(row: ComparisonRow) -> str:

@@ -255,7 +255,7 @@ def _equation_6() -> dict[str, Any]:
     return {
         "where": "Eq. 6 on the fingertip",
         "printed": "c = (M^T M)^-1 M^T K with all 8 functions",
-        "meant": "the same with c_1 = -(c_3/3 + c_5/5 + c_7/7), as pinned ends decide",
+        "meant": "the same with c_1 = -(c_3/3 + c_5/5 + c_7/7), as determined by pinned ends",
         "gives": {
             "rank of the 8 columns of M": int(np.linalg.matrix_rank(M)),
             "length of the column k = 1 over that of k = 2": float(length[0] / length[1]),
@@ -263,7 +263,7 @@ def _equation_6() -> dict[str, Any]:
                 S @ c - S[:, :3] @ truth.ravel()
             ),
         },
-        "why": "sin(theta) moves half a circle as a whole and bends nothing: its column of M is "
+        "why": "sin(theta) moves half a circle as a whole without curvature: its column of M is "
         "zero, M^T M has no inverse, and dropping the function drops a part of the shape",
     }
 
@@ -365,7 +365,7 @@ def misprints() -> list[dict[str, Any]]:
 _TITLES = {
     1: "Table 1: 10 x 10 elements, {} x {} functions, truth of 15 x 15; mm; paper in brackets;\n"
     "on slopes: with gages that sense the curvature of the bent surface",
-    2: "Table 2: 10 elements on half a circle, {} functions, truth of Eq. 10 as it must read; mm;\n"
+    2: "Table 2: 10 elements on half a circle, {} functions, truth of Eq. 10 as corrected; mm;\n"
     "paper's simulation in brackets, its experiment under measured",
 }
 _LAST = {1: f"{'on slopes: error':>18}{'RMS':>9}", 2: "  measured"}

@@ -164,7 +164,7 @@ def regions_text(rows: list[dict[str, Any]]) -> str:
     """The rows of `regions` under a heading."""
     lines = [
         "A contact on a circle, 20 us per channel; RMS errors of contact and shape in mm,",
-        "of each frame in the middle of its scan, and while its answer is the newest there is",
+        "of each frame in the middle of its scan, and while it is the newest estimate",
         f"{'mm/s':>6}  {'method':<14}{'around':<10}{'radius':>6}{'share':>7}{'channels':>10}"
         f"{'frames/s':>10}{'contact':>9}{'newest':>8}{'shape':>8}{'newest':>8}",
     ]

@@ -146,7 +146,7 @@ def plan_text(scene: Scene, rows: list[dict[str, Any]]) -> str:
     there = [row for row in rows if row["microseconds"] is not None]
     lines = [
         f"{scene.title}: errors as shares of the peak curvature, of which "
-        f"{scene.choice.accuracy:.2g} may be left out",
+        f"{scene.choice.accuracy:.2g} may be omitted",
         "",
         f"{'effect':<18}{'size':>9}{'error':>9}{'us':>7}  kept  why",
     ]

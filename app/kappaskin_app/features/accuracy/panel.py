@@ -269,7 +269,7 @@ class CostPanel(QWidget):
         known = math.isfinite(self._accuracy)
         self.required_text.setText(length(self._accuracy) if known else "")
         if cost is None:
-            self.cheapest.setText("No measured setting reaches it." if known else "")
+            self.cheapest.setText("No measured setting reaches this accuracy." if known else "")
             return
         self.cheapest.setText(
             f"Fastest: {setting_text(cost.setting, cost.count)}: {performance(cost)}"

@@ -82,5 +82,5 @@ def is_calibration(file: Path) -> bool:
             return any(line.startswith(_CHECKSUM) for line in text.read(_HEAD).splitlines())
     except OSError as error:
         raise Refusal(
-            f"{file}: cannot be read ({error.strerror}); check its name and who may read it"
+            f"{file}: cannot be read ({error.strerror}); check its name and permissions"
         ) from error

@@ -223,7 +223,7 @@ class CalibrationController(QObject):
             self._captured is not None
             and self._clock() - max(self._last_time, self._begin_time) > _SILENCE
         ):
-            self._refuse_step(f"no reading for {_SILENCE:g} s; is the device still sending?")
+            self._refuse_step(f"no reading for {_SILENCE:g} s; check the device.")
 
     def receive(self, estimate: Estimate) -> None:
         """Capture an estimate of the present step, and finish the step after its last."""

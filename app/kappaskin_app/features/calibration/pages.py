@@ -189,7 +189,7 @@ class CylinderStepPage(QWidget):
             return
         taken = procedure.taken[-1]
         missing = int(np.isnan(taken.mean).sum())
-        lost = f"; {missing} channels dead or on a rail" if missing else ""
+        lost = f"; {missing} channels dead or saturated" if missing else ""
         self.heading.setText(
             f"Step {taken.step.number}: mean of {taken.frames} frames{lost} (1/m):"
         )
@@ -233,11 +233,11 @@ class ResultPage(QWidget):
         self.passed = Heading(1.3)
         self.errors = text_label(
             tip="RMS of the residuals from the cylinders' curvature, and the largest difference of "
-            "readings at falling and rising radius. Both with the line of each gage pair alone "
+            "readings at falling and rising radius. Both with a straight line for each gage pair "
             "(section 5 of the paper), and with hysteresis compensated."
         )
         self.map, self.plot, self.channel = PassMap(), LoopPlot(), text_label()
-        self.worst = text_label(tip="Click one to see its readings.")
+        self.worst = text_label(tip="Click a channel to see its readings.")
         self.worst.setTextInteractionFlags(
             Qt.TextInteractionFlag.LinksAccessibleByMouse
             | Qt.TextInteractionFlag.LinksAccessibleByKeyboard
@@ -246,7 +246,7 @@ class ResultPage(QWidget):
             "Use",
             "use",
             "Correct the readings with this calibration (Ctrl+Z undoes). The hysteresis model "
-            "starts at rest: bend a real skin back and forth first, with falling amplitude.",
+            "starts at rest: bend a real skin back and forth first, with decreasing amplitude.",
         )
         self.save = button(f"Save{ELLIPSIS}", "save", "Write it to a file.")
         self.leave = button("New", "leave", "Start another calibration; discard an unsaved result.")

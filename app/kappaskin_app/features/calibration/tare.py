@@ -154,7 +154,7 @@ def when(tare: Tare) -> str:
 def ago(seconds: float) -> str:
     """An age in one number."""
     if seconds < 0:
-        return "in the future: is this machine's clock right?"
+        return "in the future; check this computer's clock"
     for length, unit in ((86400, "days"), (3600, "hours"), (60, "minutes")):
         if seconds >= 2 * length:
             return f"{seconds // length:.0f} {unit} ago"
@@ -164,8 +164,8 @@ def ago(seconds: float) -> str:
 _DEGREES = "\N{DEGREE SIGN}C"
 _TAKE = "Set the present readings as zero (Ctrl+0). Refused while the skin is loaded or moves."
 _DRIFT = (
-    "RMS change of the unloaded readings since the tare, and the largest displacement that it "
-    "equals. Shown, never subtracted."
+    "RMS change of the unloaded readings since the tare, and the largest displacement to which "
+    "it corresponds. Shown, never subtracted."
 )
 
 
@@ -250,10 +250,10 @@ def drift_text(status: Status) -> str:
         return ""
     if not math.isfinite(drift.curvature):
         wait = "the skin is loaded" if drift.loaded else "wait two seconds"
-        return f"Drift since: unknown, {wait}"
+        return f"Drift since the tare: unknown, {wait}"
     then = ", before the load" if drift.loaded else ""
     return (
-        f"Drift since: {drift.curvature:.3f} 1/m (RMS), equal to a displacement of "
+        f"Drift since the tare: {drift.curvature:.3f} 1/m (RMS), equal to a displacement of "
         f"{1e3 * drift.displacement:.3f} mm{then}"
     )
 

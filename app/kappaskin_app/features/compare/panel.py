@@ -43,7 +43,7 @@ _DIFFERENCE = "B minus A in \N{MICRO SIGN}m, on its own scale."
 _TABLE = (
     "Position, force and depth of the contact, and the principal curvatures of the skin there, "
     "each with its standard deviation. That of the difference assumes that A and B are "
-    "independent; they use the same readings, so that it is mostly smaller."
+    "independent; they use the same readings, so the true one is usually smaller."
 )
 
 

@@ -7,7 +7,7 @@ from kappaskin_app.shell.pages import LIVE
 from kappaskin_app.shell.parts import SOURCE
 from kappaskin_app.shell.window import MainWindow
 
-_SIMULATE = "Read the simulated skin that the panels describe"
+_SIMULATE = "Connect the simulated skin that the panels define"
 _CONNECT = "Connect the source selected under Connection"
 _DISCONNECT = "Close the source; the last readings stay visible, marked as lost"
 _PORTS = "Search for serial ports; the list is also updated every second"

@@ -217,7 +217,7 @@ def _recording_text(status: Status) -> str:
     replay = status.replay
     if replay is None:
         return ""
-    whole = "" if replay.whole else ", never ended"
+    whole = "" if replay.whole else ", unfinished"
     return f"\nRecorded {day(replay.begun)}, {replay.length:.1f} s{whole}"
 
 

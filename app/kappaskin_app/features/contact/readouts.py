@@ -31,11 +31,11 @@ FIELDS = {
     ),
     "contact": (
         "Contact",
-        "Position of the point load that fits the readings best; spread: distributed over an "
-        "area, no point load fits; near rim: too close to a held edge to be reliable.",
+        "Position of the point load that fits the readings best; distributed: over an area or "
+        "several places, no point load fits; near rim: too close to a held edge to be reliable.",
     ),
 }
-_WIDTHS = {"contact": 22, "rate": 15, "lost": 19, "age": 10}
+_WIDTHS = {"contact": 26, "rate": 15, "lost": 19, "age": 10}
 """Usual number of characters of each."""
 _NUMBERS = [(each, each.header) for each in REPORTED if each.header is not None]
 FIELDS |= {header.key: (of.labels_shown[0], header.tip) for of, header in _NUMBERS}
@@ -69,7 +69,7 @@ def _contact(contact: Contact) -> str:
     if contact.near_rim:
         return f"\N{ALMOST EQUAL TO} ({x:.0f}, {y:.0f}) mm, near rim"
     if not contact.single:
-        return f"\N{ALMOST EQUAL TO} ({x:.0f}, {y:.0f}) mm, spread"
+        return f"\N{ALMOST EQUAL TO} ({x:.0f}, {y:.0f}) mm, distributed"
     sd = float(np.max(contact.position_sd)) * 1e3
     return f"({x:.1f}, {y:.1f}) \N{PLUS-MINUS SIGN} {sd:.2f} mm"
 

@@ -8,7 +8,7 @@ from kappaskin.live import Status
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.widgets.parts import with_error
 
-_PREPARING = "computing the readings of objects on this skin\N{HORIZONTAL ELLIPSIS}"
+_PREPARING = "computing the model readings of objects on this skin\N{HORIZONTAL ELLIPSIS}"
 
 
 def curvature_text(estimate: Estimate) -> str:

@@ -33,7 +33,7 @@ from kappaskin_app.shell.work_dialog import (
 _LONGEST = 1e6  # s
 _RECORDINGS = "Recording (*.mcap)"
 _FORMATS = (
-    "Table, every program reads it (*.csv);;Table for NumPy (*.npz);;Table in HDF5 (*.h5);;"
+    "Table for any program (*.csv);;Table for NumPy (*.npz);;Table in HDF5 (*.h5);;"
     "Surface for ParaView, PyVista (*.vtp);;Series of surfaces for ParaView (*.pvd);;"
     "Surface for CAD (*.stl)"
 )

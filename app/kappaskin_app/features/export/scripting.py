@@ -18,7 +18,7 @@ from kappaskin_app.shell.simulation import OWN, region_of
 
 _NAMES = ("Region", "Setup", "load_scene", "planned", "read_scene", "setup_from_text")
 _SCRIPT = Template('''\
-"""What Kappaskin's window shows, from Python."""
+"""The source, scene and setup of Kappaskin's window, from Python."""
 
 import time
 $paths
@@ -42,7 +42,7 @@ def estimates(seconds):
             print(status.state, status.message)
 
 
-if __name__ == "__main__":  # the engine is a process of its own, which reads this file too
+if __name__ == "__main__":  # the engine is a separate process that imports this file
     for e in estimates(seconds=5.0):
         x, y = 1e3 * e.contact.position
         force, deepest = 1e3 * e.contact.force, 1e3 * abs(e.surface).max()

@@ -91,7 +91,7 @@ class HealthPanel(QWidget):
         for row, finding in enumerate(health.findings):
             age = max(0.0, now - finding.since)
             since = f"{age:.0f} s" if age < 90 else f"{age / 60:.0f} min"
-            kind = f"{finding.kind}, kept" if finding.retained else finding.kind
+            kind = f"{finding.kind}, not excluded" if finding.retained else finding.kind
             texts = (str(finding.element), finding.component, kind, since, finding.figure)
             for column, text in enumerate(texts):
                 self._write(row, column, text.replace("-", "\N{MINUS SIGN}"))

@@ -219,8 +219,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _LEGEND = (
-    "One cell for each element. Grey: no reading. Violet: on a rail, the end of the converter's "
-    "range. Crossed: bent beyond 1 % strain, where the gage is not elastic any more. Dotted: "
+    "One cell for each element. Grey: no reading. Violet: saturated, at an end of the converter's "
+    "range. Crossed: bent beyond 1 % strain, where the gage is no longer elastic. Dotted: "
     "scanned in every frame. Letter: excluded, by fault: D dead, S stuck, N noisy, R saturated, "
     "X swapped, T drifting, O offset, P spike. Framed: to be pressed now."
 )

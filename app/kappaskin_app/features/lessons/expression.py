@@ -52,7 +52,7 @@ def expression(text: str, kinds: Mapping[str, str], wanted: str) -> Expression:
     Its kind is `wanted`; a `Refusal` where it is not.
     """
     if len(text) > LONGEST:
-        raise Refusal(f"expected at most {LONGEST} letters, got {len(text)}; shorten it")
+        raise Refusal(f"expected at most {LONGEST} characters, got {len(text)}; shorten it")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of Python about what is refused below

@@ -126,18 +126,18 @@ def read_lesson(file: Path) -> Lesson:
             data = opened.read(_LARGEST + 1)
         text = data.decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise Refusal(f"{file}: expected a lesson in UTF-8 text, got none: {error}") from error
+        raise Refusal(f"{file}: expected a lesson in UTF-8 text: {error}") from error
     return lesson_of(text, file.name)
 
 
 def lesson_of(text: str, name: str) -> Lesson:
     """The lesson in a `text`, called `name`."""
     if len(text) > _LARGEST:
-        raise Refusal(f"{name}: expected a lesson of at most {_LARGEST} letters, got more")
+        raise Refusal(f"{name}: expected a lesson of at most {_LARGEST} characters, got more")
     text = text.replace("\r\n", "\n")
     head = _HEAD.match(text)
     if head is None:
-        raise Refusal(f"{name}, line 1: expected a head between two lines +++; see the guide")
+        raise Refusal(f"{name}, line 1: expected a header between two lines +++; see the guide")
     table = _Table.parse(name, head[1], 2)
     table.only(_HEAD_KEYS)
     if table.get("format", int) != _FORMAT:
@@ -181,7 +181,7 @@ def _step(name: str, title: str, text: str, begin: int, end: int, usual: dict[st
     words = (body if not blocks else body[: blocks[0].start()] + body[blocks[0].end() :]).strip()
     if not 1 <= len(words) <= _TEXT:
         raise Refusal(
-            f"{name}, line {line}: expected a text of 1 to {_TEXT} letters, got {len(words)}"
+            f"{name}, line {line}: expected a text of 1 to {_TEXT} characters, got {len(words)}"
         )
     at = line if not blocks else _line(text, begin + blocks[0].start(1))
     table = _Table.parse(name, blocks[0][1] if blocks else "", at)
@@ -270,7 +270,7 @@ class _Table:
             at = _AT_LINE.search(str(error))
             where = line + int(at[1]) - 1 if at else line
             why = _AT_LINE.sub("", str(error)).strip()
-            raise Refusal(f"{name}, line {where}: expected TOML, got a mistake: {why}") from error
+            raise Refusal(f"{name}, line {where}: expected TOML, but: {why}") from error
 
     def refusal(self, key: str, expected: str) -> Refusal:
         """The error of the value of `key`, with its line."""
@@ -284,7 +284,7 @@ class _Table:
         for key in self.values:
             if key not in keys:
                 known = ", ".join(sorted(keys))
-                raise self.refusal(key, f"left out or spelt as one of {known}")
+                raise self.refusal(key, f"omitted, or one of {known}")
 
     def get(self, key: str, kind: type[_Some], usual: _Some | None = None) -> _Some:
         value = self.values.get(key, usual)
@@ -296,7 +296,7 @@ class _Table:
     def words(self, key: str) -> str:
         text = self.get(key, str).strip()
         if not 1 <= len(text) <= 2 * _LINE:
-            raise self.refusal(key, f"text of 1 to {2 * _LINE} letters")
+            raise self.refusal(key, f"text of 1 to {2 * _LINE} characters")
         return text
 
     def real(self, key: str) -> float:
@@ -305,7 +305,7 @@ class _Table:
             raise self.refusal(key, "a number, in SI units")
         with suppress(OverflowError):
             return float(value)
-        raise self.refusal(key, "a number that is not as large")
+        raise self.refusal(key, "a smaller number")
 
     def within(self, key: str, least: int, most: int) -> int:
         value = self.get(key, int)
@@ -317,7 +317,7 @@ class _Table:
         try:
             return expression(text, KINDS, wanted)
         except Refusal as refusal:
-            raise self.refusal(key, f"right ({refusal})") from refusal
+            raise self.refusal(key, f"a valid expression ({refusal})") from refusal
 
     def settings(self, key: str) -> dict[str, Any]:
         """The settings in the table `key`, by their names; none where there is none."""
@@ -325,7 +325,7 @@ class _Table:
         try:
             return {str(name): checked_setting(str(name), one) for name, one in values.items()}
         except Refusal as refusal:
-            raise self.refusal(key, f"settings ({refusal})") from refusal
+            raise self.refusal(key, f"a table of valid settings ({refusal})") from refusal
 
     def placed(self) -> dict[str, Any]:
         """The settings of a step or a button, and the ready scene among them."""
@@ -340,5 +340,5 @@ class _Table:
         for place in places:
             if place not in _PLACES:
                 docks = ", ".join((*DOCKS, *READOUTS))
-                raise self.refusal("point", f"settings by their names, or of {docks}")
+                raise self.refusal("point", f"names of settings, or some of {docks}")
         return tuple(places)

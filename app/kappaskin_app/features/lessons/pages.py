@@ -265,7 +265,7 @@ class ListPage(QWidget):
             "Start or continue the lesson (Enter, or double-click). It changes the settings; Leave "
             "restores them.",
         )
-        self.open = button(f"&Open file{ELLIPSIS}", "open-lesson", "Open a lesson from a file.")
+        self.open = button(f"&Open file{ELLIPSIS}", "open-lesson", "Open a lesson file.")
         stack = QVBoxLayout(self)
         stack.setContentsMargins(8, 6, 8, 8)
         stack.addWidget(self.list, 1)

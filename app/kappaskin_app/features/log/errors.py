@@ -166,7 +166,7 @@ class ReportDialog(WorkDialog):
 REPORT_TIP = "Save the log, the settings and the versions in one file"
 _TIP = (
     "Errors inside the program, which continues. Click to read them in the Log; Help > Report "
-    "saves a file for finding the cause."
+    "saves a file that helps to find the cause."
 )
 
 
@@ -179,7 +179,7 @@ class Errors(QObject):
         self.failures = 0
         self.count = QToolButton()
         self.count.setToolTip(_TIP)
-        self.count.setAccessibleName("No failures")
+        self.count.setAccessibleName("No errors")
         self.count.clicked.connect(guarded(lambda *_: window.docks.reveal("log")))
         self.count.hide()
         self.report = ReportDialog(self._contents, log_folder(), window.tasks, window)
@@ -194,8 +194,8 @@ class Errors(QObject):
 
     def _take(self, words: str) -> None:
         self.failures += 1
-        self.count.setText(f"{self.failures} failure{'s' if self.failures > 1 else ''}")
-        self.count.setAccessibleName(f"{self.count.text()}: read them")
+        self.count.setText(f"{self.failures} error{'s' if self.failures > 1 else ''}")
+        self.count.setAccessibleName(f"{self.count.text()}: open the Log")
         self.count.show()
         self.events.note("failure", words)
         self._window.notify(words)

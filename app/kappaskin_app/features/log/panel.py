@@ -81,7 +81,7 @@ class LogBuffer(logging.Handler):
 _ROOM = 6  # px above and below a line together
 _HEAD = ("Time", "Level", "Text")
 _LEVELS = (
-    ("Everything", logging.NOTSET),
+    ("All messages", logging.NOTSET),
     ("Warnings and errors", logging.WARNING),
     ("Errors", logging.ERROR),
 )
@@ -99,9 +99,9 @@ class LogPanel(QWidget):
         for words, level in _LEVELS:
             self.level.addItem(words, level)
         self.level.setAccessibleName("Level")
-        self.level.setToolTip("The least level of the messages listed.")
+        self.level.setToolTip("Lowest level of the messages listed.")
         self.level.currentIndexChanged.connect(guarded(lambda *_: self._fill()))
-        self.copy, self.clear = QPushButton("&Copy these"), QPushButton("C&lear")
+        self.copy, self.clear = QPushButton("&Copy list"), QPushButton("C&lear")
         self.copy.setToolTip("Copy the listed messages with all their lines, as text.")
         self.clear.setToolTip("Clear the list; the log file still has these messages.")
         self.copy.clicked.connect(guarded(lambda *_: self._copy()))

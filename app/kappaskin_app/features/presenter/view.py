@@ -23,7 +23,7 @@ _HEIGHT, _WIDTH = 1080.0, 1920.0  # px of the screen for which a unit is one px
 _SKIN, _FIGURES = 51, 49  # shares of the width
 _EDGE = 26.0  # units around the numbers
 _RADIUS = "Radius of the object"
-_OBJECTS = {"sphere": "ball", "cylinder": "pipe", "plane": "flat face", "skin": "skin there"}
+_OBJECTS = {"sphere": "ball", "cylinder": "pipe", "plane": "flat face", "skin": "skin at contact"}
 
 
 class PresenterView(QWidget):
@@ -120,7 +120,7 @@ class PresenterView(QWidget):
         self.force.show_figure(
             f"{number(feedback.force, '.3f')} N", _off(feedback.force_95, 3, "N")
         )
-        off = _off(1e3 * feedback.displacement_95, 2, "mm") or "at its deepest"
+        off = _off(1e3 * feedback.displacement_95, 2, "mm") or "largest on the skin"
         self.displacement.show_figure(f"{number(1e3 * feedback.displacement, '.2f')} mm", off)
         x, y = (number(1e3 * value, ".1f") for value in feedback.position)
         off = _off(1e3 * feedback.position_95, 1, "mm")

@@ -16,7 +16,7 @@ from kappaskin_app.widgets.parts import ELLIPSIS, text_label
 _NAMES = ("send_udp", "udp_to", "serve_foxglove", "foxglove_at")
 _EVERY = 0.5  # s between two updates of the counts
 _TIP = (
-    "Messages sent to each receiver, and those dropped because it was not ready or not there. "
+    "Messages sent to each receiver, and those dropped because it was not ready or not found. "
     "Publishing never delays the readings."
 )
 _LATE = "Latency from the arrival of a frame's bytes until it was sent, 99th percentile."

@@ -68,7 +68,7 @@ class RecordingMark(QWidget):
     minimumSizeHint = sizeHint
 
     def show_written(self, written: RecordingStatus, trouble: str) -> None:
-        """Show the recording, or why it ended by itself."""
+        """Show the recording, or the error that ended it."""
         if written.active:
             head, size = duration_of(written.seconds), size_of(written.size)
             head = head if written.seconds >= _HOUR else f"REC {head}"
@@ -78,7 +78,7 @@ class RecordingMark(QWidget):
                 "Messages are lost when the disk is too slow."
             )
         else:
-            self._show("REC ended", "by itself", True)
+            self._show("REC ended", "with an error", True)
             self.setToolTip(f"{trouble}\n\nClick to remove this mark.")
         self.setAccessibleName(f"{self.head}, {self.below}")
 
@@ -185,7 +185,7 @@ class RecordingControl(QObject):
         self._engine, self._window = engine, window
         self._replays = False
         self.written, self.ended = RecordingStatus(), ""
-        """The state of the recording, and why it ended by itself."""
+        """The state of the recording, and the error that ended it."""
         self.message, self.alarming = "", False
         self.damaged: Path | None = None
         self.repairs = RepairDialog(tasks, window)

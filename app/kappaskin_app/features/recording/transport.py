@@ -21,7 +21,7 @@ _HATCH = 6.0  # px between two lines of a gap
 _STEP = 1e-3  # s, for those who do not see it
 _NAMED = 3  # of flags at one place, those in the tooltip
 _TIP = (
-    "The recording: flags are events (point at one to read it), hatched spans are gaps. Press or "
+    "The recording: flags are events (point at one for its text), hatched spans are gaps. Press or "
     "drag to go to another time; Left and Right, or comma and period, step by one frame, Page Up "
     "and Page Down by a tenth, Home and End go to the ends; Space plays or pauses."
 )

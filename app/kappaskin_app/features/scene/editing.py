@@ -64,7 +64,7 @@ class SceneEditing:
         """Force an effect on or off, or by plan; raises `Refusal` for a text that is no TOML."""
         written = self._edited(forced(text_of(self._history.settings), effect, how))
         if written is not None:
-            self._history.change(f"Force {effect_name(effect).lower()}", -1, written=written)
+            self._history.change(f"Selection of {effect_name(effect).lower()}", -1, written=written)
 
     def replace_object(self, table: Mapping[str, Any], x: float, y: float, force: float) -> None:
         """Replace the object by that of the TOML `table`, at (x, y) in m with `force` in N."""

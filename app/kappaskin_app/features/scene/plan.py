@@ -88,7 +88,7 @@ class EffectPlanner(QObject):
 _COLUMNS = ("Effect", "Selection", "Simulated", "Size", "Error if omitted", "Time", "Reason")
 _TIPS = (
     "An effect on the readings.",
-    "Selected by the plan, or forced on or off.",
+    "Selected by the plan, or always on or off.",
     "Whether the effect is simulated.",
     "Dimensionless size of the effect in this scene; the tooltip shows the formula.",
     "Largest change of a reading if the effect is omitted, relative to the scene's peak curvature.",

@@ -1,6 +1,6 @@
 """Edits of a scene's TOML text, which keep its comments and layout.
 
-Each raises `Refusal` for a text that is no TOML, and KeyError or IndexError for a place that does
+Each raises `Refusal` for a text that is not TOML, and KeyError or IndexError for a place that does
 not exist.
 """
 
@@ -328,5 +328,5 @@ def _touch(document: Any, touch: int) -> Any:
     many = document.get("touch", ())
     each = [many] if isinstance(many, AbstractTable) else many  # a single table is an array of one
     if not touch < len(each):
-        raise Refusal(f"expected a scene with a touch {touch + 1}, got one with {len(each)}")
+        raise Refusal(f"expected a scene with touch {touch + 1}, got one with {len(each)} touches")
     return each[touch]

@@ -33,7 +33,7 @@ class ShapePanel(SimulationForm):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Shape", ("shape", *_NUMBERS, "edge"), parent)
         self.opening = QLabel()
-        self._opening_name = QLabel("Opening")
+        self._opening_name = QLabel("Opening angle")
         self._opening_name.setToolTip("The angle of the arc: its length over its radius.")
         self.form.insertRow(len(_NUMBERS) + 1, self._opening_name, self.opening)
         self._refusal, self._preparing = "", False

@@ -52,20 +52,20 @@ _QUARTER = tuple(p + 10 * q for q in range(5) for p in range(5))
 
 DEMONSTRATIONS = (
     Demonstration(
-        "Drop a row of elements",
+        "One row dead",
         "Ten dead elements, grey in the heatmaps. The others still distinguish all 64 modes, the "
-        "worst with half the singular value of the best: the error bars grow, the shape stays.",
+        "worst with half the singular value of the best: the error bars grow, the shape remains.",
         {"dead_elements": _ROW},
     ),
     Demonstration(
-        "Drop a quarter",
-        "25 dead elements. Some modes are almost zero at all the others: their noise is amplified "
+        "A quarter dead",
+        "25 dead elements. Some modes are almost zero at all the live ones: noise is amplified "
         "thousands of times. See the RMS error above, then the same with a prior.",
         {"dead_elements": _QUARTER, "load_case": "centre"},
     ),
     Demonstration(
-        "The quarter with a prior",
-        "Without readings, Bayes assumes the smoothness of a plate: the shape stays, with wider "
+        "A quarter dead, with a prior",
+        "Without readings, Bayes assumes the smoothness of a plate: the shape remains, with wider "
         "error bars there.",
         {"dead_elements": _QUARTER, "load_case": "centre", "method": "bayes"},
     ),
@@ -88,7 +88,7 @@ DEMONSTRATIONS = (
         _FINGERTIP,
     ),
     Demonstration(
-        "Its ends free to slide",
+        "The fingertip with sliding ends",
         "The same readings, but the fit assumes sliding ends: then "
         "sin \N{GREEK SMALL LETTER THETA}, in red, is undetermined, and the fit is refused.",
         _FINGERTIP,

@@ -68,7 +68,7 @@ class Spectrum:
         verb = "are" if self.silent > 1 else "is"
         return (
             f"Condition number infinite: {self.silent} of {count} modes {verb} unobservable and "
-            f"can only be determined by a prior. Of the others {others}."
+            f"can only be determined by a prior. Of the other modes {others}."
         )
 
     def mode_text(self, number: int) -> str:

@@ -100,7 +100,7 @@ class Skin:
         0.0129,
         Range(
             "Base radius",
-            "Radius of the arc of the unloaded skin; the paper's fingertip has 12.9 mm.",
+            "Radius of the arc of the unloaded skin; that of the paper's fingertip is 12.9 mm.",
             0.002,
             1.0,
             0.0005,

@@ -83,7 +83,7 @@ class ExportRequest:
                 f"every {self.every:g}"
             )
         if self.at is not None and (self.begin, self.end, self.every) != (0.0, math.inf, 0.0):
-            raise Refusal("expected one moment, or a span, got both; leave one of them out")
+            raise Refusal("expected one moment or a span of time, got both; omit one of them")
 
     def _check_format(self) -> None:
         if self.format not in TABLES + SURFACES:
@@ -92,8 +92,7 @@ class ExportRequest:
             )
         if self.format in TABLES and self.at is not None:
             raise Refusal(
-                f"a {self.format} has a row for each frame: give from when until when instead of "
-                "a moment"
+                f"a {self.format} has a row for each frame: give a span of time instead of a moment"
             )
         if self.format == ".vtp" and self.at is None:
             raise Refusal(
@@ -101,7 +100,7 @@ class ExportRequest:
                 "the time between two surfaces"
             )
         if self.format == ".pvd" and not self.every:
-            raise Refusal("a .pvd is a series: give the time between two surfaces")
+            raise Refusal("a .pvd is a series of surfaces: give the time between two surfaces")
         if self.format == ".stl" and self.at is None and not self.every:
             raise Refusal(
                 "an .stl is the skin at one moment, or a series: give the moment, or the time "
@@ -160,8 +159,8 @@ def recording_info(recording: Recording, request: ExportRequest) -> RecordingInf
             setups.append(number | _setup_facts(setup, sensor))
     if not setups:
         raise Refusal(
-            f"{path}: was recorded without settings until {request.end:g} s, so that no frame was "
-            "worked out; export a later span"
+            f"{path}: was recorded without settings until {request.end:g} s, so no frame was "
+            "computed; export a later span"
         )
     functions = (max(setup[name] for setup in setups) for name in ("Ni", "Nj"))
     return RecordingInfo(_facts(recording, devices[0].text, sensor, setups), sensor, (*functions,))
@@ -171,7 +170,7 @@ def another(at: float) -> str:
     """The error for a second device, `at` s after the beginning."""
     before, after = math.ceil(1e3 * at - 1) / 1e3, math.floor(1e3 * at + 1) / 1e3
     return (
-        f"another device, or another skin, came at {at:.6g} s, and a file is of one: export the "
+        f"another device, or another skin, came at {at:.6g} s; a file holds one only: export the "
         f"time until {before:.3f} s (--until), or from {after:.3f} s on (--from)"
     )
 

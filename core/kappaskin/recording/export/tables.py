@@ -62,7 +62,7 @@ def columns(info: RecordingInfo) -> tuple[Column, ...]:
     made = {group: _columns(group, lengths) for group in ("frame", "fit", "contact")}
     return (
         Column(
-            "time", "s", "<f8", (), (), "when it came, since the recording began", attrgetter("at")
+            "time", "s", "<f8", (), (), "arrival time since the recording began", attrgetter("at")
         ),
         *made["frame"],
         Column(

@@ -57,11 +57,11 @@ class Exported(NamedTuple):
         """Counts of frames written and left out, as text."""
         parts = [f"{self.written:,} frame{'s' * (self.written != 1)}"]
         if self.unsettled:
-            parts.append(f"{self.unsettled:,} recorded before the first settings left out")
+            parts.append(f"{self.unsettled:,} omitted: recorded before the first settings")
         if self.shapeless:
-            parts.append(f"{self.shapeless:,} whose readings determine no shape left out")
+            parts.append(f"{self.shapeless:,} omitted: readings determine no shape")
         if not self.whole:
-            parts.append("the recording broke off, and this is up to there")
+            parts.append("the recording is incomplete; this is all up to its end")
         return "; ".join(parts)
 
 
@@ -161,7 +161,7 @@ class _Work:
         elif self._shapeless:
             why = f"the readings {span} determine no shape"
         elif math.isnan(self._last):
-            why = "got none that can be used"
+            why = "got no usable frames"
         else:
             which = "next" if self._last > self._request.end else "last"
             why = f"got none {span}; the {which} one came at {self._last:.6g} s"
@@ -233,7 +233,7 @@ class ExportTask:
         try:
             for place in self.files:
                 if place.exists():
-                    raise FileExistsError(17, "it has appeared meanwhile")
+                    raise FileExistsError(17, "it has been created meanwhile")
                 made = self._scratch / place.name
                 made.rename(place)
                 given.append((place, made))

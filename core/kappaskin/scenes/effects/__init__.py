@@ -48,5 +48,5 @@ _LINK = (DroppedFrames, CorruptedFrames)
 EFFECTS: dict[str, type[Effect]] = {
     effect.name: effect for effect in (*_SKIN, *_GAGES, *_ELECTRONICS, *_LINK)
 }
-"""Every known effect by name, in the order in which they come about: in the skin, in its gages, in
+"""Every known effect by name, in the order in which they act: in the skin, in its gages, in
 the electronics, on the link."""

@@ -1,4 +1,4 @@
-"""What every effect on readings has: a name, numbers within limits, and a size in a scene.
+"""Interface of effects on readings: a name, parameters within limits, and a size in a scene.
 
 The size of an effect is judged by a `Survey` of the scene, so that what does not matter there can
 be left out.

@@ -47,7 +47,7 @@ class Skew(Effect):
     """Channels are read one after the other while the skin moves; `Scan.times` says when."""
 
     name: ClassVar = "skew"
-    elsewhere: ClassVar = "the converter's times make it"
+    elsewhere: ClassVar = "it follows from the converter's times"
     formula: ClassVar = "scan time times rate of curvature over peak curvature"
 
     def size(self, survey: Survey) -> Size:
@@ -91,7 +91,7 @@ class Quantisation(ReadingEffect):
     """Curvature is that of the count next to it, as `transduction` counts: no rails, only steps."""
 
     name: ClassVar = "quantisation"
-    elsewhere: ClassVar = "the converter makes it"
+    elsewhere: ClassVar = "it follows from the converter"
     at_once: ClassVar = True
     formula: ClassVar = "half a count over peak curvature"
 
@@ -112,9 +112,9 @@ class Saturation(ReadingEffect):
     """Curvature stays between the lowest and the highest count of `transduction`."""
 
     name: ClassVar = "saturation"
-    elsewhere: ClassVar = "the amplifier and the converter make it"
+    elsewhere: ClassVar = "it follows from the amplifier and the converter"
     at_once: ClassVar = True
-    formula: ClassVar = "largest curvature over that at the rail on its side"
+    formula: ClassVar = "largest curvature over that at the limit of the electronics"
 
     transduction: Transduction
 

@@ -1,4 +1,4 @@
-"""Failures, as a scene's author decides: of elements, and of the link from the device."""
+"""Failures of elements and of the link from the device, selected by the scene's author."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -56,7 +56,7 @@ class DeadElements(_Failing, LayoutEffect):
 
     name: ClassVar = "dead"
     label: ClassVar = "Dead elements"
-    elsewhere: ClassVar = "[elements] has those that are dead"
+    elsewhere: ClassVar = "set dead in [elements]"
 
     def of(self, layout: SensorLayout) -> SensorLayout:
         return layout.without(self.elements)

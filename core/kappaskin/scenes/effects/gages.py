@@ -37,7 +37,7 @@ class FiniteSlopeEffect(Effect):
     """
 
     name: ClassVar = "finite-slope"
-    elsewhere: ClassVar = "it has no numbers: name it in choose, on or off"
+    elsewhere: ClassVar = "it has no parameters: name it in choose, on or off"
     formula: ClassVar = "largest slope squared"
 
     def size(self, survey: Survey) -> Size:
@@ -59,7 +59,7 @@ class GageLength(LayoutEffect):
     """Gages are `length` L in m long, along x, along y and along both diagonals."""
 
     name: ClassVar = "gage-length"
-    elsewhere: ClassVar = "[elements] has the gage_length"
+    elsewhere: ClassVar = "set gage_length in [elements]"
     formula: ClassVar = "k L / 2, where k^2 is peak curvature over peak deflection"
 
     length: Annotated[float, Within(0, 10, "m")]
@@ -255,7 +255,7 @@ class Tolerance(ReadingEffect):
     name: ClassVar = "tolerance"
     example: ClassVar = {"gain_sd": 0.05, "offset_sd": 1.0}
     at_once: ClassVar = True
-    formula: ClassVar = "spread of the gains, plus that of the offsets over peak curvature"
+    formula: ClassVar = "sd of the gains, plus that of the offsets over peak curvature"
 
     gain_sd: Annotated[float, Within(0, 10)]
     offset_sd: Annotated[float, Within(0, 1e4, "1/m")]

@@ -1,4 +1,4 @@
-"""What holds the skin besides its own stiffness: tension, foam and fluid."""
+"""Support of the skin in addition to its stiffness: tension, foam and fluid."""
 
 from abc import abstractmethod
 from dataclasses import dataclass, replace
@@ -41,7 +41,7 @@ class Tension(_Backing):
     """The skin is pulled with `tension` T in N/m all round, as a drum head."""
 
     name: ClassVar = "tension"
-    elsewhere: ClassVar = "[skin] has the tension"
+    elsewhere: ClassVar = "set tension in [skin]"
     formula: ClassVar = "T k^2 over the rest of the first mode's stiffness, D k^4 + k_f"
 
     tension: Annotated[float, Within(0, 1e6, "N/m")]
@@ -61,7 +61,7 @@ class Foam(_Backing):
     """The skin lies on foam with the `foundation` modulus k_f in N/m^3."""
 
     name: ClassVar = "foam"
-    elsewhere: ClassVar = "[skin] has the foundation"
+    elsewhere: ClassVar = "set foundation in [skin]"
     formula: ClassVar = (
         "k_f over the rest of the first mode's stiffness, D k^4 + T k^2: k_f a^4 / (4 D pi^4) of a "
         "square without tension"
@@ -84,7 +84,7 @@ class Fluid(_Backing):
     """The skin closes in a fluid that keeps its volume."""
 
     name: ClassVar = "fluid"
-    elsewhere: ClassVar = "[skin] has the fluid"
+    elsewhere: ClassVar = "set fluid in [skin]"
     formula: ClassVar = "volume displaced without it, over area times peak deflection"
 
     def of(self, plate: Plate) -> Plate:

@@ -165,7 +165,7 @@ def settings_to_try(
 # Which costs are worth their time
 
 ALIKE = 0.01
-"""Errors that differ by a smaller share count as equal: who would wait for that?"""
+"""Relative difference below which errors count as equal."""
 
 
 def frontier(costs: Iterable[Cost | Refused], total: bool = False) -> tuple[Cost, ...]:

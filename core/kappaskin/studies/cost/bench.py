@@ -349,7 +349,7 @@ def usual_setting(scene: Scene) -> Setting:
         except Refusal:
             continue
         return Setting(method, functions, own_elements(scene))
-    raise Refusal(f"expected elements that carry a shape, got the {len(scene.layout)} of the scene")
+    raise Refusal(f"expected enough elements for a shape, got the {len(scene.layout)} of the scene")
 
 
 def effect_costs(scene: Scene, setting: Setting) -> tuple[EffectCost, ...]:

@@ -108,8 +108,8 @@ def effects_text(scene: Scene, setting: Setting, found: Sequence[EffectCost]) ->
     how = setting.method, "{} x {} functions".format(*setting.functions)
     lines = [
         f"What each effect costs in the scene {scene.name}, with {', '.join(how)}",
-        "us      what it adds to simulating a frame",
-        "bound   by how much leaving it out changes a reading at most, as a share of the peak",
+        "us      computing time that it adds to a simulated frame",
+        "bound   largest change of a reading if it is omitted, as a share of the peak",
         f"RMS     error over the skin, mean of {FRAMES} frames all over the scene",
         "",
         f"{'effect':<18}{'kept':<5}{'us':>8}{'bound':>10}{'RMS with':>12}{'without it':>12}",
@@ -138,7 +138,7 @@ def costs_text(scene: Scene, costs: Sequence[Cost | Refused]) -> str:
     sections = {
         "No other setting beats these in both error and time": best,
         "The methods, on all of the scene's own elements": _methods(scene, costs),
-        "What elements, precision and fewer channels change": _others(costs),
+        "Other elements, precision and fewer channels": _others(costs),
     }
     lines = [_intro(scene)]
     for title, shown in sections.items():
@@ -263,13 +263,13 @@ def accuracy_verdict(
     """
     found = cheapest(costs, within)
     if found is not None:
-        lines = (f"{_mm_text(within)} is reached; with the least time by", *described(found))
+        lines = (f"{_mm_text(within)} is reached; in the least time with", *described(found))
         return AccuracyVerdict(True, found, (*lines, *_remarks(scene, costs, within, found)))
     known = [cost for cost in costs if isinstance(cost, Cost)]
     if not known:
-        return AccuracyVerdict(False, None, ("No setting that was tried gives a shape.",))
+        return AccuracyVerdict(False, None, ("No measured setting gives a shape.",))
     best = min(known, key=lambda cost: cost.rms)
-    line = f"{_mm_text(within)} is reached by none of {len(known)} settings; nearest is"
+    line = f"{_mm_text(within)} is reached by none of {len(known)} settings; the nearest is"
     return AccuracyVerdict(False, best, (line, *described(best), *_missing(scene, known, within)))
 
 
@@ -295,7 +295,7 @@ def described(cost: Cost) -> tuple[str, ...]:
         f"{elements_text(cost)} elements, {scanned}",
         f"  RMS error {_mm_text(cost.rms)}, {_mm_text(cost.rms_exact)} without noise; at the load "
         f"{1e3 * cost.e:+.3f} +- {1e3 * cost.e_sd:.3f} mm",
-        f"  an answer after {_s(cost.total_time)}: {_s(cost.conversion_time)} of conversion, "
+        f"  an estimate after {_s(cost.total_time)}: {_s(cost.conversion_time)} of conversion, "
         f"{_s(cost.time_per_frame)} of arithmetic",
     )
 
@@ -338,7 +338,7 @@ def _missing(scene: Scene, known: Sequence[Cost], within: float) -> list[str]:
         least = min(whole, key=lambda cost: cost.rms_exact)
         Ni, Nj = least.setting.functions
         return [
-            "Missing are functions, and elements that distinguish them: without noise the error "
+            "More functions are needed, and elements to distinguish them: without noise the error "
             f"is {_mm_text(least.rms_exact)}",
             f"at best, with {Ni} x {Nj} functions on {elements_text(least)} elements. Neither a "
             "faster conversion nor more time helps.",
@@ -347,11 +347,11 @@ def _missing(scene: Scene, known: Sequence[Cost], within: float) -> list[str]:
     (Ni, Nj), times = cost.setting.functions, _times(cost, within)
     frames = math.ceil(times)
     return [
-        f"Missing are readings: without noise {Ni} x {Nj} functions on {elements_text(cost)} "
+        f"More readings are needed: without noise {Ni} x {Nj} functions on {elements_text(cost)} "
         f"elements reach {_mm_text(cost.rms_exact)}. It takes {times:.2g} times as many:",
         f"  more elements: {_more_elements(scene, cost, times)}",
         f"  or more time: about {frames} frames averaged, {_s(frames * cost.total_time)} for an "
-        "answer, while the load rests",
+        "estimate, while the load is constant",
     ]
 
 
@@ -417,7 +417,7 @@ def draw(figure: style.Figure, scene: Scene, costs: Sequence[Cost | Refused]) ->
         raise Refusal("expected a setting whose error is smaller than the shape, got none to draw")
     style.resize(figure, style.DOUBLE, 97)
     style.letter(figure, 1, 96, "a", "arithmetic of a frame")
-    style.letter(figure, 92, 96, "b", "until the answer is there, conversion included")
+    style.letter(figure, 92, 96, "b", "until the estimate, conversion included")
     panels = [style.place(figure, (left, 22, *_PANEL)) for left in (13, 103)]
     for axes, total in zip(panels, (False, True), strict=True):
         axes.set(xscale="log", yscale="log")

@@ -127,7 +127,7 @@ def cluster(address: str) -> Generator[Workers]:
         client = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
         raise Refusal(
-            f"{address}: no Dask scheduler replies there ({error}); start one by dask scheduler, "
+            f"{address}: no Dask scheduler replies there ({error}); start one with dask scheduler, "
             "and give the address that it prints"
         ) from error
     try:
@@ -165,7 +165,7 @@ def _check_workers(client: Any, address: str) -> None:
         kinds: dict[str, str] = client.run(worker_kind)
     except Exception as error:  # whatever a worker without kappaskin, or with an old one, raises
         raise Refusal(
-            f"{address}: expected workers with {version()}, got some that do not report theirs "
+            f"{address}: expected workers with {version()}, got some of unknown version "
             f"({error}); install the same kappaskin[dask] there"
         ) from error
     alike = f"{version()}, threads of BLAS 1"
@@ -173,7 +173,7 @@ def _check_workers(client: Any, address: str) -> None:
         worker, other = next(iter(others.items()))
         raise Refusal(
             f"{address}: expected workers with {alike}, got {len(others)} of {len(kinds)} "
-            f"with another, {worker} with {other}; install the same on all, and "
+            f"with others, {worker} with {other}; install the same on all, and "
             "start them with OPENBLAS_NUM_THREADS=1"
         )
 
@@ -198,7 +198,7 @@ class StudyProgress:
         """A line of progress at `now` in s: blocks done, rate, time left, failures."""
         rate = (self.done - self.found) / max(now - self.began, 1e-9)
         left = f", {(self.required - self.done) / rate:.0f} s left" if rate else ""
-        found = f", {self.found} known before" if self.found else ""
+        found = f", {self.found} computed before" if self.found else ""
         failed = f", {self.failed} failed" if self.failed else ""
         return f"{self.done} of {self.required} blocks{found}, {rate:.3g}/s{left}{failed}"
 
@@ -273,7 +273,7 @@ class _Run:
             return str(refusal)
         except BrokenExecutor:
             again = task.key in self._suspects
-            return "the process that computed it died, and so did a second one" if again else None
+            return "two processes that computed it ended unexpectedly" if again else None
         except CancelledError:
             raise scheduler_lost() from None
         except Exception as error:  # whatever there is wrong with one task, the others go on

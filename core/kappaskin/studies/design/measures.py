@@ -203,13 +203,13 @@ def _time(block: FrameBlock) -> Array:
 MEASURES = {
     "rms": StudyMeasure("RMS error of the shape", "mm", 1e3, FrameBlock.rms_error),
     "at-load": StudyMeasure("error at the load, signed", "mm", 1e3, _at_load),
-    "contact": StudyMeasure("distance of the contact found", "mm", 1e3, _contact),
-    "force": StudyMeasure("error of the force, of the largest", "%", 1e2, _force),
-    "found": StudyMeasure("frames with a contact found", "%", 1e2, _found, share=True),
+    "contact": StudyMeasure("error of the contact position", "mm", 1e3, _contact),
+    "force": StudyMeasure("error of the force, relative to the largest", "%", 1e2, _force),
+    "found": StudyMeasure("share of frames with a contact", "%", 1e2, _found, share=True),
     "radius": StudyMeasure("error of the object's radius", "%", 1e2, _radius),
     "covered": StudyMeasure("skin within the 95 % bands", "%", 1e2, _covered, share=True),
-    "predicted": StudyMeasure("RMS error by noise alone, predicted", "mm", 1e3, _predicted),
-    "rate": StudyMeasure("frame rate that the conversions allow", "frames/s", 1.0, _rate),
+    "predicted": StudyMeasure("RMS error due to noise alone, predicted", "mm", 1e3, _predicted),
+    "rate": StudyMeasure("highest frame rate by the conversion time", "frames/s", 1.0, _rate),
     "time": StudyMeasure("time to fit a frame", "us", 1e6, _time),
 }
 """What can be measured, by name; lengths in m, rates in 1/s, times in s, the others shares of 1.

@@ -87,7 +87,7 @@ def remarks_on(study: Study, known: Sequence[PointResults]) -> list[str]:
             what = ", ".join(study.stop.of)
             remarks.append(
                 f"{at}: {what} not known to {100 * study.stop.within:g} % after the "
-                f"{study.stop.most} blocks that are allowed"
+                f"{study.stop.most} blocks allowed"
             )
     return remarks
 
@@ -161,16 +161,16 @@ def page_of(study: Study, known: Sequence[PointResults], figures: Mapping[str, s
         f"<p>{html.escape(study.description.strip())}</p>",
         f"<p class='faint'>{len(known)} points, {computed} blocks of "
         f"{study.base.measure.frames} frames. Bars and ± are 95 % intervals of the mean. "
-        "What varies is in the units of scene files: m, 1/m, N and s.</p>",
+        "The parameters have the units of scene files: m, 1/m, N and s.</p>",
         f"<h2>Remarks</h2><ul>{remarks}</ul>" if remarks else "",
         *drawn,
         "<h2>Table</h2>",
         f"<div class='wide'>{_table(study, known)}</div>",
-        "<h2>To repeat it</h2>",
+        "<h2>How to repeat this study</h2>",
         f"<p>Save this as {html.escape(study.name)}.toml and run "
         f"<code>kappaskin study {html.escape(study.name)}.toml</code>, with "
-        f"{html.escape(version())} (here on Python {platform.python_version()}). The same numbers "
-        "come out to the last bit, but for times.</p>",
+        f"{html.escape(version())} (here on Python {platform.python_version()}). The numbers "
+        "are bit-identical, except times.</p>",
         f"<pre>{html.escape(study.text)}</pre>",
     ]
     return (

@@ -116,7 +116,7 @@ def _compensated(scene: Scene, read: Array) -> Array:
     """Readings (T, 3 P) in 1/m, one after the other, with the scene's hysteresis compensated."""
     loops = [effect for effect in kept_effects(scene) if isinstance(effect, Hysteresis)]
     if not loops:
-        raise Refusal("expected a scene with hysteresis to compensate, got none of it")
+        raise Refusal("expected a scene with hysteresis to compensate, got one without")
     undo = loops[0].operator(read.shape[1]).inverse.start()
     return np.array([undo(frame) for frame in read])
 
@@ -291,7 +291,7 @@ class StudyFolder:
             if any(path.iterdir()) and (owner := folder.name) != study.name:
                 raise Refusal(
                     f"{path}: expected an empty folder or one of the study {study.name}, got that "
-                    f"of {owner}; choose another by --out"
+                    f"of {owner}; choose another with --out"
                 )
             folder._write(path / _ABOUT, json.dumps({"study": study.name}))
             folder._write(path / _TEXT, study.text)
@@ -308,8 +308,7 @@ class StudyFolder:
             return str(json.loads((self.path / _ABOUT).read_text("utf-8"))["study"])
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise Refusal(
-                f"{self.path}: expected the folder of a study, which kappaskin study made; this is "
-                f"none ({error})"
+                f"{self.path}: expected a folder made by kappaskin study, got another one ({error})"
             ) from error
 
     def study(self) -> Study:

@@ -38,7 +38,7 @@ def parts_of(place: str) -> list[str | int]:
     for part in place.split("."):
         if not (match := _PART.fullmatch(part)):
             raise Refusal(
-                f"expected a place in this file such as elements.grid or touch[1].x, got {place!r}"
+                f"expected a key in this file such as elements.grid or touch[1].x, got {place!r}"
             )
         found.append(match[1])
         if match[2]:
@@ -70,9 +70,9 @@ def _inside(at: Any, part: str | int, place: str, array: bool) -> Any:
     found = cast("dict[str, Any]", at).setdefault(part, [] if array else {})
     if isinstance(found, list) != array:
         raise Refusal(
-            f"expected {part}[1] or another number in {place!r}, for there are several"
+            f"expected {part}[1] or another number in {place!r}, since there are several"
             if isinstance(found, list)
-            else f"expected no number after {part} in {place!r}, for there is one alone"
+            else f"expected no number after {part} in {place!r}, since there is only one"
         )
     return found
 
@@ -134,7 +134,7 @@ def read_axis(table: TomlTable, most: int) -> Axis:
     places = {place: _values(table, place, most) for place in table}
     counts = {place: len(values) for place, values in places.items()}
     if not places or not all(counts.values()):
-        raise table.refusal("expected values to go through, got none")
+        raise table.refusal("expected values to vary, got none")
     if len(set(counts.values())) > 1:
         got = ", ".join(f"{count} of {place}" for place, count in counts.items())
         raise table.refusal(f"expected as many values of each, since they go together, got {got}")
@@ -199,7 +199,7 @@ class LogUniform(Uniform):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.low > 0:
-            raise Refusal(f"expected low above zero where factors are alike, got {self.low:g}")
+            raise Refusal(f"expected low above zero for a log-uniform draw, got {self.low:g}")
 
     def __call__(self, rng: np.random.Generator) -> float:
         return float(math.exp(rng.uniform(math.log(self.low), math.log(self.high))))
@@ -370,7 +370,7 @@ def _scene(top: TomlTable, file: Path) -> Scene:
         for key in _ELSEWHERE:
             if key in touch:
                 raise touch.refusal(
-                    "expected nothing that is in a file of its own: workers have none; take a "
+                    "expected nothing in a separate file, which workers do not have; use a "
                     "sphere, a cylinder or another shape, and steps or an orbit",
                     key,
                 )
@@ -560,7 +560,7 @@ def _check_place(
         parts = parts_of(place)
         if parts[0] in barred:
             raise Refusal(
-                "expected to vary or draw what is simulated, not what the study does with it"
+                "expected a parameter of the scene, fit or placement, not of the study itself"
             )
         # A table says again all that stands in it.
         if any(parts[: len(other)] == other[: len(parts)] for other in seen):

@@ -63,7 +63,7 @@ def _spoilt(fault: Callable[[Path], AbstractContextManager[None]], _: Stand) -> 
                 refusal = str(reason)
         claims = [
             ("cannot be written" in refusal, "that the disk was full is not reported"),
-            (path.read_bytes() == before, "the file that was there is spoilt"),
+            (path.read_bytes() == before, "the existing file is damaged"),
             (list(Path(folder).iterdir()) == [path], "half a file is left behind"),
         ]
     return DrillOutcome(failures=tuple(text for holds, text in claims if not holds))
@@ -146,8 +146,8 @@ def _claims(
         return [(False, str(refusal))]
     kept = sum(len(data) for _, sent, data in lines if not sent)
     if full:
-        room = "whole up to then" in written.trouble and 0 < kept < received
-        return [(whole, "the file is not whole"), (room, "that the disk was full is not reported")]
+        room = "complete up to that time" in written.trouble and 0 < kept < received
+        return [(whole, "the file is incomplete"), (room, "that the disk was full is not reported")]
     untroubled = not written.trouble and not written.lost
     return [
         (whole and untroubled, f"the file is not whole: {written.trouble or written.lost}"),
@@ -260,9 +260,9 @@ def _killed(stand: Stand) -> DrillOutcome:
             engine,
             recovered,
             (streaming, "no frames came"),
-            (noticed, "that it ended was not noticed within 1 s"),
-            (engine.pid != was, "no other process was started"),
-            (reported, "that it was restarted is not reported"),
+            (noticed, "its end was not detected within 1 s"),
+            (engine.pid != was, "no new process was started"),
+            (reported, "its restart is not reported"),
         )
 
 
@@ -287,7 +287,7 @@ def _orphaned(stand: Stand) -> DrillOutcome:
         )
     failures = [
         (streaming, "no frames came"),
-        (ended, f"the live process is still there after {took:.1f} s"),
+        (ended, f"the live process still runs after {took:.1f} s"),
         (clean, f"left in {_MEMORY}: {', '.join(block.name for block in blocks)}"),
     ]
     return DrillOutcome(
@@ -332,7 +332,7 @@ def _blocks_of(pid: int) -> list[Path]:
 
 PROCESS_DRILLS = [
     Drill("engine suspended", "the live process is suspended and resumes", _suspend, _WITHIN),
-    Drill("engine killed", "kill -9 of the live process: another takes over", _killed, _RESTARTED),
+    Drill("engine killed", "kill -9 of the live process: a new one starts", _killed, _RESTARTED),
     Drill(
         "app killed",
         "kill -9 of the window's process: the live process ends too",

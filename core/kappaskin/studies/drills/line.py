@@ -187,7 +187,7 @@ def _spoilt(make: Callable[[Stand], Spoil], stand: Stand) -> DrillOutcome:
         stand.relay.spoil = make(stand)
         stand.run(10.0 if stand.long else 0.8)
     spoilt = stand.source.accounting().bytes_discarded
-    return stand.outcome((spoilt > 0, "nothing was spoilt"))
+    return stand.outcome((spoilt > 0, "nothing was corrupted"))
 
 
 def _cuts(stand: Stand) -> DrillOutcome:
@@ -218,7 +218,7 @@ def _speed(baud_rate: int, stand: Stand) -> DrillOutcome:
     relay.spoil = clean
     lost = stand.source.accounting().lost
     return stand.outcome(
-        (stand.reported("rate"), "the rate that was found is not reported"),
+        (stand.reported("rate"), "the detected baud rate is not reported"),
         (lost == 0, f"{lost} messages lost after the rate was found"),
         restarted=True,  # what was sent before is nowhere counted
     )
@@ -238,11 +238,11 @@ BYTE_DRILLS = [
     *GARBAGE,
     Drill(
         "bits",
-        "one bit in 20,000 turned over",
+        "one bit in 20,000 inverted",
         partial(_spoilt, lambda stand: FlippedBits(20_000, stand.rng)),
         _WITHIN,
     ),
-    Drill("cuts", "messages cut off after every byte, and restarted", _cuts, _WITHIN),
+    Drill("cuts", "messages cut off after each byte in turn, then restarted", _cuts, _WITHIN),
     Drill(
         "baud rate too low",
         "bits at 2,000,000 baud read at 921,600",
@@ -375,7 +375,7 @@ def _other_plugged_in(stand: Stand) -> DrillOutcome:
     stand.relay.rewrite, stand.relay.sequence = InformationChange("serial_number", "drill"), 0
     stand.relay.plug()
     stand.recover(_BACK)
-    other = (stand.reported("other"), "that it is another device is not reported")
+    other = (stand.reported("other"), "the other device is not reported")
     return stand.outcome(other, cut_off=True, restarted=True)
 
 
@@ -400,7 +400,7 @@ def _unplug(stand: Stand) -> DrillOutcome:
     return stand.outcome(
         (
             counts == [cycles, cycles],
-            f"of {cycles} times, gone was reported {counts[0]}, back {counts[1]}",
+            f"of {cycles} disconnections, {counts[0]} were reported, and {counts[1]} reconnections",
         ),
         *ProcessResources.now().leaked(before, _GROWTH),
         cut_off=True,
@@ -448,7 +448,7 @@ def _host_clock(stand: Stand) -> DrillOutcome:
     trouble = stand.source.trouble
     return stand.outcome(
         (all(followed), "times do not follow this machine's clock"),
-        (not trouble, f"it is still in trouble: {trouble}"),
+        (not trouble, f"it still reports an error: {trouble}"),
     )
 
 
@@ -462,17 +462,17 @@ DEVICE_DRILLS = [
     Drill("restart", "a device that restarts while it is connected", _restart, _WITHIN),
     Drill(
         "other device",
-        "another one on the same line",
+        "another device on the same line",
         partial(_other, "serial_number", "other"),
         _WITHIN,
     ),
     Drill(
         "other firmware",
-        "its firmware is changed",
+        "the device returns with other firmware",
         partial(_other, "firmware", "firmware"),
         _WITHIN,
     ),
-    Drill("other plugged in", "another one on the port", _other_plugged_in, _BACK),
+    Drill("other plugged in", "another device on the same port", _other_plugged_in, _BACK),
     Drill("unplug", "unplugged and plugged in again and again", _unplug, _BACK),
     Drill("suspend", "the device is suspended and resumes", _suspend, _WITHIN),
     Drill("device clock", "the device's clock is set", _device_clock, _WITHIN),

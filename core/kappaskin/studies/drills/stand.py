@@ -1,4 +1,4 @@
-"""Test stand of a drill: a device, the relay before it, and the source behind that."""
+"""Test stand of a drill: a device, a relay that corrupts its traffic, and the source."""
 
 import json
 import math

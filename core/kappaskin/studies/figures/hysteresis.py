@@ -89,7 +89,7 @@ def draw_loops(figure: style.Figure) -> None:
     """The loop with the calibration line left, errors on other cylinders right."""
     first, second = loop_run(FIRST_GENERATION_LOOPS), loop_run(SECOND_GENERATION_LOOPS)
     style.resize(figure, style.DOUBLE, 84)
-    style.letter(figure, 1, 83, "a", "one gage pair on cylinders, there and back")
+    style.letter(figure, 1, 83, "a", "one gage pair on cylinders, falling and rising radius")
     style.letter(figure, 93, 83, "b", "its error on cylinders not calibrated on")
     _draw_loop(style.place(figure, (13, 10, 71, 67)), first, second)
     _draw_errors(style.place(figure, (104, 10, 67, 67)), second)
@@ -106,13 +106,13 @@ def _draw_loop(axes: style.Axes, first: _LoopRun, second: _LoopRun) -> None:
               label="least-squares line")  # fmt: skip
     axes.plot(applied, read, color=style.BLUE, lw=0.8, label="second prototype")
     back = np.array([step.back for step in second.sweep.steps[since]])
-    for way, fill, name in ((~back, style.BLUE, "way there"), (back, "white", "way back")):
+    for way, fill, name in ((~back, style.BLUE, "falling"), (back, "white", "rising")):
         axes.plot(applied[way], read[way], ls="", marker="o", mfc=fill, color=style.BLUE, mew=0.7,
                   label=name)  # fmt: skip
     axes.set(xlim=ends, ylim=(-100, 100), xticks=range(-80, 81, 40), yticks=range(-80, 81, 40))
     axes.set(xlabel="applied curvature [1/m]", ylabel="curvature read [1/m]")
     axes.legend(loc="upper left")
-    lines = ["widest gap, κ > 0 / κ < 0:"]
+    lines = ["widest loop, κ > 0 / κ < 0:"]
     for name, found in (("first", first), ("second", second)):
         inner, outer = found.report.gaps[:, PAIR]
         lines.append(f"{name} {inner:.1f} / {outer:.1f} 1/m")
@@ -229,7 +229,7 @@ def draw_initial_curvature(figure: style.Figure) -> None:
     style.resize(figure, style.DOUBLE, 70)
     applied = rows[0]["applied_mm"]
     style.letter(figure, 1, 69, "a", f"readings while {applied:.2f} mm are pressed in and released")
-    style.letter(figure, 97, 69, "b", "the shape that they are taken for")
+    style.letter(figure, 97, 69, "b", "the shape estimated from them")
     readings, shape = (style.place(figure, (left, 10, 66, 52)) for left in (13, 105))
     for cycle, colour in (("first", style.BLUE), ("settled", style.ORANGE)):
         name = f"{cycle} cycle"

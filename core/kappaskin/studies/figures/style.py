@@ -1,4 +1,4 @@
-"""Style of the figures: sizes for print, colours, and files that are the same every time."""
+"""Style of the figures: sizes for print, colours, and reproducible files."""
 
 import io
 import re

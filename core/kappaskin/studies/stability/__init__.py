@@ -149,14 +149,14 @@ def verdict_on(
     `peer` is what the first frame's coefficients should be to rounding: None when nothing is known.
     """
     if not np.isfinite(answer.coefficients).all():
-        return "wrong", "the coefficients are no numbers"
+        return "wrong", "the coefficients are NaN or infinite"
     at_truth, covered = _at_truth(case, reference, answer, eps), answer.covered
     if covered is not None and not (at_truth or covered >= COVERED):
         return "wrong", f"the 95 % bar covers {100 * covered:.0f} % of the truth"
     if flagged := int(answer.flagged.sum()):
         return "degraded", f"{flagged} of {len(answer.flagged)} frames are flagged: not converged"
     if not np.isfinite(reference.condition):
-        return "degraded", "not all is determined; the bar covers the truth"
+        return "degraded", "some coefficients are undetermined; the bar covers the truth"
     if peer is not None and not reference.near(answer.coefficients, peer, eps):
         return "degraded", "rounding costs digits; the bar covers the truth"
     if at_truth or covered is None:

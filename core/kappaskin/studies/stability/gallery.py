@@ -1,7 +1,7 @@
 """Gallery of hard cases.
 
 Where a case does not say otherwise, 40 frames are read of a shape whose every function bends the
-skin alike, by about 0.3 1/m, with Gaussian noise of the paper's 0.231 1/m; all seeded.
+skin equally, by about 0.3 1/m, with Gaussian noise of the paper's 0.231 1/m; all seeded.
 """
 
 import math
@@ -151,7 +151,7 @@ def _sizes() -> Iterator[HardCase]:
     )
     yield case_of(
         "Ni = 2m",
-        "a function that is zero at every element is seen by its twist alone",
+        "a function that is zero at every element is observable by its twist only",
         _TENS,
         (20, 8),
         kind=CaseKind.DENSE,
@@ -184,7 +184,7 @@ def _sizes() -> Iterator[HardCase]:
 def _arcs() -> Iterator[HardCase]:
     patch = Patch(math.pi * RADIUS, 0.02, RADIUS, strip=True)
     layout = SensorLayout.regular(patch, 10, 1)
-    hard = "sin(theta) moves half a circle as a whole and bends nothing: its column is zero"
+    hard = "sin(theta) moves half a circle as a whole and has no curvature: its column is zero"
     pinned = SineBasis(patch, 8, 1)
     a0 = 0.63e-3 / 4
     dent = np.zeros((8, 1))
@@ -195,11 +195,11 @@ def _arcs() -> Iterator[HardCase]:
                   truth=dent, noise=4.5, basis=pinned)  # fmt: skip
     yield case_of(
         "fingertip, free ends",
-        f"{hard}; nothing decides it",
+        f"{hard}; nothing determines it",
         layout,
         (8, 1),
         basis=SineBasis(patch, 8, 1, sliding=True),
-        announced="no reading depends on where the skin as a whole is",
+        announced="no reading depends on the position of the skin as a whole",
     )
 
 
@@ -225,7 +225,7 @@ def _loads() -> Iterator[HardCase]:
         )
     yield case_of(
         "load on the edge",
-        "the edge holds: a load moves nothing, whatever its force",
+        "the edge is held: a load there moves nothing, at any force",
         _TENS,
         (8, 8),
         truth=Plate(_SQUARE).deflection([PointLoad(0.0, 0.04, 100.0)], SineBasis(_SQUARE, 8, 8)),
@@ -243,7 +243,7 @@ def _only(channel: int) -> SensorLayout:
 
 def _elements() -> Iterator[HardCase]:
     for channel, name in enumerate(COMPONENTS):
-        yield case_of(f"only {name}", "one channel kind of three", _only(channel), (8, 8))
+        yield case_of(f"only {name}", "one component of three", _only(channel), (8, 8))
     yield case_of("dead elements", "five elements of a hundred read nothing",
                   _TENS.without([0, 11, 12, 57, 99]), (8, 8))  # fmt: skip
     yield case_of("dead row", "a row of ten elements reads nothing",
@@ -251,17 +251,17 @@ def _elements() -> Iterator[HardCase]:
     quarter = _TENS.without(p + 10 * q for p in range(5) for q in range(5))
     yield case_of("dead quarter", "a quarter of the skin is not read", quarter, (5, 5))
     yield case_of("dead quarter, 8 x 8", "a quarter is not read, and functions are fine enough to "
-                  "hide in it", quarter, (8, 8),
-                  announced="float32 has too few digits for what hides there")  # fmt: skip
+                  "be limited to it", quarter, (8, 8),
+                  announced="float32 has too few digits to resolve the dead quarter")  # fmt: skip
     yield case_of("all dead", "no element reads anything", _TENS.without(range(100)), (8, 8),
                   truth=np.zeros((8, 8)), announced="there is nothing to go by")  # fmt: skip
     rng = np.random.default_rng(SEED)
     points = rng.uniform(0.0, 0.1, (60, 2))
-    yield case_of("scattered", "60 elements anywhere", _scattered(points), (6, 5))
+    yield case_of("scattered", "60 elements at random positions", _scattered(points), (6, 5))
     clusters = np.repeat(rng.uniform(0.01, 0.09, (6, 2)), 12, axis=0)
     clusters += rng.normal(0.0, 1e-3, clusters.shape)
-    yield case_of("clustered", "72 elements in six heaps of 2 mm", _scattered(clusters), (5, 5),
-                  announced="between the heaps little is seen")  # fmt: skip
+    yield case_of("clustered", "72 elements in six clusters of 2 mm", _scattered(clusters), (5, 5),
+                  announced="between the clusters few readings depend on the shape")  # fmt: skip
     yield case_of("nearly coincident", "40 elements, each with another 1 nm beside it",
                   _scattered(np.vstack([points[:40], points[:40] * (1 - 1e-8)])),
                   (6, 5))  # fmt: skip
@@ -279,7 +279,7 @@ def _pair(gap: float) -> HardCase:
     points = np.column_stack([x, np.full(4, 0.01)])
     return case_of(
         f"pairs {gap:.0e} m apart",
-        "two functions, seen from nearly the same place: all that is not noise is what they share",
+        "two functions, seen from nearly the same place: only their common part exceeds the noise",
         SensorLayout.scattered(Patch(0.1, 0.02, strip=True), points),
         (2, 1),
         announced="only the distance of the elements distinguishes the functions",
@@ -291,7 +291,7 @@ def _scales() -> Iterator[HardCase]:
         yield case_of(f"{name} patch", f"the lengths of M's columns go with 1/{name}^2",
                     SensorLayout.regular(Patch(side, side), 10, 10), (8, 8),
                     kind=CaseKind.LINEAR)  # fmt: skip
-    yield case_of("1:100", "functions across bend ten thousand times as much as those along",
+    yield case_of("1:100", "functions in x have ten thousand times the curvature of those in y",
                   SensorLayout.regular(Patch(0.01, 1.0), 4, 20), (3, 15))  # fmt: skip
 
 
@@ -313,7 +313,7 @@ def _readings() -> Iterator[HardCase]:
     yield case_of("all NaN", "every reading is missing", _TENS, (8, 8), spoilt=lost(2.0, np.nan),
                   announced="there is nothing to go by")  # fmt: skip
     chain = Transduction()
-    yield case_of("rails", "bent so far that the electronics stand on a rail where it matters most",
+    yield case_of("rails", "bent so far that the electronics saturate at the peak",
                   _TENS, (8, 8), truth=_strong(chain), noise=0.1, kind=CaseKind.LINEAR,
                   spoilt=lambda K: chain.curvature(chain.counts(K)))  # fmt: skip
     yield case_of("spikes", "one reading of each frame is off by 1e6 1/m", _TENS, (8, 8),
@@ -345,7 +345,7 @@ def _slopes() -> Iterator[HardCase]:
         K = skin.predicted(truth) + rng.normal(0.0, TABLE_1_NOISE, (FRAMES, 3, 100))
         hard = "gages sense the curvature of the bent surface, which is not that of Eqs. 3-5"
         yield HardCase(f"slopes of {steepest}", hard, basis, _TENS, basis, truth, K,
-                       "linear methods do not know slopes", CaseKind.SLOPES)  # fmt: skip
+                       "linear methods neglect slopes", CaseKind.SLOPES)  # fmt: skip
 
 
 def _sequence(frames: int, elements: int, functions: int) -> HardCase:

@@ -1,1 +1,1 @@
-"""Effects at work: what each does to readings, imported when a scene calls for it."""
+"""Computation of the effects on readings, imported when a scene needs them."""

@@ -1,4 +1,4 @@
-"""Effects in the electronics, at work."""
+"""Computation of the effects in the electronics."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Failures of elements and of the link, at work."""
+"""Computation of the failures of elements and of the link."""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Effects in the strain gages, at work."""
+"""Computation of the effects in the strain gages."""
 
 from collections.abc import Callable
 

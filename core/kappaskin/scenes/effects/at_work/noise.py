@@ -1,4 +1,4 @@
-"""Noise, at work."""
+"""Computation of noise."""
 
 import math
 
