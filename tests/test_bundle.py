@@ -138,3 +138,13 @@ def test_what_cannot_be_tried_is_told(argument, why, tmp_path):
     assert ran.returncode == 2
     assert why in ran.stderr
     assert not (tmp_path / "dist").exists()
+
+
+def test_programs_are_started_by_module_as_a_bundle_can():
+    starts = re.compile(r"\[\s*sys\.executable,\s*([^,\]]+)")
+    found = {
+        file.name: starts.findall(file.read_text("utf-8"))
+        for folder in ("core", "app")
+        for file in (ROOT / folder).rglob("*.py")
+    }
+    assert {word for words in found.values() for word in words} == {'"-m"'}

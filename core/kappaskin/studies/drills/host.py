@@ -268,8 +268,7 @@ def _killed(stand: Stand) -> DrillOutcome:
 
 def _orphaned(stand: Stand) -> DrillOutcome:
     """Kill the process that shows: the live one ends, and leaves no memory."""
-    show = f"from {__name__} import show_stream; show_stream({stand.relay.port!r})"
-    command = [sys.executable, "-c", show]
+    command = [sys.executable, "-m", __name__, stand.relay.port]  # a bundle knows no -c
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
     ) as parent:
@@ -340,3 +339,7 @@ PROCESS_DRILLS = [
         _WITHIN,
     ),
 ]
+
+
+if __name__ == "__main__":
+    show_stream(sys.argv[1])
