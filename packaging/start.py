@@ -238,9 +238,15 @@ def base_python() -> str:
 
 
 def other_pythons() -> list[str]:
-    """The names of other Pythons on the path that the library is for."""
+    """The names of other Pythons on the path that the library is for, and that start."""
     minors = set(range(OLDEST[1], 30)) - {sys.version_info.minor}
-    return [name for minor in sorted(minors) if shutil.which(name := f"python3.{minor}")]
+    names = [name for minor in sorted(minors) if shutil.which(name := f"python3.{minor}")]
+    started = [
+        name for name in names if not subprocess.call([name, "-c", ""], stderr=subprocess.DEVNULL)
+    ]
+    if missing := [name for name in names if name not in started]:
+        say(f"Skipped, as they do not start here: {', '.join(missing)}")
+    return started
 
 
 def install(venv: Path, *asked: str, keep: bool, python: str = "") -> None:
