@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kappaskin._processes import preload_library
+from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
@@ -168,11 +169,14 @@ def launch(
     watch = QTimer(window, interval=50)  # pyright: ignore[reportCallIssue]
     watch.timeout.connect(lambda: asked and window.close())
     watch.start()
-    saved: list[bool] = []
+    refused: list[Refusal] = []
 
     def end() -> None:
-        if screenshot is not None:
-            saved.append(window.picture(screenshot))
+        try:
+            if screenshot is not None:
+                window.picture(screenshot)
+        except Refusal as reason:
+            refused.append(reason)
         window.close()
 
     if seconds is not None:
@@ -181,10 +185,8 @@ def launch(
     for kept in (recovering, log_files):
         if kept is not None:
             kept.close()
-    if saved == [False]:
-        from kappaskin.errors import Refusal
-
-        raise Refusal(f"{screenshot}: the picture cannot be written; choose another place")
+    if refused:
+        raise refused[0]
 
 
 def _kept_file() -> Path:

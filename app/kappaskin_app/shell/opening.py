@@ -122,8 +122,8 @@ class Opening(QObject):
                 write(path)
                 self.note(path)
                 self.notified.emit(f"Saved {path}")
-            except (OSError, Refusal) as error:
-                self.notified.emit(f"Could not write {file}: {error}")
+            except Refusal as reason:
+                self.notified.emit(str(reason))
 
     def follow(self, status: Status) -> None:
         """Open the file that waited for a sensor."""

@@ -5,11 +5,12 @@ from datetime import datetime
 from importlib import metadata
 from pathlib import Path
 
-from PySide6.QtCore import QPoint, QRect, QSize, Qt
+from PySide6.QtCore import QBuffer, QPoint, QRect, QSize, Qt
 from PySide6.QtGui import QFont, QFontMetrics, QImage, QPainter
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QFileDialog, QWidget
 
+from kappaskin._files import write_whole
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
 from kappaskin_app.shell.session import Session
@@ -40,10 +41,12 @@ def caption_now(session: Session) -> str:
     return caption_of(session.status, at, datetime.now())
 
 
-def write_png(image: QImage, path: Path) -> None:
-    """Write an `image`, in any thread; a `Refusal` where that fails."""
-    if not image.save(str(path)):
-        raise _unwritable(path)
+def write_png(image: QImage, path: Path, quality: int = -1) -> None:
+    """Write an `image`, in any thread, packed as Qt's `quality` says; a `Refusal` if that fails."""
+    packed = QBuffer()
+    packed.open(QBuffer.OpenModeFlag.WriteOnly)
+    image.save(packed, "PNG", quality)  # pyright: ignore[reportArgumentType, reportCallIssue]
+    write_whole(path, bytes(packed.data().data()))
 
 
 def save_view(
@@ -83,12 +86,8 @@ def _png(view: QWidget, title: str, caption: str) -> QImage:
 
 
 def _save_svg(view: QWidget, path: Path, title: str, caption: str) -> None:
-    try:
-        path.open("wb").close()  # Qt does not report the reason
-    except OSError as error:
-        raise _unwritable(path) from error
-    drawing = QSvgGenerator()
-    drawing.setFileName(str(path))
+    drawing, drawn = QSvgGenerator(), QBuffer()
+    drawing.setOutputDevice(drawn)
     size = _size(view, caption)
     drawing.setSize(size)
     drawing.setViewBox(QRect(QPoint(0, 0), size))
@@ -98,6 +97,7 @@ def _save_svg(view: QWidget, path: Path, title: str, caption: str) -> None:
         painter.fillRect(QRect(QPoint(0, 0), size), view.palette().window())
         view.render(painter, QPoint(0, 0))
         _write(painter, view, caption)
+    write_whole(path, bytes(drawn.data().data()))
 
 
 def _size(view: QWidget, caption: str) -> QSize:
@@ -120,10 +120,6 @@ def _write(painter: QPainter, view: QWidget, caption: str) -> None:
     painter.setPen(view.palette().windowText().color())
     painter.setFont(_font(view))
     painter.drawText(_lines(view, caption), _WRAPPED, caption)
-
-
-def _unwritable(path: Path) -> Refusal:
-    return Refusal(f"{path}: cannot be written; choose another place")
 
 
 def chosen_file(parent: QWidget, title: str, flat: bool) -> Path | None:

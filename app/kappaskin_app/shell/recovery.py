@@ -13,6 +13,7 @@ from typing import Any
 import platformdirs
 from PySide6.QtCore import QLockFile, QObject
 
+from kappaskin._files import write_whole
 from kappaskin.errors import Refusal
 from kappaskin.live import Engine, ResumeInfo, Status
 from kappaskin_app.guard import guarded
@@ -152,9 +153,7 @@ class OpenWindow:
             "source": last.source,
             "recording": last.recording,
         }
-        part = self._file.with_suffix(".part")
-        part.write_text(json.dumps(data, indent=1), encoding="utf-8")
-        part.replace(self._file)  # whole, or not at all
+        write_whole(self._file, json.dumps(data, indent=1))
 
     def close(self) -> None:
         self._file.unlink(missing_ok=True)

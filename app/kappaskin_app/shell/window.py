@@ -11,6 +11,7 @@ from kappaskin.live import Engine, ResumeInfo, Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.menus import Menus
 from kappaskin_app.shell.parts import Parts
+from kappaskin_app.shell.pictures import write_png
 from kappaskin_app.shell.recovery import settings_left
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.simulation import settings_for
@@ -107,9 +108,9 @@ class MainWindow(Parts):
 
     # Called by features.
 
-    def picture(self, path: Path) -> bool:
-        """Save the window, 3-D picture included, as a PNG; whether it could be written."""
-        return self.grab().save(str(path), "PNG", _PACKED)
+    def picture(self, path: Path) -> None:
+        """Save the window, 3-D picture included, as a PNG; a `Refusal` where that fails."""
+        write_png(self.grab().toImage(), path, _PACKED)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         banner = self.display.centre.banner

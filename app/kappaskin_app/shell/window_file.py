@@ -2,7 +2,6 @@
 
 import itertools
 import os
-import tempfile
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -13,6 +12,7 @@ import tomlkit
 from PySide6.QtCore import QLockFile, QObject, QRect
 from PySide6.QtGui import QGuiApplication
 
+from kappaskin._files import replacing
 from kappaskin.errors import Refusal
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.arrangement import AREAS, FLOATING, Layout, Place
@@ -257,10 +257,11 @@ class WindowFile:
     def write(self, state: WindowState) -> str:
         """Write the file whole or not at all; returns an error text."""
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._write(to_text(state).encode())
-        except (OSError, UnicodeEncodeError) as error:
-            return f"{self.path}: cannot be written ({error}); the window's state is not saved"
+            with replacing(self.path, "the window's state is not saved") as part:
+                self.path.parent.mkdir(parents=True, exist_ok=True)
+                part.write_text(to_text(state), "utf-8")
+        except Refusal as reason:
+            return str(reason)
         return ""
 
     def merge(self, state: WindowState, before: WindowState) -> str:
@@ -273,17 +274,6 @@ class WindowFile:
         wrong = self.write(state if wrong else merged(state, before, theirs)) or wrong
         lock.unlock()
         return wrong
-
-    def _write(self, data: bytes) -> None:
-        # Each under a name of its own: another window may be writing the same file.
-        opened, name = tempfile.mkstemp(".part", f".{self.path.name}.", self.path.parent)
-        try:
-            with os.fdopen(opened, "wb") as part:
-                part.write(data)
-            os.replace(name, self.path)
-        except OSError:
-            Path(name).unlink(missing_ok=True)
-            raise
 
 
 class WindowSaver(QObject):

@@ -3,7 +3,6 @@
 import hashlib
 import io
 import math
-import os
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -20,6 +19,7 @@ from scipy.sparse.linalg import eigsh
 from scipy.spatial import Delaunay, KDTree
 from scipy.special import perm
 
+from kappaskin._files import write_whole
 from kappaskin.bases.basis import ORDERS, Order
 from kappaskin.bases.product import gauss
 from kappaskin.errors import Refusal
@@ -422,7 +422,7 @@ def cached(key: str, compute: Callable[[], dict[str, Array]]) -> dict[str, Array
             return dict(np.load(io.BytesIO(data[_MARK:])))
     arrays = compute()
     if sum(values.nbytes for values in arrays.values()) <= _LARGEST:
-        with suppress(OSError):
+        with suppress(OSError, Refusal):
             _write(file, arrays)
     return arrays
 
@@ -436,16 +436,11 @@ def _folder() -> Path:
 
 
 def _write(file: Path, arrays: dict[str, Array]) -> None:
-    file.parent.mkdir(parents=True, exist_ok=True)
-    part = file.with_suffix(f".{os.getpid()}")  # whole when it has its name
     made = io.BytesIO()
     np.savez(made, **arrays)  # pyright: ignore[reportArgumentType]
     data = made.getvalue()
-    try:
-        part.write_bytes(_mark(data) + data)
-        part.replace(file)
-    finally:
-        part.unlink(missing_ok=True)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(file, _mark(data) + data)
     there = sorted(file.parent.iterdir(), key=lambda one: one.stat().st_mtime, reverse=True)
     for old in there[_MOST:]:
         old.unlink(missing_ok=True)

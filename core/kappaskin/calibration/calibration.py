@@ -14,6 +14,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from kappaskin._files import write_whole
 from kappaskin._state import Stateful
 from kappaskin._toml import table
 from kappaskin.errors import Refusal
@@ -167,17 +168,7 @@ class Calibration:
     def save(self, path: Path) -> None:
         """Write `path` whole or not at all."""
         self.check_writable(path)
-        part = path.with_name(f".{path.name}.part")
-        try:
-            with part.open("w", encoding="utf-8") as file:
-                file.write(self.to_toml())
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(part, path)
-        except (OSError, UnicodeEncodeError) as error:
-            raise Refusal(f"{path}: cannot be written ({error}); choose another place") from error
-        finally:
-            part.unlink(missing_ok=True)
+        write_whole(path, self.to_toml())
 
     @staticmethod
     def read(path: Path) -> "Calibration":

@@ -1,7 +1,6 @@
 """Storage of the tares of every sensor."""
 
 import hashlib
-import os
 import re
 import tomllib
 from contextlib import suppress
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 import platformdirs
 
+from kappaskin._files import replacing
 from kappaskin._toml import table
 from kappaskin.calibration.calibration import digest
 from kappaskin.calibration.tare import Tare
@@ -99,21 +99,10 @@ class TareStore:
             self._write(serial_number, SavedTares(saved.tares, tare))
 
     def _write(self, serial_number: str, saved: SavedTares) -> None:
-        """Write the file whole or not at all."""
         path = self.path(serial_number)
-        part = path.with_name(f".{path.name}.{os.getpid()}.part")
-        try:
+        with replacing(path, "free disk space, or check its permissions") as part:
             self.folder.mkdir(parents=True, exist_ok=True)
-            with part.open("w", encoding="utf-8") as file:
-                file.write(_text(saved))
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(part, path)
-        except (OSError, UnicodeEncodeError) as error:
-            part.unlink(missing_ok=True)
-            raise Refusal(
-                f"{path}: cannot be written ({error}); free disk space, or check its permissions"
-            ) from error
+            part.write_text(_text(saved), "utf-8")
 
     @staticmethod
     def to_toml(tare: Tare) -> str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from cyclopts import Parameter, Token
 
+from kappaskin._files import replacing
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
@@ -118,8 +119,5 @@ def save_arrays(out: Path, arrays: "Mapping[str, NDArray[Any]]") -> None:
     """Write an NPZ; raises a `Refusal` where that cannot be."""
     import numpy as np
 
-    try:
-        with out.open("wb") as file:
-            np.savez(file, **arrays)  # pyright: ignore[reportArgumentType]
-    except OSError as error:
-        raise Refusal(f"{out}: cannot be written ({error}); choose another place") from error
+    with replacing(out) as part, part.open("wb") as file:
+        np.savez(file, **arrays)  # pyright: ignore[reportArgumentType]

@@ -7,6 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QImage
 from PySide6.QtWidgets import QDockWidget, QMenu, QPushButton, QScrollArea, QScrollBar
 
+from kappaskin.errors import Refusal
 from kappaskin_app.shell.actions import plain
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import THEMES, bar_palette
@@ -65,8 +66,9 @@ def test_both_themes_draw(window: MainWindow, until, colours_in, theme: str) -> 
 
 
 def test_a_picture_is_saved(window: MainWindow, tmp_path: Path) -> None:
-    assert window.picture(tmp_path / "a.png")
-    assert not window.picture(tmp_path / "nowhere" / "a.png")
+    window.picture(tmp_path / "a.png")
+    with pytest.raises(Refusal, match=r"nowhere/a\.png: cannot be written \(No such file"):
+        window.picture(tmp_path / "nowhere" / "a.png")
     assert QImage(str(tmp_path / "a.png")).size() == window.size()
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 
+from kappaskin._files import write_whole
 from kappaskin.bases import edges_of
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
@@ -167,12 +168,12 @@ class DesignPrediction(QObject):
         self.changed.emit()
 
     def write(self, file: Path) -> None:
-        """Write the design into a scene file; may raise `OSError` or `Refusal`."""
+        """Write the design into a scene file; a `Refusal` where that fails."""
         if self._requested is None or self.prospect is None or self.predicting:
             raise Refusal(
                 "expected a design with a prediction, got none; change it until a map is shown"
             )
-        file.write_text(write_scene(_placed(self._requested, self.prospect)), encoding="utf-8")
+        write_whole(file, write_scene(_placed(self._requested, self.prospect)))
 
     def _stop(self) -> None:
         self.predicts.stop()

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from PySide6.QtGui import QGuiApplication
 
+from kappaskin._files import write_whole
 from kappaskin.calibration import TareStore
 from kappaskin.errors import Refusal
 from kappaskin.studies import FIGURES
@@ -59,7 +60,7 @@ class ExportFeature:
             script = script_of(shell.session, shell.history.settings, folder)
             for name, content in script.files.items():
                 folder.mkdir(parents=True, exist_ok=True)
-                (folder / name).write_bytes(content)
+                write_whole(folder / name, content)
         except (Refusal, OSError) as error:
             shell.notify(f"Nothing was copied: {error}")
             return

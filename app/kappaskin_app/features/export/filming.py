@@ -9,6 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from PySide6.QtCore import QObject, QTimer, Signal
 
+from kappaskin._files import part_for, replace_whole
 from kappaskin.errors import Refusal, lacking
 from kappaskin_app.guard import guarded
 
@@ -54,7 +55,7 @@ class Filming(QObject):
             raise Refusal(f"{path.name}: expected a file that ends in .mp4")
         if path.exists():
             raise Refusal(f"{path}: exists already; choose another name")
-        self._path, self._part = path, path.with_name(f".{path.stem}.part.mp4")
+        self._path, self._part = path, part_for(path)
         try:
             self._part.open("wb").close()
         except OSError as error:
@@ -118,9 +119,9 @@ class Filming(QObject):
             return
         film.close()
         try:
-            self._part.rename(self._path)
-        except OSError as error:
-            self.notified.emit(f"{self._path}: cannot be written ({error}); choose another place")
+            replace_whole(self._path, self._part)
+        except Refusal as reason:
+            self.notified.emit(str(reason))
             return
         self.notified.emit(f"Filmed {self._path}")
 

@@ -13,6 +13,7 @@ import numpy as np
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QCheckBox, QFileDialog, QLabel, QLineEdit, QToolButton, QWidget
 
+from kappaskin._files import replacing
 from kappaskin.cli.system import examine
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate
@@ -69,7 +70,6 @@ def write_report(
         raise Refusal(f"{path.name}: expected a file that ends in .zip")
     if path.exists():
         raise Refusal(f"{path}: exists already; choose another name")
-    part = path.with_name(f".{path.name}.part")
     parts = {name: text.encode() for name, text in contents.texts.items()}
     parts["doctor.json"] = json.dumps(doctor(), indent=1).encode()
     for file in sorted([*logs.glob(f"{LOG}*"), *logs.glob(CRASHES)]):
@@ -79,19 +79,13 @@ def write_report(
         parts = {name: text.replace(written.encode(), b"~") for name, text in parts.items()}
     if contents.estimate is not None:
         parts["shown.npz"] = _readings(contents.estimate)
-    try:
+    with replacing(path) as part:
         path.parent.mkdir(parents=True, exist_ok=True)
         with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as packed:
             for number, (name, content) in enumerate(parts.items()):
                 yield number / len(parts)
                 packed.writestr(name, content)
         yield 1.0
-        part.replace(path)
-    except OSError as error:
-        why = error.strerror or error
-        raise Refusal(f"{path}: cannot be written ({why}); choose another place") from error
-    finally:  # it may have been cancelled
-        part.unlink(missing_ok=True)
     yield f"{path}: {', '.join(parts)}"
 
 

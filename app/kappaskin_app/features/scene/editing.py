@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from kappaskin._files import write_whole
 from kappaskin.mechanics import Load
 from kappaskin_app.features.scene.scene_text import forced, replaced, scaled, shifted
 from kappaskin_app.guard import guarded
@@ -54,9 +55,9 @@ class SceneEditing:
         return Written(text, OWN if now is None else now.file)
 
     def save(self, file: Path) -> None:
-        """Write the scene to a file, which becomes its file; may raise `OSError`."""
+        """Write the scene to a file, which becomes its file; a `Refusal` where that fails."""
         settings = self._history.settings
-        file.write_text(text_of(settings), encoding="utf-8")
+        write_whole(file, text_of(settings))
         if settings.written is not None:
             self._history.change("Save the scene", -1, written=replace(settings.written, file=file))
 

@@ -10,6 +10,7 @@ from itertools import chain, cycle, repeat
 from pathlib import Path
 from typing import Any
 
+from kappaskin._files import write_whole
 from kappaskin.errors import Refusal
 from kappaskin.scenes import Scene
 from kappaskin.studies.cost import (
@@ -402,10 +403,7 @@ def write_plot(path: Path, scene: Scene, costs: Sequence[Cost | Refused]) -> Non
     check_plot(path)
     kind = path.suffix.lower()[1:]
     drawn = style.drawn(lambda figure: draw(figure, scene, costs), kind)
-    try:
-        path.write_bytes(drawn[kind])
-    except OSError as error:
-        raise Refusal(f"{path}: cannot be written ({error}); choose another place") from error
+    write_whole(path, drawn[kind])
 
 
 def draw(figure: style.Figure, scene: Scene, costs: Sequence[Cost | Refused]) -> None:

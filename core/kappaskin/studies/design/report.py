@@ -11,7 +11,7 @@ from itertools import cycle
 from pathlib import Path
 from typing import Any, cast
 
-from kappaskin.errors import Refusal
+from kappaskin._files import write_whole
 from kappaskin.studies.design.measures import MEASURES, StudyMeasure
 from kappaskin.studies.design.results import (
     Mean,
@@ -294,9 +294,6 @@ def write_report(folder: Path) -> list[Path]:
     figures = draw_study(study, known)
     files = {f"{name}.svg": svg for name, svg in figures.items()}
     files |= {"report.csv": table_csv(study, known), "report.html": page_of(study, known, figures)}
-    try:
-        for name, text in files.items():
-            (folder / name).write_text(text, "utf-8")
-    except OSError as error:
-        raise Refusal(f"{folder}: cannot be written to ({error}); copy it elsewhere") from error
+    for name, text in files.items():
+        write_whole(folder / name, text, "copy the study's folder elsewhere")
     return [folder / name for name in files]

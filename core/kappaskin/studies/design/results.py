@@ -3,7 +3,6 @@
 import hashlib
 import json
 import math
-import os
 import sys
 import threading
 from collections import deque
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 import scipy
 
+from kappaskin._files import replacing, write_whole
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Estimator
 from kappaskin.frames import Array
@@ -293,8 +293,8 @@ class StudyFolder:
                     f"{path}: expected an empty folder or one of the study {study.name}, got that "
                     f"of {owner}; choose another with --out"
                 )
-            folder._write(path / _ABOUT, json.dumps({"study": study.name}))
-            folder._write(path / _TEXT, study.text)
+            write_whole(path / _ABOUT, json.dumps({"study": study.name}))
+            write_whole(path / _TEXT, study.text)
         except OSError as error:
             raise Refusal(
                 f"{path}: expected a folder that can be written to ({error}); choose another"
@@ -342,20 +342,9 @@ class StudyFolder:
         )
         about = {"version": task.version, "block": task.block, "point": json.loads(task.document)}
         file = self._file(task)
-        try:
+        with replacing(file, "free disk space, then run the study again: it resumes") as part:
             file.parent.mkdir(parents=True, exist_ok=True)
-            self._write(file, json.dumps(about | found, allow_nan=failed))
-        except OSError as error:
-            raise Refusal(
-                f"{file}: cannot be written ({error}); free disk space, then run the "
-                "study again: it resumes"
-            ) from error
-
-    @staticmethod
-    def _write(file: Path, text: str) -> None:
-        part = file.with_name(f".{file.name}.part")
-        part.write_text(text, "utf-8")
-        os.replace(part, file)
+            part.write_text(json.dumps(about | found, allow_nan=failed), "utf-8")
 
 
 def stored_results(study: Study, folder: StudyFolder) -> list[PointResults]:

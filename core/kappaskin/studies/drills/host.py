@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Generator
-from contextlib import AbstractContextManager, closing, contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -23,8 +23,6 @@ from kappaskin.recording import Recorder, Recording, RecordingStatus, ReservedFi
 from kappaskin.sources import Accounting
 from kappaskin.studies.drills.stand import Drill, DrillOutcome, Stand
 
-_FULL = Path("/dev/full")
-_FILE_ROOM = 512  # bytes of a file that are written before the disk is full
 _CHANNELS = 300
 
 
@@ -34,29 +32,23 @@ def _calibration(name: str) -> Calibration:
 
 
 @contextmanager
-def _device_full(part: Path) -> Generator[None]:
-    part.symlink_to(_FULL)
-    yield
-
-
-@contextmanager
-def _room(_: Path) -> Generator[None]:
-    """Let no file of this process grow beyond `_FILE_ROOM`."""
+def _room(size: int) -> Generator[None]:
+    """Let no file of this process grow beyond `size` bytes."""
     was = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (_FILE_ROOM, was[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, was[1]))
     try:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, was)
 
 
-def _spoilt(fault: Callable[[Path], AbstractContextManager[None]], _: Stand) -> DrillOutcome:
+def _spoilt(room: int, _: Stand) -> DrillOutcome:
     """Replace a file on a full disk: the old one stays intact, and the error is reported."""
     with TemporaryDirectory(prefix="kappaskin-drill-") as folder:
         path = Path(folder) / "skin.toml"
         _calibration("before").save(path)
         before, refusal = path.read_bytes(), ""
-        with fault(path.with_name(f".{path.name}.part")):
+        with _room(room):
             try:
                 _calibration("after").save(path)
             except Refusal as reason:
@@ -70,12 +62,8 @@ def _spoilt(fault: Callable[[Path], AbstractContextManager[None]], _: Stand) -> 
 
 
 CALIBRATION_DRILLS = [
-    Drill("disk ends", "no room in the middle of a calibration", partial(_spoilt, _room)),
-    *(
-        [Drill("disk full", "no room for a calibration", partial(_spoilt, _device_full))]
-        if _FULL.exists()
-        else []
-    ),
+    Drill("disk ends", "no room in the middle of a calibration", partial(_spoilt, 512)),
+    Drill("disk full", "no room for a calibration", partial(_spoilt, 0)),
 ]
 
 

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterable
 from importlib import import_module
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
+from kappaskin._files import write_whole
 from kappaskin.errors import Refusal
 
 
@@ -45,14 +45,15 @@ def write_figures(out: Path, names: Iterable[str]) -> list[Path]:
     style.loaded()  # or refused before a folder is made
     try:
         out.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(prefix=".figures-", dir=out) as room:
-            made = list[Path]()
-            for name in asked:
-                for kind, drawn in style.drawn(FIGURES[name], *style.KINDS).items():
-                    made.append(Path(room) / f"{name}.{kind}")
-                    made[-1].write_bytes(drawn)
-            return [path.replace(out / path.name) for path in made]
     except OSError as error:
         raise Refusal(
             f"{out}: expected a folder that can be written to ({error}); choose another"
         ) from error
+    files = {
+        out / f"{name}.{kind}": drawn
+        for name in asked
+        for kind, drawn in style.drawn(FIGURES[name], *style.KINDS).items()
+    }
+    for path, drawn in files.items():
+        write_whole(path, drawn)
+    return list(files)

@@ -1,0 +1,84 @@
+"""Files that are written whole or not at all."""
+
+import os
+import secrets
+import stat
+from collections.abc import Generator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from kappaskin.errors import Refusal
+
+_ELSEWHERE = "choose another place"
+
+
+@contextmanager
+def replacing(path: Path, remedy: str = _ELSEWHERE) -> Generator[Path]:
+    """A new file to write to in the block, which replaces the one at `path` when the block ends.
+
+    Until then, and for good if the block raises, `path` is as it was. A link is replaced, its
+    target untouched. A device or a pipe cannot be replaced: it is written to directly, and so is
+    standard output, for `-`. Raises a `Refusal` with a `remedy` where the file cannot be written.
+    """
+    part = part_for(path)
+    try:
+        with _refused(path, remedy):
+            if str(path) == "-":
+                yield Path("/dev/stdout")
+            elif _is_stream(path):
+                yield path
+            else:
+                yield part
+                _replace(path, part)
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def write_whole(path: Path, content: bytes | str, remedy: str = _ELSEWHERE) -> None:
+    """Replace the file at `path` by the `content`, as `replacing` does."""
+    with replacing(path, remedy) as part:
+        part.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+def replace_whole(path: Path, part: Path) -> None:
+    """Replace the file at `path` by the complete one at `part`; a `Refusal` if that fails."""
+    with _refused(path, _ELSEWHERE):
+        _replace(path, part)
+
+
+def part_for(path: Path) -> Path:
+    """The path of a new hidden file in the same folder, of the same suffix."""
+    return path.parent / f".{secrets.token_hex(4)}.part{path.suffix}"
+
+
+@contextmanager
+def _refused(path: Path, remedy: str) -> Generator[None]:
+    try:
+        yield
+    except (OSError, UnicodeEncodeError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise Refusal(f"{path}: cannot be written ({why}); {remedy}") from error
+
+
+def _is_stream(path: Path) -> bool:
+    """Whether what is at `path` has no contents to replace, as a device or a pipe."""
+    if path.parent.resolve() in (Path("/dev"), Path("/dev/fd").resolve()):
+        return True  # /dev/stdout is a link, which must stay, wherever it leads
+    try:
+        kind = path.stat().st_mode
+    except FileNotFoundError:
+        return False
+    return not (stat.S_ISREG(kind) or stat.S_ISDIR(kind))
+
+
+def _replace(path: Path, part: Path) -> None:
+    with part.open("rb+") as file:
+        os.fsync(file.fileno())  # before it has the name, or a loss of power could leave neither
+    with suppress(FileNotFoundError):
+        before = path.lstat().st_mode
+        if stat.S_ISREG(before):
+            if not os.access(path, os.W_OK):
+                raise PermissionError("it is read-only")
+            part.chmod(stat.S_IMODE(before))
+    part.replace(path)

@@ -1,0 +1,161 @@
+"""Files are written whole or not at all, whatever is at the path."""
+
+import os
+import resource
+import stat
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from kappaskin._files import replace_whole, replacing, write_whole
+from kappaskin.errors import Refusal
+
+
+@contextmanager
+def room(size: int) -> Iterator[None]:
+    """A disk on which no file grows beyond `size` bytes."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def test_a_file_is_replaced_and_nothing_is_left_beside_it(tmp_path: Path) -> None:
+    file = tmp_path / "a.toml"
+    for text in ("first", "second, \N{PLUS-MINUS SIGN}"):
+        write_whole(file, text)
+        assert file.read_text("utf-8") == text
+    write_whole(file, b"\x00\xff")
+    assert file.read_bytes() == b"\x00\xff"
+    assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.mark.parametrize("size", [0, 100])
+def test_a_full_disk_leaves_the_old_file(tmp_path: Path, size: int) -> None:
+    file = tmp_path / "a.npz"
+    file.write_bytes(b"old")
+    with room(size), pytest.raises(Refusal, match=r"a\.npz: cannot be written \(File too large"):
+        write_whole(file, bytes(100_000))
+    assert file.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_an_error_while_writing_leaves_the_old_file(tmp_path: Path) -> None:
+    file = tmp_path / "a.csv"
+    file.write_text("old")
+
+    def write() -> None:
+        with replacing(file) as part:
+            part.write_text("half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write()
+    assert file.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_until_the_block_ends_readers_see_the_old_file(tmp_path: Path) -> None:
+    file = tmp_path / "a.csv"
+    file.write_text("old")
+    with replacing(file) as part:
+        part.write_text("new")
+        assert file.read_text() == "old"
+        assert part.suffix == file.suffix
+    assert file.read_text() == "new"
+
+
+def test_a_link_is_replaced_and_its_target_untouched(tmp_path: Path) -> None:
+    target, link = tmp_path / "target", tmp_path / "link"
+    target.write_text("mine")
+    link.symlink_to(target)
+    write_whole(link, "new")
+    assert (target.read_text(), link.read_text()) == ("mine", "new")
+    assert not link.is_symlink()
+
+
+def test_permissions_are_kept(tmp_path: Path) -> None:
+    file = tmp_path / "key"
+    file.write_text("old")
+    file.chmod(0o600)
+    write_whole(file, "new")
+    assert stat.S_IMODE(file.stat().st_mode) == 0o600
+
+
+def test_a_read_only_file_is_refused(tmp_path: Path, monkeypatch) -> None:
+    file = tmp_path / "a"
+    file.write_text("old")
+    monkeypatch.setattr(os, "access", lambda path, _: path != file)  # root may write everywhere
+    with pytest.raises(Refusal, match="it is read-only"):
+        write_whole(file, "new")
+    assert file.read_text() == "old"
+
+
+def test_devices_and_pipes_are_written_directly(tmp_path: Path) -> None:
+    write_whole(Path("/dev/null"), "nothing")
+    assert stat.S_ISCHR(Path("/dev/null").stat().st_mode)
+    link = tmp_path / "link to a device"
+    link.symlink_to("/dev/null")
+    write_whole(link, "nothing")
+    assert link.is_symlink()
+
+    pipe, found = tmp_path / "pipe", list[bytes]()
+    os.mkfifo(pipe)
+    reader = threading.Thread(target=lambda: found.append(pipe.read_bytes()))
+    reader.start()
+    write_whole(pipe, "through")
+    reader.join(30)
+    assert found == [b"through"]
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", ["-", "/dev/stdout", "/dev/fd/1"])
+@pytest.mark.parametrize("into", ["a pipe", "a file"])
+def test_standard_output_is_written_to(tmp_path: Path, path: str, into: str) -> None:
+    script = (
+        "from pathlib import Path; from kappaskin._files import write_whole; "
+        f"write_whole(Path({path!r}), 'told')"
+    )
+    before = os.lstat("/dev/stdout")
+    if into == "a pipe":
+        out = subprocess.run([sys.executable, "-c", script], stdout=-1, check=True).stdout
+    else:
+        with (tmp_path / "out").open("w") as file:
+            subprocess.run([sys.executable, "-c", script], stdout=file, check=True)
+        out = (tmp_path / "out").read_bytes()
+    assert out == b"told"
+    assert os.lstat("/dev/stdout").st_ino == before.st_ino
+
+
+@pytest.mark.parametrize("name", ["", ".", "..", "/", "folder", "missing/a", "a\ud800", "a" * 300])
+def test_what_is_no_place_for_a_file_is_refused(tmp_path: Path, name: str, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(Refusal, match="cannot be written"):
+        write_whole(Path(name), "new")
+    assert list(tmp_path.iterdir()) == [tmp_path / "folder"]
+
+
+def test_text_that_cannot_be_encoded_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(Refusal, match=r"cannot be written .*surrogates"):
+        write_whole(tmp_path / "a", "\ud800")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_made_by_another_program_takes_the_place(tmp_path: Path) -> None:
+    file, part = tmp_path / "a.mp4", tmp_path / ".part.mp4"
+    file.write_text("old")
+    with pytest.raises(Refusal, match=r"a\.mp4: cannot be written \(No such file"):
+        replace_whole(file, part)
+    part.write_text("new")
+    replace_whole(file, part)
+    assert file.read_text() == "new"
+    assert list(tmp_path.iterdir()) == [file]
