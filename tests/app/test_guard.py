@@ -23,6 +23,6 @@ def test_an_exception_in_a_slot_is_told_and_the_next_call_works(qapp: QApplicati
     sender.sent.emit(-1)
     sender.sent.emit(1)
     guard.forget(told.append)
-    assert told == ["Something went wrong: below zero"]
+    assert told == ["Error in the program: below zero"]
     assert got == [1]
     assert "below zero" in caplog.text

@@ -141,7 +141,7 @@ def test_an_exception_inside_ends_it_and_is_told_once(slot: Slot, how: str, unti
     assert (slot.items, len(slot.errors), slot.ends) == ([], 1, 1)
     assert slot.threads == {threading.main_thread()}
     if how == "thread":
-        assert told == [f"Something went wrong: {slot.errors[0]}"]
+        assert told == [f"Error in the program: {slot.errors[0]}"]
     else:
         assert "the background process ended unexpectedly" in str(slot.errors[0])
     assert alive() == []

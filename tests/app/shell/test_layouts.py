@@ -272,5 +272,5 @@ def test_the_skin_is_not_drawn_while_the_window_is_arranged(window: MainWindow) 
 
 
 def test_what_refuses_says_what_was_expected() -> None:
-    with pytest.raises(Refusal, match="expected format 1, got 7: another version wrote it"):
+    with pytest.raises(Refusal, match="expected format 1, got 7: written by another version"):
         from_text("format = 7")

@@ -174,7 +174,7 @@ def test_a_skin_that_cannot_be_is_explained_until_it_can(panels) -> None:
 
 def test_a_choice_without_room_for_all_its_words_says_so(panels) -> None:
     box = panels.basis.editor("method")
-    box.setCurrentText("Robust, leaves out bad elements")
+    box.setCurrentText("Robust, excludes faulty elements")
     box.resize(110, box.height())
     assert box.words_shown().endswith("\N{HORIZONTAL ELLIPSIS}")
     box.resize(400, box.height())

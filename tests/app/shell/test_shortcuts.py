@@ -40,7 +40,7 @@ def _shown(sheet: ShortcutDialog) -> list[str]:
 
 
 def test_a_clash_is_told_with_what_has_the_key_and_changes_nothing(actions: Actions) -> None:
-    with pytest.raises(Refusal, match=r"Ctrl\+S is the shortcut of Picture"):
+    with pytest.raises(Refusal, match=r"Ctrl\+S belongs to Picture"):
         actions.change_key("theme", "Ctrl+S")
     assert actions.key("theme") == "Ctrl+T"
 
@@ -64,7 +64,7 @@ def test_keys_kept_may_change_places(actions: Actions) -> None:
 
 def test_of_two_that_want_one_key_the_second_is_told_and_has_none(actions: Actions) -> None:
     (told,) = actions.take_keys({"reset": "Ctrl+J", "theme": "Ctrl+J", "unknown": "Ctrl+U"})
-    assert told == "Ctrl+J is the shortcut of Reset: change that first"
+    assert told == "Ctrl+J belongs to Reset: change that shortcut first"
     assert actions.key("theme") == ""
 
 
@@ -79,7 +79,7 @@ def test_a_shortcut_is_found_changed_and_reset_with_the_keyboard(
     assert actions.key("theme") == "Ctrl+J"
     assert "Theme is Ctrl+J now." in sheet.message.text()
     qtbot.keyClick(sheet.edit, Qt.Key.Key_S, CONTROL)
-    until(lambda: "Ctrl+S is the shortcut of Picture" in sheet.message.text())
+    until(lambda: "Ctrl+S belongs to Picture" in sheet.message.text())
     assert sheet.edit.keySequence().toString() == "Ctrl+J"
     sheet.reset.click()
     assert actions.key("theme") == "Ctrl+T"

@@ -445,7 +445,7 @@ def change_5(readings, kind, noise):
 @pytest.mark.parametrize(
     ("kind", "reason"),
     [
-        ("rail", "on a rail or not read on 2 of 103 steps, first on step 9"),
+        ("rail", "saturated or not read on 2 of 103 steps, first on step 9"),
         ("stuck", "gain [-0-9.e]+, expected 0.5 to 2"),
         ("reversed", "gain -.*wired in reverse"),
         ("loose", "error .* 1/m, expected at most 3.85"),
@@ -478,7 +478,7 @@ def test_dead_channels_are_left_out_and_are_no_failure():
     report = report_of(TOLERANCE, NOISE, scene=dead, dwell=0.05)
     assert report.failed == {}
     assert np.flatnonzero(~report.passed).tolist() == [3, 19, 35]
-    assert dict(report.calibration.failures)[19] == "dead, as the device itself says"
+    assert dict(report.calibration.failures)[19] == "dead, reported by the device"
 
 
 def test_a_strip_is_calibrated_by_bending_it_along_x_alone():
@@ -510,7 +510,7 @@ def test_a_sweep_that_cannot_calibrate_is_refused():
     for which, reason in (
         (lambda s: s.face < 0, "no cylinder bends xx with the outer face.*both faces"),
         (lambda s: s.along != "x", "no cylinder bends yy with the inner face"),
-        (lambda s: s.way == "back", "bends xx with the inner face was taken again on the way back"),
+        (lambda s: s.way == "back", "bends xx with the inner face was taken again rising radius"),
         (lambda s: s.radius < 0.05 and s.face > 0, "3 radii that bend xy with the inner.*got 2"),
         (lambda s: s.along == "diagonal" and s.radius < 0.05, "3 radii that bend xy.*got 2"),
     ):
@@ -677,14 +677,14 @@ def test_a_pipeline_that_goes_on_from_another_remembers_what_that_one_saw(second
 
 def test_the_calibration_of_another_device_or_skin_is_refused(second):
     sensor = SKIN.sensor()
-    with pytest.raises(Refusal, match=r"is of Simulated skin SIM-0001, the sensor is .* SIM-0002"):
+    with pytest.raises(Refusal, match=r"is of Simulated skin SIM-0001, not to .* SIM-0002"):
         pipeline_of(second.calibration, replace(sensor, serial_number="SIM-0002"))
     for layout in (
         SensorLayout.regular(sensor.layout.patch, 5, 20),
         SMALL.layout,
         SensorLayout.scattered(sensor.layout.patch, sensor.layout.positions + 1e-6),
     ):
-        with pytest.raises(Refusal, match="in other places than when it was calibrated"):
+        with pytest.raises(Refusal, match="at other positions than when it was calibrated"):
             pipeline_of(second.calibration, replace(sensor, layout=layout))
     pipeline_of(second.calibration, replace(sensor, layout=sensor.layout.without([1])))
 

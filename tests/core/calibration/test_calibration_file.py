@@ -137,7 +137,7 @@ def test_a_name_that_no_file_can_hold_is_refused(tmp_path):
 def test_a_calibration_of_more_channels_than_the_sensor_has_is_refused():
     one, zero = np.ones(C + 3), np.zeros(C + 3)
     more = dict.fromkeys(("offset", "gain_sd", "offset_sd"), zero)
-    with pytest.raises(Refusal, match="in other places than when it was calibrated"):
+    with pytest.raises(Refusal, match="at other positions than when it was calibrated"):
         replace(CALIBRATION, gain=one, **more, hysteresis=None, creep=None, failures=()).check(
             SENSOR
         )
@@ -212,7 +212,7 @@ def test_a_missing_heading_is_refused(path, heading):
     edit(path, f"[{heading}]", "[another]")
     refused(path, "unknown headings .*another")
     edit(path, "[another]", "[creep.more]" if heading == "failures" else "[failures.more]")
-    refused(path, f"lacks the headings .*{heading}")
+    refused(path, f"lacks the tables .*{heading}")
 
 
 def test_missing_and_unknown_keys_are_named(path):
@@ -222,7 +222,7 @@ def test_missing_and_unknown_keys_are_named(path):
 
 def test_a_heading_that_is_none_is_refused(path):
     edit(path, "[creep]", "[[creep]]")
-    refused(path, "creep is no heading")
+    refused(path, "creep is not a table")
 
 
 @pytest.mark.parametrize(
@@ -256,7 +256,7 @@ def test_a_resealed_file_is_read(path):
 
 def test_a_foreign_device_is_refused(path):
     other = replace(SENSOR, serial_number="K-7")
-    refused(path, "is of Simulated skin SIM-0001, the sensor is Simulated skin K-7", other)
+    refused(path, "is of Simulated skin SIM-0001, not to Simulated skin K-7", other)
 
 
 def test_another_layout_is_refused(path):

@@ -189,7 +189,7 @@ def test_what_is_skipped_or_silent_confirms_no_map():
     assert verdict.words == (
         "no error was found: 1 element responds where pressed",
         "element 5 was not pressed",
-        "element 6 does not respond, nor does any other",
+        "element 6 does not respond, and no other does",
     )
 
 
@@ -202,7 +202,7 @@ def test_two_fingers_are_not_clear():
     came = finger.read(np.zeros(300), 0.3)
 
     assert came.verdict == "unclear"
-    assert "22 and 77 respond alike" in str(came) or "77 and 22 respond alike" in str(came)
+    assert "22 and 77 respond equally" in str(came) or "77 and 22 respond equally" in str(came)
 
 
 def test_a_press_between_two_elements_counts_for_the_one_asked_for():
@@ -306,7 +306,7 @@ def test_the_command_presses_a_simulation_by_itself_and_confirms_its_map(run):
     code, out, err = run("press", "sim:circle", "--quick")
 
     assert (code, out) == (0, "channel map confirmed: 20 elements respond where pressed\n")
-    assert err.startswith("1/20  press element 0, at (5.0, 5.0) mm, and let go\n    element 0")
+    assert err.startswith("1/20  press element 0, at (5.0, 5.0) mm, and release it\n    element 0")
 
 
 def test_the_command_fails_where_the_map_is_not_confirmed(run, monkeypatch):

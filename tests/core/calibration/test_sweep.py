@@ -79,12 +79,12 @@ def test_the_ready_radii_stay_within_the_elastic_limit_and_reach_the_papers_fing
         (CylinderStep(1), "Flat table, nothing pressing on the skin"),
         (
             CylinderStep(5, 0.025, "x", 1, "back"),
-            "Cylinder of radius 25 mm, bent along x, inner face on it, on the way back",
+            "Cylinder of radius 25 mm, bent along x, inner face on it, rising radius",
         ),
         (
             CylinderStep(5, 0.0145, "diagonal", -1),
             "Cylinder of radius 14.5 mm, bent along the diagonal from corner x = y = 0, "
-            "outer face on it, on the way there",
+            "outer face on it, falling radius",
         ),
         (
             CylinderStep(2, 0.013, "y", -1, "first"),
@@ -234,7 +234,7 @@ def test_a_channel_on_a_rail_in_any_frame_has_no_reading_of_that_step():
     readings[2, 7] = np.nan
     taken = Procedure(SENSOR, SHORT).take(times, readings)
     assert np.flatnonzero(np.isnan(taken.mean)).tolist() == [7]
-    assert "1 channels dead or on a rail" in str(taken)
+    assert "1 channels dead or saturated" in str(taken)
 
 
 def test_what_was_taken_is_told_beside_the_cylinder():
@@ -286,7 +286,7 @@ def test_frames_that_make_no_reading_are_refused_and_the_step_stays():
 
 def test_a_sweep_is_given_when_all_is_done_and_not_before():
     procedure = Procedure(SENSOR, SHORT)
-    with pytest.raises(Refusal, match="43 steps are still to be taken"):
+    with pytest.raises(Refusal, match="43 steps are not captured yet"):
         procedure.sweep()
     with pytest.raises(Refusal, match="every step is done"):
         all_taken().take(*frames(SHORT[0], time=99.0))

@@ -247,7 +247,7 @@ def test_a_small_load_is_told_against_the_tare_before():
     first = taken(pressed)  # cannot be told from elements that are off
 
     assert first.frames
-    with pytest.raises(Refusal, match=r"since the tare of 2026-11-22 01:02: undo that one first"):
+    with pytest.raises(Refusal, match=r"since the tare of 2026-11-22 01:02: undo that tare first"):
         taken(pressed, pipeline)
 
 
@@ -365,13 +365,13 @@ def test_frames_of_before_it_was_asked_for_do_not_count():
 
 def test_another_sensor_is_refused():
     other = replace(SENSOR, serial_number="other")
-    with pytest.raises(Refusal, match="this tare is of Simulated skin SIM-0001, the sensor is"):
+    with pytest.raises(Refusal, match="this tare belongs to Simulated skin SIM-0001, not to"):
         Pipeline(other, Setup(tare=tare_of(0.0)))
 
 
 def test_a_sensor_with_its_elements_elsewhere_is_refused():
     other = load_scene("fingertip").sensor()
-    with pytest.raises(Refusal, match="in other places than when it was tared; tare it again"):
+    with pytest.raises(Refusal, match="at other positions than when it was tared; tare it again"):
         Pipeline(other, Setup(tare=tare_of(0.0)))
 
 

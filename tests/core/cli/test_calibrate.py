@@ -206,7 +206,7 @@ def test_a_person_is_asked_for_each_cylinder_and_shown_what_was_read(monkeypatch
     assert rig.closed
     assert len(rig.asked) == 55
     assert rig.asked[0] == (
-        "1/55  Flat table, nothing pressing on the skin: press Enter when it lies still: "
+        "1/55  Flat table, nothing pressing on the skin: press Enter when at rest: "
     )
     assert rig.asked[1].endswith("or r and Enter to take the last one again: ")
     assert rig.told[0] == ADVICE
@@ -279,7 +279,7 @@ def test_a_device_that_falls_silent_is_refused(monkeypatch) -> None:
     rig = Rig()
     take = rig.read
     rig.read = lambda timeout: take(timeout) if len(rig.asked) < 5 else time.sleep(0.01) or []
-    with pytest.raises(Refusal, match=r"no frame came for .* still sending"):
+    with pytest.raises(Refusal, match=r"no frame for .* still sending"):
         guided(rig, monkeypatch)
     assert rig.closed
 
@@ -375,7 +375,7 @@ def test_a_device_that_is_already_on_its_way_is_refused(run, tmp_path) -> None:
         os.close(line)
         out = tmp_path / "s.toml"
         found = run("calibrate", device.port, "--out", out, "--dwell", 0.05, *FAST[:2])
-    refused(found, "step 1 was not seen: the device presents step.*restart it", tmp_path)
+    refused(found, "step 1 was missed: the device is at step.*restart it", tmp_path)
 
 
 def started(port: str, out: Path, **streams: Any) -> subprocess.Popen[str]:

@@ -211,16 +211,25 @@ def test_noise_alone_is_never_a_contact(patch):
 
 @SKINS
 def test_a_force_too_small_against_its_noise_has_no_place(patch):
-    refused(patch, pressed(patch, (0.02, 0.015), 0.02), "expected a press above 0.03 N, got 0.02 N")
+    refused(
+        patch,
+        pressed(patch, (0.02, 0.015), 0.02),
+        "expected a normal force above 0.03 N, got 0.02 N",
+    )
 
 
 @SKINS
 @pytest.mark.parametrize("sensor", [EXACT, NOISY])
 def test_no_force_at_all_has_no_place_even_without_noise(patch, sensor):
-    refused(patch, Wrench(np.zeros(3), np.zeros(3)), "expected a press above", sensor)
-    refused(patch, Wrench(np.zeros(3), np.array([1.0, 0.5, 0.2])), "expected a press above", sensor)
+    refused(patch, Wrench(np.zeros(3), np.zeros(3)), "expected a normal force above", sensor)
+    refused(
+        patch,
+        Wrench(np.zeros(3), np.array([1.0, 0.5, 0.2])),
+        "expected a normal force above",
+        sensor,
+    )
     tiny = np.array([0, 0, -1e-300])
-    refused(patch, Wrench(tiny, np.array([1.0, 0.5, 0.2])), "expected a press above", sensor)
+    refused(patch, Wrench(tiny, np.array([1.0, 0.5, 0.2])), "expected a normal force above", sensor)
 
 
 @SKINS
@@ -236,7 +245,7 @@ def test_a_pull_on_the_plane_is_told_as_one():
 def test_a_force_along_the_skin_alone_has_no_place(patch):
     along = Wrench(np.array([0.0, 1.0, 0.0]), np.array([0.01, 0.0, 0.0]))
 
-    refused(patch, along, "expected a press above")
+    refused(patch, along, "expected a normal force above")
 
 
 @pytest.mark.parametrize("place", [(-0.005, 0.01), (0.045, 0.01), (0.02, -0.004), (0.02, 0.034)])
@@ -256,7 +265,9 @@ def test_a_force_beside_the_cylinder_has_no_place():
 def test_a_grazing_force_that_hardly_presses_has_no_place():
     where = (0.5 * FINGER.a, 0.015)
 
-    refused(FINGER, pressed(FINGER, where, 0.02, (1.0, 0.0)), "expected a press above 0.03 N")
+    refused(
+        FINGER, pressed(FINGER, where, 0.02, (1.0, 0.0)), "expected a normal force above 0.03 N"
+    )
 
 
 def test_a_moment_too_noisy_for_the_force_has_no_place():

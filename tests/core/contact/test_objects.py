@@ -464,7 +464,7 @@ def test_one_line_describes_it():
     for found, pattern in (
         (rod, text.format("cylinder", r", \d+ mm long, axis \d+ deg")),
         (ball, text.format("sphere", "")),
-        (replace(ball, kind=""), "undetermined: fits none of these objects, sphere best"),
+        (replace(ball, kind=""), "undetermined: no object fits, sphere best"),
         (replace(rod, kind="edge"), r"edge, \d+ mm long, axis \d+ deg; second guess \w+ \d+ %"),
         (replace(ball, radius_95=(0.05, math.inf)), r"sphere, radius above 50 mm; .*"),
         (replace(ball, radius_95=(0.0, 2.756)), r"sphere, radius below 2756 mm; .*"),

@@ -308,7 +308,7 @@ def test_what_the_device_calls_dead_is_told_at_once_and_on_a_strip_no_more_than_
     monitor, _ = watched(frames_of("fingertip", 1), None, sensor)
 
     (finding,) = monitor.findings(np.zeros(30, bool))
-    assert (finding.channel, finding.kind, finding.figure) == (4, "dead", "the device says so")
+    assert (finding.channel, finding.kind, finding.figure) == (4, "dead", "reported by the device")
 
 
 def test_frames_that_hold_a_tenth_of_the_channels_in_turn_are_enough() -> None:

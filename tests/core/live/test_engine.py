@@ -671,7 +671,7 @@ def test_nothing_is_not_tared(engine: Engine) -> None:
     engine.disconnect()
     state(engine, OFF)
 
-    assert tared(engine).refusal == "nothing streams: connect a sensor, then tare"
+    assert tared(engine).refusal == "no readings arrive: connect a sensor, then tare"
 
 
 def test_a_tare_ends_with_the_connection(engine: Engine) -> None:
@@ -703,7 +703,7 @@ def test_a_tare_that_dies_with_its_engine_is_said_to(own_engine) -> None:
     engine.revive()
 
     assert wait_for(lambda: engine.status().tare.ended == 1)
-    assert engine.status().tare.refusal == "the engine ended while it was taken; tare again"
+    assert engine.status().tare.refusal == "the engine ended during the tare; tare again"
 
 
 def test_a_scene_that_warms_tells_its_temperature(engine: Engine) -> None:

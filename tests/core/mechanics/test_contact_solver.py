@@ -460,7 +460,7 @@ def test_a_force_of_zero_just_touches():
         ({"depth": math.nan}, "depth of at most 0.1 m.*got nan"),
         ({"depth": 5.0}, "depth of at most 0.1 m.*got 5.0; depths are in metres"),
         ({"x": 0.2, "depth": 1e-3}, r"over the patch of 0.1 x 0.1 m, got Sphere.*at \(0.2, 0.05\)"),
-        ({"force": 1e3}, "so hard a push would press the object .* m deep"),
+        ({"force": 1e3}, "this force would press the object .* m deep"),
     ],
 )
 def test_a_push_that_cannot_be_is_refused(asked, said):

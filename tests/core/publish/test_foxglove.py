@@ -377,7 +377,9 @@ def test_a_kind_of_address_that_this_machine_does_not_have_is_refused(monkeypatc
         raise OSError(97, "Address family not supported by protocol")
 
     monkeypatch.setattr(socket, "socket", lacking)
-    with pytest.raises(Refusal, match=r"cannot be listened on \(Address family not supported"):
+    with pytest.raises(
+        Refusal, match=r"cannot be opened for listening \(Address family not supported"
+    ):
         opened(target_of("foxglove://127.0.0.1:8799"))
 
 

@@ -84,7 +84,7 @@ def test_a_disk_that_fills_leaves_a_whole_recording(small_disk) -> None:
             sent += 1
         time.sleep(0.01)
     assert not file.written.active
-    assert "No space left on device; it is whole up to then" in file.written.trouble
+    assert "No space left on device; it is complete up to that time" in file.written.trouble
     file.put(m.LINES, 0.0, LINE)  # nobody minds
     file.close()
     with Recording(small_disk) as recording:

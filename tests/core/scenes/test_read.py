@@ -92,7 +92,7 @@ WRONG = {
     "a negative size": ("format = 1\n[skin]\nsize = [-0.1, 0.1]\n", "line 2: skin: .*metres"),
     "one side": ("format = 1\n[skin]\nsize = [0.1]\n", "line 3: .*list of 2 numbers"),
     "no size": ("format = 1\n", "expected size = a list of 2 numbers, got none"),
-    "a newer format": ("format = 2\n", "line 1: format: .*get a newer kappaskin"),
+    "a newer format": ("format = 2\n", "line 1: format: .*update kappaskin"),
     "no format": ("", "expected format = a whole number, got none"),
     "no TOML": ("format = \n", "a mistake in it: .*line 1"),
     "a load beside the skin": (TOUCH.replace("x = 0.05", "x = 0.2"), "a load on the patch"),
@@ -139,7 +139,7 @@ WRONG = {
     "an accuracy of all": ("accuracy = 1.0\n" + HEAD, "line 1: accuracy: .*between 0 and 1"),
     "on and off": (HEAD + "[effects]\non=['skew']\noff=['skew']\n", "skew as both"),
     "an unknown choice": (HEAD + "[effects]\nchoose = 'none'\n", "line 6: effects.choose: .*auto"),
-    "an effect of the skin": (HEAD + "[effects.foam]\nx = 1\n", r"\[skin\] has the foundation"),
+    "an effect of the skin": (HEAD + "[effects.foam]\nx = 1\n", r"set foundation in \[skin\]"),
     "a rate that cannot be": ("rate = 1e6\n" + HEAD, "lower the rate"),
     "a grid of words": (HEAD + "[elements]\ngrid = ['a', 'b']\n", "line 6: elements.grid: "),
     "a listed effect that there is not": (

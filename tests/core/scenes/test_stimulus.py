@@ -133,7 +133,7 @@ def test_nothing_jumps_along_a_path() -> None:
 def test_a_path_that_ends_where_it_began_need_not_be_lifted() -> None:
     there_and_back = (PressStep(1.0), PressStep(1.0, to=0.0), SlideStep(1.0, by=(0.1, 0.0)))
     assert MotionPath(there_and_back).at(2.9).dx > 0.09
-    with pytest.raises(Refusal, match=r"0\.1 and 0 m away that presses 1 times"):
+    with pytest.raises(Refusal, match=r"0\.1 and 0 m away with 1 times"):
         MotionPath((PressStep(1.0), SlideStep(1.0, by=(0.1, 0.0))))
 
 

@@ -90,7 +90,7 @@ def test_a_device_that_sends_what_it_says_it_has_not_gives_no_frame_any_more() -
 
     assert means.frame(samples(SENSOR.channels), 9.0) is None
 
-    assert f"sends channel {SENSOR.channels} but says it has {SENSOR.channels}" in means.unusable
+    assert f"sends channel {SENSOR.channels} but reports {SENSOR.channels}" in means.unusable
     assert means.frame(samples(0), 9.0) is None
 
 

@@ -525,7 +525,7 @@ def test_a_port_taken_meanwhile_is_waited_for(streaming, plug, monkeypatch):
     def busy(url, clock):
         if len(refused) < 3:
             refused.append(url)
-            raise SourceError(f"{url}: busy, a program has it open; close that program")
+            raise SourceError(f"{url}: busy, a program ; close that program")
         return real(url, clock)
 
     monkeypatch.setattr(serial_source, "SerialConnection", busy)

@@ -301,7 +301,7 @@ def test_a_silent_device_is_given_up(line, opened, hasty) -> None:
     frames, why = read_to_trouble(opened(line.port))
     assert frames == []
     assert why == (
-        f"{line.port}: silent for more than 0.15 s; is the device on, and is this its port?"
+        f"{line.port}: silent for more than 0.15 s; check the power, and that this its port?"
     )
 
 
@@ -321,7 +321,7 @@ def test_another_protocol_is_told_apart(line, opened, hasty) -> None:
     frames, why = read_to_trouble(source)
     assert frames == []
     assert "260 bytes came but no message of wire version 1" in why
-    assert "at 2000000 baud; as bytes come other rates are tried, or it is another kind" in why
+    assert "at 2000000 baud; other rates are tried as bytes arrive, or it is another kind" in why
 
 
 def test_another_version_is_told_apart(line, opened, hasty) -> None:
@@ -331,7 +331,7 @@ def test_another_version_is_told_apart(line, opened, hasty) -> None:
     line.write(said := body + struct.pack("<I", zlib.crc32(body)))
     read_all(source, said)
     _, why = read_to_trouble(source)
-    assert "speaks wire version 7, this program speaks 1; update the older" in why
+    assert "speaks wire version 7, this program uses 1; update the older" in why
 
 
 def test_a_device_that_never_says_what_it_is_is_given_up(line, opened, hasty) -> None:
@@ -339,7 +339,7 @@ def test_a_device_that_never_says_what_it_is_is_given_up(line, opened, hasty) ->
     line.write(stream(0, 5))
     assert read_all(source, stream(0, 5)) == []
     _, why = read_to_trouble(source)
-    assert "messages come, but for more than 0.15 s none said what the device is" in why
+    assert "messages arrive, but in 0.15 s none described the device is" in why
 
 
 def test_information_that_cannot_be_used_is_refused_after_the_frames_before_it(
@@ -360,7 +360,7 @@ def test_a_channel_that_the_device_does_not_have_is_refused_after_the_frames_bef
     line.write(introduction(0) + stream(1, 4) + scan(4, channels=301))
     frames, why = read_to_trouble(source)
     assert sequences(frames) == [1, 2, 3]
-    assert "sends channel 300 but says it has 300" in why
+    assert "sends channel 300 but reports 300" in why
     line.write(introduction(5) + stream(6, 8))
     assert read(source, 1, within=0.2) == []
     assert source.trouble == why  # until it says something else of itself
@@ -422,7 +422,7 @@ def test_what_cannot_be_opened_is_refused_with_a_reason(name: str, reason: str) 
 
 def test_a_port_opened_twice_is_busy(line, opened) -> None:
     opened(line.port)
-    with pytest.raises(SourceError, match="busy, another program has it open; close that program"):
+    with pytest.raises(SourceError, match="busy, another program ; close that program"):
         SerialSource(line.port)
 
 

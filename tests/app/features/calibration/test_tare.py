@@ -181,7 +181,9 @@ def test_another_sensor_without_one_is_told_that_it_is_not_in_use(bench):
     bench.meet(OTHER)
 
     assert bench.used == tare_of(1.0)
-    assert bench.panel.message.text().startswith("Not in use: this tare is of Simulated skin KS-7")
+    assert bench.panel.message.text().startswith(
+        "Not in use: this tare belongs to Simulated skin KS-7"
+    )
     assert bench.tares.load("KS-7").used == tare_of(1.0)
     assert bench.tares.load("KS-8").used is None
 
@@ -249,7 +251,7 @@ def test_a_refusal_is_cleared_with_its_connection(bench):
 
 def test_drift_is_told_in_words():
     status = Status(setup=Setup(tare=tare_of()), drift=Drift(0.0512, 3.4e-5, 12.0))
-    words = "Drift since: 0.051 1/m (RMS), equal to a displacement of 0.034 mm"
+    words = "Drift since the tare: 0.051 1/m (RMS), equal to a displacement of 0.034 mm"
     assert drift_text(status) == words
     loaded = replace(status, drift=Drift(0.0512, 3.4e-5, 12.0, True))
     assert drift_text(loaded) == f"{words}, before the load"
@@ -285,7 +287,7 @@ def test_a_window_tares_a_skin_at_rest_and_refuses_a_loaded_one(window, until):
     action.trigger()
     until(lambda: window.history.settings.tare is not None)
     until(lambda: window.session.status.setup.tare is not None)
-    until(lambda: panel.drift.text().startswith("Drift since: 0.0"))
+    until(lambda: panel.drift.text().startswith("Drift since the tare: 0.0"))
 
     window.history.stack.undo()
     until(lambda: window.session.status.setup.tare is None)

@@ -73,4 +73,4 @@ def test_a_failure_is_reported_once_and_the_next_estimate_is_described(
     window.recognition.described.connect(described.append)
     until(lambda: described)
 
-    assert told == ["Something went wrong: once"]
+    assert told == ["Error in the program: once"]

@@ -17,7 +17,7 @@ from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import DARK, apply_look
 
 STUCK = Finding(157, 57, "yy", "stuck", 100.0, "reads -1.70 1/m")
-KEPT = Finding(12, 12, "xx", "dead", 20.0, "the device says so", retained=True)
+KEPT = Finding(12, 12, "xx", "dead", 20.0, "reported by the device", retained=True)
 
 
 def told(panel: HealthPanel) -> list[list[str]]:
@@ -32,7 +32,7 @@ def test_findings_are_listed_with_their_age_and_figure(qapp) -> None:
     panel._show(Health((KEPT, STUCK), 2, 1, 1.08, 1.3), 130.0)  # noqa: SLF001
 
     assert told(panel) == [
-        ["12", "xx", "dead, kept", "2 min", "the device says so"],
+        ["12", "xx", "dead, kept", "2 min", "reported by the device"],
         ["57", "yy", "stuck", "30 s", "reads \N{MINUS SIGN}1.70 1/m"],
     ]
     assert panel.words.text() == (

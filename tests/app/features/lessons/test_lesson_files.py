@@ -134,7 +134,7 @@ def test_no_text_is_an_expression_that_breaks(text: str) -> None:
 @pytest.mark.parametrize(
     ("block", "line", "said"),
     [
-        ("sett = {}", 10, "left out or spelt as one of"),
+        ("sett = {}", 10, "omitted, or one of"),
         ("\nset = { force = 99 }", 11, "force from -50 to 50"),
         ("set = { send_udp = true }", 10, "the name of a setting"),
         ("set = { theme = 'light' }", 10, "the name of a setting"),

@@ -39,8 +39,8 @@ def test_what_goes_wrong_is_in_the_log_whoever_missed_it(tmp_path: Path, monkeyp
     logged = (tmp_path / "log" / LOG).read_text()
     for words in ("in fail", "no such thing", "in a slot", "in beside", "a warning of Qt's"):
         assert words in logged
-    assert told == ["Something went wrong: no such thing", "Something went wrong: in a slot"]
-    assert "begun as" in (tmp_path / "log" / CRASHES).read_text()
+    assert told == ["Error in the program: no such thing", "Error in the program: in a slot"]
+    assert "started, process" in (tmp_path / "log" / CRASHES).read_text()
     assert (sys.excepthook, threading.excepthook) == hooks
     if was_on:
         faulthandler.enable()
@@ -72,7 +72,7 @@ def test_a_failure_is_counted_and_listed_while_the_session_goes_on(
     for _ in range(5):
         QApplication.processEvents()
     assert not window.display.notice.isVisible()  # or the two would stand over each other
-    assert "failure:  Something went wrong: no such thing" in window.event_log.list.toPlainText()
+    assert "failure:  Error in the program: no such thing" in window.event_log.list.toPlainText()
     window.errors.count.click()
     until(lambda: window.log.table.rowCount() >= 4)
     texts = [window.log.table.item(row, 2).text() for row in range(window.log.table.rowCount())]

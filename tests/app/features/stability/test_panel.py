@@ -52,7 +52,7 @@ def test_twelve_by_twelve_from_ten_by_ten_leave_four_shapes_unseen() -> None:
 
 def test_a_row_less_costs_twice_the_noise_and_a_quarter_thousands() -> None:
     assert "has 2 times the noise" in of(**demonstration("Drop a row")).describe()
-    assert "has 9\N{THIN SPACE}500 times" in of(**demonstration("Drop a quarter")).describe()
+    assert "has 9\N{THIN SPACE}500 times" in of(**demonstration("A quarter dead")).describe()
 
 
 def test_pinned_ends_decide_the_fingertips_silent_mode_and_sliding_ones_do_not() -> None:

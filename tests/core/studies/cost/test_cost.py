@@ -370,7 +370,7 @@ def test_what_reaches_an_accuracy_is_named_with_its_figures(small) -> None:
     assert found.cost == cheapest(small, 0.02e-3)
     assert found.cost.setting.elements == (10, 10)
     said = "\n".join(found.lines)
-    assert said.startswith("0.02 mm is reached; with the least time by")
+    assert said.startswith("0.02 mm is reached; in the least time with")
     assert "8 x 8 functions, float64, 10 x 10 elements, all 300 channels scanned" in said
     assert "1.5 ms of conversion" in said
 

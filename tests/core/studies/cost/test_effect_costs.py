@@ -238,7 +238,7 @@ def test_the_usual_setting_of_a_strip_goes_along_it() -> None:
 
 def test_elements_that_carry_nothing_are_refused() -> None:
     scene = replace(CENTRE, layout=CENTRE.layout.without(range(100)))
-    with pytest.raises(Refusal, match="expected elements that carry a shape, got the 100"):
+    with pytest.raises(Refusal, match="expected enough elements for a shape, got the 100"):
         usual_setting(scene)
 
 

@@ -246,7 +246,7 @@ def test_a_task_that_kills_workers_fails_alone(study_of, tmp_path):
     found = computed(study, tmp_path / "out", Fragile())
 
     for known in found:
-        assert known.failures == ["the process that computed it died, and so did a second one"]
+        assert known.failures == ["two processes that computed it ended unexpectedly"]
         folder, point = StudyFolder(tmp_path / "out"), known.point.document
         kept = [folder.result(BlockTask(point, block, version())) for block in range(known.done)]
         assert [isinstance(result, str) for result in kept] == [False, True, False, False]

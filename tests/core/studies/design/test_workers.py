@@ -178,7 +178,7 @@ class Told:
     ("versions", "told"),
     [
         ({}, "expected workers, got none in 5 s; start some by dask worker"),
-        ({"a": ALIKE, "b": "kappaskin 9"}, "got 1 of 2 with another, b with kappaskin 9"),
+        ({"a": ALIKE, "b": "kappaskin 9"}, "got 1 of 2 with others, b with kappaskin 9"),
         ({"a": ALIKE.replace("BLAS 1", "BLAS 2")}, "start them with OPENBLAS_NUM_THREADS=1"),
     ],
 )

@@ -270,13 +270,13 @@ def test_fig6_shows_both_surfaces_on_one_scale(drawn) -> None:
 
 def test_fig8_tells_the_gaps_and_the_line_of_the_loops_it_draws(drawn) -> None:
     loop = drawn["fig8"][0].axes[0]
-    x, there = line(loop, "way there")
+    x, there = line(loop, "falling")
     applied, read = line(loop, "second prototype")
     slope, offset = np.polyfit(applied, read, 1)
 
     ends, drawn_line = line(loop, "least-squares line")
     np.testing.assert_allclose(drawn_line, offset + slope * ends, atol=1e-9)
-    back = dict(line(loop, "way back").T)
+    back = dict(line(loop, "rising").T)
     pairs = [
         (k, (back[k] - reading) / slope) for k, reading in zip(x, there, strict=True) if k in back
     ]
