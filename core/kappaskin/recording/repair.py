@@ -12,9 +12,10 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
+from kappaskin._files import part_for
 from kappaskin._processes import BackgroundProcess
 from kappaskin.errors import Refusal
-from kappaskin.recording.disk import ReservedFile, is_there, is_written
+from kappaskin.recording.disk import ReservedFile, is_there
 from kappaskin.recording.messages import TOPICS
 from kappaskin.recording.reading import (
     LARGEST,
@@ -67,36 +68,39 @@ class Repaired:
         return f"{self.total:,} messages and {self.attachments} attachments; {lost}"
 
     @staticmethod
-    def steps(path: Path, out: Path) -> "Generator[float | Repaired]":
+    def steps(path: Path, out: Path, part: Path | None = None) -> "Generator[float | Repaired]":
         """Save every whole message of `path` to `out`, with summary and index.
 
         Yields the share that is done now and then, and what was saved at the end. Nothing is
-        written where nothing is saved. A `Refusal` where `path` cannot be read or is no MCAP file,
-        or `out` cannot be written.
+        written where nothing is saved; until all is, it is in `part`. A `Refusal` where `path`
+        cannot be read or is no MCAP file, or `out` cannot be written.
         """
-        check_new(out)
+        check_new(out, path)
         check_file(path)
         try:
             with path.open("rb") as file:
                 if not path.stat().st_size:
                     raise Refusal(f"{path}: is empty")
                 with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-                    yield (yield from _Repair(path, data, out).run())
+                    yield (yield from _Repair(path, data, out, part or part_for(out)).run())
         except OSError as error:
             raise Refusal(f"{path}: cannot be read ({error.strerror or error})") from error
 
 
-def check_new(out: Path) -> None:
-    """Refuse a file that exists or is being written."""
-    if is_there(out) or is_there(part_of(out)):
+def check_new(out: Path, path: Path) -> None:
+    """Refuse an `out` that exists, or that another recording than `path` will be named."""
+    part = part_of(out)
+    ours = is_there(part) and is_there(path) and part.samefile(path)
+    if is_there(out) or (is_there(part) and not ours):
         raise Refusal(f"{out}: already exists; choose another name")
 
 
 class _Repair:
     """Reads the bytes of one file once."""
 
-    def __init__(self, path: Path, data: mmap.mmap, out: Path) -> None:
+    def __init__(self, path: Path, data: mmap.mmap, out: Path, part: Path) -> None:
         self._path, self._data, self._out, self._size = path, data, out, len(data)
+        self._part = part
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
         self._new: dict[int, int] = {}  # channels as they are called in what is written
@@ -106,7 +110,7 @@ class _Repair:
         self._ended = False
 
     def run(self) -> Generator[float, None, Repaired]:
-        disk, next_report = ReservedFile(part_of(self._out)), 0.0
+        disk, next_report = ReservedFile(self._part), 0.0
         try:
             self._writer = Writer(disk.stream, _CHUNK, CompressionType.LZ4)
             self._begin()
@@ -286,10 +290,10 @@ class RepairTask:
     """
 
     def __init__(self, path: Path, out: Path) -> None:
-        check_new(out)
-        self._part = part_of(out)
+        check_new(out, path)
+        self.part = part_for(out)
         self._task = BackgroundProcess[float | Repaired](
-            "kappaskin-repair", Repaired.steps, path, out
+            "kappaskin-repair", Repaired.steps, path, out, self.part
         )
 
     @property
@@ -306,5 +310,4 @@ class RepairTask:
     def close(self) -> None:
         """End it, done or not."""
         self._task.close()
-        if not is_written(self._part):  # by another that began it meanwhile
-            self._part.unlink(missing_ok=True)
+        self.part.unlink(missing_ok=True)

@@ -71,7 +71,7 @@ def saved(tmp_path):
         out.unlink(missing_ok=True)
         done = repair(path, out)
         assert path.read_bytes() == data
-        assert not part_of(out).exists()
+        assert set(tmp_path.iterdir()) <= {path, out}
         if not done.total:
             return done, []
         with Recording(out) as recording:
@@ -239,9 +239,9 @@ class Far:
 def test_one_given_up_leaves_nothing(tmp_path) -> None:
     out = tmp_path / "out.mcap"
     work = RepairTask(Far(), out)
-    part_of(out).write_bytes(b"as far as it is")
+    work.part.write_bytes(b"as far as it is")
     work.close()
-    assert not list(tmp_path.glob("out*"))
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.slow
@@ -250,11 +250,11 @@ def test_one_whose_process_died_leaves_nothing(tmp_path) -> None:
     work = RepairTask(Far(), out)
     (child,) = (p for p in multiprocessing.active_children() if p.name == "kappaskin-repair")
     child.kill()
-    part_of(out).write_bytes(b"as far as it was")
+    work.part.write_bytes(b"as far as it was")
     with pytest.raises(Refusal, match="ended unexpectedly"):
         list(iter(work.poll, None))
     work.close()
-    assert not list(tmp_path.glob("out*"))
+    assert not list(tmp_path.iterdir())
 
 
 def test_what_another_writes_is_left_alone(whole, tmp_path) -> None:
@@ -262,3 +262,13 @@ def test_what_another_writes_is_left_alone(whole, tmp_path) -> None:
     with pytest.raises(Refusal, match="already exists"):
         RepairTask(whole, tmp_path / "out.mcap")
     assert part_of(tmp_path / "out.mcap").read_bytes() == b"another's"
+
+
+def test_an_unfinished_recording_is_repaired_to_its_own_name(whole, tmp_path) -> None:
+    out = tmp_path / "press.mcap"
+    part_of(out).write_bytes(data := whole.read_bytes()[:-1000])
+    assert repair(part_of(out), out).total
+    assert part_of(out).read_bytes() == data
+    with Recording(out) as recording:
+        assert recording.whole
+    assert set(tmp_path.iterdir()) == {out, part_of(out)}
