@@ -74,6 +74,8 @@ def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
         time.sleep(_POLL)
         engine.revive()
         status = engine.status()
+        if engine.given_up:
+            raise Refusal(status.message)
         for target in status.publishing.targets:
             if target.refusal:
                 raise Refusal(target.refusal)

@@ -1,6 +1,7 @@
 """Commands on recordings: record, info, verify, repair, export, reconstruct."""
 
 import math
+import shlex
 import sys
 import time
 from dataclasses import replace
@@ -70,8 +71,9 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
             if not _ended(engine).recording.trouble:
                 out.unlink(missing_ok=True)  # ours, with nothing in it
             raise
-        if engine.alive:
-            status = _ended(engine)
+        if not engine.alive:
+            return _broken_off(out)
+        status = _ended(engine)
         written = status.recording
     print(
         f"{written.path}: {written.messages:,} messages in {written.seconds:.1f} s, "
@@ -108,6 +110,23 @@ def _recorded(
             raise Refusal(f"{status.source}: no readings within {_BEGIN:g} s")
         show_progress(_line(status))
         time.sleep(_POLL)
+
+
+def _broken_off(out: Path) -> int:
+    """Complete the file of an engine that ended, and report it; the exit code."""
+    from kappaskin.recording import Repaired, part_of
+
+    part, ended = part_of(out), "the engine process ended unexpectedly"
+    try:
+        done = result_of(Repaired.steps(part, out), Repaired)
+    except Refusal as reason:
+        repair = shlex.join(["kappaskin", "repair", str(part), "--out", str(out)])
+        raise Refusal(f"{ended}; the recording was not completed: {reason}; try {repair}") from None
+    if not done.total:
+        raise Refusal(f"{ended}; nothing was recorded: {done.words}")
+    part.unlink()
+    print(f"kappaskin: {ended}; saved up to then: {out}: {done.words}", file=sys.stderr)
+    return FAILED
 
 
 def _use_tare(engine: "Engine", sensor: "Sensor") -> None:

@@ -128,11 +128,11 @@ class Engine:
         To be called now and then. The position in a scene is lost. After the third death within ten
         seconds it stays dead until `connect`, and `status` says why.
         """
-        if self._process is None or self.alive or self._given_up:
+        if self._process is None or self.alive or self.given_up:
             return
         now = time.monotonic()
         self._deaths = [when for when in self._deaths if now - when < _WITHIN] + [now]
-        if self._given_up:
+        if self.given_up:
             was = self._ring.read_status() or self._seen
             self._ring.write_status(was.after((Event(now, "engine", _GIVEN_UP),)))
             return
@@ -145,7 +145,8 @@ class Engine:
             self._requests.act(Seek(None, requested.speed, requested.looped))
 
     @property
-    def _given_up(self) -> bool:
+    def given_up(self) -> bool:
+        """Whether the process has died so often that it is not restarted; `status` says so."""
         return len(self._deaths) >= _DEATHS
 
     @property
@@ -243,7 +244,7 @@ class Engine:
             self._seen = read
             self._requests.acknowledge(read.requested, read.reported)
         if not self.alive:
-            message = _GIVEN_UP if self._given_up else _DIED
+            message = _GIVEN_UP if self.given_up else _DIED
             return replace(self._seen, state=LOST, rate=0.0, message=message)
         return self._seen
 

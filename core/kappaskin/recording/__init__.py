@@ -16,4 +16,5 @@ from kappaskin.recording.repair import RepairTask as RepairTask
 from kappaskin.recording.replay import Replay as Replay
 from kappaskin.recording.replay import ReplayedSource as ReplayedSource
 from kappaskin.recording.writing import RecordingStatus as RecordingStatus
+from kappaskin.recording.writing import part_of as part_of
 from kappaskin.recording.writing import unused as unused

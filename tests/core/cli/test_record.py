@@ -6,8 +6,11 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
+import psutil
 import pytest
 
 from kappaskin.cli import main
@@ -46,6 +49,49 @@ def test_stopped_it_ends_its_file(tmp_path) -> None:
             # Who else wants the cores may cost frames before; stopping loses none of the file.
             assert f"{path}: {sum(recording.counts.values()):,} messages in " in told
         path.unlink()
+
+
+def engine_of(process: subprocess.Popen[str], begun: Callable[[], bool]) -> psutil.Process:
+    """The engine's process of a command, once something has `begun`."""
+    end = time.monotonic() + 60
+    while time.monotonic() < end:
+        for child in psutil.Process(process.pid).children(recursive=True) if begun() else ():
+            with suppress(psutil.NoSuchProcess):
+                if "forkserver" in " ".join(child.cmdline()) and child.num_threads() > 1:
+                    return child
+        time.sleep(0.05)
+    raise AssertionError("no engine was begun")
+
+
+def test_an_engine_that_is_killed_is_told_and_what_it_recorded_is_completed(tmp_path) -> None:
+    path = tmp_path / "a.mcap"
+    command = [sys.executable, "-m", "kappaskin", "record", "sim:circle", str(path)]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        part = part_of(path)
+        engine = engine_of(process, lambda: part.exists() and part.stat().st_size > 50_000)
+        engine.kill()
+        told, why = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert told == ""
+    assert "the engine process ended unexpectedly; saved up to then: " in why.splitlines()[-1]
+    with Recording(path) as recording:
+        assert recording.whole
+        assert f"{sum(recording.counts.values()):,} messages" in why
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_publishing_ends_where_its_engine_is_killed_again_and_again() -> None:
+    command = [sys.executable, "-m", "kappaskin", "publish", "sim:circle", "--udp", "127.0.0.1:9"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        for _ in range(3):
+            engine_of(process, lambda: True).kill()
+        _, why = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert "the engine process ended 3 times within 10 s" in why.splitlines()[-1]
 
 
 @pytest.mark.parametrize(
