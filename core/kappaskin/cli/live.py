@@ -92,7 +92,7 @@ def _line(status: "Status") -> str:
     parts = [f"{status.state:9}", f"{status.rate:6.0f} frames/s", *map(_words, publishing.targets)]
     if math.isfinite(publishing.latency.whole):
         parts.append(f"99 % within {1e3 * publishing.latency.whole:.1f} ms")
-    return "  ".join([*parts, status.message])
+    return "  ".join([*parts, *filter(None, (status.message, status.refusal))])
 
 
 def _words(target: "TargetStatus") -> str:

@@ -81,9 +81,10 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
     )
     if written.lost:
         print(f"{written.lost:,} messages were not recorded: the disk is too slow")
-    if written.trouble:
-        print(f"kappaskin: {written.trouble}", file=sys.stderr)
-    return FAILED if written.trouble or written.lost or not status.accounting.accepted else 0
+    for why in filter(None, (written.trouble, status.refusal)):
+        print(f"kappaskin: {why}", file=sys.stderr)
+    failed = written.trouble or status.refusal or written.lost
+    return FAILED if failed or not status.accounting.accepted else 0
 
 
 def _recorded(

@@ -73,8 +73,12 @@ class Engine:
         process = resume_process(resume_from) if resume_from else None
         if process is None:
             self._requests = RequestSender(Requested().changing(setup=setup or Setup()))
-            self._ring, self._compared_ring = Ring.create(), Ring.create()
-            self._start(Status(setup=self._requested.setup))
+            self._ring, self._compared_ring = Ring.pair()
+            try:
+                self._start(Status(setup=self._requested.setup))
+            except BaseException:
+                self._release_memory()
+                raise
         else:
             self._requests = RequestSender(process.info.requested)
             self._resume(process)
@@ -110,7 +114,7 @@ class Engine:
         was = self._ring.read_status() or self._seen
         if self.resumed is not None:
             self._release_memory()
-            self._ring, self._compared_ring, self.resumed = Ring.create(), Ring.create(), None
+            self._ring, self._compared_ring, self.resumed = *Ring.pair(), None
         setup, source = self._requested.setup, self._requested.source
         fresh = Status(
             setup=setup,

@@ -5,8 +5,10 @@ as fit, written cyclically. Neither side ever waits: each value carries a count 
 writer makes odd, or changes, while it writes, and a reader that saw it change reads again.
 """
 
+import errno
 import os
 import pickle
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from multiprocessing import resource_tracker
@@ -102,14 +104,36 @@ class Ring:
         self._opened: Any = None
         self._closed: Any = None
         self._columns: list[_Column] = []
-        self._generation = 0
+        self._generation = self._reserved = 0
 
-    # The header: status count, status length, generation of the slots, slots written.
-    _COUNT, _LENGTH, _GENERATION, _WRITTEN = range(4)
+    # The header: status count and length, generation of the slots, slots written, and how many.
+    _COUNT, _LENGTH, _GENERATION, _WRITTEN, _SLOTS = range(5)
 
     @classmethod
     def create(cls) -> "Ring":
-        return cls(SharedMemory(create=True, size=_SIZE))
+        """A new block; a `Refusal` where the system has no shared memory for it."""
+        try:
+            if 0 < _largest_file() < _SIZE:  # or Python's tracker of memory would print a traceback
+                raise OSError(errno.EFBIG, "files may not be so large, see ulimit -f")
+            made = cls(SharedMemory(create=True, size=_SIZE))
+        except OSError as error:
+            raise _no_memory(_SIZE, error) from error
+        try:
+            made._reserve(0, _HEADER)
+        except Refusal:
+            made.destroy()
+            raise
+        return made
+
+    @classmethod
+    def pair(cls) -> "tuple[Ring, Ring]":
+        """Two new blocks; none where there is memory for one only."""
+        first = cls.create()
+        try:
+            return first, cls.create()
+        except Refusal:
+            first.destroy()
+            raise
 
     @classmethod
     def attach(cls, name: str) -> "Ring":
@@ -132,6 +156,9 @@ class Ring:
         data = pickle.dumps(status)
         if len(data) > _STATUS_SIZE:
             raise Refusal(f"expected a status of at most {_STATUS_SIZE} bytes, got {len(data)}")
+        if len(data) > self._reserved:
+            self._reserve(_HEADER, len(data))
+            self._reserved = len(data)
         # Odd already when a writer was killed in the middle: |= sets it right, += would not.
         self._header[self._COUNT] |= 1
         self._status[: len(data)] = np.frombuffer(data, np.uint8)
@@ -151,15 +178,37 @@ class Ring:
         # Written by our own engine into memory that only this user may open.
         return pickle.loads(data) if data else None
 
-    def _map(self, slot: np.dtype[np.void]) -> None:
+    def _reserve(self, begin: int, size: int) -> None:
+        """Have the system back these bytes: to write to what it cannot back ends the process."""
+        if sys.platform == "linux":
+            try:
+                os.posix_fallocate(self._memory._fd, begin, size)  # pyright: ignore  # noqa: SLF001
+            except OSError as error:
+                raise _no_memory(size, error) from error
+
+    def _slots_for(self, slot: np.dtype[np.void]) -> int:
+        """How many slots there is memory for."""
         count = min(_MOST_SLOTS, len(self._area) // slot.itemsize)
         if count < 2:
             raise Refusal(f"an estimate of {slot.itemsize} bytes is too large; use a smaller basis")
-        self._slots = self._area[: count * slot.itemsize].view(slot)
+        while True:
+            try:
+                self._reserve(_HEADER + _STATUS_SIZE, count * slot.itemsize)
+            except Refusal:
+                if count == 2:
+                    raise
+                count = max(2, count // 2)
+            else:
+                return count
+
+    def _map(self, slot: np.dtype[np.void]) -> None:
+        size = int(self._header[self._SLOTS]) * slot.itemsize
+        self._slots = self._area[:size].view(slot)
 
     def lay_out(self, generation: int, slot: np.dtype[np.void]) -> None:
         """Writer: begin anew with slots for estimates of `generation` (above zero)."""
         self._header[self._GENERATION] = 0
+        self._header[self._SLOTS] = self._slots_for(slot)
         self._map(slot)
         self._opened, self._closed = self._slots["opened"], self._slots["closed"]
         self._columns = _columns(self._slots)
@@ -184,9 +233,8 @@ class Ring:
 
         None when there is none yet, or no more.
         """
-        if generation != self._generation or slot != self._slots.dtype:
-            self._map(slot)
-            self._generation = generation
+        if not self._mapped(generation, slot):
+            return None
 
         def copied() -> Any:
             written = int(self._header[self._WRITTEN])
@@ -201,8 +249,6 @@ class Ring:
             whole = closed == here["opened"] == ticket
             return record if whole and self._header[self._GENERATION] == generation else None
 
-        if self._header[self._GENERATION] != generation:
-            return None
         record = _tried(copied)
         return _estimate(record) if record is not None else None
 
@@ -214,10 +260,9 @@ class Ring:
         It is (T, 3 k, P), for each of the k quantities its components. As many of `generation` as
         are still there, and the number of the last, counted from 1.
         """
-        if generation != self._generation or slot != self._slots.dtype:
-            self._map(slot)
-            self._generation = generation
         written = int(self._header[self._WRITTEN])
+        if not self._mapped(generation, slot):
+            return np.empty(0), np.empty((0, 3, 0)), written
         tickets = np.arange(max(after, written - len(self._slots)), written) + 1
         here = (tickets - 1) % len(self._slots)
         closed = self._slots["closed"][here]
@@ -228,6 +273,15 @@ class Ring:
         if self._header[self._GENERATION] != generation:
             whole[:] = False
         return times[whole], values[whole], written
+
+    def _mapped(self, generation: int, slot: np.dtype[np.void]) -> bool:
+        """Reader: whether the slots are those of `generation`, as they are laid out."""
+        if self._header[self._GENERATION] != generation:
+            return False
+        if generation != self._generation or slot != self._slots.dtype:
+            self._map(slot)
+            self._generation = generation
+        return True
 
     def _ticket_of(self, sequence: int) -> int:
         """Which estimate was written of that frame last, counted from 1; 0 where none is there."""
@@ -244,6 +298,22 @@ class Ring:
         """Owner: let go of the memory and give it back."""
         self.close()
         self._memory.unlink()
+
+
+def _largest_file() -> int:
+    """Bytes that a file of this process may have, shared memory among them; below 0: any."""
+    if sys.platform == "win32":
+        return -1
+    import resource
+
+    return resource.getrlimit(resource.RLIMIT_FSIZE)[0]
+
+
+def _no_memory(size: int, error: OSError) -> Refusal:
+    return Refusal(
+        f"expected {size:,} bytes of shared memory, got none ({error.strerror or error}); free "
+        "some, or allow more (in a container --shm-size=256m)"
+    )
 
 
 def _tried(copied: Callable[[], Any]) -> Any:

@@ -1,6 +1,10 @@
 """Estimates through shared memory: whole or not at all, whatever the writer does meanwhile."""
 
 import multiprocessing
+import os
+import re
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
@@ -13,6 +17,7 @@ import pytest
 from kappaskin import Estimate, Pipeline, Refusal, Setup, Simulator, load_scene
 from kappaskin.frames import Array, Contact, LocalGeometry
 from kappaskin.live.ring import Ring, slot_type
+from kappaskin.recording import Recording
 
 
 def pipeline_of(setup: Setup | None = None) -> Pipeline:
@@ -46,6 +51,18 @@ def writer(ring) -> Iterator[Ring]:
     made = Ring.attach(ring.name)
     yield made
     made.close()
+
+
+SMALL = pytest.mark.skipif(
+    sys.platform != "linux" or os.geteuid() != 0, reason="mounts a small memory: needs root"
+)
+
+
+def with_memory(size: str, *command: str) -> subprocess.CompletedProcess[str]:
+    """Run `kappaskin` with the arguments where there is so much shared memory."""
+    mount = f'mount -t tmpfs -o size={size} tmpfs /dev/shm && exec "$@"'
+    run = ["unshare", "-m", "sh", "-c", mount, "sh", sys.executable, "-m", "kappaskin", *command]
+    return subprocess.run(run, capture_output=True, text=True, timeout=60)
 
 
 # Estimates
@@ -276,3 +293,40 @@ def test_a_block_given_back_is_gone() -> None:
     ring.destroy()
     with pytest.raises(FileNotFoundError):
         Ring.attach(name)
+
+
+# Little memory
+
+
+@SMALL
+@pytest.mark.slow
+@pytest.mark.parametrize("size", ["4m", "512k"])
+def test_little_memory_is_made_do_with(tmp_path, size: str) -> None:
+    file = tmp_path / "a.mcap"
+    done = with_memory(size, "record", "sim:", str(file), "--seconds", "1")
+    assert (done.returncode, done.stderr) == (0, "")
+    with Recording(file) as recording:
+        assert recording.counts["/kappaskin/contact"] > 50
+
+
+@SMALL
+@pytest.mark.slow
+@pytest.mark.parametrize("size", ["4k", "16k"])
+def test_too_little_memory_is_refused(tmp_path, size: str) -> None:
+    file = tmp_path / "a.mcap"
+    done = with_memory(size, "record", "sim:", str(file), "--seconds", "1")
+    assert done.returncode in (1, 2)
+    assert re.search(r"expected [\d,]+ bytes of shared memory, got none", done.stderr)
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="has no limits of a process")
+def test_a_limit_of_file_sizes_is_told(tmp_path) -> None:
+    command = 'ulimit -f 2048; exec "$@"'
+    record = [sys.executable, "-m", "kappaskin", "record", "sim:", str(tmp_path / "a.mcap")]
+    done = subprocess.run(["sh", "-c", command, "sh", *record], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert re.fullmatch(
+        r"kappaskin: expected .* bytes of shared memory.*ulimit -f.*\n", done.stderr
+    )
