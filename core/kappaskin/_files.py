@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all."""
+"""Files: written whole or not at all, and opened only where they are files."""
 
 import os
 import secrets
@@ -6,10 +6,32 @@ import stat
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import BinaryIO
 
 from kappaskin.errors import Refusal
 
 _ELSEWHERE = "choose another place"
+
+
+def open_file(path: Path) -> BinaryIO:
+    """Open the file at `path` to read bytes from it.
+
+    An `OSError` also for anything else than a file: a pipe that nobody writes to would block.
+    """
+    at_once = getattr(os, "O_NONBLOCK", 0)
+    file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | at_once))  # noqa: SIM115
+    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        file.close()
+        raise OSError("it is not a file")
+    return file
+
+
+def read_file(path: Path, most: int) -> bytes:
+    """The bytes of the file at `path`; an `OSError` as of `open_file`, or above `most` bytes."""
+    with open_file(path) as file:
+        if os.fstat(file.fileno()).st_size > most:
+            raise OSError(f"it has more than {most} bytes")
+        return file.read()
 
 
 @contextmanager

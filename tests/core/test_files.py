@@ -1,4 +1,4 @@
-"""Files are written whole or not at all, whatever is at the path."""
+"""Files are written whole or not at all, and read only where they are files."""
 
 import os
 import resource
@@ -6,14 +6,16 @@ import stat
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from kappaskin._files import replace_whole, replacing, write_whole
+from kappaskin.calibration import Calibration
 from kappaskin.errors import Refusal
+from kappaskin.mechanics import HeightMap, Mesh
 
 
 @contextmanager
@@ -159,3 +161,45 @@ def test_a_file_made_by_another_program_takes_the_place(tmp_path: Path) -> None:
     replace_whole(file, part)
     assert file.read_text() == "new"
     assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.mark.parametrize("kind", ["pipe", "folder", "device"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("reconstruct", "FILE", "--out", "out.npz"),
+        ("plan", "FILE"),
+        ("study", "FILE"),
+        ("info", "FILE"),
+        pytest.param(("verify", "FILE"), marks=pytest.mark.slow),
+        ("repair", "FILE", "--out", "out.mcap"),
+    ],
+    ids=["reconstruct", "plan", "study", "info", "verify", "repair"],
+)
+def test_what_is_no_file_is_refused_at_once(
+    tmp_path: Path, monkeypatch, run, command: tuple[str, ...], kind: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    made = tmp_path / "in.toml"
+    if kind == "pipe":
+        os.mkfifo(made)
+    elif kind == "folder":
+        made.mkdir()
+    else:
+        made.symlink_to("/dev/zero")
+    code, _, why = run(*(str(made) if word == "FILE" else word for word in command))
+    assert code == 2
+    assert "it is not a file" in why or "Is a directory" in why
+    assert list(tmp_path.iterdir()) == [made]
+
+
+@pytest.mark.parametrize(
+    "read",
+    [Calibration.read, lambda path: HeightMap.read(path, 0.1, 0.1, 1e-3), Mesh.read],
+    ids=["calibration", "height map", "mesh"],
+)
+def test_no_reader_waits_for_a_pipe(tmp_path: Path, read: Callable[[Path], object]) -> None:
+    for name in ("a.toml", "a.png", "a.npy", "a.obj"):
+        os.mkfifo(tmp_path / name)
+        with pytest.raises(Refusal):
+            read(tmp_path / name)

@@ -14,7 +14,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from kappaskin._files import write_whole
+from kappaskin._files import open_file, write_whole
 from kappaskin._state import Stateful
 from kappaskin._toml import table
 from kappaskin.errors import Refusal
@@ -270,7 +270,7 @@ class Corrector(Stateful):
 
 def _contents(path: Path) -> bytes:
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             return file.read(_LARGEST + 1)
     except FileNotFoundError as error:
         raise Refusal(f"{path}: there is no such file; `kappaskin calibrate` makes one") from error

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import platformdirs
 
-from kappaskin._files import replacing
+from kappaskin._files import open_file, replacing
 from kappaskin._toml import table
 from kappaskin.calibration.calibration import digest
 from kappaskin.calibration.tare import Tare
@@ -68,7 +68,7 @@ class TareStore:
         """The tares of a sensor, none without a file; a file that is damaged is refused."""
         path = self.path(serial_number)
         try:
-            with path.open("rb") as file:
+            with open_file(path) as file:
                 data = file.read(_LARGEST + 1)
         except FileNotFoundError:
             return SavedTares()

@@ -14,6 +14,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from kappaskin._files import open_file, read_file
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics.rigid_objects import check_sizes
@@ -135,6 +136,7 @@ def _check_pixels(path: Path, shape: tuple[int, ...]) -> None:
 
 def _read_array(path: Path) -> Array:
     try:
+        open_file(path).close()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of a header as Python 2 wrote it
             stored = cast("NDArray[Any]", np.lib.format.open_memmap(path, mode="r"))
@@ -150,10 +152,8 @@ def _read_picture(path: Path) -> Array:
     from PIL import Image  # slow to import, and seldom needed
 
     try:
-        if path.stat().st_size > _LARGEST or not path.is_file():
-            raise Refusal(f"expected a file of at most {_LARGEST} bytes, got {path}")
         # From memory: from a file Pillow takes as much of that as a length in it says.
-        with Image.open(io.BytesIO(path.read_bytes()), formats=("PNG",)) as picture:
+        with Image.open(io.BytesIO(read_file(path, _LARGEST)), formats=("PNG",)) as picture:
             _check_pixels(path, picture.size[::-1])
             if picture.mode not in ("1", "L", "I", "I;16"):
                 raise Refusal(
@@ -242,8 +242,10 @@ class Mesh:
         if not 0 < unit < np.inf:
             raise Refusal(f"expected a unit above zero in m, got {unit}")
         try:
-            with np.errstate(all="ignore"):  # what is no number is refused below
-                mesh = cast("Any", trimesh).load_mesh(str(path))  # not typed throughout
+            # From an open file no other is looked for, as an OBJ names them. Not typed throughout.
+            load = cast("Any", trimesh).load_mesh
+            with open_file(Path(path)) as file, np.errstate(all="ignore"):  # NaN is refused below
+                mesh = load(file, file_type=Path(path).suffix.lower()[1:])
         except _UNREADABLE as error:
             raise Refusal(f"cannot read a mesh from {path}: {error}") from error
         if not len(mesh.faces):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kappaskin._files import open_file
 from kappaskin.bases import Basis, basis_for
 from kappaskin.contact import KINDS, ContactObject, ObjectFinder, PointContact, contact_geometry
 from kappaskin.errors import RankDeficient, Refusal
@@ -37,12 +38,15 @@ _DAMAGES = (
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
     # Opened here: np.load leaves a file that it opened itself open when the archive is damaged.
-    with path.open("rb") as file:
+    with open_file(path) as file:
         archive = np.load(file, allow_pickle=False)
         if not isinstance(archive, np.lib.npyio.NpzFile):
             raise ValueError("it holds a single array")
         names = ("size", "positions", "curvature", "sigma", "radius", "outline", "rigidity")
-        return {name: archive[name] for name in names if name in archive}
+        found: dict[str, Any] = {name: archive[name] for name in names if name in archive}
+        if raw := [name for name, values in found.items() if not isinstance(values, np.ndarray)]:
+            raise ValueError(f"{', '.join(raw)}: not an array, as numpy.savez writes it")
+        return found
 
 
 def _read(path: Path) -> dict[str, Array]:

@@ -31,10 +31,10 @@ from mcap.records import (
     Statistics,
 )
 
+from kappaskin._files import open_file
 from kappaskin.errors import Damaged, Refusal
 from kappaskin.frames import Event
 from kappaskin.recording.cdr import decode
-from kappaskin.recording.disk import is_there
 from kappaskin.recording.messages import (
     DEVICE,
     EVENTS,
@@ -173,12 +173,6 @@ def summary_of(file: Bytes, size: int) -> Iterator[McapRecord]:
         at = record.end
 
 
-def check_file(path: Path) -> None:
-    """Refuse anything but a regular file: opening a pipe without a writer would block."""
-    if is_there(path) and not path.is_file():
-        raise Refusal(f"{path}: cannot be read; expected a file")
-
-
 _MESSAGE = struct.Struct("<HIQQ")
 _DIGITS = 9  # of a version
 _KINDS = {topic.name: topic.kind.name for topic in TOPICS}
@@ -211,9 +205,8 @@ class Recording:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        check_file(path)
         try:
-            self._file = path.open("rb")
+            self._file = open_file(path)
             self._size = self._file.seek(0, 2)
             self._file.seek(0)
             magic = self._file.read(len(MAGIC))

@@ -12,7 +12,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
-from kappaskin._files import part_for
+from kappaskin._files import open_file, part_for
 from kappaskin._processes import BackgroundProcess
 from kappaskin.errors import Refusal
 from kappaskin.recording.disk import ReservedFile, is_there
@@ -22,7 +22,6 @@ from kappaskin.recording.reading import (
     MAGIC,
     CorruptRecord,
     McapRecord,
-    check_file,
     decompressed,
     parsed,
     record_at,
@@ -76,9 +75,8 @@ class Repaired:
         cannot be read or is no MCAP file, or `out` cannot be written.
         """
         check_new(out, path)
-        check_file(path)
         try:
-            with path.open("rb") as file:
+            with open_file(path) as file:
                 if not path.stat().st_size:
                     raise Refusal(f"{path}: is empty")
                 with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:

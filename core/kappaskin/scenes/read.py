@@ -10,6 +10,7 @@ from typing import Any, cast, get_type_hints
 
 import numpy as np
 
+from kappaskin._files import read_file
 from kappaskin._schema import Within
 from kappaskin._toml import TomlTable, parsed
 from kappaskin.bases import basis_for
@@ -98,13 +99,8 @@ def load_scene(name: str = "") -> Scene:
 def read_scene_text(file: Path) -> str:
     """The text in `file`; raises `Refusal` for a file that cannot be read, or is no scene's."""
     try:
-        if file.exists() and not file.is_file():
-            raise Refusal(f"{file}: expected a file with a scene, got a folder or a device")
-        if file.stat().st_size > _LARGEST_SCENE:
-            raise Refusal(f"{file}: expected a scene of at most {_LARGEST_SCENE} bytes, got more")
-        return file.read_text(encoding="utf-8-sig")
-    except Refusal:
-        raise
+        text = read_file(file, _LARGEST_SCENE).decode("utf-8-sig")
+        return text.replace("\r\n", "\n").replace("\r", "\n")
     except (OSError, ValueError) as error:  # undecodable, or a name that no file has
         raise Refusal(f"{file}: cannot be read as a scene ({error}); check its name") from error
 
@@ -361,9 +357,8 @@ def _step(table: TomlTable) -> MotionStep:
 def _recorded(file: Path) -> RecordedMotion:
     """A motion from a CSV file with the columns time, dx, dy and amount."""
     try:
-        if file.stat().st_size > _LARGEST_RECORD:
-            raise OSError(f"it has more than {_LARGEST_RECORD} bytes; keep fewer lines")
-        heading, *lines = file.read_text(encoding="utf-8-sig").splitlines() or [""]
+        text = read_file(file, _LARGEST_RECORD).decode("utf-8-sig")
+        heading, *lines = text.splitlines() or [""]
         rows = np.array([line.split(",") for line in lines if line.strip()], float)
     except (OSError, ValueError) as error:
         raise Refusal(

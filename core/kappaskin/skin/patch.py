@@ -138,6 +138,9 @@ def _check_corners(line: Outline) -> None:
         )
 
 
+SIDES = (1e-9, 1e9)
+"""Shortest and longest sides of a skin in m: their squares and products stay numbers."""
+
 _MARGIN = 1e-3  # of a side: how near its rim a point may be and still move with the skin
 _CORNER = 0.02  # of an edge: how near to its ends no place is looked for along it
 _CELLS = 64  # along each side of a raster that shows quickly whether a point is far inside
@@ -162,10 +165,11 @@ class Patch:
     strip: bool = False
 
     def __post_init__(self) -> None:
-        if not all(math.isfinite(side) and side > 0 for side in (self.a, self.b)):
+        least, most = SIDES
+        if not all(least <= side <= most for side in (self.a, self.b)):  # NaN too
             raise Refusal(
-                f"expected a patch with two sides above zero in metres, got {self.a} x {self.b}; "
-                "give lengths such as 0.1 x 0.1"
+                f"expected a patch with two sides above zero in metres, {least:g} to {most:g}, "
+                f"got {self.a} x {self.b}; give lengths such as 0.1 x 0.1"
             )
         if not self.radius >= self.a / (2 * math.pi):  # NaN too
             raise Refusal(

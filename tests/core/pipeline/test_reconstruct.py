@@ -222,6 +222,7 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     "size negative": ({"size": [0.1, -0.1]}, "two sides above zero"),
     "size NaN": ({"size": [np.nan, 0.1]}, "two sides above zero"),
     "size infinite": ({"size": [np.inf, 0.1]}, "two sides above zero"),
+    "size below numbers": ({"size": [1e-160, 0.1]}, "two sides above zero"),
     "positions a number": ({"positions": 0.05}, r"positions of shape \(P, 2\) in m, got \(\)"),
     "positions a list": ({"positions": [0.05, 0.05]}, r"positions of shape \(P, 2\)"),
     "positions in space": ({"positions": np.full((P, 3), 0.05)}, r"positions of shape \(P, 2\)"),

@@ -316,7 +316,7 @@ def test_a_pipe_in_place_of_a_file_is_refused_not_waited_for(tmp_path, says):
 
     with pytest.raises(Refusal, match="expected the name of a file in the folder of the scene"):
         read(HEAD + f'[[touch]]\nx = 0.05\ny = 0.05\nforce = 1\n{says} = "way.stl"\n', tmp_path)
-    with pytest.raises(Refusal, match="expected a file with a scene"):
+    with pytest.raises(Refusal, match=r"cannot be read as a scene \(it is not a file\)"):
         load_scene(str(tmp_path / "way.toml"))
 
 

@@ -9,6 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
 
+from kappaskin._files import open_file
 from kappaskin.errors import Refusal
 from kappaskin.pipeline import REPORTED
 from kappaskin.scenes import SCENES
@@ -122,7 +123,7 @@ _Some = TypeVar("_Some")
 def read_lesson(file: Path) -> Lesson:
     """The lesson in `file`; a `Refusal` names the error and its line."""
     try:
-        with file.open("rb") as opened:
+        with open_file(file) as opened:
             data = opened.read(_LARGEST + 1)
         text = data.decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
