@@ -20,7 +20,7 @@ from kappaskin.mechanics import GaussianLoad, Plate
 from kappaskin.scenes import Scene, load_scene
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
-from kappaskin.studies.cost.bench import medians_in_turn, points_on, seconds, traced
+from kappaskin.studies.accuracy import medians_in_turn, points_on, seconds, traced
 from kappaskin.studies.paper import LoadCase, fingertip_scene
 
 

@@ -16,6 +16,7 @@ from kappaskin.pipeline import Pipeline, Setup
 from kappaskin.scenes import TABLE_1_NOISE, Orbit, Scene, load_scene
 from kappaskin.sensing import SECOND_GENERATION
 from kappaskin.sources import SimulatedSource
+from kappaskin.studies.accuracy import root_mean_square
 
 PERIODS = (4.0, 1.0, 0.25)
 """Seconds per turn of the contact: 35, 138 and 553 mm/s on a circle of 22 mm."""
@@ -104,8 +105,7 @@ class _Errors:
         (load,) = self._scene.loads_at(time)
         off = estimate.contact.position - load.centre()
         w = self._surface(self._compliance(load.modal(self._basis)))
-        rms = math.sqrt(float(np.mean((estimate.surface - w) ** 2)))
-        return 1e3 * math.hypot(*off), 1e3 * rms
+        return 1e3 * math.hypot(*off), 1e3 * root_mean_square(estimate.surface - w)
 
 
 def _rms(errors: list[tuple[float, float]]) -> Array:
