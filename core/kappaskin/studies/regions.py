@@ -65,7 +65,7 @@ class _Clock:
 
 
 @dataclass(frozen=True, eq=False)
-class _Answer:
+class _TimedEstimate:
     """An estimate, with when its scan began and ended in s and how many channels that read."""
 
     estimate: Estimate
@@ -74,25 +74,25 @@ class _Answer:
     channels: int
 
 
-def _answers(scene: Scene, region: Region, seconds: float, method: str) -> list[_Answer]:
+def _answers(scene: Scene, region: Region, seconds: float, method: str) -> list[_TimedEstimate]:
     """The estimates of the closed loop: each contact moves the region that the next frame scans."""
     clock = _Clock()
     source = SimulatedSource(scene, clock, clock.sleep)
     pipeline = Pipeline(source.sensor, Setup(nx=_POINTS, ny=_POINTS, method=method), clock=clock)
     steering = track_region(source, region)
-    answers: list[_Answer] = []
+    answers: list[_TimedEstimate] = []
     while clock.now < seconds:
         for frame in source.read(seconds):
             estimate = pipeline(frame)
             duration = scene.transduction.scan_time(len(frame.channels))
             began = frame.device_time
-            answers.append(_Answer(estimate, began, began + duration, len(frame.channels)))
+            answers.append(_TimedEstimate(estimate, began, began + duration, len(frame.channels)))
             if steering is not None:
                 steering(estimate.contact, pipeline.fit)
     return [answer for answer in answers if answer.began >= _SETTLED]
 
 
-class _Errors:
+class _TruthErrors:
     """Errors of estimates against the truth at any time, in mm."""
 
     def __init__(self, scene: Scene) -> None:
@@ -122,7 +122,7 @@ def measured(
     if not _SETTLED + 0.1 <= seconds < math.inf:
         raise Refusal(f"expected at least {_SETTLED + 0.1} s to measure over, got {seconds}")
     scene = scene_of(period)
-    answers, error = _answers(scene, region, seconds, method), _Errors(scene)
+    answers, error = _answers(scene, region, seconds, method), _TruthErrors(scene)
     own = _rms([error(a.estimate, (a.began + a.ended) / 2) for a in answers])
     # An answer is the newest from its own end to that of the next.
     newest = _rms([error(a.estimate, (a.ended + b.ended) / 2) for a, b in pairwise(answers)])

@@ -48,7 +48,7 @@ _CALLS, _SLOW = 5, 1e-3  # in a turn; one of a method whose frame takes longer, 
 
 
 @dataclass(frozen=True, eq=False)
-class _Skin:
+class _SkinReadings:
     """Elements, and what they read of the scene: (T, 3, P) in 1/m, `exact` and as it is `read`."""
 
     sensor: Sensor
@@ -99,7 +99,7 @@ class Bench:
             )
         # Planned once: what stands still calls for no skew, but the whole scene is to be judged.
         self.scene = planned(scene)
-        self._skins: dict[tuple[int, int] | None, _Skin] = {}
+        self._skins: dict[tuple[int, int] | None, _SkinReadings] = {}
 
     @property
     def contact(self) -> Array:
@@ -112,12 +112,12 @@ class Bench:
         compliance = self.scene.plate.compliance(self.scene.basis)
         return np.array([compliance(pressed.force).ravel() for pressed in self._pressed])
 
-    def _skin(self, elements: tuple[int, int] | None) -> _Skin:
+    def _skin(self, elements: tuple[int, int] | None) -> _SkinReadings:
         if elements not in self._skins:
             self._skins[elements] = self._read_by(elements)
         return self._skins[elements]
 
-    def _read_by(self, elements: tuple[int, int] | None) -> _Skin:
+    def _read_by(self, elements: tuple[int, int] | None) -> _SkinReadings:
         scene = with_elements(self.scene, elements)
         sensor, simulator = scene.sensor(), Simulator(scene)
         read: list[Array] = []
@@ -126,7 +126,9 @@ class Bench:
             read.append(sensor.nominal(simulator.scanned(sensor.scan(), n, t, lambda: 0.0)))
         operator = scene.layout.curvature_operator(scene.basis)
         shape = (len(read), 3, len(scene.layout))
-        return _Skin(sensor, (self._truth @ operator.T).reshape(shape), np.reshape(read, shape))
+        return _SkinReadings(
+            sensor, (self._truth @ operator.T).reshape(shape), np.reshape(read, shape)
+        )
 
     def __call__(self, setting: Setting) -> Cost | Refused:
         """What `setting` costs, or why it gives no answer."""
@@ -136,7 +138,7 @@ class Bench:
         except (Refusal, np.linalg.LinAlgError) as error:
             return Refused(setting, str(error))
 
-    def _scanned(self, setting: Setting, skin: _Skin) -> tuple[SensorLayout, Scan]:
+    def _scanned(self, setting: Setting, skin: _SkinReadings) -> tuple[SensorLayout, Scan]:
         """The skin's layout with the channels outside the scan dead, and the scan."""
         elements = SCANS[setting.scanned](skin.layout, self.contact)
         layout = replace(skin.layout, live=skin.layout.live & elements)
