@@ -28,7 +28,7 @@ _COLUMNS = ("x", "y", "z", "displacement", "xx", "yy", "xy")
 
 
 class Recorder:
-    """Writes the recording `path`: a `Tape` for a source, and the results of its frames.
+    """Writes the recording `path`: bytes and events of a source, and the results of its frames.
 
     A `Refusal` where no file can be made. No call waits for the disk.
     """

@@ -374,10 +374,7 @@ def comparisons() -> Generator[Comparison]:
     yield _pressed()
 
 
-_TURNS, _BUDGET = (
-    (7, 201),
-    0.1,
-)  # least and most answers timed, and about how long in s
+_TURNS, _BUDGET = (7, 201), 0.1  # least and most answers timed, and about how long in s
 
 
 # Every solver in a comparison: its errors, its time, its memory

@@ -15,7 +15,7 @@ from kappaskin.mechanics import PointLoad
 from kappaskin.pipeline import Pipeline, Setup
 from kappaskin.scenes import TABLE_1_NOISE, Orbit, Scene, load_scene
 from kappaskin.sensing import SECOND_GENERATION
-from kappaskin.sources import SimulatedSource
+from kappaskin.sources import SimulatedSource, VirtualClock
 from kappaskin.studies.accuracy import root_mean_square
 
 PERIODS = (4.0, 1.0, 0.25)
@@ -40,6 +40,7 @@ ROWS = (
 """Regions, each with the method that the shape is fitted by."""
 _POINTS = 33  # of the surface, along each side
 _SETTLED = 0.1  # s, left out of the measurement
+_SECONDS = 1.0  # of each row
 
 
 def scene_of(period: float) -> Scene:
@@ -49,19 +50,6 @@ def scene_of(period: float) -> Scene:
     full_rate = 1 / SECOND_GENERATION.scan_time(3 * len(circle.layout))
     moving = circle.touched_by(*circle.loads, motion=orbit)
     return replace(moving, transduction=SECOND_GENERATION, rate=full_rate)
-
-
-class _Clock:
-    """A clock that advances only by sleeping: computing takes no time here."""
-
-    def __init__(self) -> None:
-        self.now = 0.0
-
-    def __call__(self) -> float:
-        return self.now
-
-    def sleep(self, seconds: float) -> None:
-        self.now += seconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +64,7 @@ class _TimedEstimate:
 
 def _answers(scene: Scene, region: Region, seconds: float, method: str) -> list[_TimedEstimate]:
     """The estimates of the closed loop: each contact moves the region that the next frame scans."""
-    clock = _Clock()
+    clock = VirtualClock()
     source = SimulatedSource(scene, clock, clock.sleep)
     pipeline = Pipeline(source.sensor, Setup(nx=_POINTS, ny=_POINTS, method=method), clock=clock)
     steering = track_region(source, region)
@@ -115,7 +103,7 @@ def _rms(errors: list[tuple[float, float]]) -> Array:
 def measured(
     period: float, region: Region, seconds: float, method: str = "least-squares"
 ) -> dict[str, Any]:
-    """One row of `regions`: a contact that goes round every `period` s, for `seconds`.
+    """One row of `run_regions`: a contact that goes round every `period` s, for `seconds`.
 
     `method` names the estimator, one of `METHODS`.
     """
@@ -146,22 +134,23 @@ def measured(
     }
 
 
-def run_regions(seconds: float = 1.0) -> list[dict[str, Any]]:
+def run_regions() -> list[dict[str, Any]]:
     """Contact and shape errors, RMS in mm, of full scans and of regions around the contact.
 
-    Each row is a closed loop of `seconds`, on a skin that moves while a frame is read: `contact_mm`
-    and `shape_mm` against the truth in the middle of the frame's own scan, `newest_...` against the
-    truth while the estimate is the newest there is, as a controller sees it. `bound_mm` is how
-    well one frame can locate the contact where the circle begins (see `contact_bound`); readings
-    held from earlier frames add to that. `found` is the share of frames with a contact.
+    Each row is a closed loop of one second, on a skin that moves while a frame is read:
+    `contact_mm` and `shape_mm` against the truth in the middle of the frame's own scan,
+    `newest_...` against the truth while the estimate is the newest there is, as a controller sees
+    it. `bound_mm` is how well one frame can locate the contact where the circle begins (see
+    `contact_bound`); readings held from earlier frames add to that. `found` is the share of frames
+    with a contact.
     """
     return [
-        measured(period, region, seconds, method) for period in PERIODS for region, method in ROWS
+        measured(period, region, _SECONDS, method) for period in PERIODS for region, method in ROWS
     ]
 
 
 def regions_text(rows: list[dict[str, Any]]) -> str:
-    """The rows of `regions` under a heading."""
+    """The rows of `run_regions` under a heading."""
     lines = [
         "A contact on a circle, 20 us per channel; RMS errors of contact and shape in mm,",
         "of each frame in the middle of its scan, and while it is the newest estimate",
