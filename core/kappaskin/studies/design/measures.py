@@ -338,14 +338,14 @@ def prospect(design: Design) -> Prospect:
     return Prospect(x, y, _on_map(on, sd), layout.positions, rate)
 
 
-def check(design: Design, frames: int = _MOST, seed: int = 0) -> Generator[Check]:
+def check(design: Design, frames: int = _MOST) -> Generator[Check]:
     """What simulating a design gives, after every few frames until there are so many.
 
     The readings are made as all simulations make them, with every effect of the scene.
     """
     estimator = design.estimator()
     _, _, on, points = _points(design.scene.plate.patch)
-    scene = replace(design.scene, layout=estimator.layout, seed=seed)
+    scene = replace(design.scene, layout=estimator.layout, seed=0)
     simulator, scan = Simulator(scene), scene.sensor().scan()
     rows, shares = estimator.basis.at(points), _shares(on)[on]
     true_rows = scene.basis.at(points)
