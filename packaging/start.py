@@ -9,7 +9,8 @@
     python3 packaging/start.py cover [ARGUMENTS]   tells which lines of the library no test runs
     python3 packaging/start.py bench [ARGUMENTS]   runs the benchmarks; --history tells how it went
     python3 packaging/start.py fuzz [SECONDS]      gives every reader bytes it has never seen
-    python3 packaging/start.py mutate ROOM [COUNT] changes touch, wire, fit or scene, for tests
+    python3 packaging/start.py mutate ROOM [COUNT] changes contact, sources, estimation or scenes:
+                                                   do its tests notice?
     python3 packaging/start.py core [ARGUMENTS]    tests the library where no GUI is installed;
                                                    --python python3.12 with another Python
     python3 packaging/start.py bundle [--try]      makes the app one folder; --try only tries it
@@ -71,7 +72,7 @@ RELEASE = (
     ("test", *ALL_CASES, "--without=presenter", "tests/app"),
     ("cover",),
     ("core",),
-    *(("mutate", room, "20") for room in ("touch", "wire", "fit", "scene")),
+    *(("mutate", room, "20") for room in ("contact", "sources", "estimation", "scenes")),
     ("fuzz", "120"),
     ("bench",),
     ("bundle",),

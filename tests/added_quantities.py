@@ -21,7 +21,8 @@ frames.Estimate = Estimate
 
 import kappaskin.pipeline as pipeline  # noqa: E402
 import kappaskin.pipeline.reported as table  # noqa: E402
-from kappaskin.pipeline.reported import HeaderNumber, ReportedQuantity, SkinColour  # noqa: E402
+from kappaskin.pipeline import ReportedQuantity, SkinColour  # noqa: E402
+from kappaskin.pipeline.reported import HeaderNumber  # noqa: E402
 
 pipeline.REPORTED = table.REPORTED = (
     *table.REPORTED,

@@ -25,13 +25,18 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from kappaskin.cli import _add_commands, app, main
-from kappaskin.cli.common import FAILED, REFUSED
+from kappaskin.cli import FAILED, REFUSED, _add_commands, app, main
 from kappaskin.errors import Refusal
 from kappaskin.scenes import SCENES, load_scene, write_scene
-from kappaskin.studies import EffectCost, accuracy_verdict, cost_rows, effect_rows, settings_to_try
+from kappaskin.studies import (
+    EffectCost,
+    accuracy_verdict,
+    cost_rows,
+    costs,
+    effect_rows,
+    settings_to_try,
+)
 from kappaskin.studies.compare import ComparisonRow
-from kappaskin.studies.cost.bench import costs
 from kappaskin.studies.design.measures import MEASURES
 from kappaskin.studies.design.study import STUDIES
 from kappaskin.studies.drills import DRILLS, row_of

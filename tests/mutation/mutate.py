@@ -44,17 +44,17 @@ MEMORY = 8 * 2**30  # bytes that a change may have a test ask for
 _ARGUMENTS = ["-x", "-q", "--assert=plain", "--rootdir", str(ROOT)]
 
 ROOMS = {
-    "touch": (
+    "contact": (
         "contact/point contact/load_detection contact/objects contact/hypotheses "
         "contact/elastic_skin",
         "contact/contact contact/point_products contact/objects contact/hypotheses "
         "contact/elastic_skin contact/rigid_object_of_a_kind contact/every_skin calibration/tare",
     ),
-    "wire": (
+    "sources": (
         "sources/wire sources/decoder",
         "sources/wire sources/wire_vectors sources/diagnosis sources/interpreter",
     ),
-    "fit": (
+    "estimation": (
         "estimation/estimator estimation/fit estimation/least_squares estimation/__init__ "
         "estimation/fast estimation/bayes estimation/kalman estimation/tracking estimation/robust "
         "estimation/placement",
@@ -62,7 +62,7 @@ ROOMS = {
         "estimation/prior estimation/robust estimation/tracking estimation/finite_slope "
         "estimation/placement studies/stability",
     ),
-    "scene": (
+    "scenes": (
         "scenes/* _schema _toml",
         "scenes/stimulus scenes/scene scenes/read scenes/write scenes/schema scenes/plan "
         "scenes/simulator",

@@ -13,7 +13,6 @@ from typing import Any, cast
 import numpy as np
 import platformdirs
 import scipy
-from numpy.typing import NDArray
 from scipy.sparse import block_diag, coo_array, csc_array, diags_array, eye_array
 from scipy.sparse.linalg import eigsh
 from scipy.spatial import Delaunay, KDTree
@@ -23,7 +22,7 @@ from kappaskin._files import write_whole
 from kappaskin.bases.basis import ORDERS, Order
 from kappaskin.bases.product import gauss
 from kappaskin.errors import Refusal
-from kappaskin.frames import Array
+from kappaskin.frames import Array, Indices
 from kappaskin.skin import Outline, doubled_area
 
 _INWARD = 1 / 256  # of the spacing, at corners that point inward: curvature is unbounded there
@@ -34,15 +33,13 @@ _FREE = 0.6  # of the spacing: how near to the rim no point is put
 _SMOOTHINGS = 5
 _ROUNDS = 60
 
-Triangles = NDArray[np.intp]
-
 
 @dataclass(frozen=True, eq=False)
 class TriangleMesh:
     """`points` (Q, 2), the first `rim` of them along the outline, and `triangles` (T, 3)."""
 
     points: Array
-    triangles: Triangles
+    triangles: Indices
     rim: int
 
 
@@ -115,13 +112,13 @@ def _inside(line: Outline, rim: Array, spacing: float) -> Array:
     return np.vstack(accepted)
 
 
-def _joined(points: Array) -> Triangles:
+def _joined(points: Array) -> Indices:
     triangles = Delaunay(points).simplices.astype(np.intp)
     area = np.abs(doubled_area(*np.moveaxis(points[triangles], 1, 0)))
     return triangles[area > 1e-9 * np.median(area)]  # none of points along one edge
 
 
-def _cut(triangles: Triangles, rim: int) -> Triangles:
+def _cut(triangles: Indices, rim: int) -> Indices:
     """The numbers of the rim's segments that are no side of a triangle."""
     sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     steps = np.sort(np.column_stack([np.arange(rim), (np.arange(rim) + 1) % rim]), axis=1)
@@ -129,7 +126,7 @@ def _cut(triangles: Triangles, rim: int) -> Triangles:
     return np.flatnonzero(~np.isin(steps @ (most, 1), sides @ (most, 1)))
 
 
-def _smoothed(line: Outline, points: Array, triangles: Triangles) -> Array:
+def _smoothed(line: Outline, points: Array, triangles: Indices) -> Array:
     """Every point at the mean of its neighbours, unless that is much nearer to the rim."""
     total, count = np.zeros_like(points), np.zeros(len(points))
     for i in range(3):
@@ -145,7 +142,6 @@ _NEAREST = 10  # triangles that a point is looked for in first
 _ROUNDING = 1e-8  # of a triangle: a point on the rim as computed may stand this far outside
 _FAR = 1e9  # m: off any skin
 
-Indices = NDArray[np.intp]
 
 _I, _J = np.array([(i, j) for i in range(6) for j in range(6 - i)]).T
 _FACTORS = np.array([perm(_I, a) * perm(_J, b) for a, b in ORDERS], float)
@@ -323,7 +319,7 @@ class _Space:
         self.size = 6 * len(mesh.points) + len(self._ends)
         self.shapes = self._shapes(which.reshape(-1, 3))
 
-    def _shapes(self, side: NDArray[np.intp]) -> Array:
+    def _shapes(self, side: Indices) -> Array:
         """The quintics (T, 21, 21) whose unknowns are one and otherwise zero."""
         scale = np.sqrt(np.abs(np.linalg.det(self._sides)))
         chain = chain_rule(scale[:, None, None] * self.inverse)  # slopes per size of the triangle

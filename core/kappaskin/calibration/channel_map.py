@@ -5,10 +5,9 @@ from itertools import permutations
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from kappaskin.bases import basis_for
-from kappaskin.frames import COMPONENTS, Array
+from kappaskin.frames import COMPONENTS, Array, Indices
 from kappaskin.mechanics import PointLoad
 from kappaskin.sensing import Sensor, SensorLayout
 
@@ -18,7 +17,6 @@ _BESIDE = 1.6  # distances of elements: no further apart are those beside each o
 _AS_GOOD = 0.75  # of the largest response: a neighbour that responds so much was pressed too
 _ALSO = 0.8  # of the same: one elsewhere that answers so much leaves it unclear
 
-Indices = NDArray[np.intp]
 _CLEARLY = 0.5  # of the squares left: by so much another order of components explains more
 _FUNCTIONS = 15  # along each side, of the shape it makes
 _ORDERS = tuple(permutations(range(3)))
@@ -204,7 +202,7 @@ def _line_words(what: str, to: Indices) -> list[str]:
 
 def _components(
     sensor: Sensor, answered: list[PressResult], elements: Indices
-) -> tuple[NDArray[np.intp], list[str]]:
+) -> tuple[Indices, list[str]]:
     """Which component reads xx, yy and xy of each element (3, P), and what is wrong in words."""
     P = len(sensor.layout)
     right = np.repeat(np.arange(3)[:, None], P, axis=1)

@@ -19,13 +19,13 @@ from kappaskin.calibration.channel_map import (
     judge_press,
     map_verdict,
 )
-from kappaskin.calibration.sweep import DeviceReadings, Report, VirtualClock
+from kappaskin.calibration.sweep import DeviceReadings, Report
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Frame, Mask
 from kappaskin.mechanics import PointLoad
 from kappaskin.scenes import Scene, load_scene
 from kappaskin.sensing import Sensor, SensorLayout
-from kappaskin.sources import SimulatedSource, open_source
+from kappaskin.sources import SimulatedSource, VirtualClock, open_source
 
 _OFTEN = 0.005  # s between two readings that are kept
 _STILL = 0.4  # s without motion are a rest
@@ -319,7 +319,7 @@ def _wait(
 
 
 def press_elements(
-    name: str, report: Report, *, quick: bool = False, patience: float = 20.0
+    name: str, report: Report, *, quick: bool, patience: float
 ) -> tuple[PressTest, MapVerdict]:
     """The test of the source called `name` and its verdict on the channel map.
 

@@ -23,7 +23,7 @@ from kappaskin.scenes.cylinders import (
     schedule,
 )
 from kappaskin.sensing import Sensor
-from kappaskin.sources import SimulatedSource, Source, open_source
+from kappaskin.sources import SimulatedSource, Source, VirtualClock, open_source
 
 _FEWEST_FRAMES = 2  # whose spread gives the noise
 _SETTLED = 1.0  # s at the end of a hold that count as its reading
@@ -197,19 +197,6 @@ def _course(times: Array, readings: Array) -> tuple[Array, Array]:
     sizes = np.diff(starts, append=len(times))
     sums = np.add.reduceat(readings, starts, axis=0)
     return np.add.reduceat(times, starts) / sizes, sums / sizes[:, None]
-
-
-@dataclass
-class VirtualClock:
-    """A clock that moves when someone sleeps by it: no waiting for a simulation."""
-
-    now: float = 0.0
-
-    def __call__(self) -> float:
-        return self.now
-
-    def sleep(self, seconds: float) -> None:
-        self.now += seconds
 
 
 def _steps(

@@ -116,7 +116,7 @@ NO_OBJECT = ContactObject(
 class ObjectFinder:
     """Recognises the object on a skin: a plane, a cylinder, a sphere or an edge.
 
-    Each kind has a small family of forces on the skin (`elastic_skin`), fitted to the readings by
+    Each kind has a small family of forces on an elastic skin, fitted to the readings by
     maximum likelihood. The kinds are compared by Laplace's approximation of their marginal
     likelihoods, with unknown noise. The object's curvature is that of the skin between the forces.
     It takes a few tens of milliseconds: for display, not for every frame. On a skin bent to a

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from kappaskin.errors import RankDeficient
 from kappaskin.estimation import FAULTS, Estimator, Fit, Uncertainty
-from kappaskin.frames import COMPONENTS, Array, Mask
-from kappaskin.health.inconsistency import InconsistencyTest, Indices, centred
+from kappaskin.frames import COMPONENTS, Array, Indices, Mask
+from kappaskin.health.inconsistency import InconsistencyTest, centred
 from kappaskin.sensing import Sensor
 
 _MOST_LISTED = 256  # findings that are listed one by one
@@ -72,7 +72,7 @@ class Health:
 
 
 def findings(
-    kinds: NDArray[np.uint8], since: Array, figures: Array, retained: NDArray[np.bool_]
+    kinds: NDArray[np.uint8], since: Array, figures: Array, retained: Mask
 ) -> tuple[Finding, ...]:
     """The findings for C channels with `kinds`, `since` and `retained` (C,), `figures` (C, 2)."""
     P = len(kinds) // 3
@@ -296,7 +296,7 @@ def exclude(
     )
 
 
-def _most(estimator: Estimator, worst: NDArray[np.intp], loosest: float) -> tuple[Fit, int]:
+def _most(estimator: Estimator, worst: Indices, loosest: float) -> tuple[Fit, int]:
     """The fit at rest without as many of the `worst` channels as possible, and their number."""
     fit, least, most = estimator.at_rest(), 0, len(worst)
     count = most
@@ -310,7 +310,7 @@ def _most(estimator: Estimator, worst: NDArray[np.intp], loosest: float) -> tupl
     return fit, least
 
 
-def _without(estimator: Estimator, channels: NDArray[np.intp]) -> Fit | None:
+def _without(estimator: Estimator, channels: Indices) -> Fit | None:
     missing = np.zeros(3 * len(estimator.layout), bool)
     missing[channels] = True
     with suppress(RankDeficient):

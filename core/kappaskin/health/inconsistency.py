@@ -7,9 +7,8 @@ from typing import cast
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from kappaskin.frames import Array, Frame, Mask
+from kappaskin.frames import Array, Frame, Indices, Mask
 from kappaskin.sensing import Sensor, SensorLayout
 
 _LONG = 0.25  # s at least
@@ -108,8 +107,6 @@ _LENGTHS = (1.2, 2.5)  # of what bends the skin, in distances of elements
 _NOISE = 1e-3  # in power, beside what a neighbour reads
 _MISSING = 1e9  # the same, of a reading that is not there
 _ELEMENTS_AT_ONCE = 512  # elements whose weights are computed together: 15 MB each time
-
-Indices = NDArray[np.intp]
 
 
 def _covariance(distance: Array) -> Array:

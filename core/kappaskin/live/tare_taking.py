@@ -1,7 +1,6 @@
 """Tare of the running engine: taken from the estimates while it streams."""
 
 import time
-from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from datetime import datetime
@@ -34,13 +33,8 @@ class TareCapture:
     `status` continues the one `before`, of an engine that may have died taking a tare.
     """
 
-    def __init__(
-        self,
-        worker: Executor,
-        before: TareStatus,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
-        self._worker, self._clock = worker, clock
+    def __init__(self, worker: Executor, before: TareStatus) -> None:
+        self._worker = worker
         self._taring: TareMeasurement | None = None
         self._found: Future[Tare] | None = None
         self.status = before
@@ -52,7 +46,7 @@ class TareCapture:
         if sensor is None:
             self._end("no readings arrive: connect a sensor, then tare")
             return
-        self._taring, self._found = TareMeasurement(sensor, self._clock()), None
+        self._taring, self._found = TareMeasurement(sensor, time.monotonic()), None
         self.status = TareStatus(True, self.status.ended)
 
     def take(self, estimate: Estimate) -> None:
@@ -71,7 +65,7 @@ class TareCapture:
             except Refusal as refusal:
                 self._end(str(refusal))
         taring = self._taring
-        if taring is None or self._found is not None or not taring.done(self._clock()):
+        if taring is None or self._found is not None or not taring.done(time.monotonic()):
             return
         edge, temperature = pipeline.setup.edge, source.temperature
         rest, now = pipeline.rest(), datetime.now().astimezone()

@@ -24,15 +24,12 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 from kappaskin.bases import Basis, ProductBasis
 from kappaskin.errors import Refusal
-from kappaskin.frames import Array, Mask
+from kappaskin.frames import Array, Indices, Mask
 from kappaskin.mechanics.plate import Plate
-
-Indices = NDArray[np.intp]
 
 _MOST_PLACES, _MOST_STEPS = 1024, 500  # some seconds
 _ROUNDING = 1e-14  # of what sums to it: a gap is known to that

@@ -5,7 +5,6 @@ import json
 import math
 import socket
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, cast
 
@@ -127,10 +126,10 @@ JsonMessage = dict[str, Any]
 class UdpListener:
     """Messages received on a UDP `port`, as lines of text; gaps in `number` are losses."""
 
-    def __init__(self, port: int, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, port: int) -> None:
         if not 0 < port < 65536:
             raise Refusal(f"expected a port from 1 to 65535, got {port}")
-        self._clock, self._began = clock, clock()
+        self._began = time.monotonic()
         self._socket = _bound(port)
         self._number: int | None = None
         self._shown, self._state = -math.inf, ""
@@ -160,7 +159,7 @@ class UdpListener:
         lines: list[str] = []
         if message["kind"] == "contact":
             lines += self._gap(message.get("number"))
-            now = self._clock()
+            now = time.monotonic()
             if now - self._shown >= _SHOWN:
                 self._shown = now
                 lines.append(_words(message))
@@ -169,7 +168,7 @@ class UdpListener:
             if state != self._state:
                 lines.append(f"status    {state}")
             self._state = state
-        return [f"{self._clock() - self._began:9.3f} s  {_plain(line)}" for line in lines]
+        return [f"{time.monotonic() - self._began:9.3f} s  {_plain(line)}" for line in lines]
 
     def _gap(self, number: object) -> list[str]:
         last, self._number = self._number, number if isinstance(number, int) else None

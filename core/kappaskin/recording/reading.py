@@ -173,7 +173,9 @@ def summary_of(file: Bytes, size: int) -> Iterator[McapRecord]:
         at = record.end
 
 
-_MESSAGE = struct.Struct("<HIQQ")
+MESSAGE_HEADER = struct.Struct("<HIQQ")
+"""Begins a message's record in MCAP: channel, sequence, log time and publish time."""
+
 _DIGITS = 9  # of a version
 _KINDS = {topic.name: topic.kind.name for topic in TOPICS}
 
@@ -426,10 +428,10 @@ class Recording:
 
     def _messages_in(self, data: bytes) -> Iterator[RecordedMessage]:
         for code, body in records_in(data):
-            if code == Opcode.MESSAGE and len(body) >= _MESSAGE.size:
-                channel, _, stamp, _ = _MESSAGE.unpack_from(body)
+            if code == Opcode.MESSAGE and len(body) >= MESSAGE_HEADER.size:
+                channel, _, stamp, _ = MESSAGE_HEADER.unpack_from(body)
                 if topic := self._topics.get(channel):
-                    yield RecordedMessage(topic, stamp, body[_MESSAGE.size :])
+                    yield RecordedMessage(topic, stamp, body[MESSAGE_HEADER.size :])
             else:
                 self._learn(code, body)
 

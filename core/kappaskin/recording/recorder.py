@@ -28,7 +28,7 @@ _COLUMNS = ("x", "y", "z", "displacement", "xx", "yy", "xy")
 
 
 class Recorder:
-    """Writes the recording `path`: a `Tape` for a source, and the results of its frames.
+    """Writes the recording `path`: bytes and events of a source, and the results of its frames.
 
     A `Refusal` where no file can be made. No call waits for the disk.
     """
@@ -42,7 +42,7 @@ class Recorder:
         self._truth, self._truths = _NO_TRUTH, _truths_like(_NO_TRUTH)
         self._attached: set[str] = set()
         self._views: _Views | None = None
-        self._contacts = _RateLimit(_CONTACTS)
+        self._contacts = _Throttle(_CONTACTS)
 
     @property
     def written(self) -> RecordingStatus:
@@ -177,7 +177,7 @@ def _same(a: Truth, b: Truth) -> bool:
     return shapes[0] == shapes[1] and a.coefficients.tobytes() == b.coefficients.tobytes()
 
 
-class _RateLimit:
+class _Throttle:
     """Whether something may be recorded at a time: at a `rate` at most, but for short bursts."""
 
     def __init__(self, rate: float) -> None:
@@ -218,7 +218,7 @@ class _Views:
         self.every = isinstance(fit, Stateful) and not fit.has_memory
         """Whether estimates depend on which frames were computed, so that all are recorded."""
         bytes_each = 4 * C + 4 * C + 8 * 3 * P + 8 * math.prod(N) + P * step
-        self.affordable = _RateLimit(min(_HEAVY, _BYTES / bytes_each))
+        self.affordable = _Throttle(min(_HEAVY, _BYTES / bytes_each))
 
     def heavy(self, frame: Frame, estimate: Estimate, stamp: int) -> list[tuple[m.Topic, bytes]]:
         """The messages that are as large as a frame."""

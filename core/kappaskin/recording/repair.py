@@ -20,6 +20,7 @@ from kappaskin.recording.messages import TOPICS
 from kappaskin.recording.reading import (
     LARGEST,
     MAGIC,
+    MESSAGE_HEADER,
     CorruptRecord,
     McapRecord,
     decompressed,
@@ -31,7 +32,6 @@ from kappaskin.recording.reading import (
 )
 from kappaskin.recording.writing import part_of
 
-_MESSAGE = struct.Struct("<HIQQ")
 _COMPRESSION = 9 + 8 + 8 + 8 + 4  # bytes of a chunk before the name of its compression
 _NAMES = tuple(struct.pack("<I", len(name)) + name for name in (b"zstd", b"lz4"))
 _ENDS = (Opcode.DATA_END, Opcode.FOOTER)
@@ -244,11 +244,11 @@ class _Repair:
             channel = parsed(Channel, body)
             self._channels[channel.id] = channel
         elif code == Opcode.MESSAGE:
-            if len(body) < _MESSAGE.size:
+            if len(body) < MESSAGE_HEADER.size:
                 raise CorruptRecord("a message is too short")
-            channel, sequence, logged, published = _MESSAGE.unpack_from(body)
+            channel, sequence, logged, published = MESSAGE_HEADER.unpack_from(body)
             if (to := self._channel(channel)) is not None:
-                data = body[_MESSAGE.size :]
+                data = body[MESSAGE_HEADER.size :]
                 self._writer.add_message(to, logged, data, published, sequence)
                 self._counts[self._channels[channel].topic] += 1
 

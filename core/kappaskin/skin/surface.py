@@ -3,12 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kappaskin.frames import Array, Mask
+from kappaskin.frames import Array, Indices, Mask
 from kappaskin.skin.patch import Patch
-
-Indices = NDArray[np.intp]
 
 _HALVINGS = 24  # of a cell, until the rim is found
 

@@ -17,6 +17,7 @@ from kappaskin.sources.ports import SerialConnection as SerialConnection
 from kappaskin.sources.pseudo_device import PseudoDevice as PseudoDevice
 from kappaskin.sources.serial_source import SerialSource as SerialSource
 from kappaskin.sources.simulated import SimulatedSource as SimulatedSource
+from kappaskin.sources.simulated import VirtualClock as VirtualClock
 from kappaskin.sources.source import InputRecorder as InputRecorder
 from kappaskin.sources.source import Source as Source
 from kappaskin.sources.source import open_source as open_source

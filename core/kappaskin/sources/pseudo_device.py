@@ -34,7 +34,7 @@ _AT_ONCE = 32  # frames that are due, as after standing still, before it listens
 _INFORMATION_INTERVAL = 0.5  # s between two information messages
 
 
-class _Refused(Exception):
+class _RefusedCommand(Exception):
     """A command that is not done: why, by its number, and in words."""
 
     def __init__(self, fault: Fault, reason: str) -> None:
@@ -178,7 +178,7 @@ class PseudoDevice:
     def _answer(self, command: Command, received: float) -> None:
         try:
             data, fault = self._done(command, received), Fault.NONE
-        except _Refused as refused:
+        except _RefusedCommand as refused:
             data, fault = str(refused).encode(), refused.fault
         self._send(encode_reply(self.spent, self._now(), command, fault, data))
         if command.operation in (Operation.GAIN, Operation.IDENTIFY) and not fault:
@@ -191,7 +191,7 @@ class PseudoDevice:
             case Operation.HELLO:
                 low, high = _numbers("<BB", arguments)
                 if not low <= VERSION <= high:
-                    raise _Refused(Fault.NO_COMMON_VERSION, f"this device speaks {VERSION}")
+                    raise _RefusedCommand(Fault.NO_COMMON_VERSION, f"this device speaks {VERSION}")
                 return bytes([VERSION])
             case Operation.START | Operation.STOP | Operation.IDENTIFY:
                 _numbers("<", arguments)
@@ -208,7 +208,7 @@ class PseudoDevice:
                 _numbers("<", arguments)
                 return struct.pack("<Qh", round(received * 1e6), UNKNOWN_TEMPERATURE)
             case unknown:
-                raise _Refused(Fault.UNKNOWN_OPERATION, f"there is no operation {unknown}")
+                raise _RefusedCommand(Fault.UNKNOWN_OPERATION, f"there is no operation {unknown}")
 
     def _run(self, operation: int) -> None:
         if operation == Operation.START and not self._running:
@@ -225,18 +225,20 @@ class PseudoDevice:
     def _take_list(self, arguments: bytes) -> None:
         channels = unpack_runs(arguments)
         if channels is None:
-            raise _Refused(Fault.WRONG_LENGTH, "expected runs of channels")
+            raise _RefusedCommand(Fault.WRONG_LENGTH, "expected runs of channels")
         try:
             self._scan = self._sensor.scan(channels if len(channels) else None)
         except Refusal as refusal:
-            raise _Refused(Fault.OUT_OF_RANGE, str(refusal)) from refusal
+            raise _RefusedCommand(Fault.OUT_OF_RANGE, str(refusal)) from refusal
         if self._scan.rate < self.rate:
             self._set_rate(self._scan.rate)
 
     def _take_rate(self, requested: int) -> bytes:
         rate, most = requested / RATE_UNIT, self._scan.rate
         if not 0 < rate <= most:
-            raise _Refused(Fault.OUT_OF_RANGE, f"expected at most {most:.1f} frames/s, got {rate}")
+            raise _RefusedCommand(
+                Fault.OUT_OF_RANGE, f"expected at most {most:.1f} frames/s, got {rate}"
+            )
         self._set_rate(rate)
         return struct.pack("<I", requested)
 
@@ -247,7 +249,7 @@ class PseudoDevice:
             scene = replace(self._scene, transduction=replace(chain, amplifier=amplifier))
             self._simulator.change(scene)
         except Refusal as refusal:
-            raise _Refused(Fault.OUT_OF_RANGE, str(refusal)) from refusal
+            raise _RefusedCommand(Fault.OUT_OF_RANGE, str(refusal)) from refusal
         self._scene, self._sensor = scene, scene.sensor()
         self._information = information.sensor_to_json(self._sensor)
         return struct.pack("<I", requested)
@@ -274,7 +276,7 @@ class PseudoDevice:
 
 def _numbers(form: str, arguments: bytes) -> tuple[int, ...]:
     if len(arguments) != struct.calcsize(form):
-        raise _Refused(
+        raise _RefusedCommand(
             Fault.WRONG_LENGTH,
             f"expected {struct.calcsize(form)} bytes of arguments, got {len(arguments)}",
         )

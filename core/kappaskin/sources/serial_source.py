@@ -51,7 +51,7 @@ class SerialSource:
         self._plug = Port.named(url)
         self._decoder = Decoder()
         self._interpreter = Interpreter(url)
-        self._events = _EventLog(self._decoder.sequence, clock)
+        self._events = _EventQueue(self._decoder.sequence, clock)
         self._scan_control = ScanControl()
         self._recording = _RecordingTap(self._interpreter)
         self._pending: deque[tuple[float, FromDevice]] = deque()
@@ -334,7 +334,7 @@ class SerialSource:
         )
 
 
-class _EventLog:
+class _EventQueue:
     """Collects events until they are taken; those of lost messages by the counts of `sequence`."""
 
     def __init__(self, sequence: SequenceCounter, clock: Callable[[], float]) -> None:

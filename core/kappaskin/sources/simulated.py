@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,19 @@ from kappaskin.sources.wire import MOST_RUNS, encode_scan, pack_runs
 _BACKLOG = 0.25  # s behind its own clock after which frames are skipped, and counted as lost
 _DEPTH = 0.02  # m from the middle of the skin down to the force/torque sensor
 _ROUNDING = 1e-3  # of a frame: a clock that was slept to may stand a rounding error before it
+
+
+@dataclass
+class VirtualClock:
+    """A clock that moves when someone sleeps by it: no waiting for a simulation."""
+
+    now: float = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
 
 
 class SimulatedSource:

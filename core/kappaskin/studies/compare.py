@@ -20,7 +20,7 @@ from kappaskin.mechanics import GaussianLoad, Plate
 from kappaskin.scenes import Scene, load_scene
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
-from kappaskin.studies.cost.bench import medians_in_turn, points_on, seconds, traced
+from kappaskin.studies.accuracy import medians_in_turn, points_on, seconds, traced
 from kappaskin.studies.paper import LoadCase, fingertip_scene
 
 
@@ -374,10 +374,7 @@ def comparisons() -> Generator[Comparison]:
     yield _pressed()
 
 
-_TURNS, _BUDGET = (
-    (7, 201),
-    0.1,
-)  # least and most answers timed, and about how long in s
+_TURNS, _BUDGET = (7, 201), 0.1  # least and most answers timed, and about how long in s
 
 
 # Every solver in a comparison: its errors, its time, its memory

@@ -16,7 +16,7 @@ from kappaskin.scenes import Scene, Stimulus, load_scene, scaled_to
 from kappaskin.scenes.effects import UniformNoise
 from kappaskin.sensing import NormalCurvature, SensorLayout
 from kappaskin.skin import Patch
-from kappaskin.studies.cost.bench import covered, rms_distance
+from kappaskin.studies.accuracy import covered, rms_distance, root_mean_square
 
 DRAWS = 200
 RADIUS = 12.9e-3
@@ -239,10 +239,6 @@ _EIGHT = SineBasis(_ARC, 8, 1)
 _THETA = np.linspace(0.0, math.pi, 101)
 
 
-def _rms_mm(u: Array) -> float:
-    return 1e3 * float(np.sqrt(np.mean(u**2)))
-
-
 def _equation_6() -> dict[str, Any]:
     scene = fingertip_scene(1e3 * _U)
     truth = scene.plate.deflection(scene.loads, scene.basis)
@@ -259,9 +255,8 @@ def _equation_6() -> dict[str, Any]:
         "gives": {
             "rank of the 8 columns of M": int(np.linalg.matrix_rank(M)),
             "length of the column k = 1 over that of k = 2": float(length[0] / length[1]),
-            "RMS error in mm of the 0.63 mm load, without noise, when k = 1 is dropped": _rms_mm(
-                S @ c - S[:, :3] @ truth.ravel()
-            ),
+            "RMS error in mm of the 0.63 mm load, without noise, when k = 1 is dropped": 1e3
+            * root_mean_square(S @ c - S[:, :3] @ truth.ravel()),
         },
         "why": "sin(theta) moves half a circle as a whole without curvature: its column of M is "
         "zero, M^T M has no inverse, and dropping the function drops a part of the shape",
@@ -305,9 +300,8 @@ def _equation_10() -> dict[str, Any]:
             "u at theta = 0 in mm, for 0.63 mm under the load": 1e3 * float(u[0]),
             "u at theta = pi in mm": 1e3 * float(u[-1]),
             "largest change of curvature in 1/m": float(np.abs(change).max()),
-            "RMS error in mm of 8 sines fitted to it by Eqs. 6 and 11": _rms_mm(
-                np.sin(np.outer(theta, k)) @ c - u
-            ),
+            "RMS error in mm of 8 sines fitted to it by Eqs. 6 and 11": 1e3
+            * root_mean_square(np.sin(np.outer(theta, k)) @ c - u),
         },
         "why": "the ends would move three times as far as the middle, u(0) = 3 a0 = -u(pi), but "
         "they are held; and sin theta and cos theta move the arc as a whole, so that no gage "

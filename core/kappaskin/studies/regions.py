@@ -15,7 +15,8 @@ from kappaskin.mechanics import PointLoad
 from kappaskin.pipeline import Pipeline, Setup
 from kappaskin.scenes import TABLE_1_NOISE, Orbit, Scene, load_scene
 from kappaskin.sensing import SECOND_GENERATION
-from kappaskin.sources import SimulatedSource
+from kappaskin.sources import SimulatedSource, VirtualClock
+from kappaskin.studies.accuracy import root_mean_square
 
 PERIODS = (4.0, 1.0, 0.25)
 """Seconds per turn of the contact: 35, 138 and 553 mm/s on a circle of 22 mm."""
@@ -39,6 +40,7 @@ ROWS = (
 """Regions, each with the method that the shape is fitted by."""
 _POINTS = 33  # of the surface, along each side
 _SETTLED = 0.1  # s, left out of the measurement
+_SECONDS = 1.0  # of each row
 
 
 def scene_of(period: float) -> Scene:
@@ -50,21 +52,8 @@ def scene_of(period: float) -> Scene:
     return replace(moving, transduction=SECOND_GENERATION, rate=full_rate)
 
 
-class _Clock:
-    """A clock that advances only by sleeping: computing takes no time here."""
-
-    def __init__(self) -> None:
-        self.now = 0.0
-
-    def __call__(self) -> float:
-        return self.now
-
-    def sleep(self, seconds: float) -> None:
-        self.now += seconds
-
-
 @dataclass(frozen=True, eq=False)
-class _Answer:
+class _TimedEstimate:
     """An estimate, with when its scan began and ended in s and how many channels that read."""
 
     estimate: Estimate
@@ -73,25 +62,25 @@ class _Answer:
     channels: int
 
 
-def _answers(scene: Scene, region: Region, seconds: float, method: str) -> list[_Answer]:
+def _answers(scene: Scene, region: Region, seconds: float, method: str) -> list[_TimedEstimate]:
     """The estimates of the closed loop: each contact moves the region that the next frame scans."""
-    clock = _Clock()
+    clock = VirtualClock()
     source = SimulatedSource(scene, clock, clock.sleep)
     pipeline = Pipeline(source.sensor, Setup(nx=_POINTS, ny=_POINTS, method=method), clock=clock)
     steering = track_region(source, region)
-    answers: list[_Answer] = []
+    answers: list[_TimedEstimate] = []
     while clock.now < seconds:
         for frame in source.read(seconds):
             estimate = pipeline(frame)
             duration = scene.transduction.scan_time(len(frame.channels))
             began = frame.device_time
-            answers.append(_Answer(estimate, began, began + duration, len(frame.channels)))
+            answers.append(_TimedEstimate(estimate, began, began + duration, len(frame.channels)))
             if steering is not None:
                 steering(estimate.contact, pipeline.fit)
     return [answer for answer in answers if answer.began >= _SETTLED]
 
 
-class _Errors:
+class _TruthErrors:
     """Errors of estimates against the truth at any time, in mm."""
 
     def __init__(self, scene: Scene) -> None:
@@ -104,8 +93,7 @@ class _Errors:
         (load,) = self._scene.loads_at(time)
         off = estimate.contact.position - load.centre()
         w = self._surface(self._compliance(load.modal(self._basis)))
-        rms = math.sqrt(float(np.mean((estimate.surface - w) ** 2)))
-        return 1e3 * math.hypot(*off), 1e3 * rms
+        return 1e3 * math.hypot(*off), 1e3 * root_mean_square(estimate.surface - w)
 
 
 def _rms(errors: list[tuple[float, float]]) -> Array:
@@ -115,14 +103,14 @@ def _rms(errors: list[tuple[float, float]]) -> Array:
 def measured(
     period: float, region: Region, seconds: float, method: str = "least-squares"
 ) -> dict[str, Any]:
-    """One row of `regions`: a contact that goes round every `period` s, for `seconds`.
+    """One row of `run_regions`: a contact that goes round every `period` s, for `seconds`.
 
     `method` names the estimator, one of `METHODS`.
     """
     if not _SETTLED + 0.1 <= seconds < math.inf:
         raise Refusal(f"expected at least {_SETTLED + 0.1} s to measure over, got {seconds}")
     scene = scene_of(period)
-    answers, error = _answers(scene, region, seconds, method), _Errors(scene)
+    answers, error = _answers(scene, region, seconds, method), _TruthErrors(scene)
     own = _rms([error(a.estimate, (a.began + a.ended) / 2) for a in answers])
     # An answer is the newest from its own end to that of the next.
     newest = _rms([error(a.estimate, (a.ended + b.ended) / 2) for a, b in pairwise(answers)])
@@ -146,22 +134,23 @@ def measured(
     }
 
 
-def run_regions(seconds: float = 1.0) -> list[dict[str, Any]]:
+def run_regions() -> list[dict[str, Any]]:
     """Contact and shape errors, RMS in mm, of full scans and of regions around the contact.
 
-    Each row is a closed loop of `seconds`, on a skin that moves while a frame is read: `contact_mm`
-    and `shape_mm` against the truth in the middle of the frame's own scan, `newest_...` against the
-    truth while the estimate is the newest there is, as a controller sees it. `bound_mm` is how
-    well one frame can locate the contact where the circle begins (see `contact_bound`); readings
-    held from earlier frames add to that. `found` is the share of frames with a contact.
+    Each row is a closed loop of one second, on a skin that moves while a frame is read:
+    `contact_mm` and `shape_mm` against the truth in the middle of the frame's own scan,
+    `newest_...` against the truth while the estimate is the newest there is, as a controller sees
+    it. `bound_mm` is how well one frame can locate the contact where the circle begins (see
+    `contact_bound`); readings held from earlier frames add to that. `found` is the share of frames
+    with a contact.
     """
     return [
-        measured(period, region, seconds, method) for period in PERIODS for region, method in ROWS
+        measured(period, region, _SECONDS, method) for period in PERIODS for region, method in ROWS
     ]
 
 
 def regions_text(rows: list[dict[str, Any]]) -> str:
-    """The rows of `regions` under a heading."""
+    """The rows of `run_regions` under a heading."""
     lines = [
         "A contact on a circle, 20 us per channel; RMS errors of contact and shape in mm,",
         "of each frame in the middle of its scan, and while it is the newest estimate",

@@ -11,14 +11,15 @@ from kappaskin import Disk, Patch, Polygon, Refusal, SineBasis, basis_for
 from kappaskin.bases import (
     EDGES,
     ORDERS,
+    ClampedBasis,
     CurvatureMap,
+    DiskBasis,
     ElasticBasis,
+    PolygonBasis,
     curvature_at,
     edges_of,
     overlaps,
 )
-from kappaskin.bases.modes import DiskBasis, PolygonBasis
-from kappaskin.bases.product import ClampedBasis
 from kappaskin.frames import COMPONENTS
 
 MIXED = [(2, 1), (1, 2), (2, 2)]

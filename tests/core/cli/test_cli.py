@@ -15,8 +15,8 @@ import psutil
 import pytest
 
 from kappaskin import Patch, Plate, PointLoad, SensorLayout, SineBasis
-from kappaskin.cli import app
-from kappaskin.cli.common import REFUSED, ProgressLine
+from kappaskin.cli import REFUSED, app
+from kappaskin.cli.common import ProgressLine
 from kappaskin.estimation import METHODS
 
 pytestmark = pytest.mark.slow

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kappaskin import LeastSquares, Patch, RankDeficient, Refusal, SensorLayout, SineBasis
-from kappaskin.estimation.least_squares import AsPrinted, Direct
+from kappaskin.estimation import AsPrinted, Direct
 
 METHODS = {"least-squares": LeastSquares, "direct": Direct}
 every_method = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)

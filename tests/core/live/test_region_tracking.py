@@ -10,7 +10,7 @@ from kappaskin import Pipeline, PointLoad, Refusal, Region, Setup, load_scene
 from kappaskin.live import track_region
 from kappaskin.scenes import Orbit
 from kappaskin.sensing import SECOND_GENERATION
-from kappaskin.sources import SimulatedSource
+from kappaskin.sources import SimulatedSource, VirtualClock
 
 pytestmark = pytest.mark.slow
 
@@ -23,22 +23,11 @@ CIRCLE = replace(
 )
 
 
-class Clock:
-    def __init__(self):
-        self.now = 0.0
-
-    def __call__(self):
-        return self.now
-
-    def sleep(self, seconds):
-        self.now += seconds
-
-
 class Loop:
     """A source, a pipeline and what steers, in time that only the source spends."""
 
     def __init__(self, region, scene=CIRCLE):
-        self.clock = Clock()
+        self.clock = VirtualClock()
         self.source = SimulatedSource(scene, self.clock, self.clock.sleep)
         self.pipeline = Pipeline(self.source.sensor, Setup(nx=9, ny=9), clock=self.clock)
         self.steering = track_region(self.source, region)

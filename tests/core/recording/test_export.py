@@ -46,7 +46,7 @@ from kappaskin.recording import (
 from kappaskin.recording.export.surfaces import SkinMesh, SkinSurface
 from kappaskin.recording.export.writing import export_steps
 from kappaskin.recording.messages import TOPICS
-from kappaskin.sources import SimulatedSource
+from kappaskin.sources import SimulatedSource, VirtualClock
 
 pytestmark = pytest.mark.slow
 
@@ -62,17 +62,6 @@ class Told:
     estimate: Estimate
 
 
-class Clock:
-    def __init__(self) -> None:
-        self.now = 1000.0
-
-    def __call__(self) -> float:
-        return self.now
-
-    def sleep(self, seconds: float) -> None:
-        self.now += seconds
-
-
 def recorded(
     path: Path,
     scene: Scene | None = None,
@@ -80,7 +69,7 @@ def recorded(
     seconds: float = 0.4,
 ) -> list[Told]:
     """Record a scene at `path`, so many `seconds` of each of the `steps`."""
-    clock, told = Clock(), list[Told]()
+    clock, told = VirtualClock(1000.0), list[Told]()
     scene = replace(scene or load_scene("tapping"), rate=RATE)
     source = SimulatedSource(scene, clock, clock.sleep)
     pipeline: Pipeline | None = None

@@ -19,8 +19,7 @@ from kappaskin import (
     SineBasis,
     load_scene,
 )
-from kappaskin.scenes import SCENES, TABLE_1_NOISE, LoadingHistory, Orbit, scaled_to
-from kappaskin.scenes.read import check_elements
+from kappaskin.scenes import SCENES, TABLE_1_NOISE, LoadingHistory, Orbit, check_elements, scaled_to
 from kappaskin.scenes.stimulus import MotionPath, PressStep, ReleaseStep, SlideStep, contact_of
 
 PATCH = Patch(0.1, 0.1)

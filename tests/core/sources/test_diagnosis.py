@@ -9,8 +9,7 @@ from dataclasses import replace
 import pytest
 
 from kappaskin import load_scene
-from kappaskin.cli import main
-from kappaskin.cli.common import FAILED
+from kappaskin.cli import FAILED, main
 from kappaskin.sources import Accounting, Diagnosis, information
 from kappaskin.sources.wire import encode_information
 

@@ -10,8 +10,7 @@ import pytest
 import kappaskin.studies
 import kappaskin_resources
 from kappaskin import GaussianLoad, Patch, Plate, SineBasis, load_scene
-from kappaskin.cli import main
-from kappaskin.cli.common import REFUSED
+from kappaskin.cli import REFUSED, main
 from kappaskin.studies import compared, compared_text
 from kappaskin.studies.compare import (
     WITHIN,

@@ -14,9 +14,8 @@ import numpy as np
 import pytest
 
 from kappaskin import LeastSquares, Patch, RankDeficient, SensorLayout, SineBasis, basis_for
-from kappaskin.estimation import METHODS, singular_values
+from kappaskin.estimation import METHODS, AsPrinted, singular_values
 from kappaskin.estimation.fit import DenseUncertainty
-from kappaskin.estimation.least_squares import AsPrinted
 from kappaskin.studies import run_stability
 from kappaskin.studies.stability import rows_of
 from kappaskin.studies.stability.gallery import CaseKind, gallery

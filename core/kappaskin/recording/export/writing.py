@@ -87,7 +87,7 @@ def _exported(
 ) -> Generator[float | Exported]:
     info = recording_info(recording, request)
     with closing(FORMATS[request.format](scratch, request, info)) as writer:
-        work, next_report = _Work(recording, request, info, writer), 0.0
+        work, next_report = _ExportWork(recording, request, info, writer), 0.0
         for message in recording.messages():
             if not work.take(message):
                 break
@@ -99,7 +99,7 @@ def _exported(
     yield work.done()
 
 
-class _Work:
+class _ExportWork:
     """Takes the messages in order, until all requested files are written."""
 
     def __init__(

@@ -5,7 +5,7 @@ be left out.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -17,6 +17,7 @@ from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics import Plate
+from kappaskin.scenes.effects.at_work import RunningEffect as RunningEffect
 from kappaskin.sensing import SensorLayout, Transduction
 
 
@@ -90,10 +91,6 @@ class Survey:
     def share(self, change: Array) -> float:
         """The largest `change` of a reading in 1/m as a share of the peak."""
         return float(np.abs(change).max(initial=0.0)) / self.peak
-
-
-RunningEffect = Callable[[Array, float], Array]
-"""An effect at work: curvature in 1/m and the time in s to the curvature that is read then."""
 
 
 @dataclass(frozen=True, slots=True)

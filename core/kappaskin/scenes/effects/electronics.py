@@ -161,7 +161,7 @@ class UniformNoise(_WhiteNoise):
     largest: ClassVar = math.sqrt(3)
 
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
-        from kappaskin.scenes.effects.at_work.noise import uniform
+        from kappaskin.scenes.effects.at_work.electronics import uniform
 
         return uniform(self.rms, rng)
 
@@ -174,7 +174,7 @@ class GaussianNoise(_WhiteNoise):
     largest: ClassVar = LARGEST
 
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
-        from kappaskin.scenes.effects.at_work.noise import gaussian
+        from kappaskin.scenes.effects.at_work.electronics import gaussian
 
         return gaussian(self.rms, rng)
 
@@ -219,6 +219,6 @@ class FlickerNoise(ReadingEffect):
         return Size(number, LARGEST * number)
 
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
-        from kappaskin.scenes.effects.at_work.noise import flicker
+        from kappaskin.scenes.effects.at_work.electronics import flicker
 
         return flicker(self.rms, self.corners, shape, rng)

@@ -1,6 +1,5 @@
 """Support of the skin in addition to its stiffness: tension, foam and fluid."""
 
-from abc import abstractmethod
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
@@ -11,20 +10,6 @@ from kappaskin.mechanics import Plate
 from kappaskin.scenes.effects.effect import NOTHING, Size, SkinEffect, Survey
 
 
-class _Backing(SkinEffect):
-    """Judged by what the same forces make of the skin with the backing and without it."""
-
-    @abstractmethod
-    def _number(self, survey: Survey) -> float: ...
-
-    def size(self, survey: Survey) -> Size:
-        whole, bare = self.of(survey.plate), self.off(survey.plate)
-        if whole == bare:
-            return NOTHING
-        change = survey.readings_on(whole) - survey.readings_on(bare)
-        return Size(self._number(survey), survey.share(change))
-
-
 def _stiffness(plate: Plate) -> float:
     """D k^4 + T k^2 + k_f in N/m^3 of the first mode of a hinged rectangle."""
     across = 0.0 if plate.patch.strip else 1 / plate.patch.b**2
@@ -32,8 +17,19 @@ def _stiffness(plate: Plate) -> float:
     return plate.rigidity * k2**2 + plate.tension * k2 + plate.foundation
 
 
-def _added(whole: Plate, bare: Plate) -> float:
-    return _stiffness(whole) / _stiffness(bare) - 1
+class _Backing(SkinEffect):
+    """Judged by what the same forces make of the skin with the backing and without it."""
+
+    def _number(self, survey: Survey) -> float:
+        """By how much it is stiffer with the backing, as a share of what it is without."""
+        return _stiffness(self.of(survey.plate)) / _stiffness(self.off(survey.plate)) - 1
+
+    def size(self, survey: Survey) -> Size:
+        whole, bare = self.of(survey.plate), self.off(survey.plate)
+        if whole == bare:
+            return NOTHING
+        change = survey.readings_on(whole) - survey.readings_on(bare)
+        return Size(self._number(survey), survey.share(change))
 
 
 @dataclass(frozen=True)
@@ -51,9 +47,6 @@ class Tension(_Backing):
 
     def off(self, plate: Plate) -> Plate:
         return replace(plate, tension=0.0)
-
-    def _number(self, survey: Survey) -> float:
-        return _added(self.of(survey.plate), self.off(survey.plate))
 
 
 @dataclass(frozen=True)
@@ -74,9 +67,6 @@ class Foam(_Backing):
 
     def off(self, plate: Plate) -> Plate:
         return replace(plate, foundation=0.0)
-
-    def _number(self, survey: Survey) -> float:
-        return _added(self.of(survey.plate), self.off(survey.plate))
 
 
 @dataclass(frozen=True)

@@ -1,20 +1,16 @@
 """Cost bench: error, time and memory of settings on a scene, and of the effects in it."""
 
-import statistics
 import time
-import tracemalloc
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import cycle, islice
-from typing import TypeVar, cast
 
 import numpy as np
-import scipy
 
-from kappaskin.bases import Basis, basis_for
+from kappaskin.bases import basis_for
 from kappaskin.errors import Refusal
-from kappaskin.estimation import METHODS, Estimator, Fit, estimator_for
+from kappaskin.estimation import METHODS, Estimator, estimator_for
 from kappaskin.frames import Array
 from kappaskin.scenes import (
     AppliedLoads,
@@ -35,21 +31,24 @@ from kappaskin.scenes.effects import (
     Saturation,
 )
 from kappaskin.sensing import Scan, Sensor, SensorLayout
-from kappaskin.skin import Patch
+from kappaskin.studies.accuracy import (
+    medians_in_turn,
+    rms_distance,
+    root_mean_square,
+    seconds,
+    traced,
+)
 from kappaskin.studies.cost import SCANS, Cost, Refused, Setting, own_elements
 from kappaskin.studies.simulation import costs_of
 
 SETTLING, DRAWS = 8, 40
 """Frames that methods with a memory are given to settle, and those that are judged after them."""
-_POINTS = 101  # of the surface along each side, edges included, as in Table 1
-_BAND_SIDE = 21  # points along each side at which error bars are judged, less those on the edges
 _TURNS, _BUDGET = (7, 41), 10e-3  # least and most of them that are timed, and about how long in s
 _CALLS, _SLOW = 5, 1e-3  # in a turn; one of a method whose frame takes longer, in s
-_Made = TypeVar("_Made")
 
 
 @dataclass(frozen=True, eq=False)
-class _Skin:
+class _SkinReadings:
     """Elements, and what they read of the scene: (T, 3, P) in 1/m, `exact` and as it is `read`."""
 
     sensor: Sensor
@@ -59,51 +58,6 @@ class _Skin:
     @property
     def layout(self) -> SensorLayout:
         return self.sensor.layout
-
-
-@lru_cache(8)
-def _lengths(basis: Basis, reference: Basis) -> tuple[Array, Array, Array]:
-    """A (N, N), B (Nr, N) and C (Nr, Nr) with |c A - w B|^2 + |w C|^2 the surfaces' distance^2.
-
-    By RMS over the skin. The functions of both on G points are Q R, and Q changes no lengths.
-    """
-    points, N = points_on(basis.patch), basis.size
-    functions = np.hstack([basis.at(points), reference.at(points)]) / np.sqrt(len(points))
-    R = cast("Array", np.linalg.qr(functions, mode="r")).T
-    return R[:N, :N].copy(), R[N:, :N].copy(), R[N:, N:].copy()
-
-
-def rms_distance(basis: Basis, fitted: Array, reference: Basis, true: Array) -> Array:
-    """The distance of surfaces by RMS over the skin, (T,) in m.
-
-    Of coefficients `fitted` (T, N) of the functions of `basis`, and `true` (T, Nr) or (1, Nr) of
-    those of the `reference`, in m.
-    """
-    A, B, C = _lengths(basis, reference)
-    inside, outside = fitted @ A - true @ B, true @ C
-    return np.sqrt(np.vecdot(inside, inside) + np.vecdot(outside, outside))
-
-
-def covered(fit: Fit, reference: Basis, true: Array) -> Array:
-    """The share of the skin that lies within the 95 % bands of a fit, (T,).
-
-    `true` (T, Nr) or (1, Nr) in m are coefficients of the functions of the `reference`.
-    """
-    patch, c = reference.patch, fit.coefficients
-    x, y = (along[1:-1] for along in patch.grid(_BAND_SIDE, 3 if patch.strip else _BAND_SIDE))
-    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    points = points[patch.contains(points)]
-    fitted = c.reshape(len(c), -1) @ fit.estimator.basis.at(points).T
-    reach = scipy.special.stdtrit(np.maximum(fit.spare, 1), 0.975)
-    bands = np.reshape(reach, (-1, 1)) * fit.surface_sd(points)
-    return np.mean(np.abs(fitted - true @ reference.at(points).T) <= bands, axis=1)
-
-
-def points_on(patch: Patch) -> Array:
-    """The points (G, 2) of the skin over which errors are averaged."""
-    x, y = patch.grid(_POINTS, 2 if patch.strip else _POINTS)
-    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    return points[patch.contains(points)]
 
 
 def with_elements(scene: Scene, elements: tuple[int, int] | None) -> Scene:
@@ -145,7 +99,7 @@ class Bench:
             )
         # Planned once: what stands still calls for no skew, but the whole scene is to be judged.
         self.scene = planned(scene)
-        self._skins: dict[tuple[int, int] | None, _Skin] = {}
+        self._skins: dict[tuple[int, int] | None, _SkinReadings] = {}
 
     @property
     def contact(self) -> Array:
@@ -158,12 +112,12 @@ class Bench:
         compliance = self.scene.plate.compliance(self.scene.basis)
         return np.array([compliance(pressed.force).ravel() for pressed in self._pressed])
 
-    def _skin(self, elements: tuple[int, int] | None) -> _Skin:
+    def _skin(self, elements: tuple[int, int] | None) -> _SkinReadings:
         if elements not in self._skins:
             self._skins[elements] = self._read_by(elements)
         return self._skins[elements]
 
-    def _read_by(self, elements: tuple[int, int] | None) -> _Skin:
+    def _read_by(self, elements: tuple[int, int] | None) -> _SkinReadings:
         scene = with_elements(self.scene, elements)
         sensor, simulator = scene.sensor(), Simulator(scene)
         read: list[Array] = []
@@ -172,7 +126,9 @@ class Bench:
             read.append(sensor.nominal(simulator.scanned(sensor.scan(), n, t, lambda: 0.0)))
         operator = scene.layout.curvature_operator(scene.basis)
         shape = (len(read), 3, len(scene.layout))
-        return _Skin(sensor, (self._truth @ operator.T).reshape(shape), np.reshape(read, shape))
+        return _SkinReadings(
+            sensor, (self._truth @ operator.T).reshape(shape), np.reshape(read, shape)
+        )
 
     def __call__(self, setting: Setting) -> Cost | Refused:
         """What `setting` costs, or why it gives no answer."""
@@ -182,7 +138,7 @@ class Bench:
         except (Refusal, np.linalg.LinAlgError) as error:
             return Refused(setting, str(error))
 
-    def _scanned(self, setting: Setting, skin: _Skin) -> tuple[SensorLayout, Scan]:
+    def _scanned(self, setting: Setting, skin: _SkinReadings) -> tuple[SensorLayout, Scan]:
         """The skin's layout with the channels outside the scan dead, and the scan."""
         elements = SCANS[setting.scanned](skin.layout, self.contact)
         layout = replace(skin.layout, live=skin.layout.live & elements)
@@ -224,7 +180,7 @@ class Bench:
             float(e.mean()),
             float(e.std(ddof=1)),
             float(rms.mean()),
-            float(np.sqrt(np.mean(shape**2))),
+            root_mean_square(shape),
         )
 
     def _errors(self, fit: Estimator, curvature: Array) -> tuple[Array, Array]:
@@ -242,21 +198,6 @@ def check_finite(*values: Array) -> None:
     """Raise a `Refusal` where something computed from coefficients is no number."""
     if not all(np.isfinite(each).all() for each in values):
         raise Refusal("the coefficients are not finite: the arithmetic overflowed")
-
-
-def traced(made: Callable[[], _Made]) -> tuple[_Made, int]:
-    """What is made, and the most bytes that were held while making it."""
-    mine = not tracemalloc.is_tracing()
-    if mine:
-        tracemalloc.start()
-    try:
-        tracemalloc.reset_peak()
-        before = tracemalloc.get_traced_memory()[0]
-        thing = made()
-        return thing, tracemalloc.get_traced_memory()[1] - before
-    finally:
-        if mine:
-            tracemalloc.stop()
 
 
 def _medians(
@@ -277,31 +218,6 @@ def _medians(
         _BUDGET,
     )
     return ours, theirs
-
-
-def medians_in_turn(
-    timed: Sequence[Callable[[], Iterable[float]]], turns: tuple[int, int], budget: float
-) -> list[float]:
-    """Median seconds of each of the things that are `timed` turn by turn, all in every turn.
-
-    So what else the machine does slows all of them alike. `turns` are the least and the most; after
-    about `budget` seconds no more than the least are begun.
-    """
-    taken = [list[float]() for _ in timed]
-    (least, most), end = turns, time.perf_counter() + budget
-    for turn in range(most):
-        if turn >= least and time.perf_counter() >= end:
-            break
-        for times, run in zip(taken, timed, strict=True):
-            times += run()
-    return [statistics.median(times) for times in taken]
-
-
-def seconds(call: Callable[..., object], *arguments: object) -> float:
-    """How long a call with these `arguments` takes."""
-    begun = time.perf_counter()
-    call(*arguments)
-    return time.perf_counter() - begun
 
 
 def costs(scene: Scene, settings: Iterable[Setting]) -> Generator[Cost | Refused]:

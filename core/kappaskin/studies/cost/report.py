@@ -45,7 +45,7 @@ def _setting(s: Setting) -> dict[str, Any]:
 
 
 def row(cost: Cost | Refused) -> dict[str, Any]:
-    """One of `rows`, without its place among the others."""
+    """One of `cost_rows`, without its place among the others."""
     setting = _setting(cost.setting)
     if isinstance(cost, Refused):
         return setting | dict.fromkeys(_FIGURES) | {"refused": cost.reason}

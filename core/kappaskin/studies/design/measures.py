@@ -24,7 +24,7 @@ from kappaskin.frames import Array, Contact, Mask, Truth
 from kappaskin.mechanics import Plate
 from kappaskin.scenes import Indenter, Scene, Simulator, kept_effects
 from kappaskin.skin import Patch
-from kappaskin.studies.cost.bench import covered, points_on, rms_distance, seconds
+from kappaskin.studies.accuracy import covered, points_on, rms_distance, root_mean_square, seconds
 
 # Blocks of frames: what was true, what was read, what was fitted
 
@@ -181,7 +181,7 @@ def noise_of(scene: Scene) -> float:
 @lru_cache(8)
 def _predicted_rms(estimator: Estimator, noise: float) -> float:
     sd = predicted_sd(estimator, noise, points_on(estimator.basis.patch))
-    return float(np.sqrt(np.mean(sd**2)))
+    return root_mean_square(sd)
 
 
 def _predicted(block: FrameBlock) -> Array:
@@ -338,14 +338,14 @@ def prospect(design: Design) -> Prospect:
     return Prospect(x, y, _on_map(on, sd), layout.positions, rate)
 
 
-def check(design: Design, frames: int = _MOST, seed: int = 0) -> Generator[Check]:
+def check(design: Design, frames: int = _MOST) -> Generator[Check]:
     """What simulating a design gives, after every few frames until there are so many.
 
     The readings are made as all simulations make them, with every effect of the scene.
     """
     estimator = design.estimator()
     _, _, on, points = _points(design.scene.plate.patch)
-    scene = replace(design.scene, layout=estimator.layout, seed=seed)
+    scene = replace(design.scene, layout=estimator.layout, seed=0)
     simulator, scan = Simulator(scene), scene.sensor().scan()
     rows, shares = estimator.basis.at(points), _shares(on)[on]
     true_rows = scene.basis.at(points)

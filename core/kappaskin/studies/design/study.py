@@ -91,7 +91,7 @@ _SPACING = {"even": np.linspace, "log": np.geomspace}
 
 
 @dataclass(frozen=True)
-class _Range:
+class _ValueRange:
     """`count` numbers from `first` to `last`, evenly or by the same factor (log)."""
 
     first: float
@@ -150,7 +150,7 @@ def _values(table: TomlTable, place: str, most: int) -> list[Any]:
             "expected a list or a range such as { first = 1, last = 9, count = 5 }; write a place "
             'with dots in quotes, as "elements.grid"'
         )
-    made = inner.make(_Range)
+    made = inner.make(_ValueRange)
     inner.done()
     with inner.blamed():
         return made.values(most)

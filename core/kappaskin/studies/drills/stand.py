@@ -286,14 +286,12 @@ class Stand:
     `clock` is what the source goes by. What it accepts is compared with what was sent.
     """
 
-    def __init__(
-        self, device: Device, long: bool, clock: Callable[[], float] = time.monotonic
-    ) -> None:
+    def __init__(self, device: Device, long: bool) -> None:
         self.device, self.long, self.rng = device, long, device.rng
         self._folder = Path(tempfile.mkdtemp(prefix="kappaskin-drill-"))
         device.line.take(0.0)  # from before this drill
         self.relay = Relay(device.line, self._folder)
-        self.clock = clock
+        self.clock = time.monotonic
         self._source: SerialSource | None = None
         self.frames = self.wrong = 0
         self.slowest = 0.0

@@ -23,6 +23,7 @@ from kappaskin.scenes.effects import (
 )
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
+from kappaskin.studies.accuracy import root_mean_square
 from kappaskin.studies.figures import style
 from kappaskin.studies.paper import RADIUS
 
@@ -124,9 +125,8 @@ def _draw_errors(axes: style.Axes, found: _LoopRun) -> None:
     looks = (("straight line", style.BLUE), ("hysteresis compensated", style.ORANGE))
     axes.axhline(0, color=style.LINE, lw=0.6)
     for error, (name, colour) in zip(found.errors, looks, strict=True):
-        rms = np.sqrt(np.mean(error**2))
         axes.plot(applied, error, color=colour, lw=1, marker="o", mec="white", mew=0.4,
-                  label=f"{name}: RMS {rms:.2f} 1/m")  # fmt: skip
+                  label=f"{name}: RMS {root_mean_square(error):.2f} 1/m")  # fmt: skip
     axes.set(xlim=(-85, 85), ylim=(-5, 6), xticks=range(-80, 81, 40))
     axes.set(xlabel="applied curvature [1/m]", ylabel="error of curvature [1/m]")
     axes.legend(loc="upper left")
@@ -166,10 +166,6 @@ def _pressed(running: RunningEffect, base: float, change: Array) -> Array:
     return tared.reshape(_CYCLES, len(_PRESS), len(change))
 
 
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
 def _errors(basis: Basis, fit: LeastSquares, truth: Array, readings: Array) -> dict[str, float]:
     """What one cycle of `readings` (steps, P) makes of the dent `truth` (8, 1)."""
     change = fit.M[:_ELEMENTS] @ truth.ravel()
@@ -182,11 +178,11 @@ def _errors(basis: Basis, fit: LeastSquares, truth: Array, readings: Array) -> d
     going, coming = readings[: _STEPS + 1], readings[_STEPS:][::-1]
     return {
         "swing": float(np.abs(change).max()),
-        "reading_rms": _rms(readings - true_readings),
+        "reading_rms": root_mean_square(readings - true_readings),
         "loop_width": float(np.abs(going - coming).max()),
         "e_max_mm": float(off[_STEPS, 50]),
-        "rms_mm": _rms(off),
-        "rest_rms_mm": _rms(off[-1:]),
+        "rms_mm": root_mean_square(off),
+        "rest_rms_mm": root_mean_square(off[-1:]),
     }
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from kappaskin.frames import Array
 from kappaskin.scenes import load_scene
+from kappaskin.studies.accuracy import root_mean_square
 from kappaskin.studies.figures import style
 from kappaskin.studies.paper import APPLIED, FINGERTIP_NOISE, RADIUS, fingertip_scene, noisy_fit
 
@@ -33,7 +34,7 @@ class _SquareRun:
 
     @property
     def rms(self) -> float:
-        return float(np.sqrt(np.mean(self.error**2)))
+        return root_mean_square(self.error)
 
 
 def square_run() -> _SquareRun:
@@ -117,7 +118,7 @@ class _FingertipRun:
 
     @property
     def rms(self) -> float:
-        return float(np.sqrt(np.mean((self.fitted - self.true) ** 2)))
+        return root_mean_square(self.fitted - self.true)
 
 
 def fingertip_run(applied: float, rng: np.random.Generator) -> _FingertipRun:

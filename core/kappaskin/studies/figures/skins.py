@@ -76,7 +76,7 @@ def _draw_section(axes: style.Axes, found: _StripRun) -> None:
     _draw_gages(axes, found.elements, x, z)
     at = 1e3 * _STRIP_LOAD
     touched = float(np.interp(at, x, z)) + _THICK + _GAGE
-    axes.fill(*_disc(at, touched + 9, 9), color=style.FAINT)
+    axes.fill(*_disc(at, touched + 9), color=style.FAINT)
     style.arrow(axes, (at, touched + 27), (at, touched + 19))
     axes.text(at + 1.5, touched + 27, "Q", va="top", style="italic")
     axes.text(at, touched + 9, "object", ha="center", va="center", color="white")
@@ -106,9 +106,9 @@ def _draw_gages(axes: style.Axes, elements: Array, x: Array, z: Array) -> None:
     axes.text(framed - 3.8, high + 0.6, "b", weight="bold")
 
 
-def _disc(x: float, z: float, r: float) -> tuple[Array, Array]:
+def _disc(x: float, z: float) -> tuple[Array, Array]:
     turn = np.linspace(0, 2 * np.pi, 90)
-    return x + r * np.cos(turn), z + r * np.sin(turn)
+    return x + 9 * np.cos(turn), z + 9 * np.sin(turn)
 
 
 def _draw_pair(axes: style.Axes) -> None:

@@ -36,6 +36,7 @@ from kappaskin._processes import process_context
 from kappaskin.errors import Refusal
 from kappaskin.estimation import METHODS, Estimator, Fit
 from kappaskin.frames import Array
+from kappaskin.studies.accuracy import root_mean_square
 from kappaskin.studies.stability.gallery import CaseKind, HardCase, gallery
 from kappaskin.studies.stability.reference import Reference, reference_of
 
@@ -265,16 +266,12 @@ def _row(
     if method in _SEEK_LEAST_SQUARES:
         row["digits_lost"] = reference.digits_lost(answer.coefficients, eps)
     return row | {
-        "error_mm": _number(_rms_mm(answer.error)),
-        "bar_mm": _number(_rms_mm(answer.bar)),
+        "error_mm": _number(1e3 * root_mean_square(answer.error)),
+        "bar_mm": _number(1e3 * root_mean_square(answer.bar)),
         "covered": answer.covered,
         "verdict": "breaks" if found == "wrong" and method == _PRINTED else found,
         "reason": why,
     }
-
-
-def _rms_mm(values: Array) -> float:
-    return 1e3 * float(np.sqrt(np.mean(values**2)))
 
 
 def _number(value: float) -> float | None:

@@ -18,6 +18,7 @@ from kappaskin.mechanics import Plate, PointLoad
 from kappaskin.scenes import TABLE_1_NOISE, scaled_to
 from kappaskin.sensing import SensorLayout, Transduction
 from kappaskin.skin import Patch
+from kappaskin.studies.accuracy import root_mean_square
 from kappaskin.studies.paper import RADIUS
 
 FRAMES = 40
@@ -320,7 +321,7 @@ def _readings() -> Iterator[HardCase]:
                   spoilt=spiked, announced="a spike is no noise: bars widen with it")  # fmt: skip
     dent = _dent(8)
     signal = _TENS.curvature_operator(SineBasis(_SQUARE, 8, 8)) @ dent.ravel()
-    noise = 10 * float(np.sqrt(np.mean(signal**2)))
+    noise = 10 * root_mean_square(signal)
     yield case_of("noise 10 times the signal", "readings hold more noise than shape",
                   _TENS, (8, 8), truth=dent, noise=noise)  # fmt: skip
 

@@ -84,7 +84,7 @@ def test_describing_and_sizing_every_effect_imports_none_at_work():
     [
         ("finite-slope", "gages", "finite_slope"),
         ("cross-talk", "electronics", "cross_talk"),
-        ("flicker-noise", "noise", "flicker"),
+        ("flicker-noise", "electronics", "flicker"),
         ("stuck", "failures", "stuck"),
         ("quantisation", "electronics", "quantisation"),
         ("dropped-frames", "failures", "hits"),

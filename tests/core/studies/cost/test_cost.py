@@ -23,7 +23,7 @@ from kappaskin import (
     load_scene,
 )
 from kappaskin._processes import BackgroundProcess
-from kappaskin.cli.common import FAILED, REFUSED
+from kappaskin.cli import FAILED, REFUSED
 from kappaskin.scenes import SCENES, Orbit
 from kappaskin.scenes.effects import GaussianNoise
 from kappaskin.sensing import Amplifier
@@ -32,15 +32,17 @@ from kappaskin.studies import (
     Refused,
     Setting,
     accuracy_verdict,
+    cheapest,
     cost_rows,
+    costs,
     costs_text,
     frontier,
     parse_length,
     settings_to_try,
     write_plot,
 )
-from kappaskin.studies.cost import ALIKE, cheapest
-from kappaskin.studies.cost.bench import Bench, costs
+from kappaskin.studies.cost import ALIKE
+from kappaskin.studies.cost.bench import Bench
 from kappaskin.studies.paper import fingertip_scene, table_1
 
 pytestmark = pytest.mark.slow

@@ -12,7 +12,7 @@ import kappaskin.studies
 import kappaskin.studies.simulation
 from kappaskin import Refusal, Scene, SensorLayout, load_scene
 from kappaskin._processes import BackgroundProcess
-from kappaskin.cli.common import REFUSED
+from kappaskin.cli import REFUSED
 from kappaskin.scenes import EffectSelection, plan
 from kappaskin.scenes.effects import (
     CorruptedFrames,
@@ -27,12 +27,12 @@ from kappaskin.studies import (
     Refused,
     Setting,
     cost_steps,
+    costs,
     effect_costs,
     effect_rows,
     effects_text,
     usual_setting,
 )
-from kappaskin.studies.cost.bench import costs
 
 pytestmark = pytest.mark.slow
 

@@ -7,7 +7,7 @@ from html.parser import HTMLParser
 
 import pytest
 
-from kappaskin.cli.common import FAILED
+from kappaskin.cli import FAILED
 from kappaskin.studies import StudyFolder, table_text
 from kappaskin.studies.design.measures import MEASURES
 from kappaskin.studies.design.report import mean_text, value_text

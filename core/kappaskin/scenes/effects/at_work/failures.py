@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin.frames import Array
-from kappaskin.scenes.effects.effect import RunningEffect
+from kappaskin.scenes.effects.at_work import RunningEffect
 
 
 def stuck(channels: NDArray[np.intp], since: float) -> RunningEffect:

@@ -6,7 +6,7 @@ import numpy as np
 
 from kappaskin.bases import Basis
 from kappaskin.frames import Array
-from kappaskin.scenes.effects.effect import RunningEffect
+from kappaskin.scenes.effects.at_work import RunningEffect
 from kappaskin.sensing import NormalCurvature, PrandtlIshlinskii, SensorLayout, StandardLinearSolid
 
 
