@@ -114,7 +114,7 @@ def test_what_is_no_device_is_told(saying, data, why, hasty):
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        (TEXT, "says what it is but sends no readings"),
+        (TEXT, "sends its description but no readings"),
         ('{"name": "Half"}', "the device's information cannot be used: expected serial_number = a"),
     ],
     ids=["no readings", "half an information"],
