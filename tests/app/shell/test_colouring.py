@@ -51,7 +51,7 @@ def test_a_reading_on_a_rail_has_its_own_colour_and_an_entry_in_the_legend() -> 
     rgb = tint.rgb(values, "#59626d", railed)
     assert [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in rgb[1:].tolist()] == [SATURATED, "#59626d"]
     told = tint.legend(values, "#59626d", railed)
-    assert told == ((SATURATED, "on rail"), ("#59626d", "none"))
+    assert told == ((SATURATED, "saturated"), ("#59626d", "none"))
     assert tint.legend(values[:1], "#59626d", railed[:1]) == ()
 
 

@@ -114,7 +114,7 @@ def test_a_channel_that_fails_gives_1_and_a_file_without_it(run, tmp_path, monke
         (("--radii", "100,50,0"), "radii above zero"),
         (("--seconds", "0"), "seconds above zero"),
         (("--seconds", "nan"), "seconds above zero"),
-        (("--seconds", "0.004"), "at least 2 frames|was not seen"),
+        (("--seconds", "0.004"), "at least 2 frames|was missed"),
         (("--seconds", "1e9"), "seconds above zero and at most 3600 s"),
         (("--dwell", "-1"), "dwell above zero"),
         (("--hold", "-1"), "hold above zero"),

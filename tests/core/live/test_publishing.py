@@ -151,7 +151,7 @@ def test_a_host_that_is_not_known_and_a_port_in_use_are_told_and_the_rest_goes_o
         target(engine)
         unknown, busy, fine = engine.status().publishing.targets
     # The second, where a network takes long to tell that.
-    why = "nowhere.invalid is not known", "udp://nowhere.invalid:9870: it was not found out"
+    why = "nowhere.invalid is not known", "udp://nowhere.invalid:9870: its address was not found"
     assert any(words in unknown.refusal for words in why)
     assert "cannot be opened for listening" in busy.refusal
     assert fine.refusal == ""
