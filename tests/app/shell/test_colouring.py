@@ -107,7 +107,7 @@ def test_a_map_of_health_tells_which_element_is_what(qapp: QApplication) -> None
     heatmap.show_values(kinds, HEALTH)
     heatmap.show_reading(kinds)
     assert heatmap.value.text() == "2 faulty"
-    assert [words for _, words in heatmap.bar.legend] == ["well", "stuck", "dead"]
+    assert [words for _, words in heatmap.bar.legend] == ["OK", "stuck", "dead"]
     heatmap.show_element(1)
     heatmap.show_reading(kinds)
     assert heatmap.value.text() == "dead at (75, 25) mm"
