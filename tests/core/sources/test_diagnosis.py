@@ -145,7 +145,7 @@ def test_the_command_says_in_words_and_in_json_that_a_port_is_well(served, capsy
     assert "rate                100.0 frames/s of 100 nominal\n" in words
     assert "clock               known to " in words
     assert "losses              0 of " in words
-    assert words.endswith("verdict             OK\n")
+    assert words.endswith("verdict             well\n")
     assert main(["doctor", served, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["well"], found["why"], found["said_rate"]) == (True, "", 100.0)

@@ -172,7 +172,7 @@ def test_effects_are_planned_and_forced_while_the_scene_plays(window, panel, unt
     assert 'off = ["gaussian-noise"]' in panel.editor.text.toPlainText()
     assert window.session.status.connections == connections
     force(panel, "quantisation", "on")
-    assert window.history.stack.undoText() == "force quantisation"
+    assert window.history.stack.undoText() == "selection of quantisation"
     window.history.stack.undo()
     force(panel, "gaussian-noise", "planned")
     until(lambda: not window.session.scene.choice.off)
