@@ -26,8 +26,11 @@ import pytest
 from mcap.reader import make_reader
 
 from kappaskin.cli import FAILED, REFUSED, _add_commands, app, main
+from kappaskin.cli.system import _port_text
 from kappaskin.errors import Refusal
+from kappaskin.frames import Event
 from kappaskin.scenes import SCENES, load_scene, write_scene
+from kappaskin.sources import Accounting, Diagnosis
 from kappaskin.studies import (
     EffectCost,
     accuracy_verdict,
@@ -310,7 +313,19 @@ def drill() -> dict[str, Any]:
     return {"keys": sorted(held), "verdicts": [held["verdict"], failed["verdict"]]}
 
 
-FAST = (commands, exit_codes, arrays, scenes, studies)
+def doctor() -> dict[str, Any]:
+    """What `doctor PORT` prints: its keys in JSON, and in text its labels and its verdict."""
+    event = Event(0.0, "lost", "no reply")
+    found = Diagnosis("A", "A", "", "B", 1.0, 1.0, 0.1, 20.0, Accounting(bytes_in=1), (event,))
+    lines = _port_text(found).splitlines()
+    return {
+        "keys": sorted(found.to_json()),
+        "labels": [line.split()[0] for line in lines],
+        "verdict": lines[-1].split()[1],
+    }
+
+
+FAST = (commands, exit_codes, arrays, scenes, studies, doctor)
 SLOW = (printed, calibration, study, recorded, udp, drill)
 
 

@@ -138,7 +138,7 @@ def _port_text(found: "Diagnosis") -> str:
     if received := found.accounting.bytes_in:
         lines.append(_line("losses", f"{found.accounting.words}, in {received:,} bytes"))
     lines += [_line(event.kind, event.text) for event in found.events if event.kind != "met"]
-    return "\n".join([*lines, _line("verdict", found.why or "OK")])
+    return "\n".join([*lines, _line("verdict", found.why or "well")])
 
 
 _DEAF = "unknown: no reply to pings"

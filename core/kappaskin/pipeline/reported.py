@@ -613,7 +613,7 @@ _FIT = (
         colours=(
             SkinColour(
                 "difference",
-                "Difference from the truth",
+                "Difference to the truth",
                 f"{_DELTA}w",
                 "Estimated minus true displacement, known in simulations only.",
                 unknown="No simulation: the true surface is not known",

@@ -232,11 +232,14 @@ def _pressed(what: Indenter) -> dict[str, Any]:
     }
 
 
+_FROM_FILES = {"mesh": "an object from a mesh file", "heights": "an object from a height map"}
+
+
 def _object(rigid: RigidObject) -> str:
     name = _name(OBJECTS, rigid)
-    if name in ("mesh", "heights"):
+    if name in _FROM_FILES:
         raise Refusal(
-            f"expected an object that a scene file describes, got a {type(rigid).__name__}, which "
+            f"expected an object that a scene file describes, got {_FROM_FILES[name]}, which "
             f"has no record of its file; write [[touch]] with what = {name!r} and the file "
             "by hand"
         )
@@ -253,9 +256,8 @@ def _motion(motion: Motion | None) -> dict[str, Any]:
             return {"path": [_step(step) for step in motion.steps]}
         case _:
             raise Refusal(
-                f"expected an orbit or a path to write in a scene file, got a "
-                f"{type(motion).__name__}, which has no record of its file; write "
-                "[[touch]] with recorded = the file by hand"
+                "expected an orbit or a path to write in a scene file, got a recorded motion, "
+                "which has no record of its file; write [[touch]] with recorded = the file by hand"
             )
 
 

@@ -51,7 +51,7 @@ def test_a_reading_on_a_rail_has_its_own_colour_and_an_entry_in_the_legend() -> 
     rgb = tint.rgb(values, "#59626d", railed)
     assert [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in rgb[1:].tolist()] == [SATURATED, "#59626d"]
     told = tint.legend(values, "#59626d", railed)
-    assert told == ((SATURATED, "on rail"), ("#59626d", "none"))
+    assert told == ((SATURATED, "saturated"), ("#59626d", "none"))
     assert tint.legend(values[:1], "#59626d", railed[:1]) == ()
 
 
@@ -107,7 +107,7 @@ def test_a_map_of_health_tells_which_element_is_what(qapp: QApplication) -> None
     heatmap.show_values(kinds, HEALTH)
     heatmap.show_reading(kinds)
     assert heatmap.value.text() == "2 faulty"
-    assert [words for _, words in heatmap.bar.legend] == ["well", "stuck", "dead"]
+    assert [words for _, words in heatmap.bar.legend] == ["OK", "stuck", "dead"]
     heatmap.show_element(1)
     heatmap.show_reading(kinds)
     assert heatmap.value.text() == "dead at (75, 25) mm"

@@ -149,5 +149,5 @@ def test_what_a_window_did_not_touch_is_as_the_other_left_it_at_its_second_writi
 def test_letters_are_kept_and_those_that_no_form_offers_are_refused(tmp_path: Path) -> None:
     assert from_text(to_text(WindowState(letters=150.0))).letters == 150.0
     for bad in ("1000", "nan", "true", "'large'"):
-        with pytest.raises(Refusal, match="letters from 80 to 200"):
+        with pytest.raises(Refusal, match="a text size from 80 to 200"):
             from_text(f"format = 1\n[window]\nletters = {bad}")

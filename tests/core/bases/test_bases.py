@@ -530,13 +530,13 @@ def test_a_basis_for_another_outline_is_refused():
 
 @pytest.mark.where(which=lambda held_skin: held_skin.patch.strip)
 def test_a_strip_has_one_function_across(held_skin):
-    with pytest.raises(Refusal, match="alike along y: expected 4 x 1 functions, got 4 x 4"):
+    with pytest.raises(Refusal, match="constant along y: expected 4 x 1 functions, got 4 x 4"):
         basis_for(held_skin.patch, held_skin.edge, 4, 4)
 
 
 @pytest.mark.parametrize("edge", ["hinged", "clamped"])
 def test_an_inextensible_arc_needs_two_functions(edge):
-    with pytest.raises(Refusal, match="cannot bend in its first function alone"):
+    with pytest.raises(Refusal, match="cannot bend with one function only"):
         basis_for(Patch(0.04, 0.02, 0.0129, strip=True), edge, 1, 1)
 
 

@@ -42,7 +42,7 @@ def test_the_flat_skin_is_the_limit_of_a_large_radius():
 
 @pytest.mark.parametrize("radius", [0.0, -0.02, math.nan, 0.0159])
 def test_a_radius_smaller_than_the_arc_allows_is_refused(radius):
-    with pytest.raises(Refusal, match=r"goes once round at a radius of 0\.01592 m"):
+    with pytest.raises(Refusal, match=r"is a full circle at radius 0\.01592 m"):
         Patch(0.1, 0.1, radius)
 
 

@@ -167,7 +167,7 @@ def test_what_is_no_calibration_is_refused(tmp_path, text):
 
 def test_bytes_that_are_no_text_are_refused(tmp_path):
     (tmp_path / "x.toml").write_bytes(bytes(range(256)))
-    refused(tmp_path / "x.toml", "is no calibration file")
+    refused(tmp_path / "x.toml", "is not a calibration file")
 
 
 @given(st.data())
@@ -204,13 +204,13 @@ def test_a_newer_format_is_refused_with_its_remedy(path):
 @pytest.mark.parametrize("version", ["0", "-1", "1.0", '"1"', "true"])
 def test_a_format_that_is_none_is_refused(path, version):
     edit(path, "format = 1", f"format = {version}")
-    refused(path, "has no format of a calibration")
+    refused(path, "expected a calibration format, got")
 
 
 @pytest.mark.parametrize("heading", ["device", "line", "failures"])
 def test_a_missing_heading_is_refused(path, heading):
     edit(path, f"[{heading}]", "[another]")
-    refused(path, "unknown headings .*another")
+    refused(path, "unknown tables .*another")
     edit(path, "[another]", "[creep.more]" if heading == "failures" else "[failures.more]")
     refused(path, f"lacks the tables .*{heading}")
 
@@ -256,21 +256,21 @@ def test_a_resealed_file_is_read(path):
 
 def test_a_foreign_device_is_refused(path):
     other = replace(SENSOR, serial_number="K-7")
-    refused(path, "is of Simulated skin SIM-0001, not to Simulated skin K-7", other)
+    refused(path, "belongs to Simulated skin SIM-0001, the sensor is Simulated skin K-7", other)
 
 
 def test_another_layout_is_refused(path):
     layout = SensorLayout.regular(SENSOR.layout.patch, 2, 3)
-    refused(path, "has 2 x 3 elements in other places", replace(SENSOR, layout=layout))
+    refused(path, "has 2 x 3 elements at other positions", replace(SENSOR, layout=layout))
 
 
 def test_an_old_calibration_is_refused_and_the_limit_is_stated(path):
     at_most = DATE + timedelta(days=180)
     assert load_calibration(path, SENSOR, at_most) == CALIBRATION
-    refused(path, "of 2026-03-01, 181 days old; expected at most 180", now=DATE + timedelta(181))
+    refused(path, "dated 2026-03-01, 181 days old; expected at most 180", now=DATE + timedelta(181))
     assert load_calibration(path, SENSOR, DATE + timedelta(181), timedelta(200)) == CALIBRATION
 
 
 def test_a_date_in_the_future_is_refused_but_for_a_clock_a_little_off(path):
     assert load_calibration(path, SENSOR, DATE - timedelta(hours=20)) == CALIBRATION
-    refused(path, "in the future of 2026-02-26", now=DATE - timedelta(days=3))
+    refused(path, "later than now, 2026-02-26", now=DATE - timedelta(days=3))

@@ -330,4 +330,4 @@ def test_the_command_fails_where_the_map_is_not_confirmed(run, monkeypatch):
 def test_the_command_refuses_a_patience_of_nothing(run):
     code, _, err = run("press", "sim:circle", "--patience", "0")
 
-    assert (code, "expected a patience above zero" in err) == (2, True)
+    assert (code, "expected a waiting time above zero" in err) == (2, True)

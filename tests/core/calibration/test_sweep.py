@@ -88,8 +88,7 @@ def test_the_ready_radii_stay_within_the_elastic_limit_and_reach_the_papers_fing
         ),
         (
             CylinderStep(2, 0.013, "y", -1, "first"),
-            "Cylinder of radius 13 mm, bent along y, outer face on it, first of all, to wipe out "
-            "its past",
+            "Cylinder of radius 13 mm, bent along y, outer face on it, preconditioning",
         ),
         (
             CylinderStep(2, 0.02, "y", hold=60.0),
@@ -279,7 +278,7 @@ def test_frames_that_make_no_reading_are_refused_and_the_step_stays():
     refused(procedure, "expected finite readings and times", times, readings * np.inf)
     refused(procedure, "expected finite readings and times", times * np.nan, readings)
     refused(procedure, "clock went back on step 1", times[::-1], readings)
-    refused(procedure, "every channel is dead or on a rail", times, readings * np.nan)
+    refused(procedure, "every channel is dead or saturated", times, readings * np.nan)
     procedure.take(times, readings)
     refused(procedure, "clock went back on step 2: it restarted", times - 5, readings)
 
@@ -288,7 +287,7 @@ def test_a_sweep_is_given_when_all_is_done_and_not_before():
     procedure = Procedure(SENSOR, SHORT)
     with pytest.raises(Refusal, match="43 steps are not captured yet"):
         procedure.sweep()
-    with pytest.raises(Refusal, match="every step is done"):
+    with pytest.raises(Refusal, match="all steps are captured"):
         all_taken().take(*frames(SHORT[0], time=99.0))
 
 

@@ -321,7 +321,7 @@ def test_a_skin_on_its_rails_is_refused():
     frames = [
         replace(frame, device_time=n / 50, counts=np.full(C, high, np.int32)) for n in range(60)
     ]
-    with pytest.raises(Refusal, match=r"300 of 300 channels read nothing.*on a rail.*lower"):
+    with pytest.raises(Refusal, match=r"300 of 300 channels read nothing.*saturated.*lower"):
         taken(SCENE, frames=frames)
 
 

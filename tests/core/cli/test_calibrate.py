@@ -114,7 +114,7 @@ def test_a_channel_that_fails_gives_1_and_a_file_without_it(run, tmp_path, monke
         (("--radii", "100,50,0"), "radii above zero"),
         (("--seconds", "0"), "seconds above zero"),
         (("--seconds", "nan"), "seconds above zero"),
-        (("--seconds", "0.004"), "at least 2 frames|was not seen"),
+        (("--seconds", "0.004"), "at least 2 frames|was missed"),
         (("--seconds", "1e9"), "seconds above zero and at most 3600 s"),
         (("--dwell", "-1"), "dwell above zero"),
         (("--hold", "-1"), "hold above zero"),
@@ -208,7 +208,7 @@ def test_a_person_is_asked_for_each_cylinder_and_shown_what_was_read(monkeypatch
     assert rig.asked[0] == (
         "1/55  Flat table, nothing pressing on the skin: press Enter when at rest: "
     )
-    assert rig.asked[1].endswith("or r and Enter to take the last one again: ")
+    assert rig.asked[1].endswith("or r and Enter to repeat the last step: ")
     assert rig.told[0] == ADVICE
     assert re.match(r" +xx \+\d+\.\d \(cylinder \+10\.0\), .* noise 0\.0\d", rig.told[4])
     expected = np.repeat(sweep.curvature, 16, axis=1)
@@ -256,7 +256,7 @@ def test_a_reading_that_cannot_be_used_is_asked_for_again(monkeypatch) -> None:
     guided(rig, monkeypatch)
     asked = [int(question.split("/")[0]) for question in rig.asked]
     assert asked[:4] == [1, 2, 2, 3]
-    assert any("every channel is dead or on a rail" in line for line in rig.told)
+    assert any("every channel is dead or saturated" in line for line in rig.told)
     assert refusals
 
 
@@ -279,7 +279,7 @@ def test_a_device_that_falls_silent_is_refused(monkeypatch) -> None:
     rig = Rig()
     take = rig.read
     rig.read = lambda timeout: take(timeout) if len(rig.asked) < 5 else time.sleep(0.01) or []
-    with pytest.raises(Refusal, match=r"no frame for .* still sending"):
+    with pytest.raises(Refusal, match=r"no frame for .* is sending"):
         guided(rig, monkeypatch)
     assert rig.closed
 
@@ -303,7 +303,7 @@ def test_another_device_in_the_middle_is_refused(monkeypatch) -> None:
         return ask(question)
 
     rig.ask = swapped
-    with pytest.raises(Refusal, match="another device answered in the middle"):
+    with pytest.raises(Refusal, match="another device was connected meanwhile"):
         guided(rig, monkeypatch)
 
 

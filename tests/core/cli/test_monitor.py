@@ -85,14 +85,14 @@ def test_a_device_is_told_with_its_name_and_number(device) -> None:
 
 def test_information_that_cannot_be_used_is_told_with_the_reason(device) -> None:
     text = device.says(encode_information(0, 0.0, '{"name": "new"}'))
-    assert "15 characters that cannot be used" in text
+    assert "an invalid description of 15 characters" in text
     assert "serial_number" in text or "lacks" in text
 
 
 def test_a_scan_is_told_by_its_first_counts_and_its_extremes(device) -> None:
     text = device.says(scan(7))
     assert "samples      #7  at 0.070000 s  300 channels from 0 to 299: -20 -19 -18" in text
-    assert "least -20, most 279" in text
+    assert "min -20, max 279" in text
 
 
 def test_of_many_scans_a_few_are_shown_and_the_rest_counted(device) -> None:

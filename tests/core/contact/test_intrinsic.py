@@ -273,7 +273,7 @@ def test_a_grazing_force_that_hardly_presses_has_no_place():
 def test_a_moment_too_noisy_for_the_force_has_no_place():
     coarse = ForceTorqueSensor(BASE, 1e-3, 5e-3)
 
-    refused(FLAT, pressed(FLAT, (0.02, 0.015), 0.2), "tell the place within +-25", coarse)
+    refused(FLAT, pressed(FLAT, (0.02, 0.015), 0.2), "determine the position only to +-25", coarse)
 
 
 def test_a_contact_at_the_rim_stays_on_the_skin():
@@ -288,8 +288,10 @@ def test_a_contact_at_the_rim_stays_on_the_skin():
 
 @pytest.mark.parametrize("number", [math.nan, math.inf])
 def test_a_sensor_that_gives_no_number_has_no_contact(number):
-    refused(FLAT, Wrench(np.array([0, 0, number]), np.zeros(3)), "gives no number")
-    refused(FLAT, Wrench(np.array([0, 0, -1.0]), np.array([0, number, 0])), "gives no number")
+    refused(FLAT, Wrench(np.array([0, 0, number]), np.zeros(3)), "reports NaN or infinity")
+    refused(
+        FLAT, Wrench(np.array([0, 0, -1.0]), np.array([0, number, 0])), "reports NaN or infinity"
+    )
 
 
 @pytest.mark.parametrize("force", [np.zeros(2), np.zeros((3, 1)), np.zeros(6)])

@@ -464,7 +464,7 @@ def test_one_line_describes_it():
     for found, pattern in (
         (rod, text.format("cylinder", r", \d+ mm long, axis \d+ deg")),
         (ball, text.format("sphere", "")),
-        (replace(ball, kind=""), "undetermined: no object fits, sphere best"),
+        (replace(ball, kind=""), "undetermined: no object fits, sphere is nearest"),
         (replace(rod, kind="edge"), r"edge, \d+ mm long, axis \d+ deg; second guess \w+ \d+ %"),
         (replace(ball, radius_95=(0.05, math.inf)), r"sphere, radius above 50 mm; .*"),
         (replace(ball, radius_95=(0.0, 2.756)), r"sphere, radius below 2756 mm; .*"),
@@ -517,7 +517,7 @@ def test_a_skin_that_cannot_tell_is_refused():
     drum = Plate(patch, rigidity=0.0, tension=1.0)
     for plate, elements, why in (
         (Plate(strip), (20, 1), "needs a 2-D skin; this one is a strip"),
-        (drum, (10, 10), "this skin is a drum head"),
+        (drum, (10, 10), "needs a rigidity above zero; this skin has none"),
         (Plate(patch), (60, 40), "at most 2000 elements, got 2400"),
     ):
         with pytest.raises(Refusal, match=why):

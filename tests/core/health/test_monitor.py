@@ -173,7 +173,7 @@ def test_swapped_elements_are_found_with_their_partners(pair) -> None:
     kinds = told(monitor)
     assert {kinds[c] for c in (a, b, 100 + a, 100 + b)} == {"swapped"}
     figures = {f.channel: f.figure for f in monitor.findings(np.zeros(300, bool))}
-    assert figures[a] == f"reads what xx of element {b} should"
+    assert figures[a] == f"has the readings of xx of element {b}"
 
 
 def test_of_elements_beside_each_other_that_are_swapped_what_differs_is_found() -> None:

@@ -151,9 +151,9 @@ def test_a_host_that_is_not_known_and_a_port_in_use_are_told_and_the_rest_goes_o
         target(engine)
         unknown, busy, fine = engine.status().publishing.targets
     # The second, where a network takes long to tell that.
-    why = "nowhere.invalid is not known", "udp://nowhere.invalid:9870: it was not found out"
+    why = "nowhere.invalid is not known", "udp://nowhere.invalid:9870: its address was not found"
     assert any(words in unknown.refusal for words in why)
-    assert "cannot be listened on" in busy.refusal
+    assert "cannot be opened for listening" in busy.refusal
     assert fine.refusal == ""
 
 
@@ -250,7 +250,7 @@ def test_both_end_quietly_when_stopped(start, receiver, port) -> None:
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        (["sim:"], "expected somebody to send to"),
+        (["sim:"], "expected a receiver"),
         (["sim:nothing", "--udp", "127.0.0.1:1"], "nothing"),
         (["sim:", "--udp", "127.0.0.1:0"], "port from 1 to 65535"),
         (["sim:", "--udp", "127.0.0.1:many"], "port from 1 to 65535"),

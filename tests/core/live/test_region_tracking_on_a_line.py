@@ -118,8 +118,8 @@ def inside(source, x, frame):
     ("around", "why"),
     [
         ("intrinsic", "does not report a force/torque sensor"),
-        ("turns", "new scan list in every frame"),
-        ("adaptive", "new scan list in every frame"),
+        ("turns", "new scan list for every frame"),
+        ("adaptive", "new scan list for every frame"),
     ],
 )
 def test_a_region_that_no_line_carries_is_refused_and_everything_scanned(source, around, why):
@@ -205,7 +205,7 @@ def test_a_deaf_device_is_told_of_and_goes_on(device, monkeypatch):
     steering = track_region(source, Region("elements", elements=ELEMENTS))
     assert steering.refusal == ""
     read_until(source, lambda _: steering.refusal)
-    assert "got no reply to them; it goes on scanning what it chooses" in steering.refusal
+    assert "got no reply; it scans the channels that it selects" in steering.refusal
     read_until(source, scans(*range(100)))
     assert not source.trouble
     source.close()

@@ -121,7 +121,7 @@ def test_a_file_that_cannot_be_read_any_more_is_a_refusal(
         raise OSError(5, "Input/output error")
 
     monkeypatch.setattr("kappaskin.recording.reading.record_at", gone)
-    with pytest.raises(Refusal, match="cannot be read any more"):
+    with pytest.raises(Refusal, match="can no longer be read"):
         source.seek(2.0, 1.0)
 
 

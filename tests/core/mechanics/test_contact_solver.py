@@ -450,8 +450,8 @@ def test_a_force_of_zero_just_touches():
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        ({"x": math.nan, "depth": 1e-3}, "a place in m and a turn in rad"),
-        ({"turn": math.inf, "depth": 1e-3}, "a place in m and a turn in rad"),
+        ({"x": math.nan, "depth": 1e-3}, "a position in m and angle in rad"),
+        ({"turn": math.inf, "depth": 1e-3}, "a position in m and angle in rad"),
         ({}, "either a depth or a force, got None and None"),
         ({"depth": 1e-3, "force": 1.0}, "either a depth or a force"),
         ({"force": -1.0}, "force of at least zero in N, got -1"),
@@ -485,5 +485,5 @@ def test_a_layer_that_cannot_be_is_refused(layer):
 def test_what_would_take_minutes_is_refused():
     press = IndentationSolver(Plate(SQUARE, fluid=True), basis_for(SQUARE, "hinged", 9, 9))
 
-    with pytest.raises(Refusal, match="more than 1024 places"):
+    with pytest.raises(Refusal, match="more than 1024 nodes"):
         press(Block(0.2, 0.2), 0.05, 0.05, depth=5e-3)

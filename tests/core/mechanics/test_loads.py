@@ -261,7 +261,7 @@ def test_a_load_over_a_notch_in_the_skin_is_refused(load):
             super().__init__(BASIS)
             self.at = lambda p: np.where(abs(p[:, :1] - load.x) < 1e-3, np.nan, BASIS.at(p))
 
-    with pytest.raises(Refusal, match="expected a load that lies wholly on the skin"):
+    with pytest.raises(Refusal, match="expected a load completely on the skin"):
         load.modal(Notched())
 
 

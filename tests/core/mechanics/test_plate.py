@@ -230,7 +230,9 @@ def test_under_a_point_a_drum_head_gives_way_without_limit_and_that_is_refused()
     disc = DiscLoad(0.05, 0.05, 0.01)
 
     for point in (PointLoad(0.05, 0.05), LineLoad(0.05, 0.05, 0.05, 0.05)):
-        with pytest.raises(Refusal, match="without limit under a point: expected a distributed"):
+        with pytest.raises(
+            Refusal, match="without limit under a point load: expected a distributed"
+        ):
             drum.deflection([disc, point], basis)
     with pytest.raises(Refusal, match="expected a distributed load"):
         Scene("drum", drum, SensorLayout.regular(SQUARE, 4, 4), (Stimulus(PointLoad(0.05, 0.05)),))

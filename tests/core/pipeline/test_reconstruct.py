@@ -470,9 +470,9 @@ def test_a_cylinder_skin_is_not_read_as_a_flat_one(saved) -> None:
 @pytest.mark.parametrize(
     ("changes", "arguments", "reason"),
     [
-        ({"radius": 0.01}, {}, "goes once round at a radius of"),
-        ({"radius": -1.0}, {}, "goes once round at a radius of"),
-        ({"radius": np.nan}, {}, "goes once round at a radius of"),
+        ({"radius": 0.01}, {}, "is a full circle at radius"),
+        ({"radius": -1.0}, {}, "is a full circle at radius"),
+        ({"radius": np.nan}, {}, "is a full circle at radius"),
         ({"radius": [1.0, 2.0]}, {}, r"one radius in m, got shape \(2,\)"),
         ({"size": [0.1]}, {}, r"positions of shape \(P, 1\)"),
         ({}, {"edge": "glued"}, "expected an edge of .* among hinged.*got 'glued'"),

@@ -362,7 +362,7 @@ def test_only_so_many_clients_are_served(server, monkeypatch) -> None:
 
 
 def test_a_port_in_use_is_refused(server) -> None:
-    with pytest.raises(Refusal, match=r"cannot be listened on .* choose another port"):
+    with pytest.raises(Refusal, match=r"cannot be opened for listening .* choose another port"):
         foxglove.opened(target_of("foxglove://{}:{}".format(*place(server))))
 
 

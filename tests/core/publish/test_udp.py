@@ -231,7 +231,7 @@ def test_a_look_for_a_host_that_takes_long_holds_nothing_up_and_ends_in_a_refusa
     now[0] = 6.0
     publishing.report(STATE)
     (told,) = publishing.status.targets
-    assert "not found out within 5 s" in told.refusal
+    assert "not found within 5 s" in told.refusal
     slow.go.set()
     assert slow.closed.wait(30)  # come too late
     publishing.close()

@@ -438,7 +438,7 @@ def test_an_export_that_nobody_waits_for_any_more_clears_up(taps, tmp_path) -> N
 def test_a_file_that_appears_meanwhile_stays_as_it_is(taps, tmp_path) -> None:
     with ExportTask(ExportRequest(taps[0], tmp_path / "skin.stl", at=0.1)) as exporting:
         (tmp_path / "skin.json").write_text("mine")
-        with pytest.raises(Refusal, match="appeared meanwhile"):
+        with pytest.raises(Refusal, match="has been created meanwhile"):
             deque(exporting.wait(), 0)
     assert list(tmp_path.iterdir()) == [tmp_path / "skin.json"]
     assert (tmp_path / "skin.json").read_text() == "mine"

@@ -481,7 +481,7 @@ def test_what_cannot_be_replayed_is_refused(recorded, tmp_path, engine) -> None:
         return None if topic == m.LINES.name else message.data
 
     empty = rewritten(recorded, tmp_path / "bare.mcap", bare)
-    for path, why in ((tmp_path / "none.mcap", "cannot be read"), (empty, "without any")):
+    for path, why in ((tmp_path / "none.mcap", "cannot be read"), (empty, "got none in it")):
         with pytest.raises(Refusal, match=why):
             open_source(f"replay:{path}")
     engine.connect(f"replay:{tmp_path / 'none.mcap'}")

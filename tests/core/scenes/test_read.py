@@ -94,7 +94,7 @@ WRONG = {
     "no size": ("format = 1\n", "expected size = a list of 2 numbers, got none"),
     "a newer format": ("format = 2\n", "line 1: format: .*update kappaskin"),
     "no format": ("", "expected format = a whole number, got none"),
-    "no TOML": ("format = \n", "a mistake in it: .*line 1"),
+    "no TOML": ("format = \n", "an error in it: .*line 1"),
     "a load beside the skin": (TOUCH.replace("x = 0.05", "x = 0.2"), "a load on the patch"),
     "a load that leaves": (
         TOUCH + 'path = [{step="press", seconds=1}, {step="slide", by=[0.2, 0], seconds=1},'
@@ -116,7 +116,7 @@ WRONG = {
     ),
     "a jump": (
         TOUCH + 'path = [{step="press", seconds=1}, {step="slide", by=[0.01, 0], seconds=1}]\n',
-        "ends lifted or where it began",
+        "ends lifted or at its start",
     ),
     "two motions": (TOUCH + "path = []\norbit = {radius=0.01, period=1}\n", "expected one motion"),
     "no steps": (TOUCH + "path = []\n", "at least one step"),
@@ -149,7 +149,7 @@ WRONG = {
     "a list and on": (HEAD + "[effects]\nchoose = []\non = ['quantisation']\n", "got both"),
     "an effect of nothing": (
         HEAD + "[effects]\non = ['creep']\n",
-        "line 5: effects: expected effects that there is something of .* got creep",
+        "line 5: effects: expected effects that occur in this scene, got creep",
     ),
     "a touch on cylinders": (
         TOUCH + "[cylinders]\ndwell = 1.0\n",
@@ -198,7 +198,7 @@ WRONG = {
         "touch\\[1\\].depth: expected a number, got \\[1.0\\]",
     ),
     "a number beyond computing": (f"rate = {10**400}\n" + HEAD, "line 1: rate: expected a number"),
-    "an endless number": ("seed = " + "9" * 5000 + "\n" + HEAD, "a mistake in it: .*digits"),
+    "an endless number": ("seed = " + "9" * 5000 + "\n" + HEAD, "an error in it: .*digits"),
     "lists in lists": ("a = " + "[" * 9999 + "]" * 9999 + HEAD, "nested too deep"),
     "a line of spaces": (
         HEAD + "[elements]\npositions = [\n[" + " " * 9999 + "1, 2]]\n",
@@ -231,7 +231,7 @@ WRONG = {
     ),
     "an object nowhere": (
         HEAD + '[[touch]]\nwhat="sphere"\nradius=0.01\nx=nan\ny=0.05\nforce=1\n',
-        r"line 5: touch\[1\]: expected a finite place",
+        r"line 5: touch\[1\]: expected a finite position",
     ),
     "a load moved nowhere": (
         HEAD + '[[touch]]\nwhat="point"\nx=inf\ny=0.05\ndisplacement=1e-3\n',
@@ -327,7 +327,7 @@ RECORDS = {
     "ragged lines": (b"time,dx,dy,amount\n0,0,0,0\n1,0\n", "a CSV of numbers"),
     "binary": (bytes(range(256)), "a CSV of numbers"),
     "no number": (b"time,dx,dy,amount\n0,0,0,0\n1,nan,0,0\n", "finite poses"),
-    "a jump back": (b"time,dx,dy,amount\n0,0,0,0\n1,0,0,0\n0.5,0,0,0\n", "and rise"),
+    "a jump back": (b"time,dx,dy,amount\n0,0,0,0\n1,0,0,0\n0.5,0,0,0\n", "at increasing times"),
     "too hard": (b"time,dx,dy,amount\n0,0,0,0\n1,0,0,1e300\n", "amounts of 0 to 1000"),
     "off the skin": (b"time,dx,dy,amount\n0,0,0,0\n1,1,0,1\n2,0,0,0\n", "a load on the patch"),
     "off the skin at last": (b"time,dx,dy,amount\n0,0,0,1\n1,1,0,1\n", "a load on the patch"),
@@ -335,7 +335,7 @@ RECORDS = {
         b"time,dx,dy,amount\n" + b"".join(b"%d,0,0,1\n" % n for n in range(20001)),
         "at most 20000 poses",
     ),
-    "too large": (b"time,dx,dy,amount\n" + b"0,0,0,0\n" * 2**20, "thin it out"),
+    "too large": (b"time,dx,dy,amount\n" + b"0,0,0,0\n" * 2**20, "keep fewer lines"),
 }
 
 

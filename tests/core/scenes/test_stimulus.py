@@ -133,7 +133,7 @@ def test_nothing_jumps_along_a_path() -> None:
 def test_a_path_that_ends_where_it_began_need_not_be_lifted() -> None:
     there_and_back = (PressStep(1.0), PressStep(1.0, to=0.0), SlideStep(1.0, by=(0.1, 0.0)))
     assert MotionPath(there_and_back).at(2.9).dx > 0.09
-    with pytest.raises(Refusal, match=r"0\.1 and 0 m away with 1 times"):
+    with pytest.raises(Refusal, match=r"0\.1 and 0 m away with 1 of the load"):
         MotionPath((PressStep(1.0), SlideStep(1.0, by=(0.1, 0.0))))
 
 
@@ -158,14 +158,17 @@ def test_a_record_is_straight_between_its_times_and_begins_anew() -> None:
         (lambda: PressStep(1.0, to=1000.5), "share of 0 to 1000 to press to, got 1000.5"),
         (lambda: PressStep(1.0, to=-0.1), "share of 0 to 1000"),
         (lambda: HoldStep(1.0, "sudden"), "ease among smooth, linear, got 'sudden'"),
-        (lambda: SlideStep(1.0, by=(0.0, math.inf)), "two finite numbers"),
+        (lambda: SlideStep(1.0, by=(0.0, math.inf)), "a finite distance \\(dx, dy\\)"),
         (lambda: TurnStep(1.0, by=math.nan), "finite angle"),
         (lambda: TapStep(1.0, times=0), "1 to 1000 taps, got 0"),
         (lambda: TapStep(1.0, times=1001), "1 to 1000 taps, got 1001"),
         (lambda: RecordedMotion(np.zeros(1), np.zeros((1, 3))), "at least two times"),
         (lambda: RecordedMotion(np.arange(3.0), np.zeros((3, 2))), "poses \\(T, 3\\)"),
         (lambda: RecordedMotion(np.array([0.5, 1.0]), np.zeros((2, 3))), "begin with 0"),
-        (lambda: RecordedMotion(np.array([0.0, 1.0, 1.0]), np.zeros((3, 3))), "and rise"),
+        (
+            lambda: RecordedMotion(np.array([0.0, 1.0, 1.0]), np.zeros((3, 3))),
+            "at increasing times",
+        ),
         (lambda: RecordedMotion(np.array([0.0, 2e9]), np.zeros((2, 3))), "a record of"),
         (lambda: RecordedMotion(np.array([0.0, 1e-9]), np.zeros((2, 3))), "a record of 1e-06 to"),
         (

@@ -185,11 +185,11 @@ def test_thirty_thousand_frames_leave_no_drift():
         (((1.0,), (-0.1,)), "one weight of at least 0"),
         (((1.0,), (math.nan,)), "one weight of at least 0"),
         (((1.0, 2.0), (0.5, 0.5)), "sum is below 1, got 1"),
-        (((2.0, 1.0), (0.1, 0.1)), "thresholds above zero that rise"),
-        (((0.0,), (0.1,)), "thresholds above zero that rise"),
+        (((2.0, 1.0), (0.1, 0.1)), "increasing thresholds above zero"),
+        (((0.0,), (0.1,)), "increasing thresholds above zero"),
         (((math.inf,), (0.1,)), "expected finite thresholds"),
-        (((1.0,), (0.1,), 0.0), "the reading always rises"),
-        (((1.0,), (0.1,), -1.0), "the reading always rises"),
+        (((1.0,), (0.1,), 0.0), "the reading always increases"),
+        (((1.0,), (0.1,), -1.0), "the reading always increases"),
         (((1.0,), (0.1,), math.nan), "expected finite"),
     ],
 )
@@ -202,5 +202,5 @@ def test_an_operator_of_mixed_shapes_or_that_falls_is_refused():
     one = np.ones((1, 3))
     with pytest.raises(Refusal, match=r"got shapes \(1, 3\), \(1, 3\), \(2,\), \(3,\)"):
         PrandtlIshlinskii(one, one, np.ones(2), np.ones(3))
-    with pytest.raises(Refusal, match="the reading always rises"):
+    with pytest.raises(Refusal, match="the reading always increases"):
         PrandtlIshlinskii(one, -one, np.ones(3), np.ones(3))

@@ -113,7 +113,7 @@ def test_what_is_no_device_is_told(saying, data, why, hasty):
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        (TEXT, "says what it is but sends no readings"),
+        (TEXT, "sends its description but no readings"),
         ('{"name": "Half"}', "the device's information cannot be used: expected serial_number = a"),
     ],
     ids=["no readings", "half an information"],
@@ -144,7 +144,7 @@ def test_the_command_says_in_words_and_in_json_that_a_port_is_well(served, capsy
     assert "rate                100.0 frames/s of 100 nominal\n" in words
     assert "clock               known to " in words
     assert "losses              0 of " in words
-    assert words.endswith("verdict             OK\n")
+    assert words.endswith("verdict             well\n")
     assert main(["doctor", served, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["well"], found["why"], found["said_rate"]) == (True, "", 100.0)

@@ -275,7 +275,7 @@ def test_information_that_changes_on_the_line_is_said(streaming):
     device, reader = streaming
     device.say(encode_information(11, 0.022, text_of(dead_channels=[7])) + stream(12, 14))
     reader.took(13)
-    assert "another description of itself" in reader.told("changed")
+    assert "sent a different description than before" in reader.told("changed")
 
 
 def test_a_device_that_says_much_of_itself_is_told_of_in_few_words(streaming):
@@ -525,7 +525,7 @@ def test_a_port_taken_meanwhile_is_waited_for(streaming, plug, monkeypatch):
     def busy(url, clock):
         if len(refused) < 3:
             refused.append(url)
-            raise SourceError(f"{url}: busy, a program ; close that program")
+            raise SourceError(f"{url}: busy, opened by another program; close that program")
         return real(url, clock)
 
     monkeypatch.setattr(serial_source, "SerialConnection", busy)

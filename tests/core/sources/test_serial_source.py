@@ -301,7 +301,7 @@ def test_a_silent_device_is_given_up(line, opened, hasty) -> None:
     frames, why = read_to_trouble(opened(line.port))
     assert frames == []
     assert why == (
-        f"{line.port}: silent for more than 0.15 s; check the power, and that this its port?"
+        f"{line.port}: silent for more than 0.15 s; check the power, and that this is its port"
     )
 
 
@@ -339,7 +339,7 @@ def test_a_device_that_never_says_what_it_is_is_given_up(line, opened, hasty) ->
     line.write(stream(0, 5))
     assert read_all(source, stream(0, 5)) == []
     _, why = read_to_trouble(source)
-    assert "messages arrive, but in 0.15 s none described the device is" in why
+    assert "messages arrive, but in 0.15 s none described the device;" in why
 
 
 def test_information_that_cannot_be_used_is_refused_after_the_frames_before_it(
@@ -386,7 +386,7 @@ def test_an_unplugged_device_is_noticed_after_its_last_frame(line, opened, monke
     frames, why = read_to_trouble(source)
 
     assert sequences(frames) == [1, 2, 3, 4, 5]
-    assert "connection lost: the device was unplugged, or stopped; plug it in" in why
+    assert "connection lost: the device was unplugged or stopped; plug it in" in why
     assert source.read(0.0) == []
 
 
@@ -409,7 +409,7 @@ def test_an_unplugged_device_is_noticed_after_its_last_frame(line, opened, monke
         ("hwgrep://(", "cannot be opened"),
         ("hwgrep://no such device", "no ports found"),
         ("socket://127.0.0.1", "URL such as socket://host:port"),
-        ("socket://127.0.0.1:1", "nothing listens there"),
+        ("socket://127.0.0.1:1", "no server listens at this address"),
         ("replay:x.mcap", "cannot be read"),
         ("sim:nowhere", "expected a scene among"),
     ],
@@ -422,7 +422,7 @@ def test_what_cannot_be_opened_is_refused_with_a_reason(name: str, reason: str) 
 
 def test_a_port_opened_twice_is_busy(line, opened) -> None:
     opened(line.port)
-    with pytest.raises(SourceError, match="busy, another program ; close that program"):
+    with pytest.raises(SourceError, match="busy, opened by another program; close that program"):
         SerialSource(line.port)
 
 

@@ -228,7 +228,7 @@ def test_a_scene_that_is_refused_leaves_the_one_that_plays() -> None:
         source.play(fingertip(m=32, rate=5000.0))
 
     amplified = replace(fingertip().transduction, amplifier=Amplifier(gain=1e9))
-    with pytest.raises(Refusal, match="expected electronics that read"):
+    with pytest.raises(Refusal, match="expected electronics with a range"):
         source.play(replace(fingertip(), transduction=amplified))
     crushed = Stimulus(Indenter(Sphere(0.01), 0.05, 0.05, force=1e6))
     with pytest.raises(Refusal, match="press with less force"):
@@ -249,7 +249,7 @@ def test_an_object_that_a_drum_head_refuses_leaves_the_load_that_presses() -> No
     source = source_of("centre", clock, plate=drum, stimuli=disc)
     ball = Stimulus(Indenter(Sphere(0.01), 0.05, 0.05, force=0.1))
 
-    with pytest.raises(Refusal, match="does not tell how thick"):
+    with pytest.raises(Refusal, match="does not determine its thickness"):
         source.play(replace(source.scene, stimuli=(ball,)))
 
     (frame,) = source.read(0.0)

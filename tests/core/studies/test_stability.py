@@ -95,10 +95,10 @@ def test_eq_6_as_printed_loses_twice_the_digits_of_the_condition(rows):
     [
         (
             "Ni > m, Nj > n",
-            "determine 140 of the 144 .* finer than the elements read as coarser ones",
+            "determine 140 of the 144 .* finer than the elements have the readings of coarser ones",
         ),
         ("Ni = 2m, Nj = 2n", "determine at most 300 of the 400 coefficients"),
-        ("fingertip, free ends", "moves the skin as a whole and bends it nowhere"),
+        ("fingertip, free ends", "is a rigid motion without curvature"),
         ("all dead", "no readings are left"),
         ("all NaN", "frame 0: .* no readings are left"),
     ],

@@ -271,7 +271,9 @@ class _Table:
             at = _AT_LINE.search(str(error))
             where = line + int(at[1]) - 1 if at else line
             why = _AT_LINE.sub("", str(error)).strip()
-            raise Refusal(f"{name}, line {where}: expected TOML, but: {why}") from error
+            raise Refusal(
+                f"{name}, line {where}: expected TOML, got an error in it: {why}"
+            ) from error
 
     def refusal(self, key: str, expected: str) -> Refusal:
         """The error of the value of `key`, with its line."""

@@ -155,7 +155,7 @@ def test_a_step_on_the_rails_is_refused_and_asked_for_again(bench: Bench) -> Non
     controller.begin(THREE, 0.2)
     controller.capture_all()
     bench.read(30, blank=True)
-    assert "on a rail" in controller.message
+    assert "every channel is dead or saturated" in controller.message
     assert controller.message.endswith("Repeat this step.")
     assert not controller.automatic
     assert controller.step is not None

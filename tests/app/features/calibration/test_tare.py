@@ -201,7 +201,7 @@ def test_those_of_a_simulated_sensor_are_not_kept(bench):
 def test_a_damaged_file_is_said(bench):
     bench.tares.path("KS-7").write_text("damaged")
     bench.meet()
-    assert "holds no tares that can be used" in bench.panel.message.text()
+    assert "contains no valid tares" in bench.panel.message.text()
 
 
 def test_a_file_that_cannot_be_written_is_said_and_the_tare_used(bench, monkeypatch):

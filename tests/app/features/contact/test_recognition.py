@@ -44,7 +44,9 @@ def test_a_new_skin_shows_that_the_finder_is_being_computed(window, until, monke
     made, seen = recognition.ObjectFinder, threading.Event()
     monkeypatch.setattr(recognition, "ObjectFinder", lambda *of: seen.wait(60) and made(*of))
     window.requests.set("shape", "cylinder")
-    until(lambda: "computing the readings of objects" in window.display.status_bar.object.text())
+    until(
+        lambda: "computing the model readings of objects" in window.display.status_bar.object.text()
+    )
     seen.set()
     until(lambda: "curvatures" in window.display.status_bar.object.text())
 

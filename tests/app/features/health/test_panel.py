@@ -32,7 +32,7 @@ def test_findings_are_listed_with_their_age_and_figure(qapp) -> None:
     panel._show(Health((KEPT, STUCK), 2, 1, 1.08, 1.3), 130.0)  # noqa: SLF001
 
     assert told(panel) == [
-        ["12", "xx", "dead, kept", "2 min", "reported by the device"],
+        ["12", "xx", "dead, not excluded", "2 min", "reported by the device"],
         ["57", "yy", "stuck", "30 s", "reads \N{MINUS SIGN}1.70 1/m"],
     ]
     assert panel.words.text() == (

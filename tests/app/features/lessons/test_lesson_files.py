@@ -143,7 +143,7 @@ def test_no_text_is_an_expression_that_breaks(text: str) -> None:
         ("set = { force = nan }", 10, "from -50 to 50"),
         ("set = { dead_elements = [-1] }", 10, "a list of elements"),
         ("scene = '../secret'", 10, "one of bolt"),
-        ("point = ['nowhere']", 10, "settings by their names"),
+        ("point = ['nowhere']", 10, "names of settings"),
         (f"{ASK}number = 1\ntolerance = 0", 14, "a number above zero"),
         (f"{ASK}number = 'method'\ntolerance = 1", 13, "whose value is a word"),
         (f"{ASK}number = 1\ntolerance = 1\nunit = 'furlong'", 15, "one of m, mm"),
@@ -154,7 +154,7 @@ def test_no_text_is_an_expression_that_breaks(text: str) -> None:
         (ASK, 10, "one of choices, number or check"),
         ("hint = 'h'", 10, "one of choices, number or check"),
         ("question = 1", 10, "one of choices"),
-        ("set = 1 2", 10, "a mistake"),
+        ("set = 1 2", 10, "an error in it"),
         ("button = [1]", 10, "a table"),
     ],
 )
@@ -168,7 +168,7 @@ def test_a_mistake_is_told_with_its_line(block: str, line: int, said: str) -> No
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "line 1: expected a head"),
+        ("", "line 1: expected a header"),
         (HEAD.replace("1", "2", 1), "line 2: expected format to be 1"),
         (HEAD, "1 to 40 steps"),
         (HEAD + "Hello\n## One\nText", "before any text"),
@@ -190,7 +190,8 @@ def test_a_text_that_is_no_lesson_is_refused(text: str, said: str) -> None:
 def test_a_file_that_is_too_large_or_not_there_is_refused(tmp_path: Path) -> None:
     large = tmp_path / "large.md"
     large.write_bytes(b"a" * 300_000)
-    for file, said in ((large, "at most"), (tmp_path / "none.md", "none.md"), (tmp_path, "none")):
+    none = tmp_path / "none.md"
+    for file, said in ((large, "at most"), (none, "none.md"), (tmp_path, "lesson in UTF-8 text")):
         with pytest.raises(Refusal, match=said):
             read_lesson(file)
 

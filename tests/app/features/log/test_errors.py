@@ -65,7 +65,7 @@ def test_a_failure_is_counted_and_listed_while_the_session_goes_on(
     window.port_search.found.connect(guard.guarded(lambda *_: fail()))
     window.port_search.found.emit([])
     window.port_search.found.emit([])
-    assert window.errors.count.text() == "2 failures"
+    assert window.errors.count.text() == "2 errors"
     assert window.errors.count.isVisible()
     window.notify("in passing")
     window.display.status_bar.activity.show_work("Counting: 1 s", True)

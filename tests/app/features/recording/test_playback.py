@@ -329,7 +329,7 @@ def test_one_never_ended_is_played_up_to_where_it_breaks_off(
     until(lambda: window.display.badge.state.startswith("REPLAY"))
     assert "is unfinished" in window.recording.message.text()
     assert window.recording.copy_button.isVisibleTo(window.recording)
-    until(lambda: "never ended" in window.connection.device.text())
+    until(lambda: "unfinished" in window.connection.device.text())
 
 
 def test_one_that_goes_while_it_is_played_leaves_the_session(

@@ -85,7 +85,7 @@ def test_one_without_readings_is_not_offered(window: MainWindow, tmp_path: Path,
     with closing(Recorder(path, 0.0)) as recorder:
         recorder.add_event(Event(0.0, "note", "nothing else"))
     window.playback.open_file(path)
-    until(lambda: "expected bytes of a device" in panel.message.text())
+    until(lambda: "expected a recording with bytes of a device" in panel.message.text())
     assert not panel.offer.isVisibleTo(panel)
 
 

@@ -84,7 +84,7 @@ def test_text_that_is_no_scene_leaves_the_last_one_and_says_where(window, panel,
     good = text.toPlainText()
     for bad, said in (
         (good.replace("sd =", "sds ="), "expected sd = a number"),
-        (good.replace("sd = 0.006", "sd = 0.006 0.1"), "a mistake in it"),
+        (good.replace("sd = 0.006", "sd = 0.006 0.1"), "an error in it"),
     ):
         text.setPlainText(bad)
         until(lambda said=said: said in panel.editor.message.text())
@@ -172,7 +172,7 @@ def test_effects_are_planned_and_forced_while_the_scene_plays(window, panel, unt
     assert 'off = ["gaussian-noise"]' in panel.editor.text.toPlainText()
     assert window.session.status.connections == connections
     force(panel, "quantisation", "on")
-    assert window.history.stack.undoText() == "force quantisation"
+    assert window.history.stack.undoText() == "selection of quantisation"
     window.history.stack.undo()
     force(panel, "gaussian-noise", "planned")
     until(lambda: not window.session.scene.choice.off)

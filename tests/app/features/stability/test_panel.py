@@ -51,12 +51,13 @@ def test_twelve_by_twelve_from_ten_by_ten_leave_four_shapes_unseen() -> None:
 
 
 def test_a_row_less_costs_twice_the_noise_and_a_quarter_thousands() -> None:
-    assert "has 2 times the noise" in of(**demonstration("Drop a row")).describe()
+    assert "has 2 times the noise" in of(**demonstration("One row dead")).describe()
     assert "has 9\N{THIN SPACE}500 times" in of(**demonstration("A quarter dead")).describe()
 
 
 def test_pinned_ends_decide_the_fingertips_silent_mode_and_sliding_ones_do_not() -> None:
-    pinned, sliding = of(**demonstration("The fingertip")), of(**demonstration("Its ends"))
+    pinned = of(**demonstration("The fingertip\N{RIGHT SINGLE QUOTATION MARK}s silent mode"))
+    sliding = of(**demonstration("The fingertip with sliding ends"))
     assert (len(pinned.values), pinned.silent) == (7, 0)
     assert (len(sliding.values), sliding.silent) == (8, 1)
     x = np.linspace(0, math.pi, 65)
@@ -148,7 +149,7 @@ def test_sliding_ends_are_refused_of_a_fingertip_that_is_seen_and_all_of_it_is_o
     panel, was = _opened(window, until).stability, window.history.settings
     panel.buttons[6].click()
     until(lambda: window.history.settings.fit_edge == "sliding")
-    until(lambda: "moves the skin as a whole" in panel.refused.text())
+    until(lambda: "is a rigid motion without curvature" in panel.refused.text())
     assert panel.refused.text().startswith("In use: Least squares, 8 x 1 functions. 10")
     until(lambda: window.session.estimate is not None and window.display.badge.state == "SIM")
     until(lambda: "infinite: 1 of 8 modes is unobservable" in panel.words.text())

@@ -402,10 +402,10 @@ def test_where_noise_is_the_limit_readings_are_missing() -> None:
     found = accuracy_verdict(CENTRE, [cost], 1e-5)
     said = "\n".join(found.lines)
     assert (found.reached, found.cost) == (False, cost)
-    assert "Missing are readings" in said
+    assert "More readings are needed" in said
     assert "25 times as many" in said
     assert "50 x 50 elements, at 500 frames/s with a conversion 19 times as fast" in said
-    assert "about 25 frames averaged, 25.2 ms for an answer" in said
+    assert "about 25 frames averaged, 25.2 ms for an estimate" in said
 
 
 def test_more_readings_do_bring_the_accuracy_that_was_told() -> None:
@@ -421,7 +421,7 @@ def test_where_functions_are_the_limit_they_are_missing() -> None:
     found = accuracy_verdict(CENTRE, [cost_of(5e-5, rms_exact=4e-5)], 1e-5)
     said = "\n".join(found.lines)
     assert not found.reached
-    assert "Missing are functions, and elements that distinguish them" in said
+    assert "More functions are needed, and elements to distinguish them" in said
     assert "0.04 mm" in said
     assert "Neither a faster conversion nor more time helps" in said.replace("\n", " ")
 
@@ -429,7 +429,7 @@ def test_where_functions_are_the_limit_they_are_missing() -> None:
 def test_where_nothing_gives_a_shape_that_is_said() -> None:
     found = accuracy_verdict(CENTRE, [Refused(EIGHT, "no")], 1e-5)
     assert (found.reached, found.cost) == (False, None)
-    assert "No setting" in found.lines[0]
+    assert "No measured setting" in found.lines[0]
 
 
 # Rows, text, picture
@@ -568,7 +568,7 @@ def test_the_command_names_what_is_accurate_enough(run) -> None:
     answer = json.loads(printed)
     assert answer["reached"] is False
     assert answer["setting"]["rms_mm"] > 1e-3
-    assert any("Missing are functions" in line for line in answer["said"])
+    assert any("More functions are needed" in line for line in answer["said"])
 
 
 @pytest.mark.parametrize(

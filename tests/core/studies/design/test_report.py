@@ -123,7 +123,7 @@ def test_no_folder_of_a_study_is_refused(run, tmp_path):
     code, _, told = run("report", tmp_path)
 
     assert code == 2
-    assert "expected the folder of a study" in told
+    assert "expected a folder made by kappaskin study" in told
 
 
 def test_workers_and_a_scheduler_are_one_or_the_other(run):

@@ -293,7 +293,7 @@ def test_a_folder_of_another_study_or_of_none_is_refused(study_of, tmp_path):
         StudyFolder.opened(tmp_path / "out", replace(study, name="large"))
     (tmp_path / "photos").mkdir()
     (tmp_path / "photos" / "cat.png").touch()
-    with pytest.raises(Refusal, match="expected the folder of a study"):
+    with pytest.raises(Refusal, match="expected a folder made by kappaskin study"):
         StudyFolder.opened(tmp_path / "photos", study)
     (tmp_path / "file").touch()
     with pytest.raises(Refusal, match="expected a folder that can be written to"):

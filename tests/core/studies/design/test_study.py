@@ -97,7 +97,9 @@ def test_what_would_be_said_twice_is_refused(study_of, more):
 def test_a_draw_that_would_change_nothing_is_refused(study_of, what):
     said = refused(study_of, DRAW.format(what))
 
-    assert said.startswith("small.toml, line 34: draw[1].what: expected to vary or draw what is")
+    assert said.startswith(
+        "small.toml, line 34: draw[1].what: expected a parameter of the scene, fit or placement"
+    )
 
 
 def test_a_study_that_varies_nothing_is_one_point(study_of):
@@ -111,12 +113,12 @@ def test_a_study_that_varies_nothing_is_one_point(study_of):
         ('[[vary]]\n"elemants.grid" = [[6, 6]]', ["line 34", "did you mean elements?"]),
         ('[[vary]]\n"touch[2].x" = [0.04]', ["line 34", "one of 1 tables", "number 2"]),
         ('[[vary]]\n"touch.x" = [0.04]', ["line 34", "touch[1]"]),
-        ('[[vary]]\n"touch[00].x" = [0.04]', ["line 34", "expected a place in this file"]),
+        ('[[vary]]\n"touch[00].x" = [0.04]', ["line 34", "expected a key in this file"]),
         ('[[vary]]\n"elements.grid" = []', ["vary[1]", "got none"]),
         ("[[vary]]\n", ["vary[1]", "got none"]),
         ('[[vary]]\n"elements.grid" = 3', ["line 34", "expected a list, got 3"]),
         ("[[vary]]\nelements.grid = [[6, 6]]", ["in quotes"]),
-        ('[[vary]]\n"measure.frames" = [5, 6]', ["not what the study does"]),
+        ('[[vary]]\n"measure.frames" = [5, 6]', ["not of the study itself"]),
         ('[[vary]]\n"touch[1].x" = [0.04, 0.05]\n"touch[1].y" = [0.04]', ["2 of touch[1].x, 1 of"]),
         ('[[vary]]\n"touch[1].x" = [0.04, 0.5]', ["with touch[1].x = 0.5", "expected a load on"]),
         ('[[vary]]\n"touch[1].x" = { first = 0.0, last = 1.0, count = 0 }', ["at least one value"]),
@@ -131,7 +133,7 @@ def test_a_study_that_varies_nothing_is_one_point(study_of):
         ),
         (
             '[[draw]]\nwhat = "touch[1].z"\nkind = "uniform"\nlow = 0.0\nhigh = 1.0',
-            ["line 34", "touch[1].z", "known are"],
+            ["line 34", "touch[1].z", "valid keys are"],
         ),
     ],
 )
@@ -158,7 +160,7 @@ def test_what_cannot_be_varied_or_drawn_is_refused_with_its_line_and_the_remedy(
         ("least = 2", "least = 2\nwihtin = 0.1", "did you mean within?"),
         ("[4, 4]", "[0, 4]", "at least 1 x 1"),
         ("[fit]", "[fit]\ncompansate = true", "did you mean compensate?"),
-        ('what = "point"', 'what = "heights"\nfile = "x.png"', "in a file of its own"),
+        ('what = "point"', 'what = "heights"\nfile = "x.png"', "in a separate file"),
     ],
 )
 def test_what_no_study_can_be_made_of_is_refused(study_of, old, new, told):
@@ -186,7 +188,7 @@ def test_a_skin_that_nothing_presses_is_refused(study_of):
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ("[6, 6]", "[6, 6]\ndead = [3]", "expected live elements"),
+        ("[6, 6]", "[6, 6]\ndead = [3]", "expected only live elements"),
         ("size = [0.1, 0.1]", 'shape = "strip"\nsize = [0.1, 0.1]', "got a strip"),
     ],
 )
