@@ -181,9 +181,7 @@ class CurvePlot(QWidget):
         painter.fillRect(area, QColor(theme.base))
         self._paint_words(painter, area)
         if not self.curves:
-            painter.setPen(QColor(theme.faint))
-            flags = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
-            painter.drawText(area.adjusted(6, 2, -6, -2), flags, self._empty)
+            paint_empty(painter, area, self._empty)
             return
         painter.setClipRect(area)
         for curve in sorted(self.curves, key=lambda curve: curve.element == self._marked >= 0):
@@ -216,6 +214,13 @@ class CurvePlot(QWidget):
             painter.setPen(series(curve.number))
             painter.drawText(QPointF(x, painter.fontMetrics().ascent() + 1), curve.name)
             x += painter.fontMetrics().horizontalAdvance(curve.name) + 8
+
+
+def paint_empty(painter: QPainter, area: QRectF, text: str) -> None:
+    """Write a text in the middle of a plot without values."""
+    painter.setPen(QColor(current().faint))
+    flags = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
+    painter.drawText(area.adjusted(6, 2, -6, -2), flags, text)
 
 
 def as_seen(x: Array, y: Array) -> tuple[Array, Array]:

@@ -24,6 +24,7 @@ from kappaskin.scenes.cylinders import CylinderStep
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
 from kappaskin_app.theme import current
+from kappaskin_app.widgets.plots import paint_empty
 
 _POINTS = 61  # of the skin's cross-section
 _MOST_WRAPPED = math.pi  # rad: the rest of a long skin hangs down straight
@@ -248,8 +249,7 @@ class LoopPlot(QWidget):
         if loop is None or not np.isfinite(loop.read).any():
             area = self._area(0.0)
             painter.fillRect(area, QColor(theme.base))
-            painter.setPen(QColor(theme.faint))
-            painter.drawText(area, Qt.AlignmentFlag.AlignCenter, "No readings")
+            paint_empty(painter, area, "No readings")
             return
         most = 1.08 * max(
             float(np.abs(loop.applied).max()), float(np.nanmax(np.abs(loop.read))), 1e-9

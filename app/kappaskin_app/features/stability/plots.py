@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from kappaskin.sensing import SensorLayout
 from kappaskin_app.features.stability.observability import Spectrum
 from kappaskin_app.theme import DIVERGING, current
-from kappaskin_app.widgets.plots import LogAxis
+from kappaskin_app.widgets.plots import LogAxis, paint_empty
 from kappaskin_app.widgets.tint import Tint
 
 Array = NDArray[np.float64]
@@ -158,9 +158,7 @@ class SpectrumPlot(QWidget):
         painter.fillRect(area, QColor(theme.base))
         spectrum = self.spectrum
         if spectrum is None:
-            painter.setPen(QColor(theme.faint))
-            flags = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
-            painter.drawText(area.adjusted(8, 8, -8, -8), flags, self._empty)
+            paint_empty(painter, area, self._empty)
             return
         self._paint_axes(painter, area, len(spectrum.values))
         size = min(max(0.35 * area.width() / len(spectrum.values), 1.5), 4.0)
