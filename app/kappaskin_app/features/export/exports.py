@@ -24,9 +24,7 @@ from kappaskin_app.shell.work_dialog import (
     WorkDialog,
     browse_button,
     has_suffix,
-    label_for,
     path_in,
-    with_button,
     with_suffix,
 )
 
@@ -56,29 +54,24 @@ class ExportDialog(WorkDialog):
         how = "&Export", "Writing the export", self._start_work, self._result_text
         super().__init__(tasks, "Export a recording", *how, parent)
         self.setObjectName("export")
-        self.recording, self.to = QLineEdit(), QLineEdit()
-        self.settings = QComboBox()
+        self.recording, self.settings = QLineEdit(), QComboBox()
         self.settings.addItems(["As they were recorded", "As they are now"])
         self.begin, self.until = _seconds("the beginning"), _seconds("the end")
         self.every, self.at = _seconds("every frame"), _seconds("")
         self.export_button = self.begin_button
         self.choose_recording = browse_button(self._choose_recording)
-        self.choose_file = browse_button(self._choose_file)
+        self.needed.append(self.recording)
+        self.inputs += (self.recording, self.choose_recording, self.settings)
         self._setup = Setup()
         self._files: tuple[Path, ...] = ()
         self._lay_out()
-        self.to.textChanged.connect(guarded(lambda *_: self._allow()))
         self.recording.textChanged.connect(guarded(lambda *_: self._allow()))
         self.every.valueChanged.connect(guarded(lambda *_: self._allow()))
-        self._allow()
 
     def _lay_out(self) -> None:
         form = self.form
-        for words, line, button in (
-            ("&Recording", self.recording, self.choose_recording),
-            ("&File", self.to, self.choose_file),
-        ):
-            form.addRow(label_for(words, line), with_button(line, button))
+        self._add_file("&Recording", self.recording, self.choose_recording)
+        self._add_file("&File", self.to, self.choose_file)
         form.addRow("&Settings", self.settings)
         form.addRow("Fr&om", self.begin)
         form.addRow("&Until", self.until)
@@ -123,11 +116,6 @@ class ExportDialog(WorkDialog):
             widget.setEnabled(not busy and not one)
         self.every.setEnabled(not busy and suffix != ".vtp")
         self.at.setEnabled(not busy and one)
-        choose = self.choose_recording, self.choose_file
-        for widget in (self.recording, self.to, self.settings, *choose):
-            widget.setEnabled(not busy)
-        both = bool(self.recording.text().strip() and self.to.text().strip())
-        self.begin_button.setEnabled(both and not busy)
 
     @property
     def wanted(self) -> ExportRequest:

@@ -23,10 +23,7 @@ from kappaskin_app.shell.folders import proposed, recordings_folder, repaired, r
 from kappaskin_app.shell.recovery import resume_text
 from kappaskin_app.shell.work_dialog import (
     WorkDialog,
-    browse_button,
-    label_for,
     path_in,
-    with_button,
     with_suffix,
 )
 from kappaskin_app.theme import current
@@ -119,17 +116,13 @@ class RepairDialog(WorkDialog):
         how = "Re&pair", "Repairing the recording", self._start_work, self._result_text
         super().__init__(tasks, "Repair a recording", *how, parent)
         self.setObjectName("repair")
-        self.recording, self.to = QLineEdit(), QLineEdit()
+        self.recording = QLineEdit()
         self.recording.setReadOnly(True)
         self.recording.setToolTip("The damaged recording; it is not changed.")
         self.to.setToolTip("The file to write, with all that can be read of the damaged one.")
-        self.form.addRow(label_for("&Damaged", self.recording), self.recording)
-        self.choose_file = browse_button(self._choose)
-        self.form.addRow(label_for("&Repaired", self.to), with_button(self.to, self.choose_file))
+        self.form.addRow("&Damaged", self.recording)
+        self._add_file("&Repaired", self.to, self.choose_file)
         self._add_buttons()
-        self.begin_button.setDefault(True)
-        self.to.textChanged.connect(guarded(lambda *_: self._allow()))
-        self._allow()
 
     def ask_of(self, recording: Path) -> None:
         """Ask for the path of the repaired `recording`, by default in the same folder."""
@@ -139,19 +132,13 @@ class RepairDialog(WorkDialog):
         self.ask()
         self._allow()
 
-    def _choose(self) -> None:
+    def _choose_file(self) -> None:
         option = QFileDialog.Option.DontConfirmOverwrite  # existing files are refused
         name, _ = QFileDialog.getSaveFileName(
             self, "Save the repaired recording to", self.to.text(), "Recording (*.mcap)", "", option
         )
         if name:
             self.to.setText(str(with_suffix(name, ".mcap")))
-
-    def _allow(self) -> None:
-        super()._allow()
-        for widget in (self.to, self.choose_file):
-            widget.setEnabled(not self.busy)
-        self.begin_button.setEnabled(bool(self.to.text().strip()) and not self.busy)
 
     def _start_work(self) -> RepairTask:
         return RepairTask(path_in(self.recording), path_in(self.to))
