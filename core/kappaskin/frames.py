@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Counts = NDArray[np.int32]
 Mask = NDArray[np.bool_]
+Indices = NDArray[np.intp]
 
 COMPONENTS = ("xx", "yy", "xy")
 """Curvature components, in the one order used everywhere."""

@@ -5,11 +5,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from kappaskin.frames import Array
 from kappaskin_app.theme import current, series
 from kappaskin_app.widgets.text import in_digits, round_up
 
@@ -61,8 +61,6 @@ def _rounded(value: float, down: bool) -> float:
         return max(d * power for d in _ROUND if d * power <= value * (1 + 1e-9))
     return min(d * power for d in (*_ROUND, 10.0) if d * power >= value * (1 - 1e-9))
 
-
-Array = NDArray[np.float64]
 
 _RIGHT, _TOP = 8.0, 4.0
 _WIDEST = "\N{MINUS SIGN}0.15"  # of the numbers, more or less

@@ -1,17 +1,15 @@
 """A surface as a map in colours, seen from above, with its scale and where the contact is."""
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
+from kappaskin.frames import Array
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, SEQUENTIAL, Colours, current, follow_look
 from kappaskin_app.widgets.colour_bar import ColourBar
 from kappaskin_app.widgets.line import Line
 from kappaskin_app.widgets.tint import Tint
-
-Array = NDArray[np.float64]
 
 _DOT = 1.8  # px, the radius of a point
 _LINES = 5  # of letters, as high as a map is at least

@@ -4,7 +4,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QColor,
@@ -19,7 +18,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
-from kappaskin.frames import COMPONENTS
+from kappaskin.frames import COMPONENTS, Array, Mask
 from kappaskin.scenes.cylinders import CylinderStep
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
@@ -195,8 +194,6 @@ def _paint_arrow(painter: QPainter, skin: QRectF, dx: float, dy: float, colour: 
         painter.drawPolygon(QPolygonF([tip, back + across * 5.5, back - across * 5.5]))
 
 
-Array = NDArray[np.float64]
-
 _TOP, _RIGHT = 8.0, 10.0
 _HIGH = 158  # px of the plot without its captions
 _NUMBER_GAP = 6.0  # px between two numbers
@@ -212,8 +209,8 @@ class Loop:
 
     applied: Array
     read: Array
-    back: NDArray[np.bool_]
-    begins: NDArray[np.bool_]
+    back: Mask
+    begins: Mask
     gain: float
     offset: float
 

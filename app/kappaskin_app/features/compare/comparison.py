@@ -2,19 +2,15 @@
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin.frames import Estimate
+from kappaskin.frames import Array, Estimate
 from kappaskin.live import PipelineStatus, Status
 from kappaskin.pipeline import REPORTED, Readout, Setup, readouts
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import ComparedSettings, EstimatorSettings, Settings
 from kappaskin_app.shell.settings.form_fields import settings_from, setup_values
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,14 +17,13 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin.estimation import FAULTS
+from kappaskin.frames import Array, Indices, Mask
 from kappaskin.sensing import SensorLayout
 from kappaskin_app.shell.colouring import SHADES
 from kappaskin_app.theme import DARK_INK, WANTED, Colours, current, follow_look
 from kappaskin_app.widgets.colour_bar import ColourBar, LockButton
 from kappaskin_app.widgets.line import Line
 from kappaskin_app.widgets.tint import Tint
-
-Indices = NDArray[np.intp]
 
 _LETTERS: dict[str, str] = dict(
     zip(
@@ -222,9 +221,6 @@ class CellGrid(QWidget):
             self._hovered = element
             self.update()
 
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _LEGEND = (
     "One cell for each element. Grey: no reading. Violet: saturated, at an end of the converter's "

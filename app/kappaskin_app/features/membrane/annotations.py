@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from numpy.typing import NDArray
 
+from kappaskin.frames import Array, Indices
 from kappaskin.skin import Distances
-from kappaskin_app.shell.drawn_skin import MM, Direction, DrawnSkin, Indices
+from kappaskin_app.shell.drawn_skin import MM, Direction, DrawnSkin
 from kappaskin_app.theme import WANTED, current, follow_look, grown
 
 UNLIT = {"lighting": False, "pickable": False, "reset_camera": False, "render": False}
@@ -106,8 +106,6 @@ class Sides:
         for part in (self.actor, *self.labels):
             part.prop.color = current().text
 
-
-Array = NDArray[np.float64]
 
 _LETTERS = 15  # px
 _STEPS = 48  # points of the line along the skin

@@ -14,7 +14,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 from pyvistaqt import QtInteractor
 
-from kappaskin.frames import Estimate
+from kappaskin.frames import Array, Estimate, Indices
 from kappaskin.mechanics import Load
 from kappaskin.sensing import Sensor
 from kappaskin_app.features.membrane.annotations import UNLIT, Alarm, Caption, Marks, Sides, pixels
@@ -23,10 +23,8 @@ from kappaskin_app.features.membrane.loads import DrawnLoads, put_upright
 from kappaskin_app.features.membrane.mouse import LoadDrag, SurfacePointer
 from kappaskin_app.features.membrane.surface import WHOLE, Box, Shares, Surface
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.drawn_skin import MM, DrawnSkin, Indices
+from kappaskin_app.shell.drawn_skin import MM, DrawnSkin
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, current, follow_look
-
-Array = NDArray[np.float64]
 
 _LETTERS = 14  # px, of the caption
 _LIFT = 0.006  # of the skin's size above the surface, which would hide half of a line

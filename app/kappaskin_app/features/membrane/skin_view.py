@@ -25,8 +25,6 @@ from kappaskin_app.widgets.tint import Tint
 
 _MARKS = 0.06  # s between two updates of the marks
 
-Array = NDArray[np.float64]
-
 
 class SkinView(QObject):
     """Shows the data of the `display` on the `membrane` with its colour `scale`.

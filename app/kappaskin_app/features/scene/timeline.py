@@ -3,17 +3,15 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPen, QPolygonF
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
+from kappaskin.frames import Array
 from kappaskin.scenes import Scene
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import current, follow_look
 from kappaskin_app.widgets.timeline import Clock, Course, glyph_button, icon
-
-Array = NDArray[np.float64]
 
 _SAMPLES = 200  # of the force profile
 _TICK_GAP = 3.0  # px, least distance of two ticks

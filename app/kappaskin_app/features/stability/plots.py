@@ -3,18 +3,16 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QImage, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from kappaskin.frames import Array
 from kappaskin.sensing import SensorLayout
 from kappaskin_app.features.stability.observability import Spectrum
 from kappaskin_app.theme import DIVERGING, current
 from kappaskin_app.widgets.plots import LogAxis, paint_empty
 from kappaskin_app.widgets.tint import Tint
-
-Array = NDArray[np.float64]
 
 _THINNEST = 0.2  # of the longer side, so that a narrow skin is visible
 

@@ -2,16 +2,12 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
-from kappaskin.frames import COMPONENTS
+from kappaskin.frames import COMPONENTS, Array
 from kappaskin.pipeline import REPORTED
 from kappaskin_app.widgets.plots import Curve, CurvePlot
-
-Array = NDArray[np.float64]
 
 TRACED = tuple(quantity for quantity in REPORTED if quantity.traced)
 _NONE = "Click an element, on the skin or in a heatmap."
