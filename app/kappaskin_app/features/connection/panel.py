@@ -22,7 +22,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.form import pass_window_keys
 from kappaskin_app.shell.panel import Panel
-from kappaskin_app.widgets.parts import said
+from kappaskin_app.shell.settings import calibration_text
 from kappaskin_app.widgets.text import COMMAND, day
 
 _PERIOD = 1000  # ms between two searches
@@ -229,7 +229,7 @@ def _sensor_text(sensor: Sensor, calibration: Calibration | None) -> str:
     a, b, radius = (round(1e3 * length, 1) for length in (patch.a, patch.b, patch.radius))
     bent = f", radius {radius:g} mm" if patch.base_curvature else ""
     health = f"\n{dead} of {sensing.size} channels dead" if dead else ""
-    calibrated = f"\n{said(calibration)}" if calibration else ""
+    calibrated = f"\n{calibration_text(calibration)}" if calibration else ""
     return (
         f"{sensor.name} ({sensor.serial_number})\n{sensor.layout}, {sensor.edge}{health}\n"
         f"{a:g} x {b:g} mm{bent}, up to {sensor.rate:g} frames/s{calibrated}"
