@@ -292,11 +292,6 @@ class MembraneView(QWidget):
         if self._wire_actor:
             self._wire_actor.prop.color = ink
 
-    @property
-    def greyed(self) -> bool:
-        """Whether the skin is drawn without colours."""
-        return self.surface.lost
-
     def show_lost(self, lost: bool) -> None:
         """Grey the skin while the connection is lost."""
         if self.surface.actor is None or lost == self.surface.lost:
