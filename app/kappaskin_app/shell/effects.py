@@ -9,7 +9,8 @@ from PySide6.QtWidgets import QSizePolicy
 from kappaskin.scenes.effects import EFFECTS
 from kappaskin.studies import EffectCost
 from kappaskin_app.theme import current, follow_look
-from kappaskin_app.widgets.table import LEFT, RIGHT, Table
+from kappaskin_app.widgets.lettering import LEFT, RIGHT
+from kappaskin_app.widgets.table import Table
 from kappaskin_app.widgets.text import NONE, duration, length
 
 

@@ -3,7 +3,6 @@
 import time
 
 from PySide6.QtCore import QObject, QSignalBlocker, Qt, QTimer, Signal
-from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
@@ -99,7 +98,7 @@ class ConnectionPanel(Panel):
         self.losses.setToolTip("Messages lost and bytes discarded since the source was connected.")
         self.copy_button = QPushButton("Copy the command")
         self.copy_button.setToolTip("Copy the command in the message above, for a terminal.")
-        self.copy_button.clicked.connect(self._copy)
+        self.copy_button.clicked.connect(self._copy_command)
         self.connect_button.clicked.connect(lambda: self.connect_requested.emit(self.source()))
         self._line = QLineEdit()
         self._line.returnPressed.connect(self.connect_button.click)
@@ -194,10 +193,6 @@ class ConnectionPanel(Panel):
     def show_message(self, text: str, hint: bool = False) -> None:
         super().show_message(text, hint)
         self.copy_button.setVisible(bool(COMMAND.search(text)))
-
-    def _copy(self) -> None:
-        if command := COMMAND.search(self.message.text()):
-            QGuiApplication.clipboard().setText(command[1])
 
 
 def _port_text(port: Port) -> str:

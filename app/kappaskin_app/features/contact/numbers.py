@@ -14,7 +14,8 @@ from kappaskin.frames import Estimate
 from kappaskin.pipeline import REPORTED, Reported, readouts
 from kappaskin.sensing import Sensor
 from kappaskin_app.guard import guarded
-from kappaskin_app.widgets.table import LEFT, Table
+from kappaskin_app.widgets.lettering import LEFT
+from kappaskin_app.widgets.table import Table
 
 FACTS = ("Quantity", "Value", "95 % half-width", "Unit")
 _READ = tuple(quantity for quantity in REPORTED if quantity.traced)

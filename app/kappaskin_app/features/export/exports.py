@@ -18,6 +18,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import WITHIN, Actions
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.centre import Centre
+from kappaskin_app.shell.folders import RECORDINGS
 from kappaskin_app.shell.pictures import caption_now, chosen_file, save_view, write_png
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.work_dialog import (
@@ -27,9 +28,9 @@ from kappaskin_app.shell.work_dialog import (
     path_in,
     with_suffix,
 )
+from kappaskin_app.widgets.parts import ELLIPSIS
 
 _LONGEST = 1e6  # s
-_RECORDINGS = "Recording (*.mcap)"
 _FORMATS = (
     "Table for any program (*.csv);;Table for NumPy (*.npz);;Table in HDF5 (*.h5);;"
     "Surface for ParaView, PyVista (*.vtp);;Series of surfaces for ParaView (*.pvd);;"
@@ -92,7 +93,7 @@ class ExportDialog(WorkDialog):
         (self.to if self.recording.text() else self.recording).setFocus()
 
     def _choose_recording(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(self, "Export a recording", "", _RECORDINGS)
+        name, _ = QFileDialog.getOpenFileName(self, "Export a recording", "", RECORDINGS)
         if name:
             self.recording.setText(name)
 
@@ -178,8 +179,7 @@ class Exports(QObject):
 
         Those that are `solid` are in three dimensions, the others `flat`, a menu of its own each.
         """
-        more = "\N{HORIZONTAL ELLIPSIS}"
-        actions.add("export", _MENU, f"&Recording{more}", self.ask, "Ctrl+Shift+E", _EXPORT)
+        actions.add("export", _MENU, f"&Recording{ELLIPSIS}", self.ask, "Ctrl+Shift+E", _EXPORT)
         if self.filming is not None:
             words = "&Film of the skin, start or stop"
             actions.add("film", _MENU, words, self.film, "Ctrl+Shift+F", _FILMING)
@@ -187,7 +187,7 @@ class Exports(QObject):
         for menu, views in menus.items():
             for name, view in views.items():
                 act = partial(self.picture, view, name, menu != _MENU)
-                words, tip = f"Picture of {name}{more}", _PICTURE.format(what=name.lower())
+                words, tip = f"Picture of {name}{ELLIPSIS}", _PICTURE.format(what=name.lower())
                 actions.add(f"picture-of-{name.lower()}", menu, words, act, "", tip)
 
     def ask(self) -> None:

@@ -10,6 +10,7 @@ from kappaskin.frames import Array, Indices
 from kappaskin.skin import Distances
 from kappaskin_app.shell.drawn_skin import MM, Direction, DrawnSkin
 from kappaskin_app.theme import WANTED, current, follow_look, grown
+from kappaskin_app.widgets.parts import number
 
 UNLIT = {"lighting": False, "pickable": False, "reset_camera": False, "render": False}
 """Arguments of `add_mesh`: no lighting, no rendering, no change of the camera."""
@@ -155,10 +156,9 @@ class Ruler:
 
 def distances_text(found: Distances) -> str:
     """Text of the distances."""
-    higher = f"{1e3 * found.higher:+z.2f}".replace("-", "\N{MINUS SIGN}")
     return (
         f"straight {1e3 * found.straight:.2f} mm, along the skin {1e3 * found.along:.2f} mm, "
-        f"height {higher} mm"
+        f"height {number(1e3 * found.higher, '+.2f')} mm"
     )
 
 

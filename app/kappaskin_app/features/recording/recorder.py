@@ -19,7 +19,14 @@ from kappaskin.recording import RecordingStatus, Repaired, RepairTask
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions
 from kappaskin_app.shell.background import Tasks
-from kappaskin_app.shell.folders import proposed, recordings_folder, repaired, repairing, unfinished
+from kappaskin_app.shell.folders import (
+    RECORDINGS,
+    proposed,
+    recordings_folder,
+    repaired,
+    repairing,
+    unfinished,
+)
 from kappaskin_app.shell.recovery import resume_text
 from kappaskin_app.shell.work_dialog import (
     WorkDialog,
@@ -27,6 +34,7 @@ from kappaskin_app.shell.work_dialog import (
     with_suffix,
 )
 from kappaskin_app.theme import current
+from kappaskin_app.widgets.lettering import LEFT
 
 _WIDTH, _TEXT = 92, 22  # px: of all, and to where the words begin
 _HOUR = 3600.0  # s, from which there is room for the time alone
@@ -96,15 +104,14 @@ class RecordingMark(QWidget):
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(theme.alert))
         painter.drawEllipse(QPointF(12, top + line / 2), 5, 5)
-        left = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
         bold = painter.font()
         bold.setWeight(QFont.Weight.DemiBold)
         painter.setFont(bold)
         painter.setPen(QColor(theme.alert))
-        painter.drawText(QRectF(_TEXT, top, self.width() - _TEXT, line), left, self.head)
+        painter.drawText(QRectF(_TEXT, top, self.width() - _TEXT, line), LEFT, self.head)
         painter.setFont(self.font())
         painter.setPen(QColor(theme.alert if self._bad else theme.text))
-        painter.drawText(QRectF(_TEXT, top + line, self.width() - _TEXT, line), left, self.below)
+        painter.drawText(QRectF(_TEXT, top + line, self.width() - _TEXT, line), LEFT, self.below)
 
 
 class RepairDialog(WorkDialog):
@@ -135,7 +142,7 @@ class RepairDialog(WorkDialog):
     def _choose_file(self) -> None:
         option = QFileDialog.Option.DontConfirmOverwrite  # existing files are refused
         name, _ = QFileDialog.getSaveFileName(
-            self, "Save the repaired recording to", self.to.text(), "Recording (*.mcap)", "", option
+            self, "Save the repaired recording to", self.to.text(), RECORDINGS, "", option
         )
         if name:
             self.to.setText(str(with_suffix(name, ".mcap")))
@@ -152,7 +159,6 @@ class RepairDialog(WorkDialog):
         return f"Saved {result.words}. The damaged recording is unchanged; this one is played."
 
 
-FILES = "Recording (*.mcap)"
 _MENU = "&Recording"
 _RECORD, _STOP = "&Record\N{HORIZONTAL ELLIPSIS}", "&Stop recording"
 
@@ -219,7 +225,7 @@ class RecordingControl(QObject):
             path = Path(path.name)
         option = QFileDialog.Option.DontConfirmOverwrite  # the engine refuses existing files
         chosen, _ = QFileDialog.getSaveFileName(
-            self._window, "Record to", str(path), FILES, "", option
+            self._window, "Record to", str(path), RECORDINGS, "", option
         )
         return with_suffix(chosen, ".mcap") if chosen else None
 

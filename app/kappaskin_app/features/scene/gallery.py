@@ -41,6 +41,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import Tasks
 from kappaskin_app.theme import FAINT, current, follow_look, grown
 from kappaskin_app.widgets.layout import scrolled
+from kappaskin_app.widgets.lettering import RIGHT
 from kappaskin_app.widgets.parts import ELLIPSIS, button, in_a_row, text_label
 
 PICTURE, PLAYING = int(Qt.ItemDataRole.UserRole), int(Qt.ItemDataRole.UserRole) + 1
@@ -130,8 +131,7 @@ class CardPainter(QStyledItemDelegate):
             ]
         )
         painter.setPen(QColor(theme.base))
-        flags = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(pill.adjusted(0, 0, -height / 2 + 1, 0), flags, words)
+        painter.drawText(pill.adjusted(0, 0, -height / 2 + 1, 0), RIGHT, words)
 
     def _paint_title(self, painter: QPainter, place: QRectF, title: str) -> None:
         metrics, flags = QFontMetricsF(painter.font()), Qt.AlignmentFlag

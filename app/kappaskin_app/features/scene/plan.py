@@ -15,7 +15,8 @@ from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.effects import effect_description, effect_name
 from kappaskin_app.shell.session import Session
 from kappaskin_app.theme import current, follow_look
-from kappaskin_app.widgets.table import LEFT, Table
+from kappaskin_app.widgets.lettering import LEFT
+from kappaskin_app.widgets.table import Table
 from kappaskin_app.widgets.text import duration
 
 
