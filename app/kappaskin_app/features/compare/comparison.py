@@ -58,7 +58,6 @@ class SetupComparison(QObject):
     def __init__(self, history: History, session: Session, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._history, self._session = history, session
-        self._requested: Setup | None = None
         self._active = False
         self._shown: tuple[int, ...] = ()
 
@@ -79,9 +78,8 @@ class SetupComparison(QObject):
     def _request(self) -> None:
         setup = None
         if self._active:
-            setup = other_setup(self._history.settings, self._session.requested_setup)
-        if setup != self._requested:
-            self._requested = setup
+            setup = other_setup(self._history.settings, self._session.engine.requested.setup)
+        if setup != self._session.engine.requested.compared:
             self._session.engine.compare(setup)
 
     def follow(self, status: Status) -> None:
