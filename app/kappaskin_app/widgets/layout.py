@@ -104,8 +104,8 @@ _GAP = 6  # px between two widgets, and between two lines
 class Flow(QLayout):
     """A layout of widgets in lines, like words; at least as wide as the widest."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._items: list[QLayoutItem] = []
 
     # What Qt asks of a layout.

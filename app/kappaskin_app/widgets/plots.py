@@ -84,10 +84,8 @@ class CurvePlot(QWidget):
 
     pointed = Signal(int)
 
-    def __init__(
-        self, title: str, unit: str, signed: bool, tip: str, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, title: str, unit: str, signed: bool, tip: str) -> None:
+        super().__init__()
         self._title, self._unit, self._signed = title, unit, signed
         self._empty = ""
         self._x: Array = np.empty(0)

@@ -19,8 +19,8 @@ _CROSS = 6.0  # px from the middle of a contact's cross to its ends
 class _Map(QWidget):
     """The colours, in the proportions of the skin."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self._image: QImage | None = None
         self._contact, self._sides, self._faded = np.full(2, np.nan), (1.0, 1.0), False
@@ -94,8 +94,8 @@ class _Map(QWidget):
 class SurfaceMap(QWidget):
     """A titled map with its scale and a line of words below."""
 
-    def __init__(self, title: str, unit: str, tip: str, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, title: str, unit: str, tip: str) -> None:
+        super().__init__()
         self.title, self.words = QLabel(title), Line()
         bold = self.title.font()
         bold.setBold(True)

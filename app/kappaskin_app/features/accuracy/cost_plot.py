@@ -31,8 +31,8 @@ class CostPlot(QWidget):
 
     chosen = Signal(object)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.frontier, self._present = Frontier(), None
         self._live: Point = (math.nan, math.nan)
         self._x, self._y = LogAxis(1e-5, 1e-2), LogAxis(1e-5, 1e-4)

@@ -39,8 +39,8 @@ class InUsePanel(Panel):
     )
     guide_page = "calibrate"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("In use", parent)
+    def __init__(self) -> None:
+        super().__init__("In use")
         self.what = text_label()
         self.load = button(f"Load{ELLIPSIS}", "load", "Use a calibration from a file.")
         self.stop = button("Stop using", "stop", "Return to nominal curvature (Ctrl+Z undoes).")
@@ -113,8 +113,8 @@ class CalibratePanel(Panel):
     )
     guide_page = "calibrate"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Cylinders of known radius", parent)
+    def __init__(self) -> None:
+        super().__init__("Cylinders of known radius")
         self.start, self.steps, self.result_page = StartPage(), CylinderStepPage(), ResultPage()
         for page in (self.start, self.steps, self.result_page):
             self.body.addWidget(page)

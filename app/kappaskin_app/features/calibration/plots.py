@@ -36,8 +36,8 @@ _BENDS = {"x": (1.0, 0.0), "y": (0.0, 1.0), "diagonal": (math.sqrt(0.5), math.sq
 class CylinderView(QWidget):
     """Drawing of the skin on a cylinder, from the side to scale and from above."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._step: CylinderStep | None = None
         self._patch = Patch(0.1, 0.1)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -218,8 +218,8 @@ class Loop:
 class LoopPlot(QWidget):
     """Plot of a `Loop`: filled points at falling radii, open ones at rising radii."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._loop: Loop | None = None
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setToolTip(
@@ -343,8 +343,8 @@ class PassMap(QWidget):
 
     chosen = Signal(int)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._layout: SensorLayout | None = None
         self._failures: dict[int, str] = {}
         self._tips: list[str] = []

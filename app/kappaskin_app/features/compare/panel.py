@@ -46,8 +46,8 @@ class OtherForm(Form):
     purpose = "A second setup for the same readings, to compare with the one in use (A)."
     guide_page = "accuracy"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("B", _SETTINGS, parent)
+    def __init__(self) -> None:
+        super().__init__("B", _SETTINGS)
         self.swap = button("Swap A and B", "swap", "Exchange the setup in use and B.")
         self.body.addWidget(self.swap)
 
@@ -65,8 +65,8 @@ class OtherForm(Form):
 class ComparePanel(QWidget):
     """The form of B, both surfaces, their difference, and the contact readouts of both."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.form = OtherForm()
         numbers = range(1, len(_COLUMNS))
         title = "Contact readouts of A and B"

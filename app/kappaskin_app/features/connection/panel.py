@@ -74,8 +74,8 @@ class ConnectionPanel(Panel):
     disconnect_requested = Signal()
     refresh_requested = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Connection", parent)
+    def __init__(self) -> None:
+        super().__init__("Connection")
         self._ports: list[Port] = []
         self._selected: Port | None = None  # the selected port, listed or not
         self._next_losses = 0.0

@@ -79,8 +79,8 @@ _PERIOD = 0.5  # s between two updates: faster is illegible
 class NumbersPanel(QWidget):
     """Tables of the contact and of every element, with a button to copy them as CSV."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.facts = _table("contact", "Contact and object", FACTS, (1, 2))
         texts = ELEMENTS.index("Fault")
         self.elements = _table("elements", "Readings of every element", ELEMENTS, range(texts))

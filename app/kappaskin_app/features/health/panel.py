@@ -26,8 +26,8 @@ class HealthPanel(QWidget):
 
     pointed = Signal(int)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.words, self.press = text_label("", _TIP), PressPage()
         self.table = self._made_table()
         self._shown = Health()

@@ -43,8 +43,8 @@ class CellGrid(QWidget):
     pointed = Signal(int)
     chosen = Signal(int)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._layout: SensorLayout | None = None
         self._colours: Colours = np.empty((0, 3), np.uint8)
         self._hovered, self._faded = -1, False
@@ -241,8 +241,8 @@ class Heatmap(QWidget):
     chosen = Signal(int)
     lock_wanted = Signal(float)
 
-    def __init__(self, name: str, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, name: str) -> None:
+        super().__init__()
         self.name, self._shade = name, SHADES[name]
         self._title = QLabel(f"<b>{self._shade.symbol}</b>")
         self._title.setToolTip(self._shade.tip)
@@ -354,8 +354,8 @@ _NARROWEST = (270, 360)  # px, minimum width of one column and of two
 class HeatmapGrid(QScrollArea):
     """Scrollable grid of the heatmaps; hidden ones are not drawn."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.heatmaps = {name: Heatmap(name) for name in SHADES}
         self._none = QLabel("Select heatmaps under View.", alignment=Qt.AlignmentFlag.AlignCenter)  # pyright: ignore[reportCallIssue]
         self._shown: tuple[str, ...] | None = None

@@ -86,8 +86,8 @@ _NOTHING = "No messages of this level since the window opened."
 class LogPanel(QWidget):
     """Lists the messages of a `buffer`, newest first."""
 
-    def __init__(self, buffer: LogBuffer, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, buffer: LogBuffer) -> None:
+        super().__init__()
         self._buffer, self._seen = buffer, -1
         self._lines: list[LogLine] = []
         self.level, self.nothing = QComboBox(), QLabel(_NOTHING)

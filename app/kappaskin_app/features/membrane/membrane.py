@@ -41,8 +41,8 @@ class MembraneView(QWidget):
 
     drawn = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         # Multisampling would halve the rate in software; a timer of its own would draw twice.
         self.plotter = QtInteractor(self, auto_update=False, multi_samples=0)
         # Else each drawing composes the whole window, a fifth of its time in software.

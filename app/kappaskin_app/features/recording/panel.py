@@ -26,8 +26,8 @@ class RecordingPanel(Panel):
     )
     guide_page = "record"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Recording", parent)
+    def __init__(self) -> None:
+        super().__init__("Recording")
         self.record = button(f"Record{ELLIPSIS}", "record-button", _RECORD)
         self.note = button(f"Note{ELLIPSIS}", "note-button", _NOTE)
         self.open = button(f"Open{ELLIPSIS}", "open-button", _OPEN)

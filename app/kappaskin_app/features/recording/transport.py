@@ -35,8 +35,8 @@ def minutes(seconds: float) -> str:
 class Landmarks(Course):
     """The handle over gaps and events."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Time in the recording, in ms", _TIP, parent)
+    def __init__(self) -> None:
+        super().__init__("Time in the recording, in ms", _TIP)
         self.gaps: tuple[tuple[float, float], ...] = ()
         self.events: tuple[Event, ...] = ()
 
@@ -135,8 +135,8 @@ class Transport(QWidget):
     speed_wanted = Signal(float)
     loop_wanted = Signal(bool)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.setAccessibleName("Transport of the recording")
         self.buttons = {name: glyph_button(name) for name in _TIPS if name != "pause"}
         self.play, self.loop = self.buttons["play"], self.buttons["loop"]

@@ -173,8 +173,8 @@ class _Cards(QListWidget):
     played = Signal()
     resized = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.painter = CardPainter()
         self.setItemDelegate(self.painter)
         self.setViewMode(QListView.ViewMode.IconMode)
@@ -221,8 +221,8 @@ class GalleryPanel(QWidget):
     chosen = Signal(str)
     open_wanted = Signal()
 
-    def __init__(self, tasks: Tasks, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, tasks: Tasks) -> None:
+        super().__init__()
         self.cards = _Cards()
         self.items = {name: QListWidgetItem(_titled(name)) for name in in_order(SCENES)}
         for item in self.items.values():

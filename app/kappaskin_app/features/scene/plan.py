@@ -97,8 +97,8 @@ class EffectsPanel(QWidget):
 
     forced = Signal(str, str)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.summary = QLabel(wordWrap=True)  # pyright: ignore[reportCallIssue]
         self.table = Table(
             "effects", "Effects of the scene", _COLUMNS, _TIPS, (_SIZE, _ERROR, _TIME), (_WHY,)

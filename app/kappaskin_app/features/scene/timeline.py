@@ -36,8 +36,8 @@ def profile(scene: Scene) -> Array:
 class Track(Course):
     """The profile of the force, with a handle."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Time in the scene, in ms", _TRACK_TIP, parent)
+    def __init__(self) -> None:
+        super().__init__("Time in the scene, in ms", _TRACK_TIP)
         self.frame = _FRAME
         self._profile, self._moments = np.zeros(_SAMPLES), [0.0]
         self._shaped, self._shape = QRectF(), QPolygonF()
@@ -89,8 +89,8 @@ class Timeline(QWidget):
     sought = Signal(float)
     play_wanted = Signal(bool)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.setAccessibleName("Timeline")
         self.play = glyph_button("timeline-play")
         self.track, self.clock = Track(), Clock(_TIP)

@@ -20,8 +20,8 @@ _THINNEST = 0.2  # of the longer side, so that a narrow skin is visible
 class ModeMap(QWidget):
     """Draws a surface (ny, nx) between -1 and 1, NaN off the skin; dead elements are crossed."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._surface: Array | None = None
         self._layout: SensorLayout | None = None
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
@@ -89,8 +89,8 @@ class SpectrumPlot(QWidget):
 
     chosen = Signal(int)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.spectrum: Spectrum | None = None
         self._number, self._empty = 0, ""
         self._axis = LogAxis(0.1, 1.0)

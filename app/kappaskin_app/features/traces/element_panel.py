@@ -24,8 +24,8 @@ class ElementPanel(QWidget):
 
     plot_toggled = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.title, self.facts = QLabel(_NONE), QLabel()
         for label in (self.title, self.facts):
             label.setTextFormat(Qt.TextFormat.RichText)
@@ -84,8 +84,8 @@ class Traces(QWidget):
 
     pointed = Signal(int)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         titles = [(f"{of.traced} {name}", of.unit) for of in TRACED for name in COMPONENTS]
         self.plots = [CurvePlot(title, unit, True, _TRACE.format(title)) for title, unit in titles]
         around = QHBoxLayout(self)
