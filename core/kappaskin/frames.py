@@ -11,6 +11,7 @@ Array = NDArray[np.float64]
 Counts = NDArray[np.int32]
 Indices = NDArray[np.intp]
 Mask = NDArray[np.bool_]
+Indices = NDArray[np.intp]
 
 COMPONENTS = ("xx", "yy", "xy")
 """Curvature components, in the one order used everywhere."""

@@ -79,7 +79,7 @@ def test_every_number_spent_is_decoded_and_the_contact_follows(
     assert counts.accepted == told["spent"]
     assert window.session.status.events[-1].kind == "gone"
     assert device.port in window.connection.message.text()
-    assert window.membrane.greyed
+    assert window.membrane.surface.lost
 
     again = Device()
     try:
@@ -87,7 +87,7 @@ def test_every_number_spent_is_decoded_and_the_contact_follows(
         window.connection.connect_button.click()
         until(lambda: window.display.badge.state == "SIM")
         shown = len(errors)
-        until(lambda: len(errors) > shown + 20 and not window.membrane.greyed)
+        until(lambda: len(errors) > shown + 20 and not window.membrane.surface.lost)
     finally:
         again.stop(signal.SIGKILL)
 

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import QApplication
 from kappaskin import Pipeline, Setup, Simulator, Status, load_scene
 from kappaskin_app.features.contact.numbers import ELEMENTS, elements_of, facts_of
 from kappaskin_app.features.contact.readouts import Readouts
-from kappaskin_app.features.heatmaps.maps import HeatmapGrid
+from kappaskin_app.features.heatmaps.heatmap import HeatmapGrid
 from kappaskin_app.features.lessons.lesson_file import READOUTS
 from kappaskin_app.features.traces.element_panel import ElementPanel, Traces
 from kappaskin_app.features.traces.selected_element import facts

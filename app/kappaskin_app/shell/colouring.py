@@ -5,12 +5,11 @@ import time
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kappaskin.bases import basis_for
 from kappaskin.errors import RankDeficient
 from kappaskin.estimation import FAULTS, Estimator, estimator_for
-from kappaskin.frames import Estimate
+from kappaskin.frames import Array, Estimate
 from kappaskin.live import Status
 from kappaskin.pipeline import ErrorBars, Quantities, SkinColour, skin_colours
 from kappaskin_app.shell.background import BackgroundTask, Tasks
@@ -18,9 +17,6 @@ from kappaskin_app.shell.settings import Settings
 from kappaskin_app.theme import DIVERGING, PULLED, SEQUENTIAL
 from kappaskin_app.widgets.text import round_up
 from kappaskin_app.widgets.tint import Tint, rgb_of
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _UNITS = {"m": (1e3, "mm"), "1/m": (1.0, "1/m"), "1/m^2": (1.0, "1/m\u00b2"), "": (1.0, "")}
 _DIGITS = {"mm": ".3f", "1/m": ".2f", "1/m\u00b2": ".3g"}

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QWidget
 
 from kappaskin.contact import ContactObject
 from kappaskin.estimation import FAULTS
-from kappaskin.frames import COMPONENTS, Estimate
+from kappaskin.frames import COMPONENTS, Array, Estimate, Mask
 from kappaskin.live import Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import Tasks
@@ -29,8 +29,6 @@ _OLD = (LOST, OFF, STALE, WAITING, GAP)  # the values shown are not the present 
 _HINT, _NO_LOAD_HINT = "Drag the red arrow to move the load; F1: shortcuts", "F1: shortcuts"
 _NUMBERS = 0.2  # s between two updates of numbers
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Kinds = NDArray[np.uint8]
 
 

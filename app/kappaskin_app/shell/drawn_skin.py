@@ -5,12 +5,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from kappaskin.frames import Array, Indices
 from kappaskin.skin import Patch, interpolated, snapped_to_rim
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 MM = 1e3
 _DEEPEST = 0.45  # of the shorter side that a skin is drawn deep at most, to stay in the picture

@@ -3,19 +3,14 @@
 import inspect
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor
-from PySide6.QtWidgets import (
-    QAbstractItemView,
-    QHeaderView,
-    QSizePolicy,
-    QTableWidget,
-    QTableWidgetItem,
-)
+from PySide6.QtGui import QColor, QFont
+from PySide6.QtWidgets import QSizePolicy
 
 from kappaskin.scenes.effects import EFFECTS
 from kappaskin.studies import EffectCost
 from kappaskin_app.theme import current, follow_look
-from kappaskin_app.widgets.layout import fit_rows
+from kappaskin_app.widgets.lettering import LEFT, RIGHT
+from kappaskin_app.widgets.table import Table
 from kappaskin_app.widgets.text import NONE, duration, length
 
 
@@ -38,31 +33,28 @@ _COLUMNS = {
     "With": "RMS error of the shape with the effect; bold where the effect is simulated.",
     "Without": "RMS error of the shape without the effect; bold where the effect is omitted.",
 }
+_NUMBERS = (2, 3, 4)
 
 
-class EffectsTable(QTableWidget):
+class EffectsTable(Table):
     """One row per effect; the present error is bold, an omitted effect faint."""
 
     def __init__(self) -> None:
-        super().__init__(0, len(_COLUMNS))
+        tips = tuple(_COLUMNS.values())
+        super().__init__("costs", "Cost of each effect", tuple(_COLUMNS), tips, _NUMBERS, (0,))
         self._shown: tuple[EffectCost, ...] = ()
-        for column, (name, tip) in enumerate(_COLUMNS.items()):
-            item = _cell(name, column)
-            item.setToolTip(tip)
-            self.setHorizontalHeaderItem(column, item)
         header = self.horizontalHeader()
-        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
-        header.setHighlightSections(False)
+        header.setDefaultAlignment(LEFT)
+        for column in _NUMBERS:
+            header.model().setHeaderData(
+                column, Qt.Orientation.Horizontal, RIGHT, Qt.ItemDataRole.TextAlignmentRole
+            )
         header.setMinimumSectionSize(20)
-        self.verticalHeader().hide()
         # As high as the space allows: the table scrolls.
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
         self.setShowGrid(False)
-        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        self.setSelectionMode(Table.SelectionMode.NoSelection)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.setAccessibleName("Cost of each effect")
         follow_look(self, self._fill)
 
     def show_effects(self, effects: tuple[EffectCost, ...]) -> None:
@@ -73,8 +65,7 @@ class EffectsTable(QTableWidget):
         self._fill()
 
     def _fill(self) -> None:
-        fit_rows(self)
-        self.setRowCount(len(self._shown))
+        self.fit_rows(len(self._shown))
         for row, cost in enumerate(self._shown):
             errors = ((cost.rms_with, cost.kept), (cost.rms_without, not cost.kept))
             texts = [
@@ -83,23 +74,13 @@ class EffectsTable(QTableWidget):
                 duration(cost.time_per_frame),
             ]
             texts += [NONE if rms is None else length(rms) for rms, _ in errors]
+            bold = [False] * (len(texts) - len(errors)) + [now for _, now in errors]
             for column, text in enumerate(texts):
-                item = _cell(text, column)
-                item.setToolTip(_tip(cost))
-                if not cost.kept:
-                    item.setForeground(QColor(current().faint))
-                if column >= len(texts) - len(errors) and errors[column - len(texts)][1]:
-                    font = item.font()
-                    font.setBold(True)
-                    item.setFont(font)
-                self.setItem(row, column, item)
-
-
-def _cell(text: str, column: int) -> QTableWidgetItem:
-    item = QTableWidgetItem(text)
-    side = Qt.AlignmentFlag.AlignLeft if column < 2 else Qt.AlignmentFlag.AlignRight
-    item.setTextAlignment(side | Qt.AlignmentFlag.AlignVCenter)
-    return item
+                item = self.write(row, column, text, _tip(cost))
+                item.setForeground(QColor(current().text if cost.kept else current().faint))
+                font = QFont()
+                font.setBold(bold[column])
+                item.setFont(font)
 
 
 def _tip(cost: EffectCost) -> str:

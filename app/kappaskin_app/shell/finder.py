@@ -246,8 +246,8 @@ def clearable(editor: QLineEdit | QKeySequenceEdit) -> None:
 class Listing(QTreeWidget):
     """Rows of three texts; the arrow keys in `line` select one."""
 
-    def __init__(self, line: QLineEdit, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, line: QLineEdit) -> None:
+        super().__init__()
         self.setColumnCount(3)
         self.setHeaderHidden(True)
         self.setRootIsDecorated(False)

@@ -9,6 +9,7 @@ import platformdirs
 
 from kappaskin.recording import is_written, unused
 
+RECORDINGS = "Recording (*.mcap)"
 _OFFERED = 8  # recent ones
 _PART = ".part"
 

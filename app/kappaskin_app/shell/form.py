@@ -63,8 +63,8 @@ class SeveralButton(QToolButton):
 
     chosen = Signal(tuple)
 
-    def __init__(self, options: tuple[tuple[str, str], ...], parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, options: tuple[tuple[str, str], ...]) -> None:
+        super().__init__()
         self._options = options
         self.setMenu(_OpenMenu(self))
         self.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)

@@ -27,6 +27,7 @@ from kappaskin_app.shell.arrangement import (
 from kappaskin_app.shell.docks import Docks
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.pages import LIVE, Pages
+from kappaskin_app.widgets.parts import ELLIPSIS
 
 _HELD = 50  # ms between two checks whether the mouse button is released
 
@@ -157,7 +158,6 @@ def _discrete_part(seen: WindowArrangement) -> object:
 
 
 _MENU = "Layo&ut"
-_DOTS = "\N{HORIZONTAL ELLIPSIS}"
 _LONGEST = 60  # characters of a name
 _LIVE = "Live"
 _LIVE_TIP = "Settings and curvature beside the skin: the default layout"
@@ -236,9 +236,24 @@ class Layouts(QObject):
         own = add("layout-own", text="Your &own", act=lambda: None, tip="Layouts you saved")
         own.setMenu(self._menu)
         for name, text, act, tip in (
-            ("save", f"Sa&ve this layout{_DOTS}", self.ask_name, "Save this layout under a name"),
-            ("rename", f"Re&name a layout{_DOTS}", self.ask_rename, "Rename one of your layouts"),
-            ("delete", f"&Delete a layout{_DOTS}", self.ask_delete, "Delete one of your layouts"),
+            (
+                "save",
+                f"Sa&ve this layout{ELLIPSIS}",
+                self.ask_name,
+                "Save this layout under a name",
+            ),
+            (
+                "rename",
+                f"Re&name a layout{ELLIPSIS}",
+                self.ask_rename,
+                "Rename one of your layouts",
+            ),
+            (
+                "delete",
+                f"&Delete a layout{ELLIPSIS}",
+                self.ask_delete,
+                "Delete one of your layouts",
+            ),
             ("reset", "&Reset the layout", self.reset, "All panels to their default places"),
         ):
             add(f"layout-{name}", text=text, act=act, tip=tip)

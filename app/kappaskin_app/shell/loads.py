@@ -7,10 +7,10 @@ from functools import lru_cache
 from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kappaskin.bases import Basis, basis_for
 from kappaskin.errors import Refusal
+from kappaskin.frames import Array
 from kappaskin.mechanics import (
     Compliance,
     DiscLoad,
@@ -53,8 +53,6 @@ class Cache(Generic[_Arguments, _Result]):
         if len(self._results) > self._size:
             del self._results[next(iter(self._results))]
 
-
-Array = NDArray[np.float64]
 
 REFERENCE = (15, 15)
 """Basis functions of the true shape, as in Table 1."""

@@ -12,6 +12,7 @@ from kappaskin_app.shell.finder import EntrySource, Finder, entries_in
 from kappaskin_app.shell.parts import EDIT, FILE, HELP, VIEW, Parts
 from kappaskin_app.shell.shortcuts import ShortcutDialog
 from kappaskin_app.shell.welcome import Welcome
+from kappaskin_app.widgets.parts import ELLIPSIS
 
 _LONGEST = 60  # characters of a step in a menu
 _TIPS = {
@@ -44,15 +45,12 @@ class UndoActions(QObject):
     def _show(self, *_: object) -> None:
         for name, text in (("undo", self._stack.undoText()), ("redo", self._stack.redoText())):
             word, action = name.capitalize(), self._actions[name]
-            cut = (
-                text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}\N{HORIZONTAL ELLIPSIS}"
-            )
+            cut = text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}{ELLIPSIS}"
             action.setText(f"&{word}: {cut.replace('&', '&&')}" if text else f"&{word}")
             action.setToolTip(f"{word}: {text}" if text else _TIPS[name])
             self._actions.allow(name, "" if text else f"there is nothing to {name}")
 
 
-DOTS = "\N{HORIZONTAL ELLIPSIS}"
 _FIND = "Find commands, settings, scenes, panels and files by a few letters"
 _RESET = "All settings to their defaults, except calibration, tare and publishing"
 _PAUSE = "Pause or continue a scene or a recording; a sensor is not paused"
@@ -95,7 +93,7 @@ class Menus(QObject):
         )
         add("reset", EDIT, "&Reset settings", window.requests.reset, "", _RESET)
         find = self.finder.open_empty
-        add("find", EDIT, f"&Find a command{DOTS}", find, "Ctrl+K", _FIND)
+        add("find", EDIT, f"&Find a command{ELLIPSIS}", find, "Ctrl+K", _FIND)
         add("pause", VIEW, "&Pause or continue", window.session.pause, "Ctrl+P", _PAUSE)
         add("theme", VIEW, "Light or &dark", window.requests.switch_theme, "Ctrl+T", _THEME)
 

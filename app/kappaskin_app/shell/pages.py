@@ -3,7 +3,7 @@
 from typing import TypeVar
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QScrollArea, QTabWidget, QWidget
+from PySide6.QtWidgets import QScrollArea, QTabWidget
 
 from kappaskin.live import Status
 from kappaskin_app.shell.form import Form
@@ -28,8 +28,8 @@ class Pages(QTabWidget):
     reset_requested = Signal(str, tuple)
     guide_requested = Signal(str)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._pages: dict[str, list[Panel]] = {}
 
     def add(self, page: str, panel: _Some) -> _Some:

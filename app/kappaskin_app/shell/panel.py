@@ -1,7 +1,7 @@
 """Panels: titled boxes that show a state and request changes of settings."""
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtGui import QGuiApplication, QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
     QGroupBox,
@@ -17,6 +17,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.theme import ALERT, FAINT, current, follow_look
 from kappaskin_app.widgets.layout import scroll_to
+from kappaskin_app.widgets.text import COMMAND
 
 _GROWN = 20  # ms after which the page of a panel that grew has grown too
 
@@ -80,6 +81,11 @@ class Panel(QGroupBox):
             self.message.setText(text)
             self.message.setForegroundRole(FAINT if hint else ALERT)
         self.message.setVisible(bool(text))
+
+    def _copy_command(self) -> None:
+        """Copy the command in the message."""
+        if command := COMMAND.search(self.message.text()):
+            QGuiApplication.clipboard().setText(command[1])
 
     def _dress(self) -> None:
         style = f'style="color: {current().accent}"'

@@ -182,11 +182,8 @@ class Session(QObject):
         self._preparation = ScenePreparation(tasks, self._play)
         self.base: Setup | None = None
         if engine.resumed is None:
-            self.requested_setup = _setup_of(history.settings)
-            engine.set_up(self.requested_setup)
+            engine.set_up(_setup_of(history.settings))
             engine.scan(region_of(history.settings))
-        else:
-            self.requested_setup = engine.resumed.requested.setup
         self._cylinder: CylinderStep | None = None
         self.status = Status()
         self._lost_since, self._turned_at = math.inf, 0.0
@@ -292,11 +289,11 @@ class Session(QObject):
             setup = replace(setup, calibration=None, tare=None)
         if not self.inside and self.base is None:
             setup = replace(setup, hold=max(setup.hold, _turn(region_of(self._settings))))
-        if setup != self.requested_setup:
-            if self.inside and setup.calibration and not self.requested_setup.calibration:
+        requested = self.engine.requested.setup
+        if setup != requested:
+            if self.inside and setup.calibration and not requested.calibration:
                 # A calibration tracks hysteresis from rest: these effects restart.
                 self.engine.restart_effects()
-            self.requested_setup = setup
             self.engine.set_up(setup)
 
     def _scan(self) -> None:

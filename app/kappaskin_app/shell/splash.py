@@ -7,6 +7,7 @@ from PySide6.QtGui import QColor, QGuiApplication, QMouseEvent, QPainter, QPaint
 from PySide6.QtWidgets import QApplication, QLabel, QVBoxLayout, QWidget
 
 from kappaskin_app.theme import FAINT, current
+from kappaskin_app.widgets.parts import ELLIPSIS
 
 if TYPE_CHECKING:
     from kappaskin_app.shell.parts import Parts
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
 _WIDTH = 66  # letters wide
 _MOST = 2500  # ms that it is shown without a reading
 _READING = "Waiting for the first reading"
-_DOTS = "\N{HORIZONTAL ELLIPSIS}"
 
 
 class Splash(QWidget):
@@ -39,7 +39,7 @@ class Splash(QWidget):
 
     def say(self, words: str) -> None:
         """Show this at once: nothing else is drawn while modules are loaded."""
-        self.words.setText(words + _DOTS)
+        self.words.setText(words + ELLIPSIS)
         self.words.setAccessibleName(self.words.text())
         QApplication.processEvents()
 

@@ -19,8 +19,8 @@ class Activity(QWidget):
 
     cancel_wanted = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.words, self.cancel = QLabel(), QToolButton()
         self.words.setToolTip(_ACTIVITY_TIP)
         self.cancel.setText("Cancel")
@@ -80,8 +80,8 @@ def warnings(estimate: Estimate, strained: int) -> str:
 class Notice(QLabel):
     """Shows a hint, or a warning in the colour of alarms."""
 
-    def __init__(self, hint: str, parent: QWidget | None = None) -> None:
-        super().__init__(hint, parent)
+    def __init__(self, hint: str) -> None:
+        super().__init__(hint)
         self._hint, self.warning = hint, ""
         self.setContentsMargins(4, 0, 12, 0)
         self.setMinimumWidth(self.sizeHint().width())  # else the widgets to its right would move

@@ -23,11 +23,12 @@ _WIDTH = 560  # px
 
 
 class WorkDialog(QDialog):
-    """A `form` that starts `work` in the background and shows its progress.
+    """A `form` that starts `work`, which writes the file `to`, and shows its progress.
 
     `work` yields shares from 0 to 1 and at last a result, which `result_text` describes; it
     raises a `Refusal` where it cannot start. Closing the dialog cancels it. `task` is its name
-    in the status bar.
+    in the status bar. It can start when none of the lines `needed` is empty; while it runs the
+    `inputs` cannot be changed.
     """
 
     def __init__(
@@ -53,11 +54,24 @@ class WorkDialog(QDialog):
         self.bar.setSizePolicy(keeping)
         self.bar.hide()  # while there is no progress to show
         self.words.setWordWrap(True)
+        self.to = QLineEdit()
+        self.choose_file = browse_button(self._choose_file)
+        self.needed, self.inputs = [self.to], list[QWidget]((self.to, self.choose_file))
+        self.to.textChanged.connect(guarded(lambda *_: self._allow()))
         self.begin_button, self.cancel_button = QPushButton(verb), QPushButton("&Cancel")
+        self.begin_button.setDefault(True)
         self.cancel_button.setAutoDefault(False)
         self.begin_button.setToolTip("Start in the background; an error is shown below.")
         self.begin_button.clicked.connect(guarded(lambda *_: self._start()))
         self.cancel_button.clicked.connect(guarded(lambda *_: self.cancel()))
+
+    def _add_file(self, words: str, line: QLineEdit, button: QPushButton) -> None:
+        """Add a line for a path, called `words`, with a button to choose it."""
+        label, row = QLabel(words), QHBoxLayout()
+        label.setBuddy(line)
+        row.addWidget(line, 1)
+        row.addWidget(button)
+        self.form.addRow(label, row)
 
     def _add_buttons(self) -> None:
         """Lay out the form and what is below it, in the order of Tab."""
@@ -69,12 +83,20 @@ class WorkDialog(QDialog):
         for widget in (self.bar, self.words):
             layout.addWidget(widget)
         layout.addLayout(buttons)
+        self._allow()
 
     def _allow(self) -> None:
         """Enable what can be used now."""
         self.cancel_button.setText("&Cancel" if self.busy else "C&lose")
         tip = "Cancel; no partial file is left." if self.busy else "Close (Esc)."
         self.cancel_button.setToolTip(tip)
+        for widget in self.inputs:
+            widget.setEnabled(not self.busy)
+        complete = all(line.text().strip() for line in self.needed)
+        self.begin_button.setEnabled(complete and not self.busy)
+
+    def _choose_file(self) -> None:
+        """Ask for the file to write."""
 
     @property
     def busy(self) -> bool:
@@ -151,12 +173,6 @@ def with_ending(name: str, ending: str) -> Path:
     return path
 
 
-def label_for(words: str, line: QLineEdit) -> QLabel:
-    label = QLabel(words)
-    label.setBuddy(line)
-    return label
-
-
 def browse_button(choose: Callable[[], None]) -> QPushButton:
     """A button that opens a file dialog."""
     button = QPushButton("Choose\N{HORIZONTAL ELLIPSIS}")
@@ -164,10 +180,3 @@ def browse_button(choose: Callable[[], None]) -> QPushButton:
     button.setAutoDefault(False)  # or Enter in a line would press the first of them
     button.clicked.connect(guarded(lambda *_: choose()))
     return button
-
-
-def with_button(line: QLineEdit, button: QPushButton) -> QHBoxLayout:
-    layout = QHBoxLayout()
-    layout.addWidget(line, 1)
-    layout.addWidget(button)
-    return layout

@@ -21,8 +21,8 @@ class ColourBar(QWidget):
     Kinds, which have no scale, have the legend only.
     """
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._tint = Tint(DIVERGING, (-1.0, 1.0), "1/m")
         self.legend: tuple[tuple[str, str], ...] = ()
         """Colours, as #rrggbb, with their words, the lowest first."""
@@ -113,8 +113,8 @@ class LockButton(QToolButton):
 
     wanted = Signal(bool)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.setCheckable(True)
         self.setToolTip("Fix the colour range; otherwise it follows the values shown.")
         self.clicked.connect(self._ask)
@@ -134,8 +134,8 @@ class SkinScale(QWidget):
 
     lock_wanted = Signal(bool)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.what = QLabel(alignment=Qt.AlignmentFlag.AlignHCenter)  # pyright: ignore[reportCallIssue]
         self.bar, self.lock = ColourBar(), LockButton()
         self.bar.show_scale(SEQUENTIAL, (0.0, 1.0), "mm")

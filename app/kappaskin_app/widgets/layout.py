@@ -1,4 +1,4 @@
-"""Layouts of widgets: rows, scrolled columns, flow, table rows."""
+"""Layouts of widgets: rows, scrolled columns, flow."""
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QSize, Qt
 from PySide6.QtGui import QResizeEvent, QShowEvent
@@ -9,7 +9,6 @@ from PySide6.QtWidgets import (
     QLayoutItem,
     QMainWindow,
     QScrollArea,
-    QTableWidget,
     QVBoxLayout,
     QWidget,
 )
@@ -105,8 +104,8 @@ _GAP = 6  # px between two widgets, and between two lines
 class Flow(QLayout):
     """A layout of widgets in lines, like words; at least as wide as the widest."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._items: list[QLayoutItem] = []
 
     # What Qt asks of a layout.
@@ -169,14 +168,3 @@ def _put(line: list[QLayoutItem], at: QPoint, high: int) -> None:
         size = item.sizeHint()
         item.setGeometry(QRect(QPoint(x, at.y() + (high - size.height()) // 2), size))
         x += size.width() + _GAP
-
-
-_ROOM = 5  # px above and below a line together
-
-
-def fit_rows(table: QTableWidget) -> None:
-    """Set the row height of a `table` to a line of its present font."""
-    header, line = table.verticalHeader(), table.fontMetrics().height()
-    if header.defaultSectionSize() != line + _ROOM:
-        header.setMinimumSectionSize(line)
-        header.setDefaultSectionSize(line + _ROOM)

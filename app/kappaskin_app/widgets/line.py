@@ -4,6 +4,8 @@ from PySide6.QtCore import QEvent, QSize, Qt
 from PySide6.QtGui import QFontMetrics, QHelpEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
+from kappaskin_app.widgets.lettering import LEFT
+
 
 class Line(QWidget):
     """A line of text drawn in place; a QLabel would lay out the whole window again.
@@ -58,8 +60,7 @@ class Line(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setPen(self.palette().windowText().color())
-        flags = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
         text = painter.fontMetrics().elidedText(
             self.shown, Qt.TextElideMode.ElideRight, self.width()
         )
-        painter.drawText(self.rect(), flags, text)
+        painter.drawText(self.rect(), LEFT, text)

@@ -12,25 +12,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin.calibration import Calibration
-from kappaskin.frames import COMPONENTS
-
-FILES = "Calibration (*.toml)"
 ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
-EQUATION_8 = (
-    "Nominal curvature, as Eq. 8 reads it from the voltage: kappa = 4 V / (V_in GF (t_s + t_g) G). "
-)
-
-
-def said(calibration: Calibration) -> str:
-    """A calibration in a few words."""
-    passed, all_ = int(np.isfinite(calibration.gain).sum()), len(calibration.gain)
-    day = calibration.date.astimezone()
-    return f"calibrated {day:%Y-%m-%d}, {passed} of {all_} channels"
-
-
-def named(channel: int, elements: int) -> str:
-    return f"{COMPONENTS[channel // elements]} of element {channel % elements}"
 
 
 def number(value: float, how: str) -> str:

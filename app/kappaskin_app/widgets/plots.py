@@ -5,11 +5,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from kappaskin.frames import Array
 from kappaskin_app.theme import current, series
 from kappaskin_app.widgets.text import in_digits, round_up
 
@@ -62,8 +62,6 @@ def _rounded(value: float, down: bool) -> float:
     return min(d * power for d in (*_ROUND, 10.0) if d * power >= value * (1 - 1e-9))
 
 
-Array = NDArray[np.float64]
-
 _RIGHT, _TOP = 8.0, 4.0
 _WIDEST = "\N{MINUS SIGN}0.15"  # of the numbers, more or less
 _THIN = 1.0  # px: what is a little wider takes Qt fourteen times as long
@@ -86,10 +84,8 @@ class CurvePlot(QWidget):
 
     pointed = Signal(int)
 
-    def __init__(
-        self, title: str, unit: str, signed: bool, tip: str, parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, title: str, unit: str, signed: bool, tip: str) -> None:
+        super().__init__()
         self._title, self._unit, self._signed = title, unit, signed
         self._empty = ""
         self._x: Array = np.empty(0)
@@ -181,9 +177,7 @@ class CurvePlot(QWidget):
         painter.fillRect(area, QColor(theme.base))
         self._paint_words(painter, area)
         if not self.curves:
-            painter.setPen(QColor(theme.faint))
-            flags = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
-            painter.drawText(area.adjusted(6, 2, -6, -2), flags, self._empty)
+            paint_empty(painter, area, self._empty)
             return
         painter.setClipRect(area)
         for curve in sorted(self.curves, key=lambda curve: curve.element == self._marked >= 0):
@@ -216,6 +210,13 @@ class CurvePlot(QWidget):
             painter.setPen(series(curve.number))
             painter.drawText(QPointF(x, painter.fontMetrics().ascent() + 1), curve.name)
             x += painter.fontMetrics().horizontalAdvance(curve.name) + 8
+
+
+def paint_empty(painter: QPainter, area: QRectF, text: str) -> None:
+    """Write a text in the middle of a plot without values."""
+    painter.setPen(QColor(current().faint))
+    flags = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
+    painter.drawText(area.adjusted(6, 2, -6, -2), flags, text)
 
 
 def as_seen(x: Array, y: Array) -> tuple[Array, Array]:

@@ -1,17 +1,15 @@
 """A surface as a map in colours, seen from above, with its scale and where the contact is."""
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
+from kappaskin.frames import Array
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, SEQUENTIAL, Colours, current, follow_look
 from kappaskin_app.widgets.colour_bar import ColourBar
 from kappaskin_app.widgets.line import Line
 from kappaskin_app.widgets.tint import Tint
-
-Array = NDArray[np.float64]
 
 _DOT = 1.8  # px, the radius of a point
 _LINES = 5  # of letters, as high as a map is at least
@@ -21,8 +19,8 @@ _CROSS = 6.0  # px from the middle of a contact's cross to its ends
 class _Map(QWidget):
     """The colours, in the proportions of the skin."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self._image: QImage | None = None
         self._contact, self._sides, self._faded = np.full(2, np.nan), (1.0, 1.0), False
@@ -96,8 +94,8 @@ class _Map(QWidget):
 class SurfaceMap(QWidget):
     """A titled map with its scale and a line of words below."""
 
-    def __init__(self, title: str, unit: str, tip: str, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, title: str, unit: str, tip: str) -> None:
+        super().__init__()
         self.title, self.words = QLabel(title), Line()
         bold = self.title.font()
         bold.setBold(True)

@@ -3,12 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from kappaskin.frames import Array, Mask
 from kappaskin_app.theme import DARK_INK, DIVERGING, LIGHT_INK, SATURATED, Colours
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 def rgb_of(*colours: str) -> Colours:

@@ -75,7 +75,7 @@ class Engine:
             self._requests = RequestSender(Requested().changing(setup=setup or Setup()))
             self._ring, self._compared_ring = Ring.pair()
             try:
-                self._start(Status(setup=self._requested.setup))
+                self._start(Status(setup=self.requested.setup))
             except BaseException:
                 self._release_memory()
                 raise
@@ -84,7 +84,8 @@ class Engine:
             self._resume(process)
 
     @property
-    def _requested(self) -> Requested:
+    def requested(self) -> Requested:
+        """What is requested of the engine now."""
         return self._requests.requested
 
     def _resume(self, process: ResumedProcess) -> None:
@@ -115,7 +116,7 @@ class Engine:
         if self.resumed is not None:
             self._release_memory()
             self._ring, self._compared_ring, self.resumed = *Ring.pair(), None
-        setup, source = self._requested.setup, self._requested.source
+        setup, source = self.requested.setup, self.requested.source
         fresh = Status(
             setup=setup,
             generation=was.generation,
@@ -140,7 +141,7 @@ class Engine:
             was = self._ring.read_status() or self._seen
             self._ring.write_status(was.after((Event(now, "engine", _GIVEN_UP),)))
             return
-        requested = self._requested
+        requested = self.requested
         if requested.recording is not None:
             # Beside the one that broke off, which `repair` makes whole.
             self._requests.change(recording=unused(requested.recording))
@@ -156,7 +157,7 @@ class Engine:
     @property
     def source(self) -> str | None:
         """The source that is requested, None where there is to be none."""
-        return self._requested.source
+        return self.requested.source
 
     @property
     def pid(self) -> int | None:
@@ -199,7 +200,7 @@ class Engine:
         still read. A recording that is `looped` restarts at its end. `status` has the position.
         """
         Playback(at or 0.0, 0.0, speed)  # or refused here
-        after = self._requested.looped if looped is None else looped
+        after = self.requested.looped if looped is None else looped
         self._requests.act(Seek(at, speed, looped), speed=speed, looped=after)
 
     def restart_effects(self) -> None:
@@ -286,7 +287,7 @@ class Engine:
     def _reap(self) -> None:
         """Wait for the process to end; kill it after a time limit."""
         if self._process is not None:
-            self._process.join(_ORDERLY if self._requested.recording is None else _WRITTEN)
+            self._process.join(_ORDERLY if self.requested.recording is None else _WRITTEN)
             if self._process.is_alive():
                 self._process.kill()
                 self._process.join()

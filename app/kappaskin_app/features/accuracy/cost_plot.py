@@ -11,7 +11,7 @@ from kappaskin.studies import Cost
 from kappaskin_app.features.accuracy.measurement import Frontier, setting_text
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
 from kappaskin_app.theme import current, series
-from kappaskin_app.widgets.plots import LogAxis
+from kappaskin_app.widgets.plots import LogAxis, paint_empty
 from kappaskin_app.widgets.text import duration, length
 
 _TOP = 10.0
@@ -31,8 +31,8 @@ class CostPlot(QWidget):
 
     chosen = Signal(object)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.frontier, self._present = Frontier(), None
         self._live: Point = (math.nan, math.nan)
         self._x, self._y = LogAxis(1e-5, 1e-2), LogAxis(1e-5, 1e-4)
@@ -129,9 +129,7 @@ class CostPlot(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.fillRect(area, QColor(theme.base))
         if not self.frontier.costs:
-            painter.setPen(QColor(theme.faint))
-            flags = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
-            painter.drawText(area.adjusted(8, 8, -8, -8), flags, self._empty)
+            paint_empty(painter, area, self._empty)
             return
         self._paint_axes(painter, area)
         self._paint_frontier(painter, area)

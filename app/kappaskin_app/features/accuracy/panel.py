@@ -39,8 +39,8 @@ class CostPanel(QWidget):
     The table shows the cost of each effect of the scene with the setting in use.
     """
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.plot = CostPlot()
         self._make_figures()
         self.required = QSlider(Qt.Orientation.Horizontal)

@@ -8,7 +8,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from kappaskin.calibration import (
@@ -25,8 +24,6 @@ from kappaskin.scenes.cylinders import CylinderStep, schedule
 from kappaskin.sensing import Sensor
 from kappaskin_app.shell.background import BackgroundTask, Cancelled, Tasks
 from kappaskin_app.shell.history import History
-
-Array = NDArray[np.float64]
 
 _SETTLE = 0.2  # s from the start of a step to its first reading
 _SILENCE = 5.0  # s without a reading after which a step is aborted

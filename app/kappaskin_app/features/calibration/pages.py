@@ -26,14 +26,16 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.theme import current, follow_look
 from kappaskin_app.widgets.parts import (
     ELLIPSIS,
-    EQUATION_8,
     Heading,
     button,
     in_a_row,
-    named,
     number,
     seconds_box,
     text_label,
+)
+
+EQUATION_8 = (
+    "Nominal curvature, as Eq. 8 reads it from the voltage: kappa = 4 V / (V_in GF (t_s + t_g) G). "
 )
 
 
@@ -298,7 +300,7 @@ class ResultPage(QWidget):
         report = self._result.report
         elements, failures = len(report.passed) // 3, dict(report.calibration.failures)
         lines = [
-            f'<a href="{c}" style="color: {current().accent}">{named(c, elements)}</a>: '
+            f'<a href="{c}" style="color: {current().accent}">{_name(c, elements)}</a>: '
             + failures.get(c, f"error {report.fitted.left_out[c]:.2f} 1/m")
             for c in self._worst
         ]
@@ -310,7 +312,7 @@ class ResultPage(QWidget):
             return ""
         report = self._result.report
         fit, why = report.fitted, dict(report.calibration.failures).get(channel)
-        name = named(channel, len(report.passed) // 3)
+        name = _name(channel, len(report.passed) // 3)
         if why:
             return f"{name} fails: {why}"
         return (
@@ -346,3 +348,7 @@ def _loop(result: Result, channel: int) -> Loop:
         float(report.fitted.gain[channel]),
         float(report.fitted.offset[channel]),
     )
+
+
+def _name(channel: int, elements: int) -> str:
+    return f"{COMPONENTS[channel // elements]} of element {channel % elements}"

@@ -10,20 +10,24 @@ from kappaskin.errors import Refusal
 from kappaskin.live import Status
 from kappaskin.scenes.cylinders import radii_for
 from kappaskin_app.features.calibration.controller import CalibrationController, parsed_radii
-from kappaskin_app.features.calibration.pages import CylinderStepPage, ResultPage, StartPage
+from kappaskin_app.features.calibration.pages import (
+    EQUATION_8,
+    CylinderStepPage,
+    ResultPage,
+    StartPage,
+)
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.panel import Panel
-from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings import Settings, calibration_text
 from kappaskin_app.widgets.parts import (
     ELLIPSIS,
-    EQUATION_8,
-    FILES,
     button,
     in_a_row,
-    said,
     sentence,
     text_label,
 )
+
+_FILES = "Calibration (*.toml)"
 
 
 class InUsePanel(Panel):
@@ -35,8 +39,8 @@ class InUsePanel(Panel):
     )
     guide_page = "calibrate"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("In use", parent)
+    def __init__(self) -> None:
+        super().__init__("In use")
         self.what = text_label()
         self.load = button(f"Load{ELLIPSIS}", "load", "Use a calibration from a file.")
         self.stop = button("Stop using", "stop", "Return to nominal curvature (Ctrl+Z undoes).")
@@ -47,7 +51,7 @@ class InUsePanel(Panel):
 
     def connect_to(self, controller: CalibrationController) -> None:
         def load() -> None:
-            path, _ = QFileDialog.getOpenFileName(self, "Load a calibration", "", FILES)
+            path, _ = QFileDialog.getOpenFileName(self, "Load a calibration", "", _FILES)
             if path:
                 controller.load(Path(path))
 
@@ -75,7 +79,7 @@ class InUsePanel(Panel):
         if found is None:
             text = "None: readings are nominal curvature (Eq. 8)."
         else:
-            text = f"{found.name} {found.serial_number},\n{said(found)}"
+            text = f"{found.name} {found.serial_number},\n{calibration_text(found)}"
             if self._in_progress:
                 alarm = "Not in use during a calibration."
             elif sensor is not None:
@@ -109,8 +113,8 @@ class CalibratePanel(Panel):
     )
     guide_page = "calibrate"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Cylinders of known radius", parent)
+    def __init__(self) -> None:
+        super().__init__("Cylinders of known radius")
         self.start, self.steps, self.result_page = StartPage(), CylinderStepPage(), ResultPage()
         for page in (self.start, self.steps, self.result_page):
             self.body.addWidget(page)
@@ -176,7 +180,7 @@ class CalibratePanel(Panel):
             return
         found = self._controller.result.report.calibration
         name = f"{found.serial_number}-{found.date.astimezone():%Y%m%d}.calibration.toml"
-        path, _ = QFileDialog.getSaveFileName(self, "Save the calibration", name, FILES)
+        path, _ = QFileDialog.getSaveFileName(self, "Save the calibration", name, _FILES)
         if path:
             self._controller.save(Path(path))
 

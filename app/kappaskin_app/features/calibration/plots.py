@@ -4,7 +4,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QColor,
@@ -19,11 +18,12 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
-from kappaskin.frames import COMPONENTS
+from kappaskin.frames import COMPONENTS, Array, Mask
 from kappaskin.scenes.cylinders import CylinderStep
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
 from kappaskin_app.theme import current
+from kappaskin_app.widgets.plots import paint_empty
 
 _POINTS = 61  # of the skin's cross-section
 _MOST_WRAPPED = math.pi  # rad: the rest of a long skin hangs down straight
@@ -36,8 +36,8 @@ _BENDS = {"x": (1.0, 0.0), "y": (0.0, 1.0), "diagonal": (math.sqrt(0.5), math.sq
 class CylinderView(QWidget):
     """Drawing of the skin on a cylinder, from the side to scale and from above."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._step: CylinderStep | None = None
         self._patch = Patch(0.1, 0.1)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -194,8 +194,6 @@ def _paint_arrow(painter: QPainter, skin: QRectF, dx: float, dy: float, colour: 
         painter.drawPolygon(QPolygonF([tip, back + across * 5.5, back - across * 5.5]))
 
 
-Array = NDArray[np.float64]
-
 _TOP, _RIGHT = 8.0, 10.0
 _HIGH = 158  # px of the plot without its captions
 _NUMBER_GAP = 6.0  # px between two numbers
@@ -211,8 +209,8 @@ class Loop:
 
     applied: Array
     read: Array
-    back: NDArray[np.bool_]
-    begins: NDArray[np.bool_]
+    back: Mask
+    begins: Mask
     gain: float
     offset: float
 
@@ -220,8 +218,8 @@ class Loop:
 class LoopPlot(QWidget):
     """Plot of a `Loop`: filled points at falling radii, open ones at rising radii."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._loop: Loop | None = None
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setToolTip(
@@ -248,8 +246,7 @@ class LoopPlot(QWidget):
         if loop is None or not np.isfinite(loop.read).any():
             area = self._area(0.0)
             painter.fillRect(area, QColor(theme.base))
-            painter.setPen(QColor(theme.faint))
-            painter.drawText(area, Qt.AlignmentFlag.AlignCenter, "No readings")
+            paint_empty(painter, area, "No readings")
             return
         most = 1.08 * max(
             float(np.abs(loop.applied).max()), float(np.nanmax(np.abs(loop.read))), 1e-9
@@ -346,8 +343,8 @@ class PassMap(QWidget):
 
     chosen = Signal(int)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._layout: SensorLayout | None = None
         self._failures: dict[int, str] = {}
         self._tips: list[str] = []

@@ -4,7 +4,6 @@ import math
 from datetime import datetime
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import QWidget
 
 from kappaskin.calibration import Tare, TareStore
 from kappaskin.errors import Refusal
@@ -178,8 +177,8 @@ class TarePanel(Panel):
     )
     guide_page = "connect"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Tare", parent)
+    def __init__(self) -> None:
+        super().__init__("Tare")
         self.what = text_label()
         self.drift = text_label(tip=_DRIFT)
         self.take = button("Tare now", "tare-now", _TAKE)

@@ -2,19 +2,15 @@
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin.frames import Estimate
+from kappaskin.frames import Array, Estimate
 from kappaskin.live import PipelineStatus, Status
 from kappaskin.pipeline import REPORTED, Readout, Setup, readouts
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import ComparedSettings, EstimatorSettings, Settings
 from kappaskin_app.shell.settings.form_fields import settings_from, setup_values
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +58,6 @@ class SetupComparison(QObject):
     def __init__(self, history: History, session: Session, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._history, self._session = history, session
-        self._requested: Setup | None = None
         self._active = False
         self._shown: tuple[int, ...] = ()
 
@@ -83,9 +78,8 @@ class SetupComparison(QObject):
     def _request(self) -> None:
         setup = None
         if self._active:
-            setup = other_setup(self._history.settings, self._session.requested_setup)
-        if setup != self._requested:
-            self._requested = setup
+            setup = other_setup(self._history.settings, self._session.engine.requested.setup)
+        if setup != self._session.engine.requested.compared:
             self._session.engine.compare(setup)
 
     def follow(self, status: Status) -> None:

@@ -3,15 +3,7 @@
 import math
 
 import numpy as np
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import (
-    QAbstractItemView,
-    QHBoxLayout,
-    QHeaderView,
-    QTableWidget,
-    QTableWidgetItem,
-    QWidget,
-)
+from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from kappaskin.bases import edges_of
 from kappaskin.live import PipelineStatus, Status
@@ -23,9 +15,10 @@ from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
 from kappaskin_app.theme import DIVERGING, SEQUENTIAL, follow_look, grown
-from kappaskin_app.widgets.layout import fit_rows, scrolled
+from kappaskin_app.widgets.layout import scrolled
 from kappaskin_app.widgets.parts import button, sentence, with_error
 from kappaskin_app.widgets.surface_map import SurfaceMap
+from kappaskin_app.widgets.table import Table
 
 _SETTINGS = (
     "other_x",
@@ -53,8 +46,8 @@ class OtherForm(Form):
     purpose = "A second setup for the same readings, to compare with the one in use (A)."
     guide_page = "accuracy"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("B", _SETTINGS, parent)
+    def __init__(self) -> None:
+        super().__init__("B", _SETTINGS)
         self.swap = button("Swap A and B", "swap", "Exchange the setup in use and B.")
         self.body.addWidget(self.swap)
 
@@ -72,9 +65,14 @@ class OtherForm(Form):
 class ComparePanel(QWidget):
     """The form of B, both surfaces, their difference, and the contact readouts of both."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.form, self.table = OtherForm(), self._made_table()
+    def __init__(self) -> None:
+        super().__init__()
+        self.form = OtherForm()
+        numbers = range(1, len(_COLUMNS))
+        title = "Contact readouts of A and B"
+        self.table = Table("compared", title, _COLUMNS, right=numbers, stretched=numbers)
+        self.table.setToolTip(_TABLE)
+        self.table.setSelectionMode(Table.SelectionMode.NoSelection)
         self.maps = {
             "a": SurfaceMap("A, in use", "mm", _SURFACE),
             "b": SurfaceMap("B", "mm", _SURFACE),
@@ -91,21 +89,6 @@ class ComparePanel(QWidget):
         around.addWidget(self.table, 3)
         self._empty()
         follow_look(self, lambda: self.table.setMinimumWidth(grown(_TABLE_WIDTH)))
-
-    def _made_table(self) -> QTableWidget:
-        table = QTableWidget(0, len(_COLUMNS))
-        table.setObjectName("compared")
-        table.setAccessibleName("Contact readouts of A and B")
-        table.setToolTip(_TABLE)
-        table.setHorizontalHeaderLabels(_COLUMNS)
-        table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
-        table.setTabKeyNavigation(False)
-        table.verticalHeader().hide()
-        header = table.horizontalHeader()
-        header.setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
-        header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
-        return table
 
     def connect_to(self, comparison: SetupComparison) -> None:
         """Show the pairs of `comparison`, and pass on the requests of the user."""
@@ -175,17 +158,7 @@ class ComparePanel(QWidget):
 
     def _show_figures(self, pair: Pair) -> None:
         figures = pair.figures()
-        fit_rows(self.table)
-        if self.table.rowCount() != len(figures):
-            self.table.setRowCount(len(figures))
-            for row in range(len(figures)):
-                for column in range(len(_COLUMNS)):
-                    item = QTableWidgetItem()
-                    if column:
-                        item.setTextAlignment(
-                            Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-                        )
-                    self.table.setItem(row, column, item)
+        self.table.fit_rows(len(figures))
         for row, (a, b) in enumerate(figures):
             texts = (
                 f"{a.label}, {a.unit}",
@@ -193,9 +166,7 @@ class ComparePanel(QWidget):
                 with_error(*b.less(a), a.digits, sign="+"),
             )
             for column, text in enumerate(texts):
-                item = self.table.item(row, column)
-                if item is not None and item.text() != text:
-                    item.setText(text)
+                self.table.write(row, column, text)
 
 
 def _largest(values: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> float:

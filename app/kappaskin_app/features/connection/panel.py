@@ -3,7 +3,6 @@
 import time
 
 from PySide6.QtCore import QObject, QSignalBlocker, Qt, QTimer, Signal
-from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
@@ -22,7 +21,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.form import pass_window_keys
 from kappaskin_app.shell.panel import Panel
-from kappaskin_app.widgets.parts import said
+from kappaskin_app.shell.settings import calibration_text
 from kappaskin_app.widgets.text import COMMAND, day
 
 _PERIOD = 1000  # ms between two searches
@@ -75,8 +74,8 @@ class ConnectionPanel(Panel):
     disconnect_requested = Signal()
     refresh_requested = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Connection", parent)
+    def __init__(self) -> None:
+        super().__init__("Connection")
         self._ports: list[Port] = []
         self._selected: Port | None = None  # the selected port, listed or not
         self._next_losses = 0.0
@@ -99,7 +98,7 @@ class ConnectionPanel(Panel):
         self.losses.setToolTip("Messages lost and bytes discarded since the source was connected.")
         self.copy_button = QPushButton("Copy the command")
         self.copy_button.setToolTip("Copy the command in the message above, for a terminal.")
-        self.copy_button.clicked.connect(self._copy)
+        self.copy_button.clicked.connect(self._copy_command)
         self.connect_button.clicked.connect(lambda: self.connect_requested.emit(self.source()))
         self._line = QLineEdit()
         self._line.returnPressed.connect(self.connect_button.click)
@@ -195,10 +194,6 @@ class ConnectionPanel(Panel):
         super().show_message(text, hint)
         self.copy_button.setVisible(bool(COMMAND.search(text)))
 
-    def _copy(self) -> None:
-        if command := COMMAND.search(self.message.text()):
-            QGuiApplication.clipboard().setText(command[1])
-
 
 def _port_text(port: Port) -> str:
     """Description of a port, and whether this user may open it."""
@@ -229,7 +224,7 @@ def _sensor_text(sensor: Sensor, calibration: Calibration | None) -> str:
     a, b, radius = (round(1e3 * length, 1) for length in (patch.a, patch.b, patch.radius))
     bent = f", radius {radius:g} mm" if patch.base_curvature else ""
     health = f"\n{dead} of {sensing.size} channels dead" if dead else ""
-    calibrated = f"\n{said(calibration)}" if calibration else ""
+    calibrated = f"\n{calibration_text(calibration)}" if calibration else ""
     return (
         f"{sensor.name} ({sensor.serial_number})\n{sensor.layout}, {sensor.edge}{health}\n"
         f"{a:g} x {b:g} mm{bent}, up to {sensor.rate:g} frames/s{calibrated}"

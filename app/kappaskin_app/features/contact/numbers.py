@@ -4,27 +4,18 @@ import csv
 import io
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
-from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import (
-    QAbstractItemView,
-    QHBoxLayout,
-    QHeaderView,
-    QPushButton,
-    QTableWidget,
-    QTableWidgetItem,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from kappaskin.estimation import FAULTS
 from kappaskin.frames import Estimate
 from kappaskin.pipeline import REPORTED, Reported, readouts
 from kappaskin.sensing import Sensor
 from kappaskin_app.guard import guarded
-from kappaskin_app.widgets.layout import fit_rows
+from kappaskin_app.widgets.lettering import LEFT
+from kappaskin_app.widgets.table import Table
 
 FACTS = ("Quantity", "Value", "95 % half-width", "Unit")
 _READ = tuple(quantity for quantity in REPORTED if quantity.traced)
@@ -80,8 +71,6 @@ def _text(value: float, digits: int) -> str:
     return f"{value + 0.0:.{digits}f}" if math.isfinite(value) else ""
 
 
-_LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
-_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 _MARGIN = 14  # px, margins of a column's head
 _LINES = 6  # visible of a table at least
 _PERIOD = 0.5  # s between two updates: faster is illegible
@@ -90,10 +79,11 @@ _PERIOD = 0.5  # s between two updates: faster is illegible
 class NumbersPanel(QWidget):
     """Tables of the contact and of every element, with a button to copy them as CSV."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.facts = _table("contact", "Contact and object", FACTS)
-        self.elements = _table("elements", "Readings of every element", ELEMENTS)
+    def __init__(self) -> None:
+        super().__init__()
+        self.facts = _table("contact", "Contact and object", FACTS, (1, 2))
+        texts = ELEMENTS.index("Fault")
+        self.elements = _table("elements", "Readings of every element", ELEMENTS, range(texts))
         self.copy = QPushButton("&Copy as CSV")
         self.copy.setToolTip("Copy both tables, for a spreadsheet.")
         self.copy.clicked.connect(guarded(lambda *_: self._copy()))
@@ -114,47 +104,27 @@ class NumbersPanel(QWidget):
         self._facts, self._elements = [], []
         if estimate is not None and sensor is not None:
             self._facts, self._elements = facts_of(estimate, what), elements_of(estimate, sensor)
-        _fill(self.facts, self._facts)
-        _fill(self.elements, self._elements)
+        _fill(self.facts, FACTS, self._facts)
+        _fill(self.elements, ELEMENTS, self._elements)
         if self._facts:
-            self.facts.setSpan(len(self._facts) - 1, 1, 1, len(FACTS) - 1)  # the text of the object
+            last, text = len(self._facts) - 1, self._facts[-1][1]
+            self.facts.setSpan(last, 1, 1, len(FACTS) - 1)
+            self.facts.write(last, 1, text, text).setTextAlignment(LEFT)  # that of the object
 
     def _copy(self) -> None:
         text = csv_of((FACTS, self._facts), (ELEMENTS, self._elements))
         QGuiApplication.clipboard().setText(text)
 
 
-def _table(name: str, title: str, head: Sequence[str]) -> QTableWidget:
-    table = QTableWidget(0, len(head))
-    table.setObjectName(name)
-    table.setAccessibleName(title)
-    table.setHorizontalHeaderLabels(list(head))
-    table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-    table.setTabKeyNavigation(False)  # Tab leaves the table, the arrows move in it
+def _table(name: str, title: str, head: Sequence[str], right: Collection[int]) -> Table:
+    table = Table(name, title, head, right=right, stretched=range(1, len(head)))
     table.setWordWrap(False)
-    table.verticalHeader().hide()
-    header = table.horizontalHeader()
-    header.setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
-    header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
     return table
 
 
-def _fill(table: QTableWidget, rows: Rows) -> None:
-    """Write the changed cells of a table."""
-    table.setRowCount(len(rows))
-    fit_rows(table)
-    wide = table.fontMetrics().horizontalAdvance
-    heads = map(table.horizontalHeaderItem, range(table.columnCount()))
-    widest = max((wide(head.text()) for head in heads if head is not None), default=0)
+def _fill(table: Table, head: Sequence[str], rows: Rows) -> None:
+    """Show the rows under a head that is legible in the present font."""
+    table.show_rows(rows)
+    widest = max(map(table.fontMetrics().horizontalAdvance, head))
     table.horizontalHeader().setMinimumSectionSize(widest + _MARGIN)
     table.setMinimumHeight((_LINES + 1) * table.verticalHeader().defaultSectionSize())
-    for row, texts in enumerate(rows):
-        for column, text in enumerate(texts):
-            item = table.item(row, column)
-            if item is None:
-                item = QTableWidgetItem()
-                table.setItem(row, column, item)
-            if item.text() != text:
-                item.setText(text)
-                item.setToolTip(text)
-                item.setTextAlignment(_RIGHT if text[-1:].isdigit() else _LEFT)

@@ -86,8 +86,8 @@ def _age(age: float, sd: float) -> str:
 class Readouts(QWidget):
     """Names above numbers of fixed widths, in two rows where they do not fit in one."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(6, 2, 6, 2)
         self._grid.setHorizontalSpacing(6)

@@ -51,9 +51,9 @@ class DesignForm(Form):
     )
     guide_page = "build"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self) -> None:
         self.sliders: dict[str, QSlider] = {}
-        super().__init__("Design", _NAMES, parent)
+        super().__init__("Design", _NAMES)
 
     def field(self, name: str, editor: QWidget) -> QWidget:
         how = form_field(name)
@@ -117,8 +117,8 @@ class DesignPanel(QWidget):
 
     save_wanted = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.form = DesignForm()
         self.predicted = SurfaceMap("Predicted", "\N{MICRO SIGN}m", _PREDICTED)
         self.simulated = SurfaceMap("Simulated", "\N{MICRO SIGN}m", _SIMULATED)

@@ -1,7 +1,5 @@
 """Panel of the estimator and its basis."""
 
-from PySide6.QtWidgets import QWidget
-
 from kappaskin.bases import edges_of
 from kappaskin.live import Status
 from kappaskin_app.shell.badge import in_use
@@ -26,8 +24,8 @@ class BasisPanel(Form):
     )
     guide_page = "accuracy"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Basis", ("functions_x", "functions_y", "method", "fit_edge"), parent)
+    def __init__(self) -> None:
+        super().__init__("Basis", ("functions_x", "functions_y", "method", "fit_edge"))
 
     def show_status(self, status: Status, simulating: bool) -> None:
         if status.sensor is not None:

@@ -18,20 +18,19 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import WITHIN, Actions
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.centre import Centre
+from kappaskin_app.shell.folders import RECORDINGS
 from kappaskin_app.shell.pictures import caption_now, chosen_file, save_view, write_png
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.work_dialog import (
     WorkDialog,
     browse_button,
     has_suffix,
-    label_for,
     path_in,
-    with_button,
     with_suffix,
 )
+from kappaskin_app.widgets.parts import ELLIPSIS
 
 _LONGEST = 1e6  # s
-_RECORDINGS = "Recording (*.mcap)"
 _FORMATS = (
     "Table for any program (*.csv);;Table for NumPy (*.npz);;Table in HDF5 (*.h5);;"
     "Surface for ParaView, PyVista (*.vtp);;Series of surfaces for ParaView (*.pvd);;"
@@ -56,29 +55,24 @@ class ExportDialog(WorkDialog):
         how = "&Export", "Writing the export", self._start_work, self._result_text
         super().__init__(tasks, "Export a recording", *how, parent)
         self.setObjectName("export")
-        self.recording, self.to = QLineEdit(), QLineEdit()
-        self.settings = QComboBox()
+        self.recording, self.settings = QLineEdit(), QComboBox()
         self.settings.addItems(["As they were recorded", "As they are now"])
         self.begin, self.until = _seconds("the beginning"), _seconds("the end")
         self.every, self.at = _seconds("every frame"), _seconds("")
         self.export_button = self.begin_button
         self.choose_recording = browse_button(self._choose_recording)
-        self.choose_file = browse_button(self._choose_file)
+        self.needed.append(self.recording)
+        self.inputs += (self.recording, self.choose_recording, self.settings)
         self._setup = Setup()
         self._files: tuple[Path, ...] = ()
         self._lay_out()
-        self.to.textChanged.connect(guarded(lambda *_: self._allow()))
         self.recording.textChanged.connect(guarded(lambda *_: self._allow()))
         self.every.valueChanged.connect(guarded(lambda *_: self._allow()))
-        self._allow()
 
     def _lay_out(self) -> None:
         form = self.form
-        for words, line, button in (
-            ("&Recording", self.recording, self.choose_recording),
-            ("&File", self.to, self.choose_file),
-        ):
-            form.addRow(label_for(words, line), with_button(line, button))
+        self._add_file("&Recording", self.recording, self.choose_recording)
+        self._add_file("&File", self.to, self.choose_file)
         form.addRow("&Settings", self.settings)
         form.addRow("Fr&om", self.begin)
         form.addRow("&Until", self.until)
@@ -99,7 +93,7 @@ class ExportDialog(WorkDialog):
         (self.to if self.recording.text() else self.recording).setFocus()
 
     def _choose_recording(self) -> None:
-        name, _ = QFileDialog.getOpenFileName(self, "Export a recording", "", _RECORDINGS)
+        name, _ = QFileDialog.getOpenFileName(self, "Export a recording", "", RECORDINGS)
         if name:
             self.recording.setText(name)
 
@@ -123,11 +117,6 @@ class ExportDialog(WorkDialog):
             widget.setEnabled(not busy and not one)
         self.every.setEnabled(not busy and suffix != ".vtp")
         self.at.setEnabled(not busy and one)
-        choose = self.choose_recording, self.choose_file
-        for widget in (self.recording, self.to, self.settings, *choose):
-            widget.setEnabled(not busy)
-        both = bool(self.recording.text().strip() and self.to.text().strip())
-        self.begin_button.setEnabled(both and not busy)
 
     @property
     def wanted(self) -> ExportRequest:
@@ -190,8 +179,7 @@ class Exports(QObject):
 
         Those that are `solid` are in three dimensions, the others `flat`, a menu of its own each.
         """
-        more = "\N{HORIZONTAL ELLIPSIS}"
-        actions.add("export", _MENU, f"&Recording{more}", self.ask, "Ctrl+Shift+E", _EXPORT)
+        actions.add("export", _MENU, f"&Recording{ELLIPSIS}", self.ask, "Ctrl+Shift+E", _EXPORT)
         if self.filming is not None:
             words = "&Film of the skin, start or stop"
             actions.add("film", _MENU, words, self.film, "Ctrl+Shift+F", _FILMING)
@@ -199,7 +187,7 @@ class Exports(QObject):
         for menu, views in menus.items():
             for name, view in views.items():
                 act = partial(self.picture, view, name, menu != _MENU)
-                words, tip = f"Picture of {name}{more}", _PICTURE.format(what=name.lower())
+                words, tip = f"Picture of {name}{ELLIPSIS}", _PICTURE.format(what=name.lower())
                 actions.add(f"picture-of-{name.lower()}", menu, words, act, "", tip)
 
     def ask(self) -> None:

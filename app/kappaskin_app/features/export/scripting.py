@@ -68,7 +68,7 @@ def script_of(session: Session, settings: Settings, folder: Path) -> Script:
     """
     if not session.source:
         raise Refusal("expected an open source, got none; connect one, then copy again")
-    setup, files = _setup(session.requested_setup, folder)
+    setup, files = _setup(session.engine.requested.setup, folder)
     made, requests = [f"SETUP = {setup}"], ["engine.set_up(SETUP)"]
     if (region := region_of(settings)) != Region():
         made.append(f"REGION = {_constructor(region)}")

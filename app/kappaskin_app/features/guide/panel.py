@@ -67,8 +67,8 @@ _MARGIN, _CODE, _CELL, _ABOVE = 14, 10, 4, 8  # px
 class GuidePanel(QWidget):
     """A browser of the pages of the guide."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.contents, self.text = QListWidget(), _Text()
         self.contents.setAccessibleName("Pages of the guide")
         self.contents.setToolTip("The pages of the guide; Ctrl+K finds every heading in them.")

@@ -1,23 +1,14 @@
 """Health panel: list of faulty channels, loss of accuracy, and the press test."""
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import (
-    QAbstractItemView,
-    QHBoxLayout,
-    QHeaderView,
-    QSizePolicy,
-    QTableWidget,
-    QTableWidgetItem,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QAbstractItemView, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from kappaskin.health import Health
 from kappaskin.live import Status
 from kappaskin_app.features.health.press import ChannelMapTest, PressPage
 from kappaskin_app.guard import guarded
-from kappaskin_app.widgets.layout import fit_rows
 from kappaskin_app.widgets.parts import sentence, text_label
+from kappaskin_app.widgets.table import Table
 
 _COLUMNS = ("Element", "Channel", "Fault", "Since", "Measured")
 _TIP = (
@@ -35,8 +26,8 @@ class HealthPanel(QWidget):
 
     pointed = Signal(int)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.words, self.press = text_label("", _TIP), PressPage()
         self.table = self._made_table()
         self._shown = Health()
@@ -51,23 +42,15 @@ class HealthPanel(QWidget):
         around.addWidget(self.press, 2)
         self._show(Health(), 0.0)
 
-    def _made_table(self) -> QTableWidget:
-        table = QTableWidget(0, len(_COLUMNS))
-        table.setObjectName("findings")
-        table.setAccessibleName("Faulty channels")
+    def _made_table(self) -> Table:
+        last = len(_COLUMNS) - 1
+        table = Table("findings", "Faulty channels", _COLUMNS, right=(0,), stretched=(last,))
         table.setToolTip(_TIP)
-        table.setHorizontalHeaderLabels(_COLUMNS)
-        table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        table.setTabKeyNavigation(False)  # Tab leads on, the arrows go through the list
         table.setWordWrap(False)
-        table.verticalHeader().hide()
         # As high as there is room: it scrolls by itself.
         table.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
-        header = table.horizontalHeader()
-        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        header.setStretchLastSection(True)
         table.itemSelectionChanged.connect(guarded(self._point))
         return table
 
@@ -86,27 +69,15 @@ class HealthPanel(QWidget):
             words += f" The first {len(health.findings)} are listed."
         if words != self.words.text():
             self.words.setText(words)
-        fit_rows(self.table)
-        self.table.setRowCount(len(health.findings))
-        for row, finding in enumerate(health.findings):
+        rows = []
+        for finding in health.findings:
             age = max(0.0, now - finding.since)
             since = f"{age:.0f} s" if age < 90 else f"{age / 60:.0f} min"
             kind = f"{finding.kind}, not excluded" if finding.retained else finding.kind
             texts = (str(finding.element), finding.component, kind, since, finding.figure)
-            for column, text in enumerate(texts):
-                self._write(row, column, text.replace("-", "\N{MINUS SIGN}"))
+            rows.append([text.replace("-", "\N{MINUS SIGN}") for text in texts])
+        self.table.show_rows(rows)
         self._shown = health
-
-    def _write(self, row: int, column: int, text: str) -> None:
-        item = self.table.item(row, column)
-        if item is None:
-            item = QTableWidgetItem()
-            if column == 0:
-                item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-            self.table.setItem(row, column, item)
-        if item.text() != text:
-            item.setText(text)
-            item.setToolTip(text)
 
     def _point(self) -> None:
         rows = self.table.selectionModel().selectedRows()

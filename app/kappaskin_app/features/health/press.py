@@ -138,8 +138,8 @@ _WAIT = {
 class PressPage(QWidget):
     """Page of the press test: instruction, progress and verdict."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.words, self.last, self.verdict = (text_label() for _ in range(3))
         self.last.setForegroundRole(FAINT)
         bold = self.verdict.font()

@@ -6,7 +6,7 @@ import numpy as np
 
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
-from kappaskin_app.features.heatmaps.maps import HeatmapGrid
+from kappaskin_app.features.heatmaps.heatmap import HeatmapGrid
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.colouring import locked_at
 from kappaskin_app.shell.display import Display, Shown, of_row

@@ -1,4 +1,4 @@
-"""Heatmap: a quantity of every element, one cell each."""
+"""Heatmaps: a quantity of every element, one cell each; a grid of them."""
 
 import math
 
@@ -6,17 +6,24 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPainterPath, QPaintEvent, QPen
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QScrollArea,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
 
 from kappaskin.estimation import FAULTS
+from kappaskin.frames import Array, Indices, Mask
 from kappaskin.sensing import SensorLayout
 from kappaskin_app.shell.colouring import SHADES
 from kappaskin_app.theme import DARK_INK, WANTED, Colours, current, follow_look
 from kappaskin_app.widgets.colour_bar import ColourBar, LockButton
 from kappaskin_app.widgets.line import Line
 from kappaskin_app.widgets.tint import Tint
-
-Indices = NDArray[np.intp]
 
 _LETTERS: dict[str, str] = dict(
     zip(
@@ -36,8 +43,8 @@ class CellGrid(QWidget):
     pointed = Signal(int)
     chosen = Signal(int)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._layout: SensorLayout | None = None
         self._colours: Colours = np.empty((0, 3), np.uint8)
         self._hovered, self._faded = -1, False
@@ -215,9 +222,6 @@ class CellGrid(QWidget):
             self.update()
 
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
 _LEGEND = (
     "One cell for each element. Grey: no reading. Violet: saturated, at an end of the converter's "
     "range. Crossed: bent beyond 1 % strain, where the gage is no longer elastic. Dotted: "
@@ -237,8 +241,8 @@ class Heatmap(QWidget):
     chosen = Signal(int)
     lock_wanted = Signal(float)
 
-    def __init__(self, name: str, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, name: str) -> None:
+        super().__init__()
         self.name, self._shade = name, SHADES[name]
         self._title = QLabel(f"<b>{self._shade.symbol}</b>")
         self._title.setToolTip(self._shade.tip)
@@ -341,3 +345,49 @@ class Heatmap(QWidget):
         missing = len(values) - len(finite)
         parts = [f"peak {self._shade.written(peak)}"] if len(finite) else []
         return ", ".join(parts + [f"{missing} missing"] * bool(missing))
+
+
+_COLUMN = 3  # heatmaps at most in a single column
+_NARROWEST = (270, 360)  # px, minimum width of one column and of two
+
+
+class HeatmapGrid(QScrollArea):
+    """Scrollable grid of the heatmaps; hidden ones are not drawn."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.heatmaps = {name: Heatmap(name) for name in SHADES}
+        self._none = QLabel("Select heatmaps under View.", alignment=Qt.AlignmentFlag.AlignCenter)  # pyright: ignore[reportCallIssue]
+        self._shown: tuple[str, ...] | None = None
+        whole = QWidget()
+        self._grid = QGridLayout(whole)
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setSpacing(0)
+        for widget in (*self.heatmaps.values(), self._none):
+            widget.setParent(whole)
+            widget.hide()
+        self.setWidget(whole)
+        self.setWidgetResizable(True)
+        self.setFrameShape(QScrollArea.Shape.NoFrame)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setMinimumWidth(_NARROWEST[0])
+
+    def show_selected(self, names: tuple[str, ...]) -> None:
+        """Show only the heatmaps called `names`."""
+        if names == self._shown:
+            return
+        self._shown = names
+        columns = 1 if len(names) <= _COLUMN else 2
+        for widget in (*self.heatmaps.values(), self._none):
+            self._grid.removeWidget(widget)
+            widget.hide()
+        shown = [self.heatmaps[name] for name in names] or [self._none]
+        for number, widget in enumerate(shown):
+            self._grid.addWidget(widget, *divmod(number, columns))
+            widget.show()
+        for row in range(len(SHADES)):
+            self._grid.setRowStretch(row, row * columns < len(shown))
+        self._grid.setColumnStretch(1, columns - 1)
+        self._grid.setColumnStretch(0, 1)
+        self.setMinimumWidth(_NARROWEST[columns - 1])

@@ -47,8 +47,8 @@ class QuestionView(QWidget):
     answered = Signal(str)
     show_wanted = Signal()
 
-    def __init__(self, question: Question, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, question: Question) -> None:
+        super().__init__()
         self._question = question
         self._answer, self._message = Answer(), ""
         self.text, self.feedback = text_label(question.text), text_label()
@@ -159,8 +159,8 @@ class LessonStepPage(QWidget):
     show_wanted = Signal()
     pressed = Signal(int)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.title, self.text = text_label(), text_label()
         self.title.setTextFormat(Qt.TextFormat.PlainText)
         self.text.setTextFormat(Qt.TextFormat.MarkdownText)
@@ -246,8 +246,8 @@ class ListPage(QWidget):
     taken = Signal(str)
     open_wanted = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.list = _List()
         self.list.setAccessibleName("Lessons")
         self.list.setSpacing(2)
@@ -321,8 +321,8 @@ class EndPage(QWidget):
 
     hand_in_wanted = Signal(str)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.text = text_label()
         self.text.setTextFormat(Qt.TextFormat.RichText)
         prompt = text_label("Your name, for the figure:")

@@ -23,8 +23,8 @@ class LessonPanel(QWidget):
 
     seen = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.list, self.step, self.end = ListPage(), LessonStepPage(), EndPage()
         self.pages = QStackedWidget()
         for page in (self.step, self.end):

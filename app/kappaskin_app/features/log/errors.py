@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QCheckBox, QFileDialog, QLabel, QLineEdit, QToolButton, QWidget
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QLabel, QToolButton, QWidget
 
 from kappaskin._files import replacing
 from kappaskin.cli.system import examine
@@ -27,10 +27,7 @@ from kappaskin_app.shell.log_files import CRASHES, LOG, log_folder
 from kappaskin_app.shell.recovery import settings_text
 from kappaskin_app.shell.work_dialog import (
     WorkDialog,
-    browse_button,
-    label_for,
     path_in,
-    with_button,
     with_suffix,
 )
 from kappaskin_app.theme import current, follow_look
@@ -116,19 +113,16 @@ class ReportDialog(WorkDialog):
         super().__init__(tasks, "Error report", *how, parent)
         self.setObjectName("report")
         self._contents, self._logs = contents, logs
-        self.to, self.readings = QLineEdit(), QCheckBox("&With the present readings")
-        self.choose_file = browse_button(self._choose)
+        self.readings = QCheckBox("&With the present readings")
+        self.inputs.append(self.readings)
         explanation = QLabel(_CONTENTS)
         explanation.setWordWrap(True)
         self.to.setToolTip("The zip file to write; check it before you send it.")
         self.readings.setToolTip("The readings of one frame, as numbers.")
         self.form.addRow(explanation)
-        self.form.addRow(label_for("&File", self.to), with_button(self.to, self.choose_file))
+        self._add_file("&File", self.to, self.choose_file)
         self.form.addRow(self.readings)
         self._add_buttons()
-        self.begin_button.setDefault(True)
-        self.to.textChanged.connect(guarded(lambda *_: self._allow()))
-        self._allow()
 
     def ask(self) -> None:
         if not self.busy:
@@ -136,18 +130,12 @@ class ReportDialog(WorkDialog):
             self.to.setText(str(recordings_folder() / f"kappaskin-report-{now:%Y%m%d-%H%M%S}.zip"))
         super().ask()
 
-    def _choose(self) -> None:
+    def _choose_file(self) -> None:
         name, _ = QFileDialog.getSaveFileName(
             self, "Save the report to", self.to.text(), "Report (*.zip)"
         )
         if name:
             self.to.setText(str(with_suffix(name, ".zip")))
-
-    def _allow(self) -> None:
-        super()._allow()
-        for widget in (self.to, self.choose_file, self.readings):
-            widget.setEnabled(not self.busy)
-        self.begin_button.setEnabled(bool(self.to.text().strip()) and not self.busy)
 
     def _start_work(self) -> BackgroundThread:
         contents = self._contents(self.readings.isChecked())

@@ -5,23 +5,19 @@ import time
 from collections import deque
 from dataclasses import dataclass
 
-from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QGuiApplication
 from PySide6.QtWidgets import (
-    QAbstractItemView,
     QComboBox,
     QHBoxLayout,
-    QHeaderView,
     QLabel,
     QPushButton,
-    QTableWidget,
-    QTableWidgetItem,
     QVBoxLayout,
     QWidget,
 )
 
 from kappaskin_app.guard import guarded, log
 from kappaskin_app.theme import current, follow_look
+from kappaskin_app.widgets.table import Table
 
 _KEPT = 1000
 
@@ -78,7 +74,6 @@ class LogBuffer(logging.Handler):
         super().close()
 
 
-_ROOM = 6  # px above and below a line together
 _HEAD = ("Time", "Level", "Text")
 _LEVELS = (
     ("All messages", logging.NOTSET),
@@ -91,8 +86,8 @@ _NOTHING = "No messages of this level since the window opened."
 class LogPanel(QWidget):
     """Lists the messages of a `buffer`, newest first."""
 
-    def __init__(self, buffer: LogBuffer, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, buffer: LogBuffer) -> None:
+        super().__init__()
         self._buffer, self._seen = buffer, -1
         self._lines: list[LogLine] = []
         self.level, self.nothing = QComboBox(), QLabel(_NOTHING)
@@ -106,7 +101,9 @@ class LogPanel(QWidget):
         self.clear.setToolTip("Clear the list; the log file still has these messages.")
         self.copy.clicked.connect(guarded(lambda *_: self._copy()))
         self.clear.clicked.connect(guarded(lambda *_: self._clear()))
-        self.table = _table()
+        self.table = Table("log", "Log, newest first", _HEAD, stretched=(len(_HEAD) - 1,))
+        self.table.setSelectionBehavior(Table.SelectionBehavior.SelectRows)
+        self.table.setWordWrap(False)
         row, column = QHBoxLayout(), QVBoxLayout(self)
         for widget in (self.level, self.copy, self.clear):
             row.addWidget(widget)
@@ -125,22 +122,15 @@ class LogPanel(QWidget):
         self._seen = self._buffer.count
         least = self.level.currentData()
         self._lines = [line for line in reversed(list(self._buffer.lines)) if line.level >= least]
-        self.table.setRowCount(len(self._lines))
-        self.table.verticalHeader().setDefaultSectionSize(self.fontMetrics().height() + _ROOM)
+        self.table.fit_rows(len(self._lines))
         for row, line in enumerate(self._lines):
+            colour = QColor(current().alert if line.level >= logging.WARNING else current().text)
             for column, text in enumerate((line.clock, line.word, line.text)):
-                self.table.setItem(row, column, self._item(line, text))
+                self.table.write(row, column, text, line.whole).setForeground(colour)
         self.table.setVisible(bool(self._lines))
         self.nothing.setVisible(not self._lines)
         for button in (self.copy, self.clear):
             button.setEnabled(bool(self._lines))
-
-    def _item(self, line: LogLine, text: str) -> QTableWidgetItem:
-        item = QTableWidgetItem(text)
-        item.setToolTip(line.whole)
-        if line.level >= logging.WARNING:
-            item.setForeground(QColor(current().alert))
-        return item
 
     def _copy(self) -> None:
         each = (f"{line.clock} {line.word}: {line.whole}" for line in self._lines)
@@ -149,20 +139,3 @@ class LogPanel(QWidget):
     def _clear(self) -> None:
         self._buffer.clear()
         self._fill()
-
-
-def _table() -> QTableWidget:
-    table = QTableWidget(0, len(_HEAD))
-    table.setObjectName("log")
-    table.setAccessibleName("Log, newest first")
-    table.setHorizontalHeaderLabels(list(_HEAD))
-    table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-    table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-    table.setTabKeyNavigation(False)  # Tab leaves the table, the arrow keys move in it
-    table.setWordWrap(False)
-    table.setTextElideMode(Qt.TextElideMode.ElideRight)
-    table.verticalHeader().hide()
-    header = table.horizontalHeader()
-    header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-    header.setStretchLastSection(True)
-    return table

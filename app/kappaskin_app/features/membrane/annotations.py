@@ -5,11 +5,12 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from numpy.typing import NDArray
 
+from kappaskin.frames import Array, Indices
 from kappaskin.skin import Distances
-from kappaskin_app.shell.drawn_skin import MM, Direction, DrawnSkin, Indices
+from kappaskin_app.shell.drawn_skin import MM, Direction, DrawnSkin
 from kappaskin_app.theme import WANTED, current, follow_look, grown
+from kappaskin_app.widgets.parts import number
 
 UNLIT = {"lighting": False, "pickable": False, "reset_camera": False, "render": False}
 """Arguments of `add_mesh`: no lighting, no rendering, no change of the camera."""
@@ -107,8 +108,6 @@ class Sides:
             part.prop.color = current().text
 
 
-Array = NDArray[np.float64]
-
 _LETTERS = 15  # px
 _STEPS = 48  # points of the line along the skin
 
@@ -157,10 +156,9 @@ class Ruler:
 
 def distances_text(found: Distances) -> str:
     """Text of the distances."""
-    higher = f"{1e3 * found.higher:+z.2f}".replace("-", "\N{MINUS SIGN}")
     return (
         f"straight {1e3 * found.straight:.2f} mm, along the skin {1e3 * found.along:.2f} mm, "
-        f"height {higher} mm"
+        f"height {number(1e3 * found.higher, '+.2f')} mm"
     )
 
 

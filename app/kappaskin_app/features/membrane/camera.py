@@ -4,14 +4,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QObject, QPointF, Signal
 from pyvistaqt import QtInteractor
 
+from kappaskin.frames import Array
 from kappaskin_app.features.membrane.annotations import Sides
 from kappaskin_app.shell.drawn_skin import FROM_THE_LEFT, MM, NO_SKIN, Direction, DrawnSkin
-
-Array = NDArray[np.float64]
 
 _LOW = 0.2  # of the shorter side: depth of view below the skin at rest
 _MARGIN = 0.06  # of the longer side: room for labels and arrow

@@ -5,15 +5,13 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from numpy.typing import NDArray
 
+from kappaskin.frames import Array
 from kappaskin.mechanics import Load
 from kappaskin_app.features.membrane.annotations import UNLIT, pixels
 from kappaskin_app.features.membrane.mouse import ARROW
 from kappaskin_app.shell.drawn_skin import DrawnSkin
 from kappaskin_app.shell.loads import footprint
-
-Array = NDArray[np.float64]
 
 _RED = "#e8543f"
 

@@ -1,7 +1,6 @@
 """Measurement of the distance between two places on the bent skin."""
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from kappaskin.frames import Estimate
@@ -9,7 +8,6 @@ from kappaskin.skin import Patch, distances
 from kappaskin_app.features.membrane.annotations import Ruler
 from kappaskin_app.features.membrane.membrane import MembraneView
 
-Array = NDArray[np.float64]
 Places = tuple[tuple[float, float], ...] | None
 
 _FIRST = "Measure: click a place on the skin; Esc ends"

@@ -14,7 +14,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 from pyvistaqt import QtInteractor
 
-from kappaskin.frames import Estimate
+from kappaskin.frames import Array, Estimate, Indices
 from kappaskin.mechanics import Load
 from kappaskin.sensing import Sensor
 from kappaskin_app.features.membrane.annotations import UNLIT, Alarm, Caption, Marks, Sides, pixels
@@ -23,10 +23,8 @@ from kappaskin_app.features.membrane.loads import DrawnLoads, put_upright
 from kappaskin_app.features.membrane.mouse import LoadDrag, SurfacePointer
 from kappaskin_app.features.membrane.surface import WHOLE, Box, Shares, Surface
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.drawn_skin import MM, DrawnSkin, Indices
+from kappaskin_app.shell.drawn_skin import MM, DrawnSkin
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, current, follow_look
-
-Array = NDArray[np.float64]
 
 _LETTERS = 14  # px, of the caption
 _LIFT = 0.006  # of the skin's size above the surface, which would hide half of a line
@@ -43,8 +41,8 @@ class MembraneView(QWidget):
 
     drawn = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         # Multisampling would halve the rate in software; a timer of its own would draw twice.
         self.plotter = QtInteractor(self, auto_update=False, multi_samples=0)
         # Else each drawing composes the whole window, a fifth of its time in software.
@@ -293,11 +291,6 @@ class MembraneView(QWidget):
         self._elements_actor.prop.color = ink
         if self._wire_actor:
             self._wire_actor.prop.color = ink
-
-    @property
-    def greyed(self) -> bool:
-        """Whether the skin is drawn without colours."""
-        return self.surface.lost
 
     def show_lost(self, lost: bool) -> None:
         """Grey the skin while the connection is lost."""

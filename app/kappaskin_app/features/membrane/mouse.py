@@ -1,16 +1,14 @@
 """Mouse on the skin: pointing, clicks and drags of loads."""
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QObject, QPointF, Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent, QMouseEvent
 from pyvistaqt import QtInteractor
 
+from kappaskin.frames import Array
 from kappaskin_app.features.membrane.camera import Projection
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.drawn_skin import NO_SKIN
-
-Array = NDArray[np.float64]
 
 ARROW = 0.22  # from a load's tip to its tail, as a share of the skin's size
 _NEAR = 14.0  # px around an arrow in which the mouse grabs it

@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from numpy.typing import NDArray
 
 from kappaskin.contact import ContactObject, placed_object
-from kappaskin.frames import Estimate
+from kappaskin.frames import Array, Estimate, Indices
 from kappaskin.mechanics import PlacedObject
 from kappaskin.scenes import Indenter
 from kappaskin_app.features.membrane.annotations import UNLIT, pixels
@@ -19,8 +18,6 @@ from kappaskin_app.shell.drawn_skin import MM, DrawnSkin
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.theme import DIVERGING
-
-Array = NDArray[np.float64]
 
 TIMES_SD = 2.0
 """Standard deviations from the surface to either side of the band."""
@@ -78,7 +75,7 @@ class Directions:
     def __init__(self, plotter: Any) -> None:
         self._plotter = plotter
         self._skin: DrawnSkin | None = None
-        self._nodes: NDArray[np.intp] = np.empty(0, np.intp)
+        self._nodes: Indices = np.empty(0, np.intp)
         self._lines: Any = None
         self.actor: Any = None
 
@@ -264,7 +261,7 @@ def _depth(skin: DrawnSkin, places: Array, height: Array, times: float) -> float
     return float(np.min(moved + height[over]))
 
 
-def _faces() -> NDArray[np.intp]:
+def _faces() -> Indices:
     """Faces between the rings, in VTK's format."""
     index = np.arange(_OUT * _AROUND).reshape(_OUT, _AROUND)
     beside = np.roll(index, -1, axis=1)

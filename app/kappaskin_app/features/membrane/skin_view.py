@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject
 
-from kappaskin.contact import ContactObject
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
 from kappaskin_app.features.membrane.measuring import Measurement
@@ -24,8 +23,6 @@ from kappaskin_app.widgets.colour_bar import SkinScale
 from kappaskin_app.widgets.tint import Tint
 
 _MARKS = 0.06  # s between two updates of the marks
-
-Array = NDArray[np.float64]
 
 
 class SkinView(QObject):
@@ -51,13 +48,10 @@ class SkinView(QObject):
         display.restarted.connect(guarded(self._restart))
         display.status_shown.connect(guarded(self._show_status))
         display.shown.connect(guarded(self._show))
-        display.object_found.connect(guarded(self._show_object))
+        display.object_found.connect(guarded(lambda what, _: self.overlays.set_object(what)))
         selection.pointed.connect(guarded(self.membrane.point))
         selection.target_changed.connect(guarded(lambda *_: self._show_marked()))
         selection.mode_changed.connect(guarded(self._show_mode))
-
-    def _show_object(self, what: ContactObject, _: Estimate) -> None:
-        self.overlays.set_object(what)
 
     def show_settings(self, settings: Settings) -> None:
         self._settings = settings

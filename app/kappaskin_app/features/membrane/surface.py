@@ -8,6 +8,7 @@ import scipy
 from numpy.typing import NDArray
 from vtkmodules.vtkCommonDataModel import vtkPlane, vtkPlaneCollection
 
+from kappaskin.frames import Indices
 from kappaskin.sensing import SensorLayout
 from kappaskin_app.shell.drawn_skin import DrawnSkin
 from kappaskin_app.theme import Colours, current, follow_look
@@ -20,7 +21,7 @@ class ElementCells:
 
     def __init__(self) -> None:
         self.texture: Any = None
-        self._which: NDArray[np.intp] = np.empty(0, np.intp)
+        self._which: Indices = np.empty(0, np.intp)
 
     def set_layout(self, layout: SensorLayout) -> None:
         """Set the layout of another skin: each pixel shows its nearest element."""

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from functools import partial
 
 from PySide6.QtGui import QKeySequence, QShortcut
-from PySide6.QtWidgets import QWidget
 
 from kappaskin_app.features.membrane.camera import DIRECTIONS
 from kappaskin_app.features.membrane.skin_view import SkinView
@@ -25,14 +24,14 @@ class ViewPanel(Form):
     purpose = "How the skin is drawn: colours, vertical exaggeration and overlays."
     guide_page = "numbers"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self) -> None:
         names = (
             *("colour_by", "colour_from", "maps", "one_range"),
             *("exaggeration", "show_elements", "show_truth", "show_directions", "show_band"),
             *("show_frame", "show_object", "show_pressed", "from_x", "to_x", "from_y", "to_y"),
             *("from_z", "to_z", "theme", "letters", "show_start"),
         )
-        super().__init__("View", names, parent)
+        super().__init__("View", names)
 
 
 _MENU = "Sk&in"

@@ -32,8 +32,8 @@ class Indicator(QWidget):
     Letters scale with the view, so that they are as large on any screen of the same size.
     """
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.unit = 1.0
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
 

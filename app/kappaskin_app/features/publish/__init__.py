@@ -3,8 +3,6 @@
 import math
 import time
 
-from PySide6.QtWidgets import QWidget
-
 from kappaskin.live import Status
 from kappaskin.publish import TargetStatus
 from kappaskin_app.guard import guarded
@@ -39,8 +37,8 @@ class PublishPanel(Form):
     )
     guide_page = "record"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Publish", _NAMES, parent)
+    def __init__(self) -> None:
+        super().__init__("Publish", _NAMES)
         self.counts, self.late = text_label(tip=_TIP), text_label(tip=_LATE)
         for label in (self.counts, self.late):
             label.hide()

@@ -10,12 +10,12 @@ from kappaskin_app.features.recording.recorder import RecordingControl, Recordin
 from kappaskin_app.features.recording.transport import Transport
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.folders import newest, recordings_folder
-from kappaskin_app.shell.menus import DOTS
 from kappaskin_app.shell.opening import Kind
 from kappaskin_app.shell.pages import LIVE
 from kappaskin_app.shell.recovery import SettingsHandover
 from kappaskin_app.shell.session import RECORDED
 from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.widgets.parts import ELLIPSIS
 
 
 class RecordingFeature:
@@ -63,7 +63,7 @@ class RecordingFeature:
         opening.drops.take_key = self.transport.take_key
         shell.menus.welcome.add(
             4,
-            f"&Play a recording{DOTS}",
+            f"&Play a recording{ELLIPSIS}",
             "Play a recording; a file can also be dropped on the window.",
             playback.open,
         )

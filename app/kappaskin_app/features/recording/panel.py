@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QWidget
 
 from kappaskin_app.features.recording.playback import PlaybackControl
@@ -10,14 +9,12 @@ from kappaskin_app.features.recording.recorder import RecordingControl, duration
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.widgets.line import Line
-from kappaskin_app.widgets.parts import button, in_a_row, sentence
-from kappaskin_app.widgets.text import COMMAND
+from kappaskin_app.widgets.parts import ELLIPSIS, button, in_a_row, sentence
 
 _RECORD = "Start or stop recording to a file (Ctrl+Shift+R)."
 _NOTE = "Add a note to the event log and the recording (Ctrl+Shift+N)."
 _OPEN = "Play a recording (Ctrl+Shift+O); or drop one on the window."
 _REPAIR = "Save the readable part of the damaged recording to a new file, and play it."
-_DOTS = "\N{HORIZONTAL ELLIPSIS}"
 
 
 class RecordingPanel(Panel):
@@ -29,16 +26,16 @@ class RecordingPanel(Panel):
     )
     guide_page = "record"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Recording", parent)
-        self.record = button(f"Record{_DOTS}", "record-button", _RECORD)
-        self.note = button(f"Note{_DOTS}", "note-button", _NOTE)
-        self.open = button(f"Open{_DOTS}", "open-button", _OPEN)
+    def __init__(self) -> None:
+        super().__init__("Recording")
+        self.record = button(f"Record{ELLIPSIS}", "record-button", _RECORD)
+        self.note = button(f"Note{ELLIPSIS}", "note-button", _NOTE)
+        self.open = button(f"Open{ELLIPSIS}", "open-button", _OPEN)
         self.what = Line()
         self.copy_button = button(
             "Copy the command", "copy-repair", "Copy the command in the message above."
         )
-        self.repair = button(f"Repair{_DOTS}", "repair-button", _REPAIR)
+        self.repair = button(f"Repair{ELLIPSIS}", "repair-button", _REPAIR)
         self.offer = QWidget()
         buttons = in_a_row(self.repair, self.copy_button)
         buttons.setContentsMargins(0, 0, 0, 0)
@@ -50,7 +47,7 @@ class RecordingPanel(Panel):
         self._recorder: RecordingControl | None = None
         self._playback: PlaybackControl | None = None
         self._damaged: Path | None = None
-        self.copy_button.clicked.connect(guarded(self._copy))
+        self.copy_button.clicked.connect(guarded(self._copy_command))
         self.repair.clicked.connect(guarded(self._ask_for_repair))
 
     def bind(self, recorder: RecordingControl, playback: PlaybackControl) -> None:
@@ -68,7 +65,7 @@ class RecordingPanel(Panel):
         if recorder is None or playback is None:
             return
         written = recorder.written
-        self.record.setText("Stop" if recorder.recording else f"Record{_DOTS}")
+        self.record.setText("Stop" if recorder.recording else f"Record{ELLIPSIS}")
         self.record.setEnabled(not recorder.why_not)
         self.record.setToolTip(recorder.why_not or _RECORD)
         how = f"{duration_of(written.seconds)}, {size_of(written.size)}"
@@ -85,7 +82,3 @@ class RecordingPanel(Panel):
     def _ask_for_repair(self) -> None:
         if self._recorder is not None and self._damaged is not None:
             self._recorder.repairs.ask_of(self._damaged)
-
-    def _copy(self) -> None:
-        if command := COMMAND.search(self.message.text()):
-            QGuiApplication.clipboard().setText(command[1])

@@ -21,6 +21,7 @@ from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import RECORDED, Session
 from kappaskin_app.shell.settings import EstimatorSettings
 from kappaskin_app.shell.settings.form_fields import settings_from
+from kappaskin_app.widgets.parts import ELLIPSIS
 from kappaskin_app.widgets.text import day
 
 FILES = "Recording (*.mcap *.mcap.part)"
@@ -37,7 +38,6 @@ _TIPS = {
 }
 _ARRIVES = 0.4  # s after which a request to the engine shows in its status
 _HERE = 1e-4  # s: an event so near is where the replay is
-_DOTS = "\N{HORIZONTAL ELLIPSIS}"
 
 
 class PlaybackControl(QObject):
@@ -104,7 +104,13 @@ class PlaybackControl(QObject):
         self._actions = actions
         tip = "Play a recording; it can also be dropped on the window"
         add = partial(actions.add, menu=_MENU)
-        add("open-recording", text=f"&Open{_DOTS}", act=self.open, shortcut="Ctrl+Shift+O", tip=tip)
+        add(
+            "open-recording",
+            text=f"&Open{ELLIPSIS}",
+            act=self.open,
+            shortcut="Ctrl+Shift+O",
+            tip=tip,
+        )
         for name, text, act, shortcut in (
             ("forward", "One frame &forward", partial(self.step, 1), "Ctrl+."),
             ("back", "One frame &back", partial(self.step, -1), "Ctrl+,"),
@@ -143,7 +149,7 @@ class PlaybackControl(QObject):
             self._read(Path(source.removeprefix(RECORDED).strip()), connects=False)
 
     def _read(self, path: Path, connects: bool) -> None:
-        self.notified.emit(f"Reading {path.name}{_DOTS}")
+        self.notified.emit(f"Reading {path.name}{ELLIPSIS}")
         self._asked, self._connects = path, connects
         self._reading.compute(summary_of, path)
 

@@ -19,17 +19,22 @@ from kappaskin.recording import RecordingStatus, Repaired, RepairTask
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions
 from kappaskin_app.shell.background import Tasks
-from kappaskin_app.shell.folders import proposed, recordings_folder, repaired, repairing, unfinished
+from kappaskin_app.shell.folders import (
+    RECORDINGS,
+    proposed,
+    recordings_folder,
+    repaired,
+    repairing,
+    unfinished,
+)
 from kappaskin_app.shell.recovery import resume_text
 from kappaskin_app.shell.work_dialog import (
     WorkDialog,
-    browse_button,
-    label_for,
     path_in,
-    with_button,
     with_suffix,
 )
 from kappaskin_app.theme import current
+from kappaskin_app.widgets.lettering import LEFT
 
 _WIDTH, _TEXT = 92, 22  # px: of all, and to where the words begin
 _HOUR = 3600.0  # s, from which there is room for the time alone
@@ -57,8 +62,8 @@ class RecordingMark(QWidget):
 
     clicked = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Preferred)
         self.head, self.below, self._bad = "", "", False
 
@@ -99,15 +104,14 @@ class RecordingMark(QWidget):
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(theme.alert))
         painter.drawEllipse(QPointF(12, top + line / 2), 5, 5)
-        left = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
         bold = painter.font()
         bold.setWeight(QFont.Weight.DemiBold)
         painter.setFont(bold)
         painter.setPen(QColor(theme.alert))
-        painter.drawText(QRectF(_TEXT, top, self.width() - _TEXT, line), left, self.head)
+        painter.drawText(QRectF(_TEXT, top, self.width() - _TEXT, line), LEFT, self.head)
         painter.setFont(self.font())
         painter.setPen(QColor(theme.alert if self._bad else theme.text))
-        painter.drawText(QRectF(_TEXT, top + line, self.width() - _TEXT, line), left, self.below)
+        painter.drawText(QRectF(_TEXT, top + line, self.width() - _TEXT, line), LEFT, self.below)
 
 
 class RepairDialog(WorkDialog):
@@ -119,17 +123,13 @@ class RepairDialog(WorkDialog):
         how = "Re&pair", "Repairing the recording", self._start_work, self._result_text
         super().__init__(tasks, "Repair a recording", *how, parent)
         self.setObjectName("repair")
-        self.recording, self.to = QLineEdit(), QLineEdit()
+        self.recording = QLineEdit()
         self.recording.setReadOnly(True)
         self.recording.setToolTip("The damaged recording; it is not changed.")
         self.to.setToolTip("The file to write, with all that can be read of the damaged one.")
-        self.form.addRow(label_for("&Damaged", self.recording), self.recording)
-        self.choose_file = browse_button(self._choose)
-        self.form.addRow(label_for("&Repaired", self.to), with_button(self.to, self.choose_file))
+        self.form.addRow("&Damaged", self.recording)
+        self._add_file("&Repaired", self.to, self.choose_file)
         self._add_buttons()
-        self.begin_button.setDefault(True)
-        self.to.textChanged.connect(guarded(lambda *_: self._allow()))
-        self._allow()
 
     def ask_of(self, recording: Path) -> None:
         """Ask for the path of the repaired `recording`, by default in the same folder."""
@@ -139,19 +139,13 @@ class RepairDialog(WorkDialog):
         self.ask()
         self._allow()
 
-    def _choose(self) -> None:
+    def _choose_file(self) -> None:
         option = QFileDialog.Option.DontConfirmOverwrite  # existing files are refused
         name, _ = QFileDialog.getSaveFileName(
-            self, "Save the repaired recording to", self.to.text(), "Recording (*.mcap)", "", option
+            self, "Save the repaired recording to", self.to.text(), RECORDINGS, "", option
         )
         if name:
             self.to.setText(str(with_suffix(name, ".mcap")))
-
-    def _allow(self) -> None:
-        super()._allow()
-        for widget in (self.to, self.choose_file):
-            widget.setEnabled(not self.busy)
-        self.begin_button.setEnabled(bool(self.to.text().strip()) and not self.busy)
 
     def _start_work(self) -> RepairTask:
         return RepairTask(path_in(self.recording), path_in(self.to))
@@ -165,7 +159,6 @@ class RepairDialog(WorkDialog):
         return f"Saved {result.words}. The damaged recording is unchanged; this one is played."
 
 
-FILES = "Recording (*.mcap)"
 _MENU = "&Recording"
 _RECORD, _STOP = "&Record\N{HORIZONTAL ELLIPSIS}", "&Stop recording"
 
@@ -232,7 +225,7 @@ class RecordingControl(QObject):
             path = Path(path.name)
         option = QFileDialog.Option.DontConfirmOverwrite  # the engine refuses existing files
         chosen, _ = QFileDialog.getSaveFileName(
-            self._window, "Record to", str(path), FILES, "", option
+            self._window, "Record to", str(path), RECORDINGS, "", option
         )
         return with_suffix(chosen, ".mcap") if chosen else None
 

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from functools import partial
 from html import escape
 
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSignalBlocker, Qt, Signal
@@ -36,8 +35,8 @@ def minutes(seconds: float) -> str:
 class Landmarks(Course):
     """The handle over gaps and events."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Time in the recording, in ms", _TIP, parent)
+    def __init__(self) -> None:
+        super().__init__("Time in the recording, in ms", _TIP)
         self.gaps: tuple[tuple[float, float], ...] = ()
         self.events: tuple[Event, ...] = ()
 
@@ -136,8 +135,8 @@ class Transport(QWidget):
     speed_wanted = Signal(float)
     loop_wanted = Signal(bool)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.setAccessibleName("Transport of the recording")
         self.buttons = {name: glyph_button(name) for name in _TIPS if name != "pause"}
         self.play, self.loop = self.buttons["play"], self.buttons["loop"]
@@ -174,21 +173,17 @@ class Transport(QWidget):
         buttons = self.buttons
         for name, frames in (("back", -1), ("forward", 1)):
             buttons[name].setAutoRepeat(True)
-            buttons[name].clicked.connect(guarded(partial(self._step, frames)))
+            buttons[name].clicked.connect(
+                guarded(lambda *_, frames=frames: self.step_wanted.emit(frames))
+            )
         for name, way in (("previous", -1), ("next", 1)):
-            buttons[name].clicked.connect(guarded(partial(self._jump, way)))
+            buttons[name].clicked.connect(guarded(lambda *_, way=way: self.jump_wanted.emit(way)))
         self.play.clicked.connect(guarded(lambda *_: self.play_wanted.emit(not self._playing)))
         self.loop.clicked.connect(guarded(lambda *_: self.loop_wanted.emit(self.loop.isChecked())))
         self.speed.activated.connect(
             guarded(lambda index: self.speed_wanted.emit(self.speed.itemData(index)))
         )
         self.course.sought.connect(guarded(self._seek))
-
-    def _step(self, frames: int, *_: object) -> None:
-        self.step_wanted.emit(frames)
-
-    def _jump(self, way: int, *_: object) -> None:
-        self.jump_wanted.emit(way)
 
     def _seek(self, seconds: float) -> None:
         self._show_clock(seconds)

@@ -16,11 +16,11 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import plain
 from kappaskin_app.shell.finder import FinderEntry, enter
 from kappaskin_app.shell.loads import loads_at, object_replaceable
-from kappaskin_app.shell.menus import DOTS
 from kappaskin_app.shell.opening import Kind
 from kappaskin_app.shell.pages import LIVE
 from kappaskin_app.shell.parts import FILE
 from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.widgets.parts import ELLIPSIS
 
 _MILLIMETRE = 1e-3  # m, the unit of mesh files
 _OPEN = "Simulate a scene file (.toml); it can also be dropped on the window"
@@ -62,11 +62,11 @@ class SceneFeature:
 
     def _add_actions(self, shell: MainWindow) -> None:
         add, control = shell.actions_by_name.add, self.scene_control
-        add("open-scene", FILE, f"&Open scene{DOTS}", control.open, "Ctrl+O", _OPEN)
-        add("save-scene", FILE, f"Save scene &as{DOTS}", control.save, "Ctrl+Shift+S", _SAVE)
+        add("open-scene", FILE, f"&Open scene{ELLIPSIS}", control.open, "Ctrl+O", _OPEN)
+        add("save-scene", FILE, f"Save scene &as{ELLIPSIS}", control.save, "Ctrl+Shift+S", _SAVE)
         shell.menus.welcome.add(
             1,
-            f"&Open a scene{DOTS}",
+            f"&Open a scene{ELLIPSIS}",
             "Simulate a scene file (Ctrl+O); for the gallery see Scene (F2).",
             control.open,
         )

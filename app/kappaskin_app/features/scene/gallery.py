@@ -41,6 +41,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import Tasks
 from kappaskin_app.theme import FAINT, current, follow_look, grown
 from kappaskin_app.widgets.layout import scrolled
+from kappaskin_app.widgets.lettering import RIGHT
 from kappaskin_app.widgets.parts import ELLIPSIS, button, in_a_row, text_label
 
 PICTURE, PLAYING = int(Qt.ItemDataRole.UserRole), int(Qt.ItemDataRole.UserRole) + 1
@@ -130,8 +131,7 @@ class CardPainter(QStyledItemDelegate):
             ]
         )
         painter.setPen(QColor(theme.base))
-        flags = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(pill.adjusted(0, 0, -height / 2 + 1, 0), flags, words)
+        painter.drawText(pill.adjusted(0, 0, -height / 2 + 1, 0), RIGHT, words)
 
     def _paint_title(self, painter: QPainter, place: QRectF, title: str) -> None:
         metrics, flags = QFontMetricsF(painter.font()), Qt.AlignmentFlag
@@ -173,8 +173,8 @@ class _Cards(QListWidget):
     played = Signal()
     resized = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.painter = CardPainter()
         self.setItemDelegate(self.painter)
         self.setViewMode(QListView.ViewMode.IconMode)
@@ -221,8 +221,8 @@ class GalleryPanel(QWidget):
     chosen = Signal(str)
     open_wanted = Signal()
 
-    def __init__(self, tasks: Tasks, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, tasks: Tasks) -> None:
+        super().__init__()
         self.cards = _Cards()
         self.items = {name: QListWidgetItem(_titled(name)) for name in in_order(SCENES)}
         for item in self.items.values():

@@ -1,6 +1,6 @@
 """Forms of the load on the simulated skin, and of the noise."""
 
-from PySide6.QtWidgets import QComboBox, QLabel, QWidget
+from PySide6.QtWidgets import QComboBox, QLabel
 
 from kappaskin.live import Status
 from kappaskin_app.shell.form import SimulationForm
@@ -25,9 +25,9 @@ class LoadPanel(SimulationForm):
     )
     guide_page = "scenes"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self) -> None:
         names = ("load_case", "force", "x", "y", "x_end", "y_end", "size", "size_y")
-        super().__init__("Load", names, parent)
+        super().__init__("Load", names)
         self._refusal = ""
 
     def show_settings(self, settings: Settings) -> None:
@@ -74,8 +74,8 @@ class NoisePanel(SimulationForm):
     )
     guide_page = "scenes"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Noise", ("noise_kind", "noise_rms", "noise_seed"), parent)
+    def __init__(self) -> None:
+        super().__init__("Noise", ("noise_kind", "noise_rms", "noise_seed"))
 
     def show_settings(self, settings: Settings) -> None:
         super().show_settings(settings)

@@ -58,8 +58,8 @@ class SceneText(QPlainTextEdit):
 
     edited = Signal(str)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.setObjectName("scene-text")
         self.setAccessibleName("The scene as text")
         self.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
@@ -197,8 +197,8 @@ class SceneEditor(QWidget):
     edited = Signal(str)
     save_wanted = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.form, self.text = SceneForm(), SceneText()
         self.name, self.message = QLabel(), text_label()
         self.message.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
@@ -249,8 +249,8 @@ class ScenePanel(QTabWidget):
 
     plan_visible = Signal(bool)
 
-    def __init__(self, tasks: Tasks, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, tasks: Tasks) -> None:
+        super().__init__()
         self.gallery = GalleryPanel(tasks)
         self.editor, self.effects = SceneEditor(), EffectsPanel()
         for page, title in (

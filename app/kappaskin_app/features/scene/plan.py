@@ -2,18 +2,9 @@
 
 from typing import Any
 
-from PySide6.QtCore import QObject, QSignalBlocker, Qt, Signal
+from PySide6.QtCore import QObject, QSignalBlocker, Signal
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import (
-    QAbstractItemView,
-    QComboBox,
-    QHeaderView,
-    QLabel,
-    QTableWidget,
-    QTableWidgetItem,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QComboBox, QLabel, QVBoxLayout, QWidget
 
 from kappaskin.live import Status
 from kappaskin.scenes import EffectSelection, Scene
@@ -24,6 +15,8 @@ from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.effects import effect_description, effect_name
 from kappaskin_app.shell.session import Session
 from kappaskin_app.theme import current, follow_look
+from kappaskin_app.widgets.lettering import LEFT
+from kappaskin_app.widgets.table import Table
 from kappaskin_app.widgets.text import duration
 
 
@@ -104,27 +97,16 @@ class EffectsPanel(QWidget):
 
     forced = Signal(str, str)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.summary = QLabel(wordWrap=True)  # pyright: ignore[reportCallIssue]
-        self.table = QTableWidget(0, len(_COLUMNS))
-        self.table.setObjectName("effects")
-        self.table.setAccessibleName("Effects of the scene")
-        for column, (title, tip) in enumerate(zip(_COLUMNS, _TIPS, strict=True)):
-            item = QTableWidgetItem(title)
-            item.setToolTip(tip)
-            self.table.setHorizontalHeaderItem(column, item)
-        self.table.verticalHeader().hide()
-        self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        self.table = Table(
+            "effects", "Effects of the scene", _COLUMNS, _TIPS, (_SIZE, _ERROR, _TIME), (_WHY,)
+        )
+        self.table.setSelectionMode(Table.SelectionMode.NoSelection)
         self.table.setShowGrid(False)
-        self.table.setTabKeyNavigation(False)
-        header = self.table.horizontalHeader()
-        header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        header.setStretchLastSection(True)
+        self.table.horizontalHeader().setDefaultAlignment(LEFT)
         self.forces: dict[str, QComboBox] = {}
-        self._cells: list[list[QTableWidgetItem]] = []
         self._rows: list[dict[str, Any]] = []
         self._choice = EffectSelection()
         stack = QVBoxLayout(self)
@@ -156,13 +138,7 @@ class EffectsPanel(QWidget):
         self.table.setRowCount(0)
         self.table.setRowCount(len(names))
         self.forces = {}
-        self._cells = [[QTableWidgetItem() for _ in _COLUMNS] for _ in names]
-        right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
         for number, name in enumerate(names):
-            for column, item in enumerate(self._cells[number]):
-                if column in (_SIZE, _ERROR, _TIME):
-                    item.setTextAlignment(right)
-                self.table.setItem(number, column, item)
             box = QComboBox()
             box.setObjectName(f"force-{name}")
             box.setAccessibleName(f"{effect_name(name)}, selection")
@@ -189,10 +165,7 @@ class EffectsPanel(QWidget):
         }
         colour = QColor(current().text if row["kept"] else current().faint)
         for column, (text, tip) in cells.items():
-            item = self._cells[number][column]
-            item.setText(text)
-            item.setToolTip(tip)
-            item.setForeground(colour)
+            self.table.write(number, column, text, tip).setForeground(colour)
 
     def _show_force(self, name: str, there: bool) -> None:
         box, choice = self.forces[name], self._choice

@@ -217,8 +217,8 @@ class SceneForm(QScrollArea):
 
     edited = Signal(str)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._text = ""
         self._showing = False
         self._content = QWidget()

@@ -5,19 +5,17 @@ from collections.abc import Generator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QObject, QPointF, QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QImage, QLinearGradient, QPainter, QPen, QPolygonF
 
 from kappaskin.errors import Refusal
+from kappaskin.frames import Array, Indices, Mask
 from kappaskin.scenes import AppliedLoads, Indenter, LoadingHistory, Scene, Stimulus, load_scene
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import BackgroundTask, Tasks
-from kappaskin_app.shell.drawn_skin import FROM_THE_LEFT, DrawnSkin, Indices
+from kappaskin_app.shell.drawn_skin import FROM_THE_LEFT, DrawnSkin
 from kappaskin_app.shell.loads import footprint
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, SEQUENTIAL, Colours, Theme
-
-Array = NDArray[np.float64]
 
 _POINTS = 49  # of the surface along each side
 _OF_A_STRIP = (97, 25)  # along x and y: nothing changes along y
@@ -363,7 +361,7 @@ def _filled(corners: Array, colours: Colours, width: int, height: int) -> Colour
     return made.view(np.uint8).reshape(height, width, 4)
 
 
-def _on_the_rim(relief: Relief) -> NDArray[np.bool_]:
+def _on_the_rim(relief: Relief) -> Mask:
     """Whether the sides (k, 4) of the faces are on the rim."""
     faces = relief.faces
     sides = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1), axis=-1)

@@ -3,17 +3,15 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPen, QPolygonF
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
+from kappaskin.frames import Array
 from kappaskin.scenes import Scene
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import current, follow_look
 from kappaskin_app.widgets.timeline import Clock, Course, glyph_button, icon
-
-Array = NDArray[np.float64]
 
 _SAMPLES = 200  # of the force profile
 _TICK_GAP = 3.0  # px, least distance of two ticks
@@ -38,8 +36,8 @@ def profile(scene: Scene) -> Array:
 class Track(Course):
     """The profile of the force, with a handle."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Time in the scene, in ms", _TRACK_TIP, parent)
+    def __init__(self) -> None:
+        super().__init__("Time in the scene, in ms", _TRACK_TIP)
         self.frame = _FRAME
         self._profile, self._moments = np.zeros(_SAMPLES), [0.0]
         self._shaped, self._shape = QRectF(), QPolygonF()
@@ -91,8 +89,8 @@ class Timeline(QWidget):
     sought = Signal(float)
     play_wanted = Signal(bool)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.setAccessibleName("Timeline")
         self.play = glyph_button("timeline-play")
         self.track, self.clock = Track(), Clock(_TIP)

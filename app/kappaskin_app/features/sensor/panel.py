@@ -3,7 +3,7 @@
 import math
 from contextlib import suppress
 
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QLabel
 
 from kappaskin.bases import edges_of
 from kappaskin.errors import Refusal
@@ -30,8 +30,8 @@ class ShapePanel(SimulationForm):
     )
     guide_page = "scenes"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Shape", ("shape", *_NUMBERS, "edge"), parent)
+    def __init__(self) -> None:
+        super().__init__("Shape", ("shape", *_NUMBERS, "edge"))
         self.opening = QLabel()
         self._opening_name = QLabel("Opening angle")
         self._opening_name.setToolTip("The angle of the arc: its length over its radius.")
@@ -75,8 +75,8 @@ class ElementsPanel(SimulationForm):
     )
     guide_page = "scenes"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Elements", ("elements_x", "elements_y"), parent)
+    def __init__(self) -> None:
+        super().__init__("Elements", ("elements_x", "elements_y"))
 
     def alarm(self, status: Status) -> str:
         return in_use(status)
@@ -91,8 +91,8 @@ class SupportPanel(SimulationForm):
     )
     guide_page = "scenes"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Support", ("tension", "foam", "fluid"), parent)
+    def __init__(self) -> None:
+        super().__init__("Support", ("tension", "foam", "fluid"))
 
 
 _SELECT = "Click elements on a heatmap to select them."
@@ -118,8 +118,8 @@ class ElectronicsPanel(SimulationForm):
     )
     guide_page = "scenes"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Electronics", ("electronics", "bits", "conversion_time"), parent)
+    def __init__(self) -> None:
+        super().__init__("Electronics", ("electronics", "bits", "conversion_time"))
         self._facts = [QLabel() for _ in range(3)]
         rows = (
             ("Frame", "Largest frame rate: one over the conversion time of all channels."),
@@ -150,8 +150,8 @@ class GagesPanel(SimulationForm):
     )
     guide_page = "scenes"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Gages", ("loops", "creep", "tolerance"), parent)
+    def __init__(self) -> None:
+        super().__init__("Gages", ("loops", "creep", "tolerance"))
 
 
 class RegionPanel(Form):
@@ -163,8 +163,8 @@ class RegionPanel(Form):
     )
     guide_page = "accuracy"
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Region of interest", ("region", "region_radius", "region_share"), parent)
+    def __init__(self) -> None:
+        super().__init__("Region of interest", ("region", "region_radius", "region_share"))
         self._region, self._selected = "off", 0
         self._text, self._rates = "", (math.inf, math.inf)
 

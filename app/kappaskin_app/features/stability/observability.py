@@ -3,17 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from kappaskin.bases import Basis, basis_for
 from kappaskin.estimation import singular_values
+from kappaskin.frames import Array
 from kappaskin.live import Status
 from kappaskin.sensing import Sensor, SensorLayout
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.history import History
-
-Array = NDArray[np.float64]
 
 MOST = 576
 """Largest number of functions: parts of the computation block the window."""

@@ -39,8 +39,8 @@ class StabilityPanel(QWidget):
     back = Signal()
     shown = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.plot, self.map = SpectrumPlot(), ModeMap()
         self.words, self.explanation, self.refused = text_label(), text_label(), text_label()
         self.number = QSpinBox()

@@ -3,18 +3,16 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QImage, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from kappaskin.frames import Array
 from kappaskin.sensing import SensorLayout
 from kappaskin_app.features.stability.observability import Spectrum
 from kappaskin_app.theme import DIVERGING, current
-from kappaskin_app.widgets.plots import LogAxis
+from kappaskin_app.widgets.plots import LogAxis, paint_empty
 from kappaskin_app.widgets.tint import Tint
-
-Array = NDArray[np.float64]
 
 _THINNEST = 0.2  # of the longer side, so that a narrow skin is visible
 
@@ -22,8 +20,8 @@ _THINNEST = 0.2  # of the longer side, so that a narrow skin is visible
 class ModeMap(QWidget):
     """Draws a surface (ny, nx) between -1 and 1, NaN off the skin; dead elements are crossed."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._surface: Array | None = None
         self._layout: SensorLayout | None = None
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
@@ -91,8 +89,8 @@ class SpectrumPlot(QWidget):
 
     chosen = Signal(int)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.spectrum: Spectrum | None = None
         self._number, self._empty = 0, ""
         self._axis = LogAxis(0.1, 1.0)
@@ -158,9 +156,7 @@ class SpectrumPlot(QWidget):
         painter.fillRect(area, QColor(theme.base))
         spectrum = self.spectrum
         if spectrum is None:
-            painter.setPen(QColor(theme.faint))
-            flags = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
-            painter.drawText(area.adjusted(8, 8, -8, -8), flags, self._empty)
+            paint_empty(painter, area, self._empty)
             return
         self._paint_axes(painter, area, len(spectrum.values))
         size = min(max(0.35 * area.width() / len(spectrum.values), 1.5), 4.0)

@@ -2,16 +2,12 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
-from kappaskin.frames import COMPONENTS
+from kappaskin.frames import COMPONENTS, Array
 from kappaskin.pipeline import REPORTED
 from kappaskin_app.widgets.plots import Curve, CurvePlot
-
-Array = NDArray[np.float64]
 
 TRACED = tuple(quantity for quantity in REPORTED if quantity.traced)
 _NONE = "Click an element, on the skin or in a heatmap."
@@ -28,8 +24,8 @@ class ElementPanel(QWidget):
 
     plot_toggled = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.title, self.facts = QLabel(_NONE), QLabel()
         for label in (self.title, self.facts):
             label.setTextFormat(Qt.TextFormat.RichText)
@@ -88,8 +84,8 @@ class Traces(QWidget):
 
     pointed = Signal(int)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         titles = [(f"{of.traced} {name}", of.unit) for of in TRACED for name in COMPONENTS]
         self.plots = [CurvePlot(title, unit, True, _TRACE.format(title)) for title, unit in titles]
         around = QHBoxLayout(self)

@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, Signal
 
 from kappaskin.calibration import Calibration
 from kappaskin.estimation import amplitude_spectrum
-from kappaskin.frames import COMPONENTS, Estimate
+from kappaskin.frames import COMPONENTS, Array, Estimate
 from kappaskin.live import Status
 from kappaskin.pipeline import REPORTED, Reported, ReportedQuantity
 from kappaskin.sensing import Sensor
@@ -21,8 +21,6 @@ from kappaskin_app.shell.selection import Selection
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.widgets.parts import with_error
-
-Array = NDArray[np.float64]
 
 SECONDS = 10.0
 """Length of the history."""

@@ -3,6 +3,8 @@
 from dataclasses import dataclass, fields
 from typing import Any
 
+import numpy as np
+
 from kappaskin.calibration import Calibration, Tare
 from kappaskin_app.shell.settings.designed import DesignSettings as DesignSettings
 from kappaskin_app.shell.settings.form_fields import Choice as Choice
@@ -79,6 +81,13 @@ def part(settings: Settings, kind: Kind) -> tuple[Any, ...]:
 def form_field(name: str) -> FormField:
     """The form field of the setting `name`."""
     return next(f.metadata["form"] for f in fields(Settings) if f.name == name)
+
+
+def calibration_text(calibration: Calibration) -> str:
+    """When a calibration was made, and how many channels passed."""
+    passed, all_ = int(np.isfinite(calibration.gain).sum()), len(calibration.gain)
+    day = calibration.date.astimezone()
+    return f"calibrated {day:%Y-%m-%d}, {passed} of {all_} channels"
 
 
 def change_text(name: str, before: Settings, after: Settings) -> str:

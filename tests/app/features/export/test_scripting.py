@@ -65,7 +65,7 @@ class Asked:
             estimate is not None
             and bool(status.events)
             and estimate.host_time > status.events[-1].time
-            and status.setup == session.requested_setup
+            and status.setup == session.engine.requested.setup
             and estimate.generation == status.generation
             and math.isfinite(estimate.contact.force)
         )
@@ -228,10 +228,10 @@ def test_a_tare_in_use_is_in_a_file_that_the_script_reads(
     now = datetime(2026, 11, 22, tzinfo=UTC)
     of = (sensor.name, sensor.serial_number, fingerprint(sensor.layout))
     asked.history.change("Tare", -1, tare=Tare(*of, now, None, 100, 0.2, zero, 0.1 * zero))
-    assert asked.session.requested_setup.tare is not None
+    assert asked.session.engine.requested.setup.tare is not None
     made: dict[str, Any] = {}
     exec(asked.text(tmp_path), made)
-    assert made["SETUP"] == asked.session.requested_setup
+    assert made["SETUP"] == asked.session.engine.requested.setup
 
 
 def test_the_action_puts_a_script_on_the_clipboard(window: MainWindow) -> None:

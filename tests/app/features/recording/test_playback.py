@@ -64,14 +64,14 @@ def test_a_recording_is_never_called_live_and_names_its_day(player: MainWindow, 
 def test_one_that_stands_is_paused_and_not_stale(standing: MainWindow, qtbot, until) -> None:
     qtbot.wait(700)
     assert standing.display.badge.state == "REPLAY \N{MIDDLE DOT} paused"
-    assert not standing.membrane.greyed
+    assert not standing.membrane.surface.lost
     until(lambda: standing.readouts.text("contact").endswith(" mm"))
 
 
 def test_where_nothing_came_it_is_grey(standing: MainWindow, until) -> None:
     standing.playback.seek(1.4)
     until(lambda: standing.display.badge.state == "REPLAY \N{MIDDLE DOT} gap")
-    until(lambda: standing.membrane.greyed)
+    until(lambda: standing.membrane.surface.lost)
     standing.presenter.enter()
     until(lambda: standing.presenter.view.strip.state == standing.display.badge.state)
     assert "Ctrl+P" in standing.presenter.view.banner.remedy
