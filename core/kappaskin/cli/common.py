@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from cyclopts import Parameter, Token
 
-from kappaskin._files import replacing
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
@@ -118,6 +117,8 @@ def print_result(value: Any, as_json: bool, text: Callable[[], str]) -> None:
 def save_arrays(out: Path, arrays: "Mapping[str, NDArray[Any]]") -> None:
     """Write an NPZ; raises a `Refusal` where that cannot be."""
     import numpy as np
+
+    from kappaskin._files import replacing
 
     with replacing(out) as part, part.open("wb") as file:
         np.savez(file, **arrays)  # pyright: ignore[reportArgumentType]

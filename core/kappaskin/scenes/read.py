@@ -362,7 +362,8 @@ def _recorded(file: Path) -> RecordedMotion:
         rows = np.array([line.split(",") for line in lines if line.strip()], float)
     except (OSError, ValueError) as error:
         raise Refusal(
-            f"{file}: expected a CSV of numbers time,dx,dy,amount in s, m, m and shares: {error}"
+            f"{file}: expected a CSV of numbers time,dx,dy,amount in s, m, m and shares: {error}; "
+            "correct it, or keep fewer lines"
         ) from error
     if heading.replace(" ", "") != "time,dx,dy,amount":
         raise Refusal(f"{file}: expected a first line time,dx,dy,amount, got {heading!r:.80}")

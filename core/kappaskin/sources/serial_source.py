@@ -313,7 +313,7 @@ class SerialSource:
         if counts.other_version is not None and not known:
             return (
                 f"{self.url}: the device speaks wire version {counts.other_version}, this program "
-                f"speaks {VERSION}; update the older of the two"
+                f"uses {VERSION}; update the older of the two"
             )
         arrived = counts.bytes_in - self._bytes_before
         if not arrived or (known and now - self._received_at >= _PATIENCE):

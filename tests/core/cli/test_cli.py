@@ -173,7 +173,7 @@ def test_a_place_that_cannot_be_written_is_refused(run, npz, tmp_path, out) -> N
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="has no device that is always full")
 def test_a_full_disk_is_a_refusal(run, npz) -> None:
-    refused(run("reconstruct", npz(), "--out", "/dev/full"), "cannot be written ([Errno 28]")
+    refused(run("reconstruct", npz(), "--out", "/dev/full"), "cannot be written (No space left")
 
 
 # The other commands

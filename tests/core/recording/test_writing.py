@@ -113,7 +113,7 @@ def test_nothing_else_is_taken_for_a_recording(tmp_path) -> None:
     if hasattr(os, "mkfifo"):
         os.mkfifo(tmp_path / "pipe")
         for read in (Recording, lambda pipe: list(Repaired.steps(pipe, path))):
-            with pytest.raises(Refusal, match="expected a file"):
+            with pytest.raises(Refusal, match="it is not a file"):
                 read(tmp_path / "pipe")
     for data in (b"", b"\x89PNG\r\n\x1a\n" + bytes(100), records.MAGIC, records.MAGIC * 20):
         path.write_bytes(data)
@@ -219,5 +219,5 @@ def test_a_damaged_chunk_is_said_to_be_one(whole, tmp_path) -> None:
     ids=["record", "read", "repair", "export"],
 )
 def test_a_name_that_no_file_can_have_is_refused(use, tmp_path) -> None:
-    with pytest.raises(Refusal, match=r"cannot be accessed \(File name too long\)"):
+    with pytest.raises(Refusal, match=r"cannot be (accessed|read) \(File name too long\)"):
         use(tmp_path / f"{'x' * 300}.csv")

@@ -222,8 +222,12 @@ BAD = {
     "size zero": (said(size=[0, 0.1]), "two sides above zero"),
     "size negative": (said(size=[-0.1, 0.1]), "two sides above zero"),
     "size huge": (said(size=[10**400, 0.1]), "size: expected a number, got 1000"),
-    "size of nothing": (said(size=[1e-300, 0.1]), "sides of 0.0001 to 10 m, got 1e-300 x 0.1 m"),
-    "size of a star": (said(size=[0.1, 1e300]), "sides of 0.0001 to 10 m"),
+    "size of nothing": (
+        said(size=[1e-300, 0.1]),
+        "1e-09 to 1e.09, got 1e-300 x 0.1",
+    ),
+    "size of a grain": (said(size=[1e-5, 0.1]), "sides of 0.0001 to 10 m, got 1e-05 x 0.1 m"),
+    "size of a star": (said(size=[0.1, 1e300]), "1e-09 to 1e.09, got 0.1 x 1e.300"),
     "three sides": (
         said(size=[0.1, 0.1, 0.1]),
         "size: expected a list of 2 numbers, got",

@@ -5,7 +5,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from kappaskin._files import write_whole
 from kappaskin.errors import Refusal
 
 
@@ -39,6 +38,7 @@ def write_figures(out: Path, names: Iterable[str]) -> list[Path]:
 
     The folder is made when there is none. Nothing in it is replaced before all are drawn.
     """
+    from kappaskin._files import write_whole
     from kappaskin.studies.figures import style
 
     asked = _known(names)
