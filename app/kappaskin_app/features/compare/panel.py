@@ -29,7 +29,7 @@ _SETTINGS = (
     "other_tared",
 )
 _COLUMNS = ("", "A", "B", "B \N{MINUS SIGN} A")
-_TABLE_WIDTH = 408  # px
+_TABLE_WIDTH = 432  # px
 _MICROMETRES, _MILLIMETRES = 1e6, 1e3
 _SURFACE = "Displacement of the skin, on a common scale of A and B; the cross is the contact."
 _DIFFERENCE = "B minus A in \N{MICRO SIGN}m, on its own scale."

@@ -4,7 +4,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QAbstractItemView, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from kappaskin.health import Health
-from kappaskin.live import Status
+from kappaskin.live import STREAMING, Status
 from kappaskin_app.features.health.press import ChannelMapTest, PressPage
 from kappaskin_app.guard import guarded
 from kappaskin_app.widgets.parts import sentence, text_label
@@ -40,7 +40,7 @@ class HealthPanel(QWidget):
         around.setSpacing(12)
         around.addLayout(left, 3)
         around.addWidget(self.press, 2)
-        self._show(Health(), 0.0)
+        self._show(Health(), 0.0, streaming=False)
 
     def _made_table(self) -> Table:
         last = len(_COLUMNS) - 1
@@ -60,11 +60,13 @@ class HealthPanel(QWidget):
 
     def show_status(self, status: Status, inside: bool) -> None:
         if self.isVisible():
-            self._show(status.health, status.reported)
+            self._show(status.health, status.reported, status.state == STREAMING)
         self.press.show_status(status, inside)
 
-    def _show(self, health: Health, now: float) -> None:
-        words = sentence(str(health))
+    def _show(self, health: Health, now: float, streaming: bool = True) -> None:
+        words = sentence(str(health)) if streaming else "No readings arrive, so nothing is checked."
+        if health.findings and not streaming:
+            words += " The faults found last are listed."
         if len(health.findings) < health.count:
             words += f" The first {len(health.findings)} are listed."
         if words != self.words.text():

@@ -44,6 +44,14 @@ def test_findings_are_listed_with_their_age_and_figure(qapp) -> None:
     assert panel.words.text() == "All channels OK."
 
 
+def test_without_readings_no_channel_is_said_to_be_well(qapp) -> None:
+    panel = HealthPanel()
+    assert panel.words.text() == "No readings arrive, so nothing is checked."
+    panel._show(Health((KEPT, STUCK), 2), 130.0, streaming=False)  # noqa: SLF001
+    assert panel.words.text().endswith("so nothing is checked. The faults found last are listed.")
+    assert len(told(panel)) == 2
+
+
 def test_a_finding_that_is_chosen_is_pointed_at(qapp, qtbot) -> None:
     panel = HealthPanel()
     panel._show(Health((KEPT, STUCK), 2), 130.0)  # noqa: SLF001
