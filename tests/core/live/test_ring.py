@@ -300,6 +300,7 @@ def test_a_block_given_back_is_gone() -> None:
 
 @SMALL
 @pytest.mark.slow
+@pytest.mark.cases("512k")
 @pytest.mark.parametrize("size", ["4m", "512k"])
 def test_little_memory_is_made_do_with(tmp_path, size: str) -> None:
     file = tmp_path / "a.mcap"
@@ -311,6 +312,7 @@ def test_little_memory_is_made_do_with(tmp_path, size: str) -> None:
 
 @SMALL
 @pytest.mark.slow
+@pytest.mark.cases("4k")
 @pytest.mark.parametrize("size", ["4k", "16k"])
 def test_too_little_memory_is_refused(tmp_path, size: str) -> None:
     file = tmp_path / "a.mcap"
