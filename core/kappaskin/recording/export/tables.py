@@ -7,6 +7,7 @@ import shutil
 import zipfile
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from contextlib import suppress
 from operator import attrgetter
 from pathlib import Path
 from typing import IO, Any, NamedTuple, cast
@@ -151,10 +152,14 @@ class CsvTable(TableWriter):
     def begin(self, scratch: Path) -> None:
         self._file = self.path.open("w", encoding="utf-8", newline="\n")
         facts = self.info.facts | {"columns": {c.name: c.text for c in self.columns}}
-        for name, value in facts.items():
-            self._file.write(f"# {name}: {json.dumps(value)}\n")
         heads = [head for column in self.columns for head in column.heads()]
-        self._file.write(",".join(heads) + "\n")
+        lines = [f"# {name}: {json.dumps(value)}" for name, value in facts.items()]
+        try:
+            self._file.write("\n".join([*lines, ",".join(heads), ""]))
+        except OSError:  # nobody else closes what was not begun
+            with suppress(OSError):
+                self._file.close()
+            raise
 
     def write(self, block: Block) -> None:
         flat = [values.reshape(len(values), -1) for values in block.values()]
