@@ -71,9 +71,9 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
             if not _ended(engine).recording.trouble:
                 out.unlink(missing_ok=True)  # ours, with nothing in it
             raise
-        if not engine.alive:
-            return _broken_off(out)
         status = _ended(engine)
+        if not (engine.alive or out.exists()):
+            return _broken_off(out)
         written = status.recording
     print(
         f"{written.path}: {written.messages:,} messages in {written.seconds:.1f} s, "
@@ -153,7 +153,7 @@ def _ended(engine: "Engine") -> "Status":
     asked = time.monotonic()
     for _ in range(round(_BEGIN / _POLL)):
         status = engine.status()
-        if not status.recording.active and status.reported > asked:
+        if not engine.alive or (not status.recording.active and status.reported > asked):
             break
         time.sleep(_POLL)
     return engine.status()
