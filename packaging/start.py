@@ -9,6 +9,8 @@
     python3 packaging/start.py cover [ARGUMENTS]   tells which lines of the library no test runs
     python3 packaging/start.py bench [ARGUMENTS]   runs the benchmarks; --history tells how it went
     python3 packaging/start.py fuzz [SECONDS]      gives every reader bytes it has never seen
+    python3 packaging/start.py drill [ARGUMENTS]   kills, stops, fills and floods what runs, and
+                                                   writes the results to the guide's validation page
     python3 packaging/start.py mutate ROOM [COUNT] changes contact, sources, estimation or scenes:
                                                    do its tests notice?
     python3 packaging/start.py core [ARGUMENTS]    tests the library where no GUI is installed;
@@ -60,8 +62,9 @@ READING = (
 TESTS = ("pytest", "-n3", "--max-worker-restart=0", "-m", "not full")
 LIBRARY = "tests/core"
 ALL_CASES = ("-m", "")  # the last -m counts
-# Benchmark files are named so that plain pytest passes them by.
+# Benchmarks and drills are named so that plain pytest passes them by.
 BENCHMARKS = ("tests/benchmarks", "-o", "python_files=bench_*.py", "-q")
+DRILLS = ("tests/drills", "-o", "python_files=drill_*.py", "-n0")
 CORE = (f"{ROOT}[plots,foxglove,hdf5]", "hypothesis", "mcap-ros2-support", "mpmath", "psutil")
 CORE += ("pytest", "pytest-xdist", "scikit-fem")
 
@@ -74,6 +77,7 @@ RELEASE = (
     ("core",),
     *(("mutate", room, "20") for room in ("contact", "sources", "estimation", "scenes")),
     ("fuzz", "120"),
+    ("drill",),
     ("bench",),
     ("bundle",),
 )
@@ -176,8 +180,13 @@ def bench(arguments: list[str], shown: dict[str, str]) -> int:
     return run([tool("pytest"), *BENCHMARKS, *arguments], shown, cwd=ROOT)
 
 
+def drill(arguments: list[str], shown: dict[str, str]) -> int:
+    """Run the drills, one at a time."""
+    return run([tool("pytest"), *DRILLS, *arguments], shown, cwd=ROOT)
+
+
 def fuzz(arguments: list[str], shown: dict[str, str]) -> int:
-    """Give the readers of files and lines mutated bytes, for minutes or hours."""
+    """Give the readers of files and lines mutated bytes, for minutes or an hour."""
     return run([tool("python"), str(ROOT / "tests" / "fuzz" / "fuzz.py"), *arguments], shown)
 
 
@@ -205,7 +214,7 @@ def mutate(arguments: list[str], shown: dict[str, str]) -> int:
 
 TASKS = {
     task.__name__: task
-    for task in (app, test, full, lint, fast, cover, bench, fuzz, mutate, core, bundle)
+    for task in (app, test, full, lint, fast, cover, bench, fuzz, drill, mutate, core, bundle)
 }
 
 

@@ -6,6 +6,7 @@ the same but for its numbers; ... stands for anything. The sensor at /dev/ttyACM
 `kappaskin device`.
 """
 
+import ast
 import doctest
 import importlib.util
 import io
@@ -199,7 +200,7 @@ def _keep(block: Block) -> None:
     "accuracy",
     "build",
     "calibrate",
-    "checked-against-others",
+    "validation",
     "connect",
     "numbers",
     "paper",
@@ -292,3 +293,11 @@ def test_every_page_is_in_the_contents_and_in_one_order() -> None:
     contents = (GUIDE / "README.md").read_text("utf-8")
     listed = re.findall(r"^\d+\. \[[^\]]+\]\(([\w-]+\.md)\)", contents, re.MULTILINE)
     assert sorted(listed) == sorted(page.name for page in PAGES[1:] if page.name != "README.md")
+
+
+def test_the_validation_page_lists_every_drill_as_passed() -> None:
+    table = (GUIDE / "validation.md").read_text("utf-8").partition("| drill |")[2]
+    for file in (Path(__file__).parent / "drills").glob("drill_*.py"):
+        name = (ast.get_docstring(ast.parse(file.read_text("utf-8"))) or "").splitlines()[0]
+        assert re.search(rf"^\| {re.escape(name.rstrip('.'))} \| [1-9]", table, re.M), file
+    assert "failed" not in table

@@ -25,7 +25,7 @@ from kappaskin.studies.paper import LoadCase, table_1
 
 pytestmark = pytest.mark.slow
 
-PAGE = Path(kappaskin_resources.__file__).parent / "guide" / "checked-against-others.md"
+PAGE = Path(kappaskin_resources.__file__).parent / "guide" / "validation.md"
 OURS = "Kappaskin, least squares"
 
 
