@@ -6,6 +6,7 @@ from pathlib import Path
 
 from cyclopts import App
 
+from kappaskin.cli import Limit, allow
 from kappaskin.errors import Refusal, lacking
 
 app = App(name="app", help_format="markdown")
@@ -33,6 +34,7 @@ def run(
     source: str = "sim:",
     seconds: float | None = None,
     screenshot: Path | None = None,
+    limit: Limit = "",
 ) -> None:
     """Open the desktop app on a source of readings, or on a file.
 
@@ -49,6 +51,7 @@ def run(
     screenshot
         Save a picture of the window just before it closes.
     """
+    allow(limit)
     if file is not None and not file.is_file():
         raise Refusal(f"{file}: no such file; check its name")
     _open(source, seconds, screenshot, file=file)
@@ -95,7 +98,13 @@ def _open(
         raise lacking("app", "the desktop app", error) from error
 
 
-def replay(file: Path, *, seconds: float | None = None, screenshot: Path | None = None) -> None:
+def replay(
+    file: Path,
+    *,
+    seconds: float | None = None,
+    screenshot: Path | None = None,
+    limit: Limit = "",
+) -> None:
     """Open the desktop app on a recording.
 
     Example: `kappaskin replay press.mcap`
@@ -111,5 +120,6 @@ def replay(file: Path, *, seconds: float | None = None, screenshot: Path | None 
     """
     from kappaskin.recording import Recording
 
+    allow(limit)
     with Recording(file):  # or refused here
         _open(f"replay:{file.absolute()}", seconds, screenshot)

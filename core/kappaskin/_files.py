@@ -1,16 +1,26 @@
-"""Files: written whole or not at all, and opened only where they are files."""
+"""Files: written whole or not at all, opened only where they are files, and read within limits."""
 
 import os
 import secrets
 import stat
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import BinaryIO
 
 from kappaskin.errors import Refusal
 
 _ELSEWHERE = "choose another place"
+
+LIMIT = "KAPPASKIN_LIMIT"
+"""Environment variable: bytes that reading a file may take, instead of the usual limits."""
+
+_TIMES = 200  # its size, that a file may declare
+_ALWAYS = 256_000_000  # bytes that any file may declare
+_SHARE = 4  # of the memory
+_UNKNOWN = 4_000_000_000  # bytes of memory, where the system does not say
+_CONTAINER = Path("/sys/fs/cgroup/memory.max")
 
 
 def open_file(path: Path) -> BinaryIO:
@@ -32,6 +42,68 @@ def read_file(path: Path, most: int) -> bytes:
         if os.fstat(file.fileno()).st_size > most:
             raise OSError(f"it has more than {most} bytes")
         return file.read()
+
+
+class Budget:
+    """The limit of what the file at `path`, of `size` bytes, may take by what it declares.
+
+    In all over 200 times its size, where that is over 256 MB, is refused.
+    """
+
+    def __init__(self, path: Path, size: int) -> None:
+        self._path, self._size, self.taken = path, size, 0
+        self._most = _limit() or max(_ALWAYS, _TIMES * size)
+
+    def take(self, count: int, part: str) -> None:
+        """Count `count` bytes for a `part` of the file, or work of that size.
+
+        A `Refusal` where that is too much with what was counted before.
+        """
+        self.taken += count
+        if self.taken > self._most:
+            raise Refusal(
+                f"{self._path}: expected a file of {_said(self._size)} to take at most "
+                f"{_said(self._most)}, but {part} would take {_said(self.taken)} or more; "
+                "`--limit` with a size such as 2GB allows it, for a file that you trust"
+            )
+
+
+def check_memory(count: int, part: str) -> None:
+    """Raise a `Refusal` where `part` would take more than a quarter of the memory, in bytes."""
+    most = _limit() or total_memory() // _SHARE
+    if count > most:
+        raise Refusal(
+            f"expected to take at most {_said(most)} of memory, but {part} would take "
+            f"{_said(count)}; reduce it, or allow it by `--limit` with a size such as 8GB"
+        )
+
+
+def _limit() -> int:
+    try:
+        return int(os.environ.get(LIMIT, ""))
+    except ValueError:
+        return 0
+
+
+@cache
+def total_memory() -> int:
+    """The memory of this machine, or of this container, in bytes."""
+    try:
+        memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):  # there is no sysconf on Windows
+        return _UNKNOWN
+    try:
+        return min(memory, int(_CONTAINER.read_text()))
+    except (OSError, ValueError):
+        return memory
+
+
+def _said(count: int) -> str:
+    """`count` bytes as text."""
+    for size, unit in ((1e9, "GB"), (1e6, "MB"), (1e3, "kB")):
+        if count >= size:
+            return f"{count / size:,.3g} {unit}" if count < 1e12 else f"{count / size:,.0f} {unit}"
+    return f"{count} bytes"
 
 
 @contextmanager

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from kappaskin._files import replace_whole, replacing, write_whole
+from kappaskin import _files
+from kappaskin._files import LIMIT, Budget, check_memory, replace_whole, replacing, write_whole
 from kappaskin.calibration import Calibration
 from kappaskin.errors import Refusal
 from kappaskin.mechanics import HeightMap, Mesh
@@ -203,3 +204,49 @@ def test_no_reader_waits_for_a_pipe(tmp_path: Path, read: Callable[[Path], objec
         os.mkfifo(tmp_path / name)
         with pytest.raises(Refusal):
             read(tmp_path / name)
+
+
+# What a file may take
+
+
+@pytest.mark.parametrize(
+    ("size", "legal"), [(100, 256_000_000), (1_280_000, 256_000_000), (10**9, 200 * 10**9)]
+)
+def test_a_file_may_take_256_mb_or_200_times_its_size(size: int, legal: int) -> None:
+    budget = Budget(Path("a.mcap"), size)
+    budget.take(legal - 1, "this")
+    budget.take(1, "this")
+    with pytest.raises(Refusal, match=r"^a\.mcap: expected a file of .* but that would take .*GB"):
+        budget.take(10**12, "that")
+    with pytest.raises(Refusal, match="that would take"):
+        Budget(Path("a.mcap"), size).take(legal + 1, "that")
+
+
+def test_no_more_than_a_quarter_of_memory_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_files, "total_memory", lambda: 8_000_000_000)
+    check_memory(2_000_000_000, "this")
+    with pytest.raises(Refusal, match=r"at most 2 GB of memory, but that would take 2 GB; reduce"):
+        check_memory(2_000_000_001, "that")
+
+
+def test_a_limit_replaces_both(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(LIMIT, "3000")
+    with pytest.raises(Refusal, match="at most 3 kB, but this would take 3 kB"):
+        Budget(Path("a"), 10**9).take(3001, "this")
+    with pytest.raises(Refusal, match="at most 3 kB of memory"):
+        check_memory(3001, "this")
+    monkeypatch.setenv(LIMIT, "1000000000000")
+    Budget(Path("a"), 10).take(10**12, "this")
+    check_memory(10**12, "this")
+
+
+def test_the_memory_is_that_of_the_machine_or_the_container(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    memory = _files.total_memory.__wrapped__
+    whole = memory()
+    assert 10**8 < whole < 10**14
+    monkeypatch.setattr(_files, "_CONTAINER", tmp_path / "memory.max")
+    for text, found in (("max", whole), ("500000000\n", 500_000_000), (f"{2**60}", whole)):
+        (tmp_path / "memory.max").write_text(text)
+        assert memory() == found

@@ -12,6 +12,8 @@ from cyclopts import App, CycloptsError, Group
 
 from kappaskin.cli.common import FAILED as FAILED
 from kappaskin.cli.common import REFUSED as REFUSED
+from kappaskin.cli.common import Limit as Limit
+from kappaskin.cli.common import allow as allow
 from kappaskin.errors import Refusal
 
 app = App(

@@ -2,6 +2,8 @@
 
 import json
 import math
+import os
+import re
 import signal
 import sys
 import time
@@ -27,6 +29,14 @@ REFUSED = 2
 Switch = Annotated[bool, Parameter(negative="")]
 """An option that is there or not."""
 
+Limit = Annotated[
+    str,
+    Parameter(help="Memory and work that reading the file may take, such as 2GB."),
+]
+"""An option for `allow`."""
+
+_UNITS = {"kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12}
+
 
 def _whole(_: type, tokens: Sequence[Token]) -> int:
     text = tokens[0].value
@@ -50,6 +60,18 @@ def pair(text: str, what: str) -> tuple[int, int]:
     except ValueError:
         raise Refusal(f"expected {what} as two numbers such as 8x8, got {text!r}") from None
     return first, second
+
+
+def allow(limit: str) -> None:
+    """Let reading a file take up to a `limit` such as 2GB; as usual where that is empty."""
+    from kappaskin._files import LIMIT
+
+    if not limit:
+        return
+    number, unit = limit[:-2].strip(), limit[-2:]
+    if not (unit in _UNITS and re.fullmatch(r"\d{1,6}(\.\d{1,6})?", number)):
+        raise Refusal(f"expected a limit such as 500MB or 2GB, got {limit!r}")
+    os.environ[LIMIT] = str(round(float(number) * _UNITS[unit]))
 
 
 def stops() -> list[int]:

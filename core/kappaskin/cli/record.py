@@ -13,9 +13,11 @@ from cyclopts import Parameter
 
 from kappaskin.cli.common import (
     FAILED,
+    Limit,
     Pair,
     ProgressLine,
     Switch,
+    allow,
     check_time,
     pair,
     print_result,
@@ -159,7 +161,7 @@ def _ended(engine: "Engine") -> "Status":
     return engine.status()
 
 
-def info(file: Path, *, json: Switch = False) -> None:
+def info(file: Path, *, json: Switch = False, limit: Limit = "") -> None:
     """Show what a recording contains: time, duration, devices, settings, events.
 
     An unfinished recording is shown up to its last complete message.
@@ -175,6 +177,7 @@ def info(file: Path, *, json: Switch = False) -> None:
     """
     from kappaskin.recording import Recording
 
+    allow(limit)
     with Recording(file) as recording:
         contents = _contents(recording)
     print_result(contents, json, lambda: _contents_text(file, contents))
@@ -215,7 +218,7 @@ def _device(text: str) -> str:
     return f"{sensor.name} {sensor.serial_number}, {sensor.layout}, firmware {sensor.firmware}"
 
 
-def verify(file: Path) -> int:
+def verify(file: Path, *, limit: Limit = "") -> int:
     """Recompute every recorded estimate from the recorded bytes and compare bit for bit.
 
     Exit code 0 if all are the same, 1 if one differs; the first that does is printed. Another
@@ -232,6 +235,7 @@ def verify(file: Path) -> int:
     from kappaskin._processes import BackgroundProcess
     from kappaskin.recording import Verification
 
+    allow(limit)
     with BackgroundProcess[float | Verification]("verify", Verification.steps, file) as work:
         verdict = result_of(work.wait(), Verification)
     print(f"{file}: {verdict.words}")
@@ -241,7 +245,7 @@ def verify(file: Path) -> int:
 _NOTHING = 3
 
 
-def repair(file: Path, *, out: Path) -> int:
+def repair(file: Path, *, out: Path, limit: Limit = "") -> int:
     """Save every complete message of a damaged or unfinished recording to a new file.
 
     Works for any MCAP file. Exit code 0 if nothing was lost, 1 if part of the file could not be
@@ -258,6 +262,7 @@ def repair(file: Path, *, out: Path) -> int:
     """
     from kappaskin.recording import Repaired
 
+    allow(limit)
     done = result_of(Repaired.steps(file, out), Repaired)
     if not (done.total or done.attachments):
         print(f"{file}: {done.words}")
@@ -276,6 +281,7 @@ def export(
     until: float = math.inf,
     every: float = 0.0,
     at: float | None = None,
+    limit: Limit = "",
 ) -> None:
     """Export a recording: readings and estimates as a table, or the skin's surface as a mesh.
 
@@ -303,6 +309,7 @@ def export(
     """
     from kappaskin.recording import Exported, ExportRequest, ExportTask
 
+    allow(limit)
     try:
         with ExportTask(ExportRequest(recording, to, begin, until, every, at)) as exporting:
             done = result_of(exporting.wait(), Exported)
@@ -322,6 +329,7 @@ def reconstruct(
     method: str = "least-squares",
     contact: Switch = False,
     objects: Switch = False,
+    limit: Limit = "",
 ) -> None:
     """Turn a file of curvature readings into a file of shapes.
 
@@ -355,6 +363,7 @@ def reconstruct(
     """
     from kappaskin.pipeline import reconstruct as reconstructed
 
+    allow(limit)
     points = pair(grid, "a grid") if grid else None
     functions = pair(basis, "a basis")
     found = reconstructed(readings, functions, points, edge, method, contact, objects)

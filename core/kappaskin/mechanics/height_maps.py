@@ -1,6 +1,7 @@
 """Rigid objects from files: height maps, grey pictures and triangle meshes."""
 
 import io
+import os
 import struct
 import warnings
 from collections.abc import Callable, Iterator
@@ -14,7 +15,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin._files import open_file, read_file
+from kappaskin._files import check_memory, open_file, read_file
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics.rigid_objects import check_sizes
@@ -174,6 +175,7 @@ _FILES = (".stl", ".ply", ".obj")
 _MOST_TRIANGLES = 2_000_000  # triangles
 _PIXELS = 256  # along the longer side of the map
 _AT_ONCE = 2**18  # pixels tried against triangles at a time
+_MEMORY = 20  # times the size of a file of triangles, that it takes in memory
 _TRIED = 2**25  # pixels tried in all: many large triangles above each other take minutes
 _SIZES = (1e-4, 1.0)  # m
 _EDGE_ON = 1e-9  # pixels: a face seen with less area is seen from the side
@@ -245,7 +247,10 @@ class Mesh:
             # From an open file no other is looked for, as an OBJ names them. Not typed throughout.
             load = cast("Any", trimesh).load_mesh
             with open_file(Path(path)) as file, np.errstate(all="ignore"):  # NaN is refused below
+                check_memory(_MEMORY * os.fstat(file.fileno()).st_size, f"the mesh {path}")
                 mesh = load(file, file_type=Path(path).suffix.lower()[1:])
+        except Refusal:
+            raise
         except _UNREADABLE as error:
             raise Refusal(f"cannot read a mesh from {path}: {error}") from error
         if not len(mesh.faces):

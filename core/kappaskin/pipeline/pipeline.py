@@ -9,18 +9,24 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from kappaskin._files import Budget, check_memory
 from kappaskin._state import StateArrays, Stateful
 from kappaskin.bases import Basis, ValueMap, basis_for
 from kappaskin.calibration import Calibration, Corrector, DriftMonitor, Rest, Tare
 from kappaskin.contact import NO_CONTACT, LoadDetector, PointContact, contact_geometry
 from kappaskin.errors import RankDeficient, Refusal
-from kappaskin.estimation import Fit, estimator_for
+from kappaskin.estimation import METHODS, Fit, check_method, estimator_for
 from kappaskin.frames import OVERTAKEN, Array, Estimate, Frame, Mask, Truth
 from kappaskin.health import Exclusion, exclude
 from kappaskin.pipeline.setup import Setup
 from kappaskin.sensing import Sensor
 
 _LOOSE = 100.0  # times the error bars with every reading: beyond it a shape is undetermined
+
+
+# Numbers held at most, as measured: for each point of the surface, each product of a channel and a
+# function, and each pair of functions, if it tracks them or not.
+_PER_POINT, _PER_PRODUCT, _PER_TRACKED, _PER_PAIR = 6, 4, 24, 4
 
 
 class FrameAssembly(Stateful):
@@ -79,7 +85,8 @@ class _Past:
 class Pipeline:
     """Counts to curvature, coefficients, surface and contact: `pipeline(frame)` is the estimate.
 
-    Raises `RankDeficient` when made for a basis that the sensor's readings do not determine. A
+    Raises `RankDeficient` when made for a basis that the sensor's readings do not determine, and a
+    `Refusal` for a setup too large for the memory, or for the `budget` of the file it is from. A
     frame that lacks too many readings for it gives an estimate whose shape is NaN.
     """
 
@@ -89,7 +96,9 @@ class Pipeline:
         setup: Setup,
         generation: int = 0,
         clock: Callable[[], float] = time.monotonic,
+        budget: Budget | None = None,
     ) -> None:
+        _check_size(sensor, setup, budget)
         self.sensor, self.setup, self.generation, self._clock = sensor, setup, generation, clock
         self.past = _Past(
             self._corrector(setup.calibration), FrameAssembly(sensor.channels, setup.hold)
@@ -322,3 +331,16 @@ def _estimator_settings(pipeline: Pipeline) -> tuple[object, ...]:
     """The settings that the estimator depends on, besides the sensor."""
     setup = pipeline.setup
     return setup.method, pipeline.basis.shape, setup.edge or pipeline.sensor.edge, setup.rim_sd
+
+
+def _check_size(sensor: Sensor, setup: Setup, budget: Budget | None) -> None:
+    check_method(setup.method)
+    method, numbers = METHODS[setup.method], _PER_POINT * setup.nx * setup.ny
+    if method.has_matrix:
+        N = setup.Ni * (1 if sensor.layout.patch.strip else setup.Nj)
+        pairs = _PER_TRACKED if method.has_memory else _PER_PAIR
+        numbers += _PER_PRODUCT * sensor.channels * N + pairs * N * N
+    part = f"{setup.Ni} x {setup.Nj} functions and {setup.nx} x {setup.ny} points, {setup.method},"
+    check_memory(8 * numbers, part)
+    if budget is not None:
+        budget.take(8 * numbers, part)

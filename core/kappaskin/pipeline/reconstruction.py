@@ -1,5 +1,8 @@
 """Reconstruction from a file of curvature readings to arrays of shapes."""
 
+import io
+import math
+import os
 import zipfile
 import zlib
 from pathlib import Path
@@ -8,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin._files import open_file
+from kappaskin._files import Budget, check_memory, open_file
 from kappaskin.bases import Basis, basis_for
 from kappaskin.contact import KINDS, ContactObject, ObjectFinder, PointContact, contact_geometry
 from kappaskin.errors import RankDeficient, Refusal
@@ -19,6 +22,10 @@ from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Disk, Patch, Polygon
 
 _NEEDED = "size (2,) in m, positions (P, 2) in m and curvature (T, 3, P) or (3, P) in 1/m"
+
+_NAMES = ("size", "positions", "curvature", "sigma", "radius", "outline", "rigidity")
+_HEADER = 2**16  # bytes of a member that say what it holds
+_READ_AS = 8  # bytes of each number in memory
 
 _MOST = 2**27  # numbers in one array: 1 GiB
 
@@ -42,11 +49,34 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
         archive = np.load(file, allow_pickle=False)
         if not isinstance(archive, np.lib.npyio.NpzFile):
             raise ValueError("it holds a single array")
-        names = ("size", "positions", "curvature", "sigma", "radius", "outline", "rigidity")
-        found: dict[str, Any] = {name: archive[name] for name in names if name in archive}
-        if raw := [name for name, values in found.items() if not isinstance(values, np.ndarray)]:
-            raise ValueError(f"{', '.join(raw)}: not an array, as numpy.savez writes it")
-        return found
+        with zipfile.ZipFile(file) as members:
+            _check_declared(path, members, os.fstat(file.fileno()).st_size)
+        return {name: archive[name] for name in _NAMES if name in archive}
+
+
+def _check_declared(path: Path, archive: zipfile.ZipFile, size: int) -> None:
+    """Refuse an archive of `size` bytes whose arrays would be too large, before one is read."""
+    members, budget, total = set(archive.namelist()), Budget(path, size), 0
+    if raw := [name for name in _NAMES if name in members]:
+        raise ValueError(f"{', '.join(raw)}: not an array, as numpy.savez writes it")
+    for name in _NAMES:
+        if f"{name}.npy" in members:
+            shape, bytes_each = _declared(archive, f"{name}.npy")
+            count = math.prod(map(abs, shape)) * max(_READ_AS, bytes_each)
+            budget.take(count, f"{name} of shape {shape}")
+            total += count
+    check_memory(total, f"the arrays of {path}")
+
+
+def _declared(archive: zipfile.ZipFile, name: str) -> tuple[tuple[int, ...], int]:
+    """The shape of the array in a member of an `archive`, and the bytes of each of its numbers."""
+    with archive.open(name) as member:
+        head = io.BytesIO(member.read(_HEADER))
+    version = np.lib.format.read_magic(head)
+    first = version == (1, 0)
+    read = np.lib.format.read_array_header_1_0 if first else np.lib.format.read_array_header_2_0
+    shape, _, kind = read(head)
+    return shape, kind.itemsize
 
 
 def _read(path: Path) -> dict[str, Array]:
@@ -55,6 +85,8 @@ def _read(path: Path) -> dict[str, Array]:
         found = _arrays(path)
     except FileNotFoundError as error:
         raise Refusal(f"{path}: there is no such file; expected an NPZ with {_NEEDED}") from error
+    except Refusal:
+        raise
     except _DAMAGES as error:
         raise Refusal(f"{path}: cannot be read as NPZ ({error}); expected {_NEEDED}") from error
     for name in ("size", "positions", "curvature"):

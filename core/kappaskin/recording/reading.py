@@ -1,6 +1,6 @@
 """MCAP reader, for whole files and for unfinished ones up to where they break off.
 
-Every size is checked against what is there: no file takes more memory than a few times `LARGEST`.
+Every size is checked against what is there, and what a small file declares in all is limited.
 """
 
 import struct
@@ -31,7 +31,7 @@ from mcap.records import (
     Statistics,
 )
 
-from kappaskin._files import open_file
+from kappaskin._files import Budget, open_file
 from kappaskin.errors import Damaged, Refusal
 from kappaskin.frames import Event
 from kappaskin.recording.cdr import decode
@@ -52,6 +52,9 @@ MAGIC = b"\x89MCAP0\r\n"
 LARGEST = 2**26  # bytes of a record, or of what is in a chunk
 _HEAD = struct.Struct("<BQ")
 _FOOTER = _HEAD.size + 20
+# What work on a record costs, as bytes of a file's budget: each takes some microseconds, and one
+# that is parsed some for each entry.
+_PER_RECORD, _PARSED = 400, 16
 _FAULTS = (
     McapError,
     ValueError,
@@ -111,11 +114,16 @@ def parsed(kind: type[_Kind], body: bytes) -> _Kind:
         raise CorruptRecord(f"a {kind.__name__.lower()} cannot be read ({why})") from error
 
 
-def unpacked(body: bytes) -> bytes:
-    """The bytes of the records in the chunk of a record's `body`, checked."""
+def unpacked(body: bytes, budget: Budget | None = None) -> bytes:
+    """The bytes of the records in the chunk of a record's `body`, checked.
+
+    They are counted in the `budget` of the file, if it is given.
+    """
     chunk = parsed(Chunk, body)
     if chunk.uncompressed_size > LARGEST:
         raise CorruptRecord(f"a chunk claims to hold {chunk.uncompressed_size} bytes")
+    if budget is not None:
+        budget.take(chunk.uncompressed_size, "what is compressed in it")
     data = decompressed(chunk.compression, chunk.data)
     if len(data) != chunk.uncompressed_size or (
         chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc
@@ -138,6 +146,11 @@ def decompressed(compression: str, data: bytes) -> bytes:
     if compression:
         raise CorruptRecord(f"a chunk is compressed by {compression!r:.20}, which is not supported")
     return data
+
+
+def cost(code: int, body: bytes) -> int:
+    """What work on a record counts, in bytes of a file's budget."""
+    return _PER_RECORD if code == Opcode.MESSAGE else _PER_RECORD + _PARSED * len(body)
 
 
 def records_in(data: bytes) -> Iterator[tuple[int, bytes]]:
@@ -223,6 +236,8 @@ class Recording:
         self._topics: dict[int, str] = {}
         self._schemas: dict[int, str] = {}
         self._attached: dict[str, int] = {}
+        self.budget = Budget(path, self._size)
+        self._counted: dict[int, int] = {}  # records of chunks that the budget has counted
         try:
             self._check(magic)
             self.whole = self._summarised()
@@ -269,12 +284,16 @@ class Recording:
         try:
             for record in list(summary_of(self._file, self._size)):
                 self._take(record)
-            return bool(self.chunks)
+            return bool(self.chunks) and len({chunk.at for chunk in self.chunks}) == len(
+                self.chunks
+            )
         except CorruptRecord:
             return False
 
     def _take(self, record: McapRecord) -> None:
         """Take a record of the summary, or one outside of chunks."""
+        if record.code != Opcode.CHUNK:
+            self.budget.take(cost(record.code, record.body), "its index")
         self._learn(record.code, record.body)
         if record.code == Opcode.STATISTICS:
             found = parsed(Statistics, record.body).channel_message_counts
@@ -308,7 +327,7 @@ class Recording:
     def _count(self, record: McapRecord) -> None:
         """Take a chunk of a file without a summary."""
         chunk, counts = parsed(Chunk, record.body), Counter[str]()
-        for message in self._messages_in(unpacked(record.body)):
+        for message in self._messages_in(record):
             counts[message.topic] += 1
         channels = frozenset(n for n, topic in self._topics.items() if topic in counts)
         self.chunks.append(
@@ -414,7 +433,7 @@ class Recording:
             record = record_at(self._file, chunk.at, self._size)
             if record.code != Opcode.CHUNK:
                 raise CorruptRecord("its index is wrong")
-            yield from self._messages_in(unpacked(record.body))
+            yield from self._messages_in(record)
         except OSError as error:
             raise Refusal(
                 f"{self.path}: can no longer be read ({error.strerror or error}); check that it "
@@ -426,8 +445,15 @@ class Recording:
                 "the intact messages"
             ) from fault
 
-    def _messages_in(self, data: bytes) -> Iterator[RecordedMessage]:
-        for code, body in records_in(data):
+    def _messages_in(self, chunk: McapRecord) -> Iterator[RecordedMessage]:
+        """The messages of a chunk; what is read for the first time is counted in the budget."""
+        counted = self._counted.get(chunk.at, 0)
+        data = unpacked(chunk.body, None if chunk.at in self._counted else self.budget)
+        self._counted[chunk.at] = counted
+        for number, (code, body) in enumerate(records_in(data)):
+            if number >= counted:
+                self.budget.take(cost(code, body), "the number of its records")
+                self._counted[chunk.at] = number + 1
             if code == Opcode.MESSAGE and len(body) >= MESSAGE_HEADER.size:
                 channel, _, stamp, _ = MESSAGE_HEADER.unpack_from(body)
                 if topic := self._topics.get(channel):

@@ -195,7 +195,7 @@ class Recomputation:
         self._waiting.clear()
         self._memory.clear()
         if self._setup is not None and self.sensor is not None:
-            self.pipeline = Pipeline(self.sensor, self._setup)
+            self.pipeline = Pipeline(self.sensor, self._setup, budget=self._recording.budget)
 
     def _set_up(self, setup: Setup) -> None:
         if self.sensor is None:
@@ -204,7 +204,8 @@ class Recomputation:
                 "saves the intact messages"
             )
         self._pass_over(len(self._waiting))
-        was, made = self.pipeline, Pipeline(self.sensor, setup, self._made)
+        budget = self._recording.budget
+        was, made = self.pipeline, Pipeline(self.sensor, setup, self._made, budget=budget)
         if was is not None:
             made.continue_from(was)
         self.pipeline, self._made = made, self._made + 1

@@ -12,7 +12,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
-from kappaskin._files import open_file, part_for
+from kappaskin._files import Budget, open_file, part_for
 from kappaskin._processes import BackgroundProcess
 from kappaskin.errors import Refusal
 from kappaskin.recording.disk import ReservedFile, is_there
@@ -23,6 +23,7 @@ from kappaskin.recording.reading import (
     MESSAGE_HEADER,
     CorruptRecord,
     McapRecord,
+    cost,
     decompressed,
     parsed,
     record_at,
@@ -63,6 +64,7 @@ class Repaired:
         """Counts of what was saved and lost, as text."""
         lost = f"{self.lost:,} bytes could not be read" if self.lost else "nothing was lost"
         if not (self.total or self.attachments):
+            lost = lost if self.lost else "it holds none"
             return f"no message could be saved; {lost}"
         return f"{self.total:,} messages and {self.attachments} attachments; {lost}"
 
@@ -99,6 +101,7 @@ class _Repair:
     def __init__(self, path: Path, data: mmap.mmap, out: Path, part: Path) -> None:
         self._path, self._data, self._out, self._size = path, data, out, len(data)
         self._part = part
+        self._budget = Budget(path, self._size)
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
         self._new: dict[int, int] = {}  # channels as they are called in what is written
@@ -200,7 +203,8 @@ class _Repair:
             try:
                 record = record_at(self._data, at, self._size)
                 if record.code == Opcode.CHUNK:
-                    unpacked(record.body)
+                    self._budget.take(len(record.body), "what looks like a chunk in it")
+                    unpacked(record.body, self._budget)
                     return at
             except CorruptRecord:
                 pass
@@ -209,7 +213,7 @@ class _Repair:
 
     def _save(self, record: McapRecord) -> None:
         if record.code == Opcode.CHUNK:
-            for code, body in records_in(unpacked(record.body)):
+            for code, body in records_in(unpacked(record.body, self._budget)):
                 self._take(code, body)
         elif record.code in _RECORDS:
             self._take(record.code, record.body)
@@ -237,6 +241,7 @@ class _Repair:
 
     def _take(self, code: int, body: bytes) -> None:
         """Save the messages of a chunk that may be damaged."""
+        self._budget.take(cost(code, body), "the number of its records")
         if code == Opcode.SCHEMA:
             schema = parsed(Schema, body)
             self._schemas[schema.id] = schema
@@ -251,6 +256,8 @@ class _Repair:
                 data = body[MESSAGE_HEADER.size :]
                 self._writer.add_message(to, logged, data, published, sequence)
                 self._counts[self._channels[channel].topic] += 1
+            else:
+                self._lost += len(body)
 
     def _channel(self, number: int) -> int | None:
         """The channel's number in the new file; None where its definition is lost."""

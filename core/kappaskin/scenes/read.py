@@ -68,12 +68,13 @@ CHAINS = {"modern": Transduction(), "second": SECOND_GENERATION, "first": FIRST_
 LOOPS = {"second": SECOND_GENERATION_LOOPS, "first": FIRST_GENERATION_LOOPS}
 """Electronics and loops that a scene may say are like those of a prototype."""
 
-_LARGEST_SCENE = 2**24  # bytes
+_LARGEST_SCENE = 2**21  # bytes: more takes longer than a few seconds to read
 _LARGEST_RECORD = 2**22  # bytes of a recorded motion
 
 _SIDE = Within(1e-4, 10, "m")
 _MOST_ELEMENTS = 2**16 // 3  # as many as the wire format can number
 _MOST_VALUES = 2**25  # of functions at channels, a quarter of a gigabyte
+_MOST_TOUCHES = 10_000  # some seconds to read
 _MOST_FUNCTIONS, _MOST_THAT_MIX = 64**2, 20**2  # some seconds to make the skin of
 
 
@@ -127,6 +128,11 @@ def scene_of(top: TomlTable, file: Path) -> Scene:
     with top.blamed("reference"):
         _check_functions(plate.patch, edge, reference, len(layout))
         basis()
+    if len(top.tables("touch")) > _MOST_TOUCHES:
+        raise top.refusal(
+            f"expected at most {_MOST_TOUCHES} touches, got {len(top.tables('touch'))}; take fewer",
+            "touch",
+        )
     stimuli = tuple(
         _stimulus(table, plate, lambda load, by: scaled_to(plate, load, by, basis()), folder)
         for table in top.tables("touch")

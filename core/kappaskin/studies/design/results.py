@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from kappaskin._files import replacing, write_whole
+from kappaskin._files import read_file, replacing, write_whole
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Estimator
 from kappaskin.frames import Array
@@ -269,6 +269,7 @@ class PointResults:
 # The folder
 
 _ABOUT = "about.json"
+_LARGEST = 2**22  # bytes of a file of a study
 _TEXT = "study.toml"
 
 
@@ -305,7 +306,7 @@ class StudyFolder:
     def name(self) -> str:
         """The name of the study that it belongs to."""
         try:
-            return str(json.loads((self.path / _ABOUT).read_text("utf-8"))["study"])
+            return str(json.loads(read_file(self.path / _ABOUT, _LARGEST))["study"])
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise Refusal(
                 f"{self.path}: expected a folder made by kappaskin study, got another one ({error})"
@@ -315,7 +316,7 @@ class StudyFolder:
         """The study that was last computed here."""
         name, file = self.name, self.path / _TEXT
         try:
-            return read_study(file.read_text("utf-8"), Path(f"{name}.toml"))
+            return read_study(read_file(file, _LARGEST).decode(), Path(f"{name}.toml"))
         except OSError as error:
             raise Refusal(f"{file}: cannot be read ({error}); run the study again") from error
 
@@ -325,7 +326,7 @@ class StudyFolder:
     def result(self, task: BlockTask) -> BlockMoments | str | None:
         """What the task measured, or why it failed; None where neither is known."""
         try:
-            content: dict[str, Any] = json.loads(self._file(task).read_text("utf-8"))
+            content: dict[str, Any] = json.loads(read_file(self._file(task), _LARGEST))
             if "failed" in content:
                 return str(content["failed"])
             return {name: Moments(**moments) for name, moments in content["measured"].items()}
