@@ -2,9 +2,9 @@
 
     python tests/fuzz/fuzz.py [SECONDS] [NAME ...]
 
-Each reader gets an equal part of the time. Whatever is raised but a `Refusal`, takes longer than
-twenty seconds of work or more than two GiB is a finding: it is printed, and written to this folder
-as `fuzz-NAME-N.bin`; the exit code is 1.
+Each reader gets an equal part of the time, which is an hour unless said otherwise. Whatever is
+raised but a `Refusal`, takes longer than twenty seconds of work or more than two GiB is a finding:
+it is printed, and written to this folder as `fuzz-NAME-N.bin`; the exit code is 1.
 """
 
 import logging
@@ -126,7 +126,7 @@ def fuzzed(target, seconds: float, rng: random.Random, folder: Path) -> list[tup
 
 
 def main(arguments: list[str]) -> int:
-    seconds = float(arguments[0]) if arguments else 300.0
+    seconds = float(arguments[0]) if arguments else 3600.0
     chosen = [target for target in TARGETS if target.name in arguments[1:] or not arguments[1:]]
     seed = time.time_ns() % 10**6
     print(f"{seconds:g} s, seed {seed}")

@@ -29,6 +29,7 @@ from kappaskin.calibration import Tare, TareStore
 from kappaskin.calibration.calibration import digest, fingerprint
 from kappaskin.live.resume import resume_process
 from kappaskin.mechanics import HeightMap, Mesh
+from kappaskin.pipeline import reconstruct, setup_from_text, setup_to_text
 from kappaskin.publish.foxglove import FoxgloveClient
 from kappaskin.publish.foxglove_channels import CHANNELS
 from kappaskin.recording import Recorder, Repaired, ReplayedSource, Verification
@@ -47,7 +48,11 @@ from kappaskin.sources.wire import (
     encode_reply,
     encode_samples,
 )
+from kappaskin.studies.design.study import read_study
 from kappaskin_app.features.lessons.lesson_file import READY, read_lesson
+from kappaskin_app.shell.recovery import settings_in, settings_text
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.window_file import WindowState, from_text, to_text
 
 Read = Callable[[bytes, Path], object]
 
@@ -68,6 +73,7 @@ class Target:
 SENSOR = load_scene("centre").sensor()
 SMALL = load_scene("calibration").sensor()
 SCENE_FOLDER = Path(str(files("kappaskin_resources"))) / "scenes"
+STUDIES = tuple(sorted((SCENE_FOLDER.parent / "studies").glob("*.toml")))
 
 _NUMBERS = tuple(b"0 -1 1 2 0.5 -0.0 1e308 1e-308 nan inf 65535 4294967296 99999999999".split())
 _TOML = (*_NUMBERS, b"true", b'""', b"[]", b"{}", b"[[", b"]]", b"=", b"\n", b'"""', b"2026-01-01")
@@ -169,6 +175,49 @@ def _lesson(data: bytes, folder: Path) -> object:
     file = folder / "lesson.md"
     file.write_bytes(data)
     return read_lesson(file)
+
+
+def _study(data: bytes, _: Path) -> None:
+    read_study(data.decode(errors="replace"), SCENE_FOLDER.parent / "studies" / "a.toml")
+
+
+def _motion(data: bytes, folder: Path) -> None:
+    """A recorded motion, named in a scene that is right."""
+    (folder / "exploring.csv").write_bytes(data)
+    text = (SCENE_FOLDER / "exploring.toml").read_text("utf-8")
+    read_scene(text, folder / "exploring.toml")
+
+
+def _setup(data: bytes, _: Path) -> None:
+    setup_to_text(setup_from_text(data.decode(errors="replace"), lambda name: b"format = 1"))
+
+
+def _readings(data: bytes, folder: Path) -> None:
+    path = folder / "readings.npz"
+    path.write_bytes(data)
+    with np.errstate(all="ignore"):
+        reconstruct(path, (2, 2), (5, 5), contact=True)
+
+
+def _arrays(**changed: "np.ndarray") -> bytes:
+    """A file of readings, packed as loosely as bytes can be changed in it."""
+    rng, written = np.random.default_rng(0), io.BytesIO()
+    arrays = {
+        "size": np.array([0.1, 0.08]),
+        "positions": rng.uniform(0.01, 0.07, (12, 2)),
+        "curvature": rng.normal(size=(2, 3, 12)),
+        "rigidity": np.array(0.1),
+    }
+    np.savez(written, **arrays | changed)
+    return written.getvalue()
+
+
+def _saved_settings(data: bytes, _: Path) -> None:
+    settings_text(settings_in(data.decode(errors="replace")))
+
+
+def _window(data: bytes, _: Path) -> None:
+    to_text(from_text(data.decode(errors="replace")))
 
 
 def _resealed(data: bytes) -> bytes:
@@ -364,6 +413,26 @@ TARGETS = (
         tuple(file.read_bytes() for file in READY),
         (*_TOML, b"+++\n", b"\n## ", b"\n```toml\n", b"\n```\n", b" and ", b"(", b")", b"force"),
     ),
+    Target("study", _study, tuple(file.read_bytes() for file in STUDIES), _TOML),
+    Target(
+        "motion",
+        _motion,
+        ((SCENE_FOLDER / "exploring.csv").read_bytes(),),
+        (*_NUMBERS, b",", b"\n"),
+    ),
+    Target("setup", _setup, (setup_to_text(Setup())[0].encode(),), _JSON),
+    Target(
+        "readings",
+        _readings,
+        (
+            _arrays(),
+            _arrays(radius=np.array(0.05)),
+            _arrays(size=np.array([0.08, 0.08]), outline=np.array(0.04)),
+        ),
+        (*_NUMBERS, b"'<f8'", b"(2,)", b"True", b"PK\x03\x04", b"PK\x01\x02"),
+    ),
+    Target("settings", _saved_settings, (settings_text(Settings()).encode(),), _JSON),
+    Target("window", _window, (to_text(WindowState()).encode(),), _TOML),
     Target("calibration", _calibration, (_calibrated(3), _calibrated(1)), _TOML),
     Target("tares", _tares, (_tared(),), _TOML),
     Target("note", _note, (b"0.1.0 " + b"5c" * 32,), (b" ", b"\xc3\xa9", b"zz")),
