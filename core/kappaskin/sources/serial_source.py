@@ -31,6 +31,7 @@ from kappaskin.sources.wire import (
 
 _PATIENCE = 3.0  # s without messages, or without the device's information, before that is reported
 _DWELL = 0.8  # s of unreadable bytes, after which another baud rate is tried
+_SLOW = 8.0  # s to open a port, after which that is reported: Bluetooth takes some
 _RETRY = 0.25  # s between two attempts to open a port that was lost
 _UNREAD = 2**22  # counts kept until the device has sent its information
 _MESSAGE_OVERHEAD = 64  # counts that take as much memory as a message beside its own
@@ -77,7 +78,7 @@ class SerialSource:
     def _connect(self, connection: SerialConnection) -> None:
         """Read from `connection`, and ask the device for its information."""
         now = self._clock()
-        self._connection = connection
+        self._connection, self._opening = connection, connection.opening
         self._opened = self._received_at = self._good_at = self._tuned_at = now
         self._bytes_before = self._decoder.accounting().bytes_in
         self._holders: list[str] = []
@@ -90,6 +91,9 @@ class SerialSource:
 
     def _disconnect(self, connection: SerialConnection) -> None:
         """Close a connection that was lost; the device may come back."""
+        if connection.refusal is not None:  # it took long to open, in vain
+            self._connection, self._disconnected = None, f"{connection.refusal}; retrying"
+            return
         self._overrun += connection.overrun
         connection.close()
         self._connection = None
@@ -140,7 +144,10 @@ class SerialSource:
             return []
         # Asked for first: what arrived before the connection was lost is still to be read.
         lost = connection.lost
-        arrived = connection.take(0.0 if lost or self._has_usable() else timeout)
+        if self._opening and not connection.opening:
+            self._connect(connection)
+        # Not beyond what can be used, or a flood would be kept in memory.
+        arrived = [] if self._has_usable() else connection.take(0.0 if lost else timeout)
         for now, data in arrived:
             messages = self._decoder.feed(data)
             self._received_at = now
@@ -156,7 +163,7 @@ class SerialSource:
         if self._interpreter.known and self._events.restarted():
             self._scan_control.begin()
         self._events.losses()
-        if lost and not self._has_usable():
+        if lost and connection.empty and not self._has_usable():
             self._disconnect(connection)
         else:
             self._maintain(connection)
@@ -227,8 +234,10 @@ class SerialSource:
     def _frames(self) -> list[Frame]:
         """The frames before the next message that changes the sensor, or cannot be used."""
         frames: list[Frame] = []
+        sensor = self._interpreter.sensor
         while self._has_usable():
-            if frames and self._interpreter.is_of_another(self._pending[0][1]):
+            changed = self._interpreter.sensor is not sensor
+            if (frames or changed) and self._interpreter.is_of_another(self._pending[0][1]):
                 break
             now, message = self._pending.popleft()
             self._last = message.time, now
@@ -300,7 +309,12 @@ class SerialSource:
         if self._connection is None:
             return self._disconnected
         now = self._clock()
-        if self._interpreter.unusable or now - self._opened < _PATIENCE:
+        if self._opening and now - self._opened >= _SLOW:
+            return (
+                f"{self.url}: not open after {_SLOW:g} s; unplug it and plug it in again, or check "
+                "the address"
+            )
+        if self._opening or self._interpreter.unusable or now - self._opened < _PATIENCE:
             return self._interpreter.unusable
         if self._interpreter.known and now - self._good_at < _PATIENCE:
             return ""
