@@ -1,19 +1,27 @@
-"""Floods: whatever bytes come, the work for each is bounded, and what is true is found."""
+"""Floods: whatever comes, the work for each byte and the time of each read are bounded."""
 
+import itertools
+import json
 import random
+import threading
 import time
+import tracemalloc
 import zlib
 from binascii import crc_hqx
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing
 
 import numpy as np
 import pytest
 
-from kappaskin.sources import Decoder, decoder, wire
+from kappaskin import SourceError, load_scene
+from kappaskin.sources import Decoder, SerialSource, decoder, information, ports, wire
+from kappaskin.sources.serial_source import _SLOW
 from kappaskin.sources.wire import (
     HEAD,
     LONGEST,
     Command,
+    Fault,
     MessageKind,
     Operation,
     encode,
@@ -160,3 +168,156 @@ def test_the_true_messages_in_a_flood_are_those_that_summing_each_anew_finds(see
 
     assert len(found) > 20
     assert found == found_one_by_one(stream)
+
+
+# The source
+
+
+SENSOR = load_scene("centre").sensor()
+DESCRIBED = json.loads(information.sensor_to_json(SENSOR))
+
+
+def described(number: int) -> bytes:
+    """The description of a device of this firmware."""
+    return encode_information(number, 0.0, json.dumps(DESCRIBED | {"firmware": str(number)}))
+
+
+def refused(number: int) -> bytes:
+    command = Command(number, Operation.RATE, b"")
+    return encode_reply(number, 0.0, command, Fault.NOT_NOW, b"not now, %d" % number)
+
+
+class FakePort:
+    """A port on which the device sends `pieces`, as fast as they are read."""
+
+    baudrate = in_waiting = 4096
+
+    def __init__(self, pieces: Iterator[bytes]) -> None:
+        self._pieces = pieces
+
+    def read(self, _: int) -> bytes:
+        time.sleep(1e-5)
+        return next(self._pieces)
+
+    def write(self, data: bytes) -> int:
+        return len(data)
+
+    def close(self) -> None:
+        self._pieces = iter(lambda: b"", None)
+
+
+def endless(message: Callable[[int], bytes], first: bytes = b"") -> Iterator[bytes]:
+    yield first
+    for q in itertools.count(1):
+        yield b"".join(map(message, range(q * 20, q * 20 + 20)))
+
+
+SENT = {
+    "headers": lambda q: header(LONGEST, q),
+    "descriptions": described,
+    "refusals": refused,
+    "scans": lambda q: scan(q, SENSOR.channels),
+    "scans of no channel": lambda q: scan(q, 0),
+    "restarts": lambda q: scan(q * 2**20 if q % 2 else 0, 1),
+}
+
+
+@pytest.mark.parametrize("sent", SENT)
+def test_no_read_of_a_flood_takes_long_or_leaves_more_than_a_backlog(
+    sent: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ports, "_BACKLOG", 2**20)
+    port = FakePort(endless(SENT[sent], described(0)))
+    monkeypatch.setattr(ports, "open_port", lambda _: port)
+    spent, events = list[float](), 0
+    tracemalloc.start()
+    with closing(SerialSource("a port")) as source:
+        end = time.monotonic() + 1.0
+        while time.monotonic() < end:
+            began = time.thread_time()
+            source.read(0.01)
+            spent.append(time.thread_time() - began)
+            events += len(source.events())
+        counts = source.accounting()
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+
+    assert counts.balanced
+    assert counts.bytes_in > 1000
+    assert max(spent) < 0.5
+    assert most < 2**26
+    assert events < 400
+
+
+def test_descriptions_that_change_all_the_time_are_taken_twice_a_second(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(ports, "open_port", lambda _: FakePort(endless(described)))
+    seen = set[int]()
+    with closing(SerialSource("a port")) as source:
+        end = time.monotonic() + 1.3
+        while time.monotonic() < end:
+            source.read(0.01)
+            seen.add(id(source.sensor))
+    assert 2 <= len(seen - {id(None)}) <= 4
+
+
+# A port that takes long to open
+
+
+@pytest.fixture
+def door(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
+    """Ports open once this is set, and are refused where its `refusal` is."""
+    door = threading.Event()
+    door.refusal = ""  # pyright: ignore[reportAttributeAccessIssue]
+
+    def opened(_: str) -> FakePort:
+        door.wait(20.0)
+        if door.refusal:  # pyright: ignore[reportAttributeAccessIssue]
+            raise SourceError(door.refusal)  # pyright: ignore[reportAttributeAccessIssue]
+        return FakePort(endless(lambda q: scan(q, SENSOR.channels), described(0)))
+
+    monkeypatch.setattr(ports, "open_port", opened)
+    yield door
+    door.set()
+
+
+def test_a_port_that_takes_long_to_open_holds_nobody_up(door: threading.Event) -> None:
+    late = 0.0
+    began = time.monotonic()
+    with closing(SerialSource("a port", lambda: time.monotonic() + late)) as source:
+        assert source.read(0.01) == []
+        assert source.trouble == ""
+        late = _SLOW
+        assert "not open after 8 s" in source.trouble
+        assert time.monotonic() - began < 2.0
+        door.set()
+        end = time.monotonic() + 10.0
+        while not source.read(0.02):
+            assert time.monotonic() < end
+        assert source.trouble == ""
+
+
+def test_a_port_that_is_refused_late_is_tried_again(door, monkeypatch) -> None:
+    with closing(SerialSource("a port")) as source:
+        door.refusal = "a port: no server listens at this address"
+        door.set()
+        end = time.monotonic() + 10.0
+        while not source.trouble:
+            source.read(0.02)
+            assert time.monotonic() < end
+        assert source.trouble == "a port: no server listens at this address; retrying"
+        assert source.events() == []
+        door.refusal = ""
+        while not source.read(0.02):
+            assert time.monotonic() < end
+
+
+def test_a_port_that_opens_after_it_was_closed_is_closed(door, monkeypatch) -> None:
+    closed = threading.Event()
+    monkeypatch.setattr(FakePort, "close", lambda _: closed.set())
+    began = time.monotonic()
+    SerialSource("a port").close()
+    assert time.monotonic() - began < 2.0
+    door.set()
+    assert closed.wait(10.0)
