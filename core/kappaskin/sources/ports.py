@@ -1,6 +1,7 @@
 """Serial ports: discovery, connection, baud rates and reader thread."""
 
 import errno
+import math
 import os
 import re
 import select
@@ -32,6 +33,8 @@ BAUD_RATES = (BAUD_RATE, 1_000_000, 921_600, 500_000, 460_800, 230_400, 115_200)
 _BLOCK = 65536
 _OPENING = 0.5  # s that opening is waited for: a port is open, or refused, in milliseconds
 _BACKLOG = 2**24  # bytes that may wait to be taken; beyond it they are discarded, and counted
+_CROWDED = 2**18  # bytes that may wait after that, or what is shown would be seconds old for good
+_CROWDED_FOR = 1.0  # s without such a loss, after which more may wait again
 _READ_OVERHEAD = 128  # bytes of memory that a read takes beside what came
 _PULSE = 0.1  # s that DTR and RTS are low to reset a board
 _BROKEN = (serial.SerialException, OSError, TypeError)  # TypeError: closed while reading
@@ -269,13 +272,18 @@ class SerialConnection:
 
     def _read(self, port: serial.SerialBase) -> None:
         """Read bytes with the time they arrived."""
+        most, lost_at = _BACKLOG, -math.inf
         while not self._closing.is_set():
             data = _arriving(port)
-            if data and self._put - self._taken > _BACKLOG:
+            now, waiting = self._clock(), self._put - self._taken
+            if not waiting and now - lost_at > _CROWDED_FOR:
+                most = _BACKLOG
+            if data and waiting > most:
                 self.overrun += len(data)
+                most, lost_at = min(_CROWDED, _BACKLOG), now
             elif data:
                 self._put += len(data) + _READ_OVERHEAD
-                self._arrived.put((self._clock(), data))
+                self._arrived.put((now, data))
 
     def take(self, timeout: float) -> list[tuple[float, bytes]]:
         """What arrived and when, after at most `timeout` s; the rest of much with the next call."""
