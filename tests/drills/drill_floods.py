@@ -157,13 +157,22 @@ def usual(command: str) -> float:
         return run(*COMMANDS[command](port, Path(folder)))[0]
 
 
+def check(command: str, port: str) -> None:
+    """Expect a command to end in time, once in three tries: others may want the cores."""
+    most = usual(command) + LATE
+    for _ in range(3):
+        with TemporaryDirectory() as folder:
+            took, said = run(*COMMANDS[command](port, Path(folder)))
+        if took < most:
+            return
+    pytest.fail(f"expected {command} to end within {most:.1f} s, it took {took:.1f} s: {said}")
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("sent", LINES)
-def test_a_command_ends_in_time_whatever_comes(command: str, sent: str, tmp_path: Path) -> None:
-    expected = usual(command)
+def test_a_command_ends_in_time_whatever_comes(command: str, sent: str) -> None:
     with line(sent) as port:
-        took, said = run(*COMMANDS[command](port, tmp_path))
-    assert took < expected + LATE, said
+        check(command, port)
 
 
 @pytest.mark.parametrize("sent", LINES)
@@ -173,7 +182,8 @@ def test_a_tare_and_a_diagnosis_end_by_themselves(sent: str) -> None:
         assert run("doctor", port)[0] < 30
 
 
-def test_a_port_that_does_not_open_holds_nothing_up(tmp_path: Path) -> None:
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_port_that_does_not_open_holds_nothing_up(command: str) -> None:
     with socket.create_server(("127.0.0.1", 0), backlog=0) as server, ExitStack() as waiting:
         address = server.getsockname()
         for _ in range(4):  # more than it lets wait: the next one is not answered
@@ -181,10 +191,7 @@ def test_a_port_that_does_not_open_holds_nothing_up(tmp_path: Path) -> None:
             client.setblocking(False)
             with suppress(BlockingIOError):
                 client.connect(address)
-        url = f"socket://127.0.0.1:{address[1]}"
-        for command in ("record", "publish", "monitor", "app"):
-            took, said = run(*COMMANDS[command](url, tmp_path))
-            assert took < usual(command) + LATE, said
+        check(command, f"socket://127.0.0.1:{address[1]}")
 
 
 @pytest.mark.parametrize(
