@@ -36,7 +36,7 @@ def temporary(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def blocks() -> set[str]:
-    return {path.name for path in MEMORY.iterdir()}
+    return {path.name for path in MEMORY.glob("kappaskin-*")}
 
 
 def program(*arguments: str) -> subprocess.Popen[bytes]:
