@@ -249,7 +249,9 @@ class TemporaryFolder(tempfile.TemporaryDirectory[str]):
         self._mark = mark_folder(Path(self.name))
 
     def cleanup(self) -> None:
-        os.close(self._mark)
+        mark, self._mark = self._mark, -1
+        if mark >= 0:
+            os.close(mark)
         super().cleanup()
 
 

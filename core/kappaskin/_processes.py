@@ -86,7 +86,8 @@ def _mark_temporary_folder() -> None:
 
     with suppress(OSError):  # the server says it if there is no room
         remove_folders_left_behind()
-        mark_folder(Path(util.get_temp_dir()))
+        if multiprocessing.parent_process() is None:  # or it is the folder of that process
+            mark_folder(Path(util.get_temp_dir()))
 
 
 class ProcessPriority:

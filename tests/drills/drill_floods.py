@@ -34,6 +34,7 @@ tty = pytest.importorskip("tty", reason="no pseudo-terminals on this system")
 
 SECONDS = 3.0
 LATE = 1.0  # s that a command may take longer than on a line that sends nothing
+LATE_APP = 2.0  # s: to load what it draws with, it shares the processor with the flood
 DRAWINGS = 15  # a second
 SENSOR = load_scene("").sensor()
 DESCRIBED = json.loads(information.sensor_to_json(SENSOR)) | {"simulated": False}
@@ -60,10 +61,13 @@ def reply(number: int) -> bytes:
     return encode_reply(number, number * 1e-6, command, Fault.NOT_NOW, b"not now, %d" % number)
 
 
+def now_and_then(sequence: int) -> bytes:
+    return described(0) if sequence % 500 == 0 else b""
+
+
 def between_headers(sequence: int) -> bytes:
     """One of 150 frames a second of a real device, with 6.6 KB of headers after it."""
-    said = described(0) if sequence % 50 == 0 else b""
-    return said + scan(sequence, rate=150.0) + header(LONGEST, sequence) * 300
+    return now_and_then(sequence) + scan(sequence, rate=150.0) + header(LONGEST, sequence) * 300
 
 
 def many(message: Callable[[int], bytes], count: int = 10_000) -> bytes:
@@ -73,23 +77,25 @@ def many(message: Callable[[int], bytes], count: int = 10_000) -> bytes:
 DRAW = random.Random(3)
 
 # What is sent once, then what is sent again and again.
+_UNREAD = bytes(200_000)  # opening a port discards what a device sent before
 LINES: dict[str, Callable[[], tuple[bytes, bytes]]] = {
     "headers of the longest messages": lambda: (b"", many(lambda q: header(LONGEST, q))),
     "headers of any length": lambda: (
         b"",
         many(lambda q: header(DRAW.randrange(LONGEST + 1), q)),
     ),
-    "a device between headers": lambda: (described(0), many(between_headers, 1000)),
-    "frames": lambda: (described(0), many(scan)),
-    "frames of no channel": lambda: (described(0), many(lambda q: scan(q, 0))),
+    "a device between headers": lambda: (b"", many(between_headers, 1000)),
+    "frames": lambda: (b"", many(lambda q: now_and_then(q) + scan(q))),
+    "frames of no channel": lambda: (b"", many(lambda q: now_and_then(q) + scan(q, 0))),
     "descriptions": lambda: (b"", many(described, 2000)),
-    "refusals": lambda: (described(0), many(reply)),
+    "the same description": lambda: (b"", described(0)),
+    "refusals": lambda: (b"", many(lambda q: now_and_then(q) + reply(q))),
     "first bytes": lambda: (b"", wire.MAGIC * 50_000),
     "text without a line's end": lambda: (b"", b"hello world " * 10_000),
     "noise": lambda: (b"", DRAW.randbytes(2**20)),
     "a byte at a time": lambda: (b"", wire.MAGIC[:1]),
-    "half a message, and nothing more": lambda: (header(LONGEST, 0), b""),
-    "a description, and nothing more": lambda: (described(0), b""),
+    "half a message, and nothing more": lambda: (_UNREAD + header(LONGEST, 0), b""),
+    "a description, and nothing more": lambda: (_UNREAD + described(0), b""),
     "nothing": lambda: (b"", b""),
 }
 
@@ -159,7 +165,7 @@ def usual(command: str) -> float:
 
 def check(command: str, port: str) -> None:
     """Expect a command to end in time, once in three tries: others may want the cores."""
-    most = usual(command) + LATE
+    most = usual(command) + (LATE_APP if command == "app" else LATE)
     for _ in range(3):
         with TemporaryDirectory() as folder:
             took, said = run(*COMMANDS[command](port, Path(folder)))
