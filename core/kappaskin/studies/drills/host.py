@@ -47,7 +47,7 @@ def _spoilt(room: int, _: Stand) -> DrillOutcome:
     with TemporaryFolder() as folder:
         path = Path(folder) / "skin.toml"
         _calibration("before").save(path)
-        before, refusal = path.read_bytes(), ""
+        before, files, refusal = path.read_bytes(), set(Path(folder).iterdir()), ""
         with _room(room):
             try:
                 _calibration("after").save(path)
@@ -56,7 +56,7 @@ def _spoilt(room: int, _: Stand) -> DrillOutcome:
         claims = [
             ("cannot be written" in refusal, "that the disk was full is not reported"),
             (path.read_bytes() == before, "the existing file is damaged"),
-            (list(Path(folder).iterdir()) == [path], "half a file is left behind"),
+            (set(Path(folder).iterdir()) == files, "half a file is left behind"),
         ]
     return DrillOutcome(failures=tuple(text for holds, text in claims if not holds))
 
