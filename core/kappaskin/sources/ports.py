@@ -263,9 +263,9 @@ class SerialConnection:
             return
         finally:
             self._opened.set()
-        if self._closing.is_set():  # perhaps before there was anything to close
-            port.close()
         try:
+            if self._closing.is_set():  # perhaps before there was anything to close
+                port.close()
             self._read(port)
         except _BROKEN:
             self._lost.set()

@@ -315,12 +315,14 @@ class SerialSource:
         if self._connection is None:
             return self._disconnected
         now = self._clock()
-        if self._opening and now - self._opened >= _SLOW:
+        if self._opening and now - self._opened < _SLOW:
+            return self._disconnected
+        if self._opening:
             return (
                 f"{self.url}: not open after {_SLOW:g} s; unplug it and plug it in again, or check "
                 "the address"
             )
-        if self._opening or self._interpreter.unusable or now - self._opened < _PATIENCE:
+        if self._interpreter.unusable or now - self._opened < _PATIENCE:
             return self._interpreter.unusable
         if self._interpreter.known and now - self._good_at < _PATIENCE:
             return ""

@@ -308,7 +308,12 @@ def test_a_port_that_is_refused_late_is_tried_again(door, monkeypatch) -> None:
             assert time.monotonic() < end
         assert source.trouble == "a port: no server listens at this address; retrying"
         assert source.events() == []
+        door.clear()
+        for _ in range(3):
+            source.read(0.3)
+            assert source.trouble == "a port: no server listens at this address; retrying"
         door.refusal = ""
+        door.set()
         while not source.read(0.02):
             assert time.monotonic() < end
 
