@@ -1,8 +1,10 @@
-"""Files: written whole or not at all, opened only where they are files, and read within limits."""
+"""Files: written whole or not at all, read within limits, in use or left behind."""
 
 import os
 import secrets
+import shutil
 import stat
+import tempfile
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -176,3 +178,87 @@ def _replace(path: Path, part: Path) -> None:
                 raise PermissionError("it is read-only")
             part.chmod(stat.S_IMODE(before))
     part.replace(path)
+
+
+# What a process leaves behind that is ended by force is told from what is in use by a lock on it:
+# the system releases it however the process ends. The number of a process may be another's by then.
+
+
+def hold(file: int) -> bool:
+    """Mark an open file, before it has its contents, as in use by this process; False if it cannot.
+
+    It is in use until the file is closed or the process ends.
+    """
+    try:
+        import fcntl  # not on Windows
+
+        fcntl.flock(file, fcntl.LOCK_SH)
+    except (ImportError, OSError):
+        return False
+    return True
+
+
+@contextmanager
+def left_behind(path: Path, contents: bytes, at: int = 0) -> Generator[bool]:
+    """Whether the file at `path`, with these `contents`, was left behind by a process that ended.
+
+    It is one of this user that was marked by `hold`, and that no process holds any more; during the
+    block none can. False also where that cannot be told, and for a link.
+    """
+    try:
+        import fcntl
+
+        file = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+    except (ImportError, OSError):
+        yield False
+        return
+    try:
+        found = os.fstat(file)
+        ours = stat.S_ISREG(found.st_mode) and found.st_uid == os.geteuid()
+        if ours:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            ours = os.pread(file, len(contents), at) == contents
+            ours = ours and os.path.samestat(found, path.lstat())
+    except OSError:  # it is in use, or gone
+        ours = False
+    try:
+        yield ours
+    finally:
+        os.close(file)
+
+
+_MARK, _MARKED = "kappaskin.lock", b"in use by kappaskin\n"
+
+
+def mark_folder(folder: Path) -> int:
+    """Let the next start remove a temporary `folder` if this process is ended by force.
+
+    Returns the file that must stay open until the folder is removed.
+    """
+    file = os.open(folder / _MARK, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    if hold(file):
+        os.write(file, _MARKED)
+    return file
+
+
+class TemporaryFolder(tempfile.TemporaryDirectory[str]):
+    """A folder that is removed when it is closed; if never, when the next process starts."""
+
+    def __init__(self) -> None:
+        super().__init__(prefix="kappaskin-")
+        self._mark = mark_folder(Path(self.name))
+
+    def cleanup(self) -> None:
+        mark, self._mark = self._mark, -1
+        if mark >= 0:
+            os.close(mark)
+        super().cleanup()
+
+
+def remove_folders_left_behind() -> None:
+    """Remove the marked temporary folders of processes that were ended by force."""
+    for prefix in ("kappaskin-", "pymp-"):  # the second are those of Python's `multiprocessing`
+        for folder in Path(tempfile.gettempdir()).glob(f"{prefix}*"):
+            with left_behind(folder / _MARK, _MARKED) as left:
+                if left and not folder.is_symlink():
+                    shutil.rmtree(folder, ignore_errors=True)

@@ -8,9 +8,12 @@ import threading
 import time
 from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager, suppress
+from functools import cache
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar, cast
 
+from kappaskin._files import mark_folder, remove_folders_left_behind
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
@@ -67,12 +70,24 @@ def _start_forkserver() -> None:
     """
     from multiprocessing import forkserver, resource_tracker
 
+    _mark_temporary_folder()
     resource_tracker.ensure_running()  # first: it lets the signal through once it is begun
     was = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         forkserver.ensure_running()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, was)
+
+
+@cache
+def _mark_temporary_folder() -> None:
+    """Mark the folder of the fork server's socket, and remove those that were left behind."""
+    from multiprocessing import util
+
+    with suppress(OSError):  # the server says it if there is no room
+        remove_folders_left_behind()
+        if multiprocessing.parent_process() is None:  # or it is the folder of that process
+            mark_folder(Path(util.get_temp_dir()))
 
 
 class ProcessPriority:

@@ -1,10 +1,12 @@
-"""Files are written whole or not at all, and read only where they are files."""
+"""Files: written whole or not at all, read only where they are files, in use or left behind."""
 
 import os
 import resource
+import signal
 import stat
 import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,7 +15,19 @@ from pathlib import Path
 import pytest
 
 from kappaskin import _files
-from kappaskin._files import LIMIT, Budget, check_memory, replace_whole, replacing, write_whole
+from kappaskin._files import (
+    LIMIT,
+    Budget,
+    TemporaryFolder,
+    check_memory,
+    hold,
+    left_behind,
+    mark_folder,
+    remove_folders_left_behind,
+    replace_whole,
+    replacing,
+    write_whole,
+)
 from kappaskin.calibration import Calibration
 from kappaskin.errors import Refusal
 from kappaskin.mechanics import HeightMap, Mesh
@@ -250,3 +264,131 @@ def test_the_memory_is_that_of_the_machine_or_the_container(
     for text, found in (("max", whole), ("500000000\n", 500_000_000), (f"{2**60}", whole)):
         (tmp_path / "memory.max").write_text(text)
         assert memory() == found
+
+
+# What is in use, and what was left behind
+
+CONTENTS = b"what it holds"
+HELD = """
+import os, sys, time
+from kappaskin._files import hold
+file = os.open(sys.argv[1], os.O_RDWR | os.O_CREAT | os.O_EXCL)
+hold(file)
+os.write(file, b"what it holds")
+print("held", flush=True)
+time.sleep(60)
+"""
+
+
+@pytest.fixture
+def holding() -> Iterator[Callable[[Path], subprocess.Popen[str]]]:
+    """Processes each of which makes a file and holds it."""
+    pytest.importorskip("fcntl", reason="no locks of files on this system")
+    made: list[subprocess.Popen[str]] = []
+
+    def begin(path: Path) -> subprocess.Popen[str]:
+        command = [sys.executable, "-c", HELD, str(path)]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        made.append(process)
+        assert process.stdout is not None
+        assert process.stdout.readline() == "held\n"
+        return process
+
+    yield begin
+    for process in made:
+        process.kill()
+        process.communicate()
+
+
+def was_left(path: Path) -> bool:
+    with left_behind(path, CONTENTS) as left:
+        return left
+
+
+@pytest.mark.slow
+def test_a_file_is_left_behind_once_its_process_was_killed(tmp_path: Path, holding) -> None:
+    path = tmp_path / "a"
+    process = holding(path)
+    assert not was_left(path)
+    os.kill(process.pid, signal.SIGSTOP)
+    assert not was_left(path)
+    process.kill()
+    process.wait()
+    assert was_left(path)
+
+
+@pytest.mark.slow
+def test_a_file_that_another_process_uses_too_is_not_left_behind(tmp_path: Path, holding) -> None:
+    path = tmp_path / "a"
+    process = holding(path)
+    with path.open("rb") as file:
+        assert hold(file.fileno())
+        process.kill()
+        process.wait()
+        assert not was_left(path)
+    assert was_left(path)
+
+
+@pytest.mark.slow
+def test_while_one_removes_what_was_left_behind_no_other_does(tmp_path: Path, holding) -> None:
+    path = tmp_path / "a"
+    process = holding(path)
+    process.kill()
+    process.wait()
+    with left_behind(path, CONTENTS) as left:
+        assert left
+        assert not was_left(path)
+
+
+@pytest.mark.parametrize("foreign", ["contents", "empty", "link", "folder", "pipe", "none"])
+def test_what_is_foreign_was_not_left_behind(foreign: str, tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    if foreign == "contents":
+        path.write_bytes(b"another program's")
+    elif foreign == "empty":
+        path.touch()
+    elif foreign == "link":
+        (tmp_path / "b").write_bytes(CONTENTS)
+        path.symlink_to(tmp_path / "b")
+    elif foreign == "folder":
+        path.mkdir()
+    elif foreign == "pipe":
+        os.mkfifo(path)
+    assert not was_left(path)
+
+
+def test_another_users_file_was_not_left_behind(tmp_path: Path, monkeypatch) -> None:
+    path = tmp_path / "a"
+    path.write_bytes(CONTENTS)
+    assert was_left(path)
+    monkeypatch.setattr(os, "geteuid", lambda: path.stat().st_uid + 1)
+    assert not was_left(path)
+
+
+def test_where_files_have_no_locks_nothing_was_left_behind(tmp_path: Path, monkeypatch) -> None:
+    path = tmp_path / "a"
+    path.write_bytes(CONTENTS)
+    monkeypatch.setitem(sys.modules, "fcntl", None)
+    assert not was_left(path)
+    with path.open("rb") as file:
+        assert not hold(file.fileno())
+
+
+def test_only_marked_folders_that_nobody_uses_are_removed(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    dead = [tmp_path / name for name in ("kappaskin-dead", "pymp-dead")]
+    foreign = [tmp_path / name for name in ("kappaskin-foreign", "pymp-foreign", "other")]
+    for folder in dead + foreign:
+        folder.mkdir()
+        (folder / "content").touch()
+    for folder in [*dead, foreign[-1]]:
+        os.close(mark_folder(folder))
+    (foreign[0] / "kappaskin.lock").touch()
+    linked = tmp_path / "kappaskin-link"
+    linked.symlink_to(foreign[-1])
+
+    with TemporaryFolder() as used:
+        remove_folders_left_behind()
+        assert set(tmp_path.iterdir()) == {*foreign, linked, Path(used)}
+    assert not Path(used).exists()
+    assert all((folder / "content").exists() for folder in foreign)

@@ -2,12 +2,14 @@
 
 import signal
 import time
-from multiprocessing import Pipe, forkserver
+from multiprocessing import Pipe, forkserver, util
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from kappaskin import _processes
+from kappaskin._files import left_behind
 from kappaskin._processes import process_context
 
 pytestmark = [
@@ -27,6 +29,16 @@ def test_ctrl_c_reaches_this_process_alone_while_others_begin(monkeypatch) -> No
         assert signal.SIGINT not in _blocked()
     assert [signal.SIGINT in mask for mask in began] == [True]
     assert signal.SIGINT not in _blocked()
+
+
+def test_the_folder_of_the_fork_servers_socket_is_marked_as_in_use() -> None:
+    with process_context() as context:
+        if context.get_start_method() != "forkserver":
+            pytest.skip("the system cannot fork")
+    mark = Path(util.get_temp_dir(), "kappaskin.lock")
+    with left_behind(mark, mark.read_bytes()) as left:
+        assert mark.read_bytes()
+        assert not left
 
 
 def test_one_that_computes_for_long_ends_soon_after_who_asked(monkeypatch) -> None:

@@ -31,6 +31,7 @@ _COURSE_POINTS = 500  # moments that are kept of a hold
 
 _READ = 0.05  # s that one read may wait
 _SILENCE = 5.0  # s without a frame after which the source counts as dead
+_BEHIND = 1.0  # s that frames may be read late
 _MOST_FRAMES = 5000  # kept of one step, evenly: more add nothing
 _LONGEST = 3600.0  # s on one step
 Report = Callable[[str], None]
@@ -282,7 +283,7 @@ def _recorded(listener: DeviceReadings, seconds: float) -> list[Frame]:
     """The frames of the next `seconds`: what came before was read while the skin was moved."""
     begun = now = time.monotonic()
     collected: list[Frame] = []
-    while now < begun + seconds:
+    while now < begun + seconds and time.monotonic() < begun + seconds + _BEHIND:
         for frame in listener.frames():
             now = frame.host_time
             if now >= begun:

@@ -95,17 +95,19 @@ def _recorded(
     """Record until it is over; the last status."""
     from kappaskin.live import LOST, STREAMING
 
-    began = time.monotonic()
+    began = recording = time.monotonic()
     known: Sensor | None = None
     while True:
         status, now = engine.status(), time.monotonic()
         written = status.recording
+        recording = recording if written.active else now
         if written.trouble and not written.seconds:
             raise Refusal(written.trouble)
         if status.sensor is not known and status.sensor is not None:
             known = status.sensor
             _use_tare(engine, known)
-        if stopped or written.trouble or written.seconds >= seconds or not engine.alive:
+        over = max(written.seconds, now - recording) >= seconds
+        if stopped or written.trouble or over or not engine.alive:
             return status
         if status.state == LOST and known is None:
             raise Refusal(status.message)

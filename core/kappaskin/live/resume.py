@@ -169,8 +169,6 @@ def _reached(note: Path) -> ResumedProcess | None:
     """The process that left a `note`; None if it ended, was resumed by another, or is stuck."""
     try:
         version, key = _read(note)
-        if version != metadata.version("kappaskin"):
-            return None
         line = cast("Connection[Update, ResumeInfo]", Client(_address(note)))
     except (OSError, ValueError):
         with suppress(OSError):
@@ -178,7 +176,7 @@ def _reached(note: Path) -> ResumedProcess | None:
             note.with_suffix(".sock").unlink(missing_ok=True)
         return None
     try:
-        if line.poll(_ANSWER):
+        if version == metadata.version("kappaskin") and line.poll(_ANSWER):
             answer_challenge(line, key)
             deliver_challenge(line, key)
             if line.poll(_ANSWER):

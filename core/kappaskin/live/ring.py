@@ -8,17 +8,20 @@ writer makes odd, or changes, while it writes, and a reader that saw it change r
 import errno
 import os
 import pickle
+import secrets
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from multiprocessing import resource_tracker
 from multiprocessing.shared_memory import SharedMemory
 from operator import attrgetter
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kappaskin._files import hold, left_behind
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Estimate
 from kappaskin.pipeline import ACROSS, ALONG, COLUMN, ELEMENT, REPORTED, ROW, Pipeline, stored
@@ -28,6 +31,8 @@ _STATUS_SIZE = 8 * 2**20  # the calibration of a large skin is most of it
 _HEADER = 64
 _MOST_SLOTS = 64
 _TRIES = 100
+_MEMORY, _PREFIX = Path("/dev/shm"), "kappaskin-"  # where Linux lists blocks, and ours
+_OURS, _OURS_AT = b"kappaskin shared memory\0", 40  # in the header
 
 
 def slot_type(pipeline: Pipeline) -> np.dtype[np.void]:
@@ -92,6 +97,7 @@ class Ring:
 
     def __init__(self, memory: SharedMemory) -> None:
         self._memory = memory
+        self._held = hold(getattr(memory, "_fd", -1))
         buffer = cast("memoryview", memory.buf)
         self._header: NDArray[np.uint64] = np.frombuffer(buffer, np.uint64, _HEADER // 8)
         self._status: NDArray[np.uint8] = np.frombuffer(
@@ -106,7 +112,7 @@ class Ring:
         self._columns: list[_Column] = []
         self._generation = self._reserved = 0
 
-    # The header: status count and length, generation of the slots, slots written, and how many.
+    # The header: status count and length, generation of the slots, slots written, how many; whose.
     _COUNT, _LENGTH, _GENERATION, _WRITTEN, _SLOTS = range(5)
 
     @classmethod
@@ -115,7 +121,8 @@ class Ring:
         try:
             if 0 < _largest_file() < _SIZE:  # or Python's tracker of memory would print a traceback
                 raise OSError(errno.EFBIG, "files may not be so large, see ulimit -f")
-            made = cls(SharedMemory(create=True, size=_SIZE))
+            name = _PREFIX + secrets.token_hex(8)
+            made = cls(SharedMemory(name, create=True, size=_SIZE))
         except OSError as error:
             raise _no_memory(_SIZE, error) from error
         try:
@@ -123,11 +130,17 @@ class Ring:
         except Refusal:
             made.destroy()
             raise
+        if made._held:
+            made._header[_OURS_AT // 8 :] = np.frombuffer(_OURS, np.uint64)
         return made
 
     @classmethod
     def pair(cls) -> "tuple[Ring, Ring]":
-        """Two new blocks; none where there is memory for one only."""
+        """Two new blocks; none where there is memory for one only.
+
+        Blocks that processes left behind when they were ended by force are removed first.
+        """
+        _remove_left_behind(_MEMORY)
         first = cls.create()
         try:
             return first, cls.create()
@@ -298,6 +311,13 @@ class Ring:
         """Owner: let go of the memory and give it back."""
         self.close()
         self._memory.unlink()
+
+
+def _remove_left_behind(folder: Path) -> None:
+    for path in folder.glob(f"{_PREFIX}*"):
+        with left_behind(path, _OURS, _OURS_AT) as left:
+            if left:
+                path.unlink(missing_ok=True)
 
 
 def _largest_file() -> int:

@@ -46,6 +46,10 @@ _SAMPLES_KIND = int(MessageKind.SAMPLES)
 _COUNTS = np.dtype(np.int32)
 _LISTS = 64  # scan lists that are cached as arrays
 
+_BLOCK = 2048  # bytes; the checksum of a longer message is computed from sums at their ends
+_ZEROS = bytes(_BLOCK)
+_ALL_ONES, _POLYNOMIAL = 0xFFFFFFFF, 0xEDB88320  # of the CRC-32, its highest power in bit 0
+
 
 @dataclass(frozen=True, slots=True)
 class Accounting:
@@ -180,14 +184,80 @@ class _ScanList(NamedTuple):
 _NO_LIST = _ScanList(b"", -1, np.empty(0, np.intp), np.dtype("<i2"))
 
 
+def _followed_by_zeros(value: int, count: int) -> int:
+    """The polynomial `value` times x^(8 count): the CRC register after `count` zero bytes."""
+    return crc32(_ZEROS[:count], value ^ _ALL_ONES) ^ _ALL_ONES
+
+
+def _product(a: int, b: int) -> int:
+    """The product of two polynomials modulo that of the CRC-32; x^0 is in bit 31."""
+    product = 0
+    while a:
+        if a & 1 << 31:
+            product ^= b
+        a = a << 1 & _ALL_ONES
+        b = b >> 1 ^ (_POLYNOMIAL if b & 1 else 0)
+    return product
+
+
+def _powers() -> list[int]:
+    """x^(8 n) for the length n of each number of blocks that a message may have."""
+    powers = [1 << 31]
+    while len(powers) <= (HEAD + LONGEST + CHECKSUM.size) // _BLOCK:
+        powers.append(_followed_by_zeros(powers[-1], _BLOCK))
+    return powers
+
+
+_POWERS = _powers()
+
+
+class _Buffer:
+    """Bytes that arrived, from the first that is still needed, `at`, on.
+
+    The checksum of any part of them takes bounded time, however long it is: of bytes A and then B,
+    crc(AB) = crc(A) x^(8 |B|) + crc(B), and crc(A), crc(AB) are known at the ends of blocks. Else
+    headers that announce long messages at every few bytes would have each byte summed thousands of
+    times.
+    """
+
+    def __init__(self) -> None:
+        self.data, self.at = bytearray(), 0
+        self._sums = [0]  # CRC-32 of all before each block, from where they were begun
+
+    def __len__(self) -> int:
+        return len(self.data) - self.at
+
+    def drop(self, at: int) -> None:
+        """Only the bytes from `at` on are still needed."""
+        blocks = at // _BLOCK
+        if blocks:
+            del self._sums[:blocks], self.data[: blocks * _BLOCK]
+            self._sums = self._sums or [0]
+        self.at = at - blocks * _BLOCK
+
+    def crc32(self, start: int, stop: int) -> int:
+        """The CRC-32 of the bytes from `start` to `stop`."""
+        blocks, rest = divmod(stop - start, _BLOCK)
+        before = _product(self._crc32_to(start), _POWERS[blocks])
+        return self._crc32_to(stop) ^ _followed_by_zeros(before, rest)
+
+    def _crc32_to(self, stop: int) -> int:
+        block = stop // _BLOCK
+        for begin in range((len(self._sums) - 1) * _BLOCK, block * _BLOCK, _BLOCK):
+            self._sums.append(crc32(self.data[begin : begin + _BLOCK], self._sums[-1]))
+        return crc32(self.data[block * _BLOCK : stop], self._sums[block])
+
+
 class Decoder:
-    """Finds the messages of `kinds` in bytes as they arrive; never raises."""
+    """Finds the messages of `kinds` in bytes as they arrive; never raises.
+
+    Its work for each byte is bounded, whatever the bytes.
+    """
 
     def __init__(self, kinds: frozenset[MessageKind] = FROM_DEVICE) -> None:
         self.sequence = SequenceCounter()
         self._kinds = kinds
-        self._parts: list[bytes] = []  # joined once they may hold a message, not at every read
-        self._held, self._needed = 0, HEAD
+        self._buffer, self._needed = _Buffer(), HEAD  # looked at again once so many bytes are held
         self._bytes_in = self._bytes_good = 0
         self._discarded: Counter[str] = Counter()
         self._other_version: int | None = None
@@ -197,22 +267,25 @@ class Decoder:
     def feed(self, data: bytes) -> list[Message]:
         """The new messages in order, duplicates left out."""
         self._bytes_in += len(data)
-        self._parts.append(data)
-        self._held = end = self._held + len(data)
-        if end < self._needed:
+        buffer = self._buffer
+        buffer.data += data
+        if len(buffer) < self._needed:
             return []
-        stream, messages, at = b"".join(self._parts), list[Message](), 0
+        # Parts of `bytes` are faster to take, unless much is held that was copied before.
+        end, at, messages = len(buffer.data), buffer.at, list[Message]()
+        stream = bytes(buffer.data) if end - len(data) <= 2 * _BLOCK else buffer.data
         take, unpack = self.sequence.take, HEADER.unpack_from
         while at + HEAD <= end:
             magic, version, kind, length, sequence, time_us, check = unpack(stream, at)
-            if magic != MAGIC or crc_hqx(stream[at : at + CHECKED], 0) != check or length > LONGEST:
+            if magic != MAGIC or length > LONGEST or crc_hqx(stream[at : at + CHECKED], 0) != check:
                 at = self._skip(stream, at, "garbage")
                 continue
             last = at + HEAD + length
             stop = last + CHECKSUM.size
             if stop > end:
                 break
-            if crc32(stream[at:stop]) != _WHOLE:
+            short = stop - at <= _BLOCK
+            if (crc32(stream[at:stop]) if short else buffer.crc32(at, stop)) != _WHOLE:
                 at = self._skip(stream, at, "checksum")
                 continue
             if version != VERSION:
@@ -223,7 +296,7 @@ class Decoder:
             elif kind == _SAMPLES_KIND:
                 message = self._samples(sequence, time_us * 1e-6, stream, at + HEAD, last)
             else:
-                message = _read(kind, sequence, time_us * 1e-6, stream[at + HEAD : last])
+                message = _read(kind, sequence, time_us * 1e-6, bytes(stream[at + HEAD : last]))
             if isinstance(message, str):
                 self._discarded[message] += stop - at
             else:
@@ -233,10 +306,11 @@ class Decoder:
             at = stop
         else:
             stop = at + HEAD
-        self._parts, self._held, self._needed = [stream[at:]], end - at, stop - at
+        buffer.drop(at)
+        self._needed = stop - at
         return messages
 
-    def _skip(self, stream: bytes, at: int, reason: str) -> int:
+    def _skip(self, stream: bytes | bytearray, at: int, reason: str) -> int:
         """Discard bytes up to where the next message may begin; where that is."""
         found = stream.find(MAGIC, at + 1)
         if found < 0:
@@ -245,7 +319,7 @@ class Decoder:
         return found
 
     def _samples(
-        self, sequence: int, time: float, stream: bytes, at: int, stop: int
+        self, sequence: int, time: float, stream: bytes | bytearray, at: int, stop: int
     ) -> Samples | str:
         head, size, channels, kind = self._list
         if stop - at != size or not stream.startswith(head, at):  # seldom: it changes with the scan
@@ -255,33 +329,35 @@ class Decoder:
         counts = np.frombuffer(stream, kind, len(channels), at + len(head)).astype(_COUNTS)
         return Samples(sequence, time, channels, counts)
 
-    def _take_list(self, stream: bytes, at: int, stop: int) -> bool:
+    def _take_list(self, stream: bytes | bytearray, at: int, stop: int) -> bool:
         """Use the list of channels that a payload begins with; whether it is a valid one."""
         if stop - at < 2:
             return False
-        head = stream[at : at + 2 + 4 * stream[at + 1]]
-        found = self._lists.get(head) or self._new_list(head)
+        head = bytes(stream[at : at + 2 + 4 * stream[at + 1]])
+        found = self._lists.get(head) or self._new_list(head, stop - at)
         if found is None or found.size != stop - at:
             return False
         self._list = found
         return True
 
-    def _new_list(self, head: bytes) -> _ScanList | None:
-        width, channels = head[0], unpack_runs(head[1:])
-        if width not in (2, 4) or channels is None:
+    def _new_list(self, head: bytes, size: int) -> _ScanList | None:
+        """The list of a payload of `size` bytes; a longer list is none, and is not expanded."""
+        width = head[0]
+        most = (size - len(head)) // width if width in (2, 4) else -1
+        channels = unpack_runs(head[1:], most)
+        if channels is None:
             return None
         channels.flags.writeable = False  # every scan of this list shares it
         if len(self._lists) == _LISTS:
             self._lists.clear()
-        size = len(head) + width * len(channels)
-        found = _ScanList(head, size, channels, np.dtype(f"<i{width}"))
+        found = _ScanList(head, len(head) + width * len(channels), channels, np.dtype(f"<i{width}"))
         self._lists[head] = found
         return found
 
     @property
     def held(self) -> bytes:
         """The bytes that wait for more."""
-        return b"".join(self._parts)
+        return bytes(self._buffer.data[self._buffer.at :])
 
     def accounting(self, overrun: int = 0) -> Accounting:
         """The balance so far, with `overrun` bytes that came but were never fed."""
@@ -291,7 +367,7 @@ class Decoder:
             self._bytes_in + overrun,
             self._bytes_good,
             tuple(discarded.items()),
-            self._held,
+            len(self._buffer),
             counts.good,
             counts.accepted,
             counts.duplicate,
@@ -303,9 +379,9 @@ class Decoder:
 
     def line_ended(self) -> None:
         """Count what is buffered as cut off: the rest of it will not arrive."""
-        if self._held:
-            self._discarded["cut off"] += self._held
-            self._parts, self._held, self._needed = [], 0, HEAD
+        if held := len(self._buffer):
+            self._discarded["cut off"] += held
+            self._buffer, self._needed = _Buffer(), HEAD
 
 
 def _read(kind: int, sequence: int, time: float, payload: bytes) -> Message | str:

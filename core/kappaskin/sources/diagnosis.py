@@ -148,11 +148,14 @@ class WireMonitor:
             lines += self._problems(self.accounting())
         self._commands.attend(self._clock())
         lines += self._hints(self._clock())
-        if lost:
+        if lost and self._connection.empty:
             self.lost = True
             self._decoder.line_ended()
             lines += self._problems(self.accounting())
-            lines.append("connection lost: unplugged, or closed by the other end")
+            why = (
+                self._connection.refusal or "connection lost: unplugged, or closed by the other end"
+            )
+            lines.append(str(why))
         return [f"{self._clock() - self._began:9.3f} s  {_plain(line)}" for line in lines]
 
     def _gap(self, sequence: int) -> list[str]:
@@ -204,6 +207,8 @@ class WireMonitor:
         if now - max(self._received_at, self._tuned_at) < _SILENCE:
             return []
         self._tuned_at = now
+        if self._connection.opening:
+            return [f"not open after {now - self._began:.0f} s: the system is still opening it"]
         self._commands.greet(now)
         return [
             f"no bytes for {_SILENCE:g} s. Check that the device is powered and its firmware runs "

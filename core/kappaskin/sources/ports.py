@@ -1,6 +1,7 @@
 """Serial ports: discovery, connection, baud rates and reader thread."""
 
 import errno
+import math
 import os
 import re
 import select
@@ -30,7 +31,10 @@ BAUD_RATES = (BAUD_RATE, 1_000_000, 921_600, 500_000, 460_800, 230_400, 115_200)
 """Baud rates that a device may use, the usual one first."""
 
 _BLOCK = 65536
+_OPENING = 0.5  # s that opening is waited for: a port is open, or refused, in milliseconds
 _BACKLOG = 2**24  # bytes that may wait to be taken; beyond it they are discarded, and counted
+_CROWDED = 2**18  # bytes that may wait after that, or what is shown would be seconds old for good
+_CROWDED_FOR = 1.0  # s without such a loss, after which more may wait again
 _READ_OVERHEAD = 128  # bytes of memory that a read takes beside what came
 _PULSE = 0.1  # s that DTR and RTS are low to reset a board
 _BROKEN = (serial.SerialException, OSError, TypeError)  # TypeError: closed while reading
@@ -211,14 +215,17 @@ class BaudRateSearch:
 
 
 class SerialConnection:
-    """An open port or URL that a thread of its own reads until `close`; `lost` once it broke.
+    """A port or URL that a thread of its own opens and reads until `close`; `lost` once it broke.
 
-    `overrun` counts bytes that arrived while too many waited to be taken.
+    Raises a `SourceError` where it cannot be opened. Where the system takes long, it is `opening`
+    until it is open, or `lost`: `refusal` then says why. `overrun` counts bytes that arrived while
+    too many waited to be taken.
     """
 
     def __init__(self, url: str, clock: Callable[[], float] = time.monotonic) -> None:
         self.url, self._clock = url, clock
-        self._port = open_port(url)
+        self._port: serial.SerialBase | None = None
+        self.refusal: SourceError | None = None
         self.baud_rate = BAUD_RATE
         self.overrun = 0
         self._put = self._taken = (
@@ -226,56 +233,89 @@ class SerialConnection:
         )
         self._arrived: SimpleQueue[tuple[float, bytes]] = SimpleQueue()
         self._lost, self._closing = threading.Event(), threading.Event()
-        self._thread = threading.Thread(target=self._read, name="serial-reader", daemon=True)
+        self._opened = threading.Event()
+        self._thread = threading.Thread(target=self._serve, name="serial-reader", daemon=True)
         self._thread.start()
+        self._opened.wait(_OPENING)
+        if self.refusal is not None:
+            raise self.refusal
 
     @property
     def lost(self) -> bool:
         return self._lost.is_set()
 
-    def _read(self) -> None:
-        """Read bytes with the time they arrived, until the connection is lost."""
+    @property
+    def opening(self) -> bool:
+        return not self._opened.is_set()
+
+    @property
+    def empty(self) -> bool:
+        """Whether nothing that arrived waits to be taken."""
+        return self._arrived.empty()
+
+    def _serve(self) -> None:
+        """Open the port, and read it until the connection is lost."""
         try:
-            while not self._closing.is_set():
-                data = _arriving(self._port)
-                if data and self._put - self._taken > _BACKLOG:
-                    self.overrun += len(data)
-                elif data:
-                    self._put += len(data) + _READ_OVERHEAD
-                    self._arrived.put((self._clock(), data))
+            self._port = port = open_port(self.url)
+        except SourceError as error:
+            self.refusal = error
+            self._lost.set()
+            return
+        finally:
+            self._opened.set()
+        try:
+            if self._closing.is_set():  # perhaps before there was anything to close
+                port.close()
+            self._read(port)
         except _BROKEN:
             self._lost.set()
 
+    def _read(self, port: serial.SerialBase) -> None:
+        """Read bytes with the time they arrived."""
+        most, lost_at = _BACKLOG, -math.inf
+        while not self._closing.is_set():
+            data = _arriving(port)
+            now, waiting = self._clock(), self._put - self._taken
+            if not waiting and now - lost_at > _CROWDED_FOR:
+                most = _BACKLOG
+            if data and waiting > most:
+                self.overrun += len(data)
+                most, lost_at = min(_CROWDED, _BACKLOG), now
+            elif data:
+                self._put += len(data) + _READ_OVERHEAD
+                self._arrived.put((now, data))
+
     def take(self, timeout: float) -> list[tuple[float, bytes]]:
-        """What arrived and when, after at most `timeout` s."""
+        """What arrived and when, after at most `timeout` s; the rest of much with the next call."""
         taken: list[tuple[float, bytes]] = []
+        size = 0
         with suppress(Empty):
             taken.append(self._arrived.get(timeout=timeout))
-            while True:
+            while (size := size + len(taken[-1][1]) + _READ_OVERHEAD) < _BLOCK:
                 taken.append(self._arrived.get_nowait())
-        self._taken += sum(len(data) + _READ_OVERHEAD for _, data in taken)
+        self._taken += size
         return taken
 
     def write(self, data: bytes) -> bool:
         """Send `data`; False where there is no room for it, or nobody any more."""
         try:
-            return self._has_room() and self._port.write(data) == len(data)
+            port = self._port
+            return port is not None and _has_room(port) and port.write(data) == len(data)
         except _BROKEN:
             return False
 
-    def _has_room(self) -> bool:
-        if not isinstance(self._port, serial.Serial | protocol_socket.Serial):
-            return True
-        return bool(select.select([], [self._port], [], 0.0)[1])
-
     def set_baud_rate(self, baud_rate: int) -> None:
         """Continue at another rate, where the port has one."""
+        if self._port is None:
+            return
         with suppress(*_BROKEN, ValueError):
             self._port.baudrate = baud_rate
             self.baud_rate = baud_rate
 
     def reset(self) -> None:
         """Let DTR and RTS fall and rise again, at which many boards restart."""
+        if self._port is None:
+            return
         with suppress(*_BROKEN):
             self._port.dtr = self._port.rts = False
             time.sleep(_PULSE)
@@ -283,6 +323,8 @@ class SerialConnection:
 
     def close(self) -> None:
         self._closing.set()
+        if self._port is None:
+            return  # the thread closes it, should it ever be open
         if isinstance(self._port, serial.Serial):
             with suppress(*_BROKEN):
                 self._port.cancel_read()
@@ -293,6 +335,12 @@ class SerialConnection:
                 vars(self._port)["_socket"].close()
         with suppress(*_BROKEN):
             self._port.close()
+
+
+def _has_room(port: serial.SerialBase) -> bool:
+    if not isinstance(port, serial.Serial | protocol_socket.Serial):
+        return True
+    return bool(select.select([], [port], [], 0.0)[1])
 
 
 def _arriving(port: serial.SerialBase) -> bytes:

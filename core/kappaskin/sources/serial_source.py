@@ -31,11 +31,14 @@ from kappaskin.sources.wire import (
 
 _PATIENCE = 3.0  # s without messages, or without the device's information, before that is reported
 _DWELL = 0.8  # s of unreadable bytes, after which another baud rate is tried
+_SLOW = 8.0  # s to open a port, after which that is reported: Bluetooth takes some
 _RETRY = 0.25  # s between two attempts to open a port that was lost
 _UNREAD = 2**22  # counts kept until the device has sent its information
 _MESSAGE_OVERHEAD = 64  # counts that take as much memory as a message beside its own
 _CLOCK_OFFSET, _CLOCK_DRIFT = 0.5, 0.01  # s, and share, by which two running clocks may differ
 _LONGEST_TEXT = 500  # characters: a device may send any name, and each status has 64 events
+_EVENTS, _EVENTS_A_SECOND = 256, 20  # that are reported at once at most, and for long
+_CHANGE = 0.5  # s between two changes of a device's description that is connected
 _LOSS_INTERVAL = 1.0  # s of which lost messages are reported together
 
 
@@ -59,7 +62,7 @@ class SerialSource:
         self._overrun = 0
         self._disconnected = ""  # why there is no connection
         self._lost_at: float | None = None  # when the connection was lost, until the device is back
-        self._next_try = 0.0
+        self._next_try, self._changed_at = 0.0, -math.inf
         self._connection: SerialConnection | None = None
         self._connect(SerialConnection(url, clock))
 
@@ -77,7 +80,7 @@ class SerialSource:
     def _connect(self, connection: SerialConnection) -> None:
         """Read from `connection`, and ask the device for its information."""
         now = self._clock()
-        self._connection = connection
+        self._connection, self._opening = connection, connection.opening
         self._opened = self._received_at = self._good_at = self._tuned_at = now
         self._bytes_before = self._decoder.accounting().bytes_in
         self._holders: list[str] = []
@@ -90,6 +93,9 @@ class SerialSource:
 
     def _disconnect(self, connection: SerialConnection) -> None:
         """Close a connection that was lost; the device may come back."""
+        if connection.refusal is not None:  # it took long to open, in vain
+            self._connection, self._disconnected = None, f"{connection.refusal}; retrying"
+            return
         self._overrun += connection.overrun
         connection.close()
         self._connection = None
@@ -140,7 +146,10 @@ class SerialSource:
             return []
         # Asked for first: what arrived before the connection was lost is still to be read.
         lost = connection.lost
-        arrived = connection.take(0.0 if lost or self._has_usable() else timeout)
+        # No more than can be used, or a flood would be kept in memory.
+        arrived = [] if self._has_usable() else connection.take(0.0 if lost else timeout)
+        if self._opening and not connection.opening:
+            self._connect(connection)
         for now, data in arrived:
             messages = self._decoder.feed(data)
             self._received_at = now
@@ -152,11 +161,13 @@ class SerialSource:
         if not self._interpreter.known:
             self._find_information()
         frames = self._frames()
+        if self._has_usable() and not frames:
+            time.sleep(timeout)  # until the description may change again
         self._recording.received(arrived)
         if self._interpreter.known and self._events.restarted():
             self._scan_control.begin()
         self._events.losses()
-        if lost and not self._has_usable():
+        if lost and connection.empty and not self._has_usable():
             self._disconnect(connection)
         else:
             self._maintain(connection)
@@ -195,6 +206,7 @@ class SerialSource:
         before, text_before = self._interpreter.sensor, self._interpreter.text
         if not self._interpreter.learn(text):
             return
+        self._changed_at = self._clock()
         if text != text_before:
             self._scan_control.scan(None)  # what was chosen is on the skin that was
         sensor = self._interpreter.sensor
@@ -228,8 +240,11 @@ class SerialSource:
         """The frames before the next message that changes the sensor, or cannot be used."""
         frames: list[Frame] = []
         while self._has_usable():
-            if frames and self._interpreter.is_of_another(self._pending[0][1]):
-                break
+            first = self._pending[0][1]
+            if self._interpreter.is_of_another(first):
+                soon = self._clock() - self._changed_at < _CHANGE  # again: each takes a pipeline
+                if frames or (soon and isinstance(first, Information)):
+                    break
             now, message = self._pending.popleft()
             self._last = message.time, now
             if isinstance(message, Reply):
@@ -300,6 +315,13 @@ class SerialSource:
         if self._connection is None:
             return self._disconnected
         now = self._clock()
+        if self._opening and now - self._opened < _SLOW:
+            return self._disconnected
+        if self._opening:
+            return (
+                f"{self.url}: not open after {_SLOW:g} s; unplug it and plug it in again, or check "
+                "the address"
+            )
         if self._interpreter.unusable or now - self._opened < _PATIENCE:
             return self._interpreter.unusable
         if self._interpreter.known and now - self._good_at < _PATIENCE:
@@ -342,9 +364,19 @@ class _EventQueue:
         self._events: list[Event] = []
         self._lost = self._restarts = 0  # that were reported
         self._losses_at = 0.0
+        self._room, self._left_out, self._added_at = float(_EVENTS), 0, clock()
 
     def add(self, kind: str, text: str) -> None:
-        self._events.append(Event(self._clock(), kind, text[:_LONGEST_TEXT]))
+        """Report an event, unless there were too many shortly before."""
+        now = self._clock()
+        room = self._room + _EVENTS_A_SECOND * (now - self._added_at)
+        self._room, self._added_at = min(room, _EVENTS), now
+        if self._room < 1:
+            self._left_out += 1
+            return
+        more = f" ({self._left_out} more events before it)" if self._left_out else ""
+        self._events.append(Event(now, kind, text[:_LONGEST_TEXT] + more))
+        self._room, self._left_out = self._room - 1, 0
 
     def take(self) -> list[Event]:
         """The events since the last call."""

@@ -169,13 +169,13 @@ def pack_runs(channels: Sequence[int] | NDArray[np.intp]) -> bytes:
     return bytes([len(runs)]) + b"".join(struct.pack("<HH", *run) for run in runs)
 
 
-def unpack_runs(data: bytes) -> NDArray[np.intp] | None:
-    """The channels of what `pack_runs` made; None if `data` is not of that form."""
+def unpack_runs(data: bytes, most: int = LONGEST // 2) -> NDArray[np.intp] | None:
+    """The channels of what `pack_runs` made; None if `data` is none, or has above `most`."""
     if not data or len(data) != 1 + 4 * data[0]:
         return None
     starts, lengths = np.frombuffer(data, "<u2", offset=1).reshape(-1, 2).astype(np.intp).T
     total = int(lengths.sum())
-    if total > LONGEST // 2:
+    if total > most:
         return None
     within = np.arange(total) - np.repeat(np.cumsum(lengths) - lengths, lengths)
     return np.repeat(starts, lengths) + within

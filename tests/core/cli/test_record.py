@@ -14,7 +14,10 @@ import psutil
 import pytest
 
 from kappaskin.cli import main
-from kappaskin.recording import Recording
+from kappaskin.cli.common import ProgressLine
+from kappaskin.cli.record import _recorded
+from kappaskin.live import Status
+from kappaskin.recording import Recording, RecordingStatus
 from kappaskin.recording.writing import part_of
 
 pytestmark = pytest.mark.slow
@@ -158,3 +161,19 @@ def test_repair_tells_by_its_exit_code_what_was_lost(recorded, tmp_path, capsys)
             assert main(["info", str(out)]) == 0
             assert "not ended" not in capsys.readouterr().out
     assert main(["info", str(recorded.with_name("none.mcap"))]) == 2
+
+
+class StuckEngine:
+    """An engine that records, and reports nothing more."""
+
+    alive = True
+
+    def status(self) -> Status:
+        return Status(recording=RecordingStatus("a.mcap", active=True))
+
+
+def test_the_seconds_are_over_even_if_the_engine_reports_no_more() -> None:
+    began = time.monotonic()
+    with ProgressLine() as show_progress:
+        _recorded(StuckEngine(), 0.3, [], show_progress)  # type: ignore[arg-type]
+    assert 0.3 <= time.monotonic() - began < 5.0

@@ -337,6 +337,13 @@ def test_another_version_leaves_it_to_its_own(waiting: ResumeListener, folder: P
     assert waiting.line is None
 
 
+def test_a_note_of_another_version_that_died_is_taken_away(folder: Path) -> None:
+    folder.mkdir()
+    (folder / "x.note").write_text(f"0.0.0 {'ab' * 32}")
+    assert resume_process(folder) is None
+    assert not list(folder.iterdir())
+
+
 @pytest.mark.parametrize(
     "text", [b"", b"\xff\xfe", b"one", b"0.1.0 xyz", b"0.1.0 00 more", b"[" * 9999]
 )

@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
 from multiprocessing.shared_memory import SharedMemory
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -332,3 +333,68 @@ def test_a_limit_of_file_sizes_is_told(tmp_path) -> None:
     assert re.fullmatch(
         r"kappaskin: expected .* bytes of shared memory.*ulimit -f.*\n", done.stderr
     )
+
+
+# What is left of processes that were ended by force
+
+
+LINUX = pytest.mark.skipif(
+    not sys.platform.startswith("linux"), reason="the system does not list shared memory"
+)
+LEAVES = """
+import os
+from multiprocessing import resource_tracker
+from kappaskin.live.ring import Ring
+print(*(ring.name for ring in Ring.pair()), flush=True)
+os.kill(resource_tracker._resource_tracker._pid, 9)
+os.kill(os.getpid(), 9)
+"""
+
+
+@LINUX
+@pytest.mark.slow
+def test_blocks_of_a_killed_process_are_removed_and_no_others(ring) -> None:
+    done = subprocess.run([sys.executable, "-c", LEAVES], capture_output=True, text=True)
+    dead = done.stdout.split()
+    foreign = SharedMemory(f"kappaskin-{os.getpid()}-foreign", create=True, size=4096)
+    try:
+        assert all(Path("/dev/shm", name).exists() for name in dead)
+        for made in Ring.pair():
+            made.destroy()
+        assert len(dead) == 2
+        assert not any(Path("/dev/shm", name).exists() for name in dead)
+        assert Path("/dev/shm", ring.name).exists()
+        assert Path("/dev/shm", foreign.name).exists()
+    finally:
+        foreign.close()
+        foreign.unlink()
+
+
+USES = """
+import sys, time
+from kappaskin.live.ring import Ring
+rings = [Ring.borrow(name) for name in sys.argv[1:]]
+print("used", flush=True)
+time.sleep(60)
+"""
+
+
+@LINUX
+@pytest.mark.slow
+def test_blocks_that_another_process_uses_stay_until_it_ended() -> None:
+    waits = LEAVES.replace("import os", "import os, sys").replace(
+        "os.kill(os.getpid(), 9)", "sys.stdin.read(); os.kill(os.getpid(), 9)"
+    )
+    piped = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with subprocess.Popen([sys.executable, "-c", waits], **piped) as owner:
+        names = owner.stdout.readline().split()
+        with subprocess.Popen([sys.executable, "-c", USES, *names], **piped) as user:
+            assert user.stdout.readline() == "used\n"
+            owner.communicate()
+            for made in Ring.pair():
+                made.destroy()
+            assert all(Path("/dev/shm", name).exists() for name in names)
+            user.kill()
+    for made in Ring.pair():
+        made.destroy()
+    assert not any(Path("/dev/shm", name).exists() for name in names)

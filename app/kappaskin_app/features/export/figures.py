@@ -1,12 +1,12 @@
 """Figures of the paper, computed in the background and shown."""
 
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QPixmap, QResizeEvent
 from PySide6.QtWidgets import QDialog, QLabel, QVBoxLayout, QWidget
 
+from kappaskin._files import TemporaryFolder
 from kappaskin.studies import write_figures
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 
@@ -29,7 +29,7 @@ class FigureWindow(QDialog):
         self.setWindowTitle(TITLES.get(name, name))
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.name = name
-        self._room = TemporaryDirectory(prefix="kappaskin-figure-")
+        self._room = TemporaryFolder()
         self._picture = QPixmap()
         self.label = QLabel("Computing\N{HORIZONTAL ELLIPSIS}")
         self.label.setAlignment(Qt.AlignmentFlag.AlignCenter)

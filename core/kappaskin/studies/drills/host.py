@@ -12,10 +12,10 @@ from contextlib import closing, contextmanager, suppress
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from kappaskin._files import TemporaryFolder
 from kappaskin.calibration import Calibration
 from kappaskin.errors import Refusal
 from kappaskin.live import LOST, STREAMING, Engine
@@ -44,10 +44,10 @@ def _room(size: int) -> Generator[None]:
 
 def _spoilt(room: int, _: Stand) -> DrillOutcome:
     """Replace a file on a full disk: the old one stays intact, and the error is reported."""
-    with TemporaryDirectory(prefix="kappaskin-drill-") as folder:
+    with TemporaryFolder() as folder:
         path = Path(folder) / "skin.toml"
         _calibration("before").save(path)
-        before, refusal = path.read_bytes(), ""
+        before, files, refusal = path.read_bytes(), set(Path(folder).iterdir()), ""
         with _room(room):
             try:
                 _calibration("after").save(path)
@@ -56,7 +56,7 @@ def _spoilt(room: int, _: Stand) -> DrillOutcome:
         claims = [
             ("cannot be written" in refusal, "that the disk was full is not reported"),
             (path.read_bytes() == before, "the existing file is damaged"),
-            (list(Path(folder).iterdir()) == [path], "half a file is left behind"),
+            (set(Path(folder).iterdir()) == files, "half a file is left behind"),
         ]
     return DrillOutcome(failures=tuple(text for holds, text in claims if not holds))
 
@@ -105,7 +105,7 @@ class _Listener(Recorder):
 def _recorded(disk: Callable[[Path], ReservedFile], full: bool, stand: Stand) -> DrillOutcome:
     """Record to a bad disk: reads continue, the file is whole, and the trouble is reported."""
     stand.settle()
-    with TemporaryDirectory(prefix="kappaskin-drill-") as folder:
+    with TemporaryFolder() as folder:
         path = Path(folder) / "drill.mcap"
         with closing(_Listener(path, stand.clock(), disk)) as recorder:
             stand.source.record(recorder)
@@ -313,7 +313,7 @@ def _blocks_of(pid: int) -> list[Path]:
     """The shared memory of a process, where the system lists it."""
     with suppress(OSError):
         lines = Path(f"/proc/{pid}/maps").read_text().splitlines()
-        return sorted({Path(line.split()[-1]) for line in lines if f"{_MEMORY}/psm_" in line})
+        return sorted({Path(line.split()[-1]) for line in lines if f"{_MEMORY}/kappaskin-" in line})
     return []
 
 

@@ -3,10 +3,8 @@
 import json
 import math
 import os
-import shutil
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 import tty
@@ -18,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kappaskin._files import TemporaryFolder
 from kappaskin.errors import SourceError
 from kappaskin.frames import Counts, Event, Frame
 from kappaskin.sources import Decoder, SerialConnection, SerialSource, wire
@@ -288,9 +287,9 @@ class Stand:
 
     def __init__(self, device: Device, long: bool) -> None:
         self.device, self.long, self.rng = device, long, device.rng
-        self._folder = Path(tempfile.mkdtemp(prefix="kappaskin-drill-"))
+        self._folder = TemporaryFolder()
         device.line.take(0.0)  # from before this drill
-        self.relay = Relay(device.line, self._folder)
+        self.relay = Relay(device.line, Path(self._folder.name))
         self.clock = time.monotonic
         self._source: SerialSource | None = None
         self.frames = self.wrong = 0
@@ -428,7 +427,7 @@ class Stand:
         if self._source is not None:
             self._source.close()
         self.relay.unplug()
-        shutil.rmtree(self._folder)
+        self._folder.cleanup()
 
 
 @dataclass(frozen=True)
