@@ -175,7 +175,7 @@ def _given(target: str) -> bytes:
         values = parse_qs(urlsplit(target).query, max_num_fields=_FIELDS).get("token", [""])
     except ValueError:
         return b""
-    return values[0].encode("utf-8", "surrogateescape")
+    return values[0].encode(errors="replace")
 
 
 def _of_this_machine(scheme: str | None, host: str | None) -> bool:

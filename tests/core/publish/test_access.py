@@ -3,9 +3,12 @@
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from http import HTTPStatus
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from kappaskin import Refusal
 from kappaskin.publish import Access, access_of
@@ -24,9 +27,11 @@ def status(check: AccessCheck, host: str = "localhost", *origins: str, target: s
     return denial and denial.status.value
 
 
-@pytest.fixture(autouse=True)
-def named(monkeypatch) -> None:
-    monkeypatch.setattr("socket.gethostname", lambda: "Robot.lab.example")
+@pytest.fixture(autouse=True, scope="module")
+def named() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("socket.gethostname", lambda: "Robot.lab.example")
+        yield
 
 
 # The name of the host
@@ -205,11 +210,21 @@ def test_a_token_that_is_none_lets_nobody_in(token: str) -> None:
     AccessCheck(Access((), token), "localhost", "::1")
 
 
+_SOME = st.text() | st.sampled_from(["localhost", "null", FOXGLOVE, "http://[::1]", "/?token=%"])
+
+
+@given(_SOME, st.lists(_SOME, max_size=2), st.lists(_SOME, max_size=2))
+def test_any_request_is_let_in_or_refused_in_words_of_one_line(target, hosts, origins) -> None:
+    for check in (HERE, EVERYWHERE):
+        denial = check.denial(target, hosts, origins)
+        assert denial is None or denial.reason.isprintable()
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("given", [SECRET, ""])
-def test_the_environment_has_the_token_or_it_is_made_once(given: str) -> None:
+@pytest.mark.parametrize("set_to", [SECRET, ""])
+def test_the_environment_has_the_token_or_it_is_made_once(set_to: str) -> None:
     words = "from kappaskin.publish import access_of as a; print(a().token, a() == a(), a())"
-    command, environment = [sys.executable, "-c", words], {**os.environ, TOKEN: given}
+    command, environment = [sys.executable, "-c", words], {**os.environ, TOKEN: set_to}
     told = [
         subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
         for _ in range(2)
@@ -217,4 +232,4 @@ def test_the_environment_has_the_token_or_it_is_made_once(given: str) -> None:
     (one, same, shown), (other, _, _) = (each.split(maxsplit=2) for each in told)
     assert same == "True"
     assert one not in shown
-    assert (one == other == SECRET) if given else (one != other and len(one) >= 22)
+    assert (one == other == SECRET) if set_to else (one != other and len(one) >= 22)

@@ -282,6 +282,7 @@ def test_a_client_that_floods_is_let_go(client, server) -> None:
     "data",
     [
         *(b"\x00" * 300, b"GET / HTTP/1.1\r\n\r\n", b"x" * 20000, b""),
+        *(HELLO.replace(b"/ ", b"/\xff "), HELLO.replace(b"localhost", b"\xe9\x00\xff")),
         *(HELLO + b"\xff" * 20, HELLO + b"\x88\x80" + bytes(4), HELLO + b"\x81\x05hello"),
     ],
 )
