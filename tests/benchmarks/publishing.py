@@ -20,7 +20,7 @@ def deafened(target: str) -> socket.socket:
     address = urlsplit(target)
     made = socket.create_connection((address.hostname or "127.0.0.1", address.port))
     made.sendall(
-        b"GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        b"GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
         b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n"
         b"Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n"
     )

@@ -30,6 +30,8 @@ from kappaskin.calibration.calibration import digest, fingerprint
 from kappaskin.live.resume import resume_process
 from kappaskin.mechanics import HeightMap, Mesh
 from kappaskin.pipeline import reconstruct, setup_from_text, setup_to_text
+from kappaskin.publish import THIS_MACHINE
+from kappaskin.publish.access import AccessCheck
 from kappaskin.publish.foxglove import FoxgloveClient
 from kappaskin.publish.foxglove_channels import CHANNELS
 from kappaskin.recording import Recorder, Repaired, ReplayedSource, Verification
@@ -83,7 +85,7 @@ _JSON = (*_NUMBERS, b"null", b"NaN", b"Infinity", b"{}", b"[]", b'""', b":", b",
 # A client of the WebSocket server
 
 _HELLO = (
-    b"GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    b"GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
     b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n"
     b"Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n"
 )
@@ -100,10 +102,13 @@ _ASKED = (
 )
 
 
+_CHECK = AccessCheck(THIS_MACHINE, "localhost", "127.0.0.1")
+
+
 def _client(data: bytes, _: Path) -> None:
     """In pieces, as they come; messages are offered meanwhile."""
     ours, theirs = socket.socketpair()
-    client = FoxgloveClient(ours, "somebody")
+    client = FoxgloveClient(ours, "somebody", _CHECK)
     with ours, theirs:
         theirs.setblocking(False)
         for at in range(0, len(data), 4096):
@@ -204,7 +209,7 @@ def _arrays(**changed: "np.ndarray") -> bytes:
     rng, written = np.random.default_rng(0), io.BytesIO()
     arrays = {
         "size": np.array([0.1, 0.08]),
-        "positions": rng.uniform(0.01, 0.07, (12, 2)),
+        "positions": rng.uniform(0.02, 0.06, (12, 2)),
         "curvature": rng.normal(size=(2, 3, 12)),
         "rigidity": np.array(0.1),
     }

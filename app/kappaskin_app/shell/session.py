@@ -304,7 +304,7 @@ class Session(QObject):
         """Publish to the requested targets, or to none and report why."""
         why = ""
         try:
-            self.engine.publish(self._settings.targets)
+            self.engine.publish(self._settings.targets, self._settings.origins)
         except Refusal as refusal:
             why = str(refusal)
             self.engine.publish([])

@@ -1,6 +1,7 @@
 """Commands on live estimates: publish, listen."""
 
 import math
+import sys
 import time
 from contextlib import closing
 from typing import TYPE_CHECKING, Annotated
@@ -22,7 +23,12 @@ Perhaps = Annotated[list[str] | None, Parameter(negative="", consume_multiple=Tr
 
 
 def publish(
-    source: str, *, udp: Many = None, foxglove: Perhaps = None, seconds: float = math.inf
+    source: str,
+    *,
+    udp: Many = None,
+    foxglove: Perhaps = None,
+    allow_origin: Many = None,
+    seconds: float = math.inf,
 ) -> int:
     """Publish contact, shape and error bars of every estimate, until stopped (Ctrl+C).
 
@@ -40,7 +46,13 @@ def publish(
     udp
         HOST:PORT to send JSON datagrams to; may be given several times.
     foxglove
-        Serve Foxglove at HOST:PORT, or without one at 127.0.0.1:8765; give it after the source.
+        Serve Foxglove at HOST:PORT, or without one at 127.0.0.1:8765; give it after the source. At
+        an address that other machines reach, such as 0.0.0.0, it asks for a token: the URL with it
+        is printed, and KAPPASKIN_TOKEN in the environment sets it.
+    allow_origin
+        Origin of web pages that may connect, besides those of this machine:
+        https://app.foxglove.dev is Foxglove in the browser, file:// its desktop app; may be given
+        several times.
     seconds
         How long to publish; until stopped when left out.
     """
@@ -55,12 +67,14 @@ def publish(
     targets += [f"foxglove://{place}" for place in places or ()]
     if not targets:
         raise Refusal("expected a receiver: give --udp HOST:PORT, or --foxglove")
+    if allow_origin and not places:
+        raise Refusal("--allow-origin is for pages that connect to a server: give --foxglove")
     targets_of(targets)  # or refused here
     if source.startswith(SimulatedSource.SCHEME):
         load_scene(source.removeprefix(SimulatedSource.SCHEME))  # or refused here
     stopped = stops()
     with Engine() as engine:
-        engine.publish(targets)
+        engine.publish(targets, allow_origin or ())
         engine.connect(source)
         status = _watched(engine, time.monotonic() + seconds, stopped)
     return FAILED if math.isnan(status.publishing.latency.whole) else 0
@@ -69,6 +83,7 @@ def publish(
 def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
     """Print a line a second until the `end`; the last status."""
     printed, line = time.monotonic(), ""
+    noticed = set[str]()
     status = engine.status()
     while not stopped and time.monotonic() < end:
         time.sleep(_POLL)
@@ -79,12 +94,23 @@ def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
         for target in status.publishing.targets:
             if target.refusal:
                 raise Refusal(target.refusal)
+        _print_notices(status.publishing.targets, noticed)
         if time.monotonic() - printed >= _EVERY:
             printed, line = time.monotonic(), _line(status)
             print(line, flush=True)
     if (last := _line(status)) != line:
         print(last)
     return status
+
+
+def _print_notices(targets: "tuple[TargetStatus, ...]", printed: set[str]) -> None:
+    """Print notices that have not been `printed` on standard error."""
+    for target in targets:
+        for notice in target.notices:
+            text = f"kappaskin: {target.target}: {notice}"
+            if text not in printed:
+                printed.add(text)
+                print(text, file=sys.stderr, flush=True)
 
 
 def _line(status: "Status") -> str:

@@ -30,7 +30,7 @@ from kappaskin.live.resume import ResumedProcess, ResumeInfo, resume_process
 from kappaskin.live.ring import Ring
 from kappaskin.live.status import LOST, Status
 from kappaskin.pipeline import Setup
-from kappaskin.publish import targets_of
+from kappaskin.publish import access_of, targets_of
 from kappaskin.recording import unused
 from kappaskin.scenes import Playback, Scene
 
@@ -215,13 +215,15 @@ class Engine:
         """Scan only `region` in every frame; where this is impossible, `status` says why."""
         self._requests.change(region=region)
 
-    def publish(self, targets: Sequence[str]) -> None:
+    def publish(self, targets: Sequence[str], origins: Sequence[str] = ()) -> None:
         """Send estimates to `targets` from now on, such as udp://127.0.0.1:9870 or foxglove://.
 
-        Earlier targets receive no more; `status` has the state of each. Raises a `Refusal` for
-        an invalid target.
+        Web pages of this machine and of `origins`, such as https://app.foxglove.dev, may connect to
+        a server. Earlier targets receive no more; `status` has the state of each. Raises a
+        `Refusal` for an invalid target or origin.
         """
-        self._requests.change(targets=tuple(str(target) for target in targets_of(targets)))
+        names = tuple(str(target) for target in targets_of(targets))
+        self._requests.change(targets=names, access=access_of(origins))
 
     def tare(self) -> None:
         """Take a tare; `status` has the result, which is in use once a setup contains it."""

@@ -16,6 +16,7 @@ from typing import Any
 
 from kappaskin.estimation import Region
 from kappaskin.pipeline import Setup
+from kappaskin.publish import THIS_MACHINE, Access
 from kappaskin.scenes import Scene
 
 _RESEND = 0.5  # s after which an engine that reports, but not of what was sent, did not get it
@@ -74,16 +75,17 @@ Action = Seek | StepFrames | TakeTare | Note | RestartEffects
 class Requested:
     """All that is requested of the engine; another engine can continue with it.
 
-    Lasting settings come first: a scene or recording plays at `speed`, `looped` or not, and
-    `window_state` is stored for a window that resumes the engine. `actions` are the last ones, each
-    with the `number` of the value that added it; `changed` has the number with which each setting
-    was last requested. `over` ends the engine.
+    Lasting settings come first: `targets` that are servers have `access`, a scene or recording
+    plays at `speed`, `looped` or not, and `window_state` is stored for a window that resumes the
+    engine. `actions` are the last ones, each with the `number` of the value that added it;
+    `changed` has the number with which each setting was last requested. `over` ends the engine.
     """
 
     setup: Setup = field(default_factory=Setup)
     compared: Setup | None = None
     region: Region = field(default_factory=Region)
     targets: tuple[str, ...] = ()
+    access: Access = THIS_MACHINE
     source: str | None = None
     scene: Scene | None = None
     recording: Path | None = None

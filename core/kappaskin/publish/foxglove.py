@@ -7,6 +7,7 @@ the skin as a cloud of points, when one of them shows it.
 """
 
 import json
+import math
 import selectors
 import socket
 import struct
@@ -18,12 +19,13 @@ from typing import Any, cast
 
 from websockets.exceptions import WebSocketException
 from websockets.frames import Frame, Opcode
-from websockets.http11 import Request
+from websockets.http11 import Request, Response
 from websockets.protocol import State
 from websockets.server import ServerProtocol
 from websockets.typing import Subprotocol
 
 from kappaskin.errors import Refusal
+from kappaskin.publish.access import AccessCheck
 from kappaskin.publish.foxglove_channels import (
     CHANNELS,
     CONTACT,
@@ -59,7 +61,8 @@ PER_SECOND = 2**18  # bytes that a client may send in a second: no viewer sends 
 _WAITING = 2**18  # bytes in the socket that the client has not taken yet
 _REST = 2**20  # bytes of replies to a client that sends requests but reads nothing
 _PATIENCE = 5.0  # s for a handshake
-STUCK = 30.0  # s for which a client may take nothing
+PING = 5.0  # s of silence after which a client is pinged
+SILENT = 9.0  # s after a ping for its reply, or for room in a full socket
 _MOMENT = 1e-3  # s that the other thread may have the socket
 _WARNING = 1
 _HEADER = struct.Struct("<BIQ")  # opcode of data, subscription, time in ns
@@ -70,11 +73,12 @@ _MOST_IDS = 2**32
 class FoxgloveClient:
     """A connection; `offer` is called by one thread, everything else by another.
 
-    `subscribed` are the channels that it request for, with the numbers it gave them.
+    `subscribed` are the channels that it requests, with the numbers it gave them. `refused` is why
+    it was not let in. It is connected `since` a monotonic time in s, once the handshake is done.
     """
 
-    def __init__(self, made: socket.socket, name: str) -> None:
-        self.socket, self.name = made, name
+    def __init__(self, made: socket.socket, name: str, check: AccessCheck) -> None:
+        self.socket, self.name, self._check = made, name, check
         made.setblocking(False)
         made.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _WAITING)
         self._protocol = ServerProtocol(
@@ -82,17 +86,23 @@ class FoxgloveClient:
         )
         self.subscribed: dict[Channel, int] = {}  # replaced whole: two threads read it
         self.sent = self.dropped = 0
-        self.ended = False
+        self.ended, self.refused = False, ""
         self._lock = threading.Lock()  # of the socket, and of what is left to be written
         self._rest = bytearray()
-        self._last_shut = False
+        self._full = self._last_shut = False
         now = time.monotonic()
-        self._since = self._moved = now
+        self.since = self._alive = now
+        self._pinged = math.inf  # since when a reply is due
         self._second, self._heard = now, 0
 
     @property
     def receiver(self) -> Receiver:
         return Receiver(self.name, self.sent, self.dropped, "too slow" if self._rest else "")
+
+    @property
+    def connected(self) -> bool:
+        """Whether it completed the handshake."""
+        return self._protocol.state is not State.CONNECTING
 
     def offer(self, channel: Channel, when: float, data: bytes) -> None:
         """Send a message of `when` in s since 1970, if the client leaves room for it now."""
@@ -122,28 +132,41 @@ class FoxgloveClient:
         try:
             taken = self.socket.send(self._rest)
         except BlockingIOError:
+            self._full = True
             return
         except OSError:
             self.ended = True
             return
         del self._rest[:taken]
-        self._moved = time.monotonic()
+        if self._full:
+            self._reply_came()  # there is room again: somebody reads
+        self._full = bool(self._rest)
+
+    def _reply_came(self) -> None:
+        self._alive, self._pinged = time.monotonic(), math.inf
 
     def go_on(self) -> None:
-        """Write unsent bytes, and close an ended connection: called now and then."""
+        """Write unsent bytes, ping, and end a connection that is over: called now and then."""
         now = time.monotonic()
         # The lock is taken for who lags behind alone: were this thread put to sleep with it, the
         # one that computes would drop messages to a client that takes all of them.
         if self._rest:
             with self._lock:
                 self._flush()
-        if not self._rest:
-            self._moved = now
-            self.ended = self.ended or self._last_shut
-        stuck = now - self._moved > STUCK or len(self._rest) > _REST
-        if self._protocol.state is State.CONNECTING and now - self._since > _PATIENCE:
-            stuck = True
-        self.ended = self.ended or stuck
+        if self.connected and now - self._alive > PING and self._pinged == math.inf:
+            self._ping(now)
+        over = self._last_shut and not self._rest
+        late = now - self.since > _PATIENCE and not self.connected
+        silent = now - self._pinged > SILENT or len(self._rest) > _REST
+        self.ended = self.ended or over or late or silent
+
+    def _ping(self, now: float) -> None:
+        """Ping it; where its socket is full, that it takes more is as good a reply."""
+        self._pinged = now
+        with self._lock, suppress(WebSocketException):  # it is closing
+            if not self._rest:
+                self._protocol.send_ping(b"")
+                self._answer()
 
     def read(self) -> None:
         """Read received bytes, and reply."""
@@ -157,6 +180,7 @@ class FoxgloveClient:
         if not data or self._floods(len(data)):
             self.ended = True
             return
+        self._reply_came()
         with self._lock:
             self._protocol.receive_data(data)
             for event in self._protocol.events_received():
@@ -180,8 +204,9 @@ class FoxgloveClient:
         if isinstance(event, Request):
             if self._protocol.close_expected():
                 return  # what came right behind it was wrong
-            self._protocol.send_response(self._protocol.accept(event))
+            self._protocol.send_response(self._response(event))
             if self._protocol.state is State.OPEN:
+                self.since = time.monotonic()
                 self._reply(_SERVER_INFO)
                 self._reply(_ADVERTISED)
         elif isinstance(event, Frame) and event.opcode in (Opcode.TEXT, Opcode.BINARY):
@@ -189,6 +214,17 @@ class FoxgloveClient:
                 return
             words = "expected a JSON object with op subscribe or unsubscribe and their lists"
             self._reply({"op": "status", "level": _WARNING, "message": words})
+
+    def _response(self, request: Request) -> Response:
+        """The reply to a handshake, which refuses who may not connect."""
+        headers = request.headers
+        denial = self._check.denial(
+            request.path, headers.get_all("Host"), headers.get_all("Origin")
+        )
+        if denial is None:
+            return self._protocol.accept(request)
+        self.refused = denial.reason
+        return self._protocol.reject(denial.status, f"{denial.reason}\n")
 
     def _reply(self, answer: _Answer) -> None:
         with suppress(WebSocketException):  # it is closing
@@ -231,7 +267,10 @@ class FoxgloveClient:
 
 
 MOST_CLIENTS = 16
-"""Clients served at the same time, at most."""
+"""Clients served at the same time, at most, and as many in the handshake."""
+
+_QUEUE = 128  # connections that may wait to be accepted
+_MOST_NOTICES = 16
 
 FRAME = 1 / 30  # s between two pictures of the skin
 _TICK = 0.1  # s between two checks of silent clients
@@ -257,7 +296,12 @@ def opened(target: Target) -> "Foxglove":
             f"{target}: cannot be opened for listening ({reason(error)}); choose another port, or "
             "an address of this machine"
         ) from error
-    return Foxglove(server)
+    try:
+        check = AccessCheck(target.access, target.host, str(address[0]))
+    except Refusal:
+        server.close()
+        raise
+    return Foxglove(server, target.port, check)
 
 
 def _listening(family: int, address: Any) -> socket.socket:
@@ -267,7 +311,7 @@ def _listening(family: int, address: Any) -> socket.socket:
         if sys.platform != "win32":  # there it would let two servers share a port
             made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         made.bind(address)
-        made.listen(MOST_CLIENTS)
+        made.listen(_QUEUE)
         made.setblocking(False)
     except OSError:
         made.close()
@@ -276,10 +320,12 @@ def _listening(family: int, address: Any) -> socket.socket:
 
 
 class Foxglove:
-    """Serves clients that come and go on the listening socket `server`."""
+    """Serves clients that come and go on the listening socket `server` if `check` accepts them."""
 
-    def __init__(self, server: socket.socket) -> None:
-        self._server = server
+    def __init__(self, server: socket.socket, port: int, check: AccessCheck) -> None:
+        self._server, self._check = server, check
+        invitation = check.invitation("ws", port)
+        self.notices = (invitation,) if invitation else ()
         self._clients: tuple[FoxgloveClient, ...] = ()  # replaced whole: two threads read it
         self._disconnected = (0, 0)
         self._latest: EstimateMessage | None = None
@@ -352,6 +398,8 @@ class Foxglove:
                 self._accept()
             else:
                 key.data.read()
+        if len(self._clients) > MOST_CLIENTS:
+            self._limit()
         for client in self._clients:
             client.go_on()
             if client.ended:
@@ -363,15 +411,28 @@ class Foxglove:
     def _accept(self) -> None:
         with suppress(OSError):  # it went away again
             made, address = self._server.accept()
-            if len(self._clients) >= MOST_CLIENTS:
-                made.close()
-                return
             made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            client = FoxgloveClient(made, f"{address[0]}:{address[1]}")
+            client = FoxgloveClient(made, f"{address[0]}:{address[1]}", self._check)
             self._clients = (*self._clients, client)
             self._selector.register(made, selectors.EVENT_READ, client)
 
+    def _limit(self) -> None:
+        """Drop who is too many: in the handshake the oldest; of the others who does not subscribe.
+
+        Of those the oldest, and where all subscribe the newest.
+        """
+        waiting = [client for client in self._clients if not client.connected]
+        served = sorted(
+            (client for client in self._clients if client.connected),
+            key=lambda client: (1, -client.since) if client.subscribed else (0, client.since),
+        )
+        for client in (*waiting[:-MOST_CLIENTS], *served[: max(len(served) - MOST_CLIENTS, 0)]):
+            self._drop(client)
+
     def _drop(self, client: FoxgloveClient) -> None:
+        refused, room = client.refused, len(self.notices) < _MOST_NOTICES
+        if refused and refused not in self.notices and room:
+            self.notices = (*self.notices, refused)
         self._selector.unregister(client.socket)
         client.close()
         sent, dropped = self._disconnected

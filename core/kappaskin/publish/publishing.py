@@ -8,7 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol, cast
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from kappaskin.errors import Refusal, lacking
 from kappaskin.frames import Estimate
 from kappaskin.pipeline import Pipeline
+from kappaskin.publish.access import THIS_MACHINE, Access
 from kappaskin.publish.message import EstimateMessage, MessageHeader, SourceState, epoch
 
 
@@ -43,6 +44,11 @@ class Publisher(Protocol):
         """Messages sent and dropped, with those of receivers that have gone."""
         ...
 
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """What a person has to know of those who connect, each once."""
+        ...
+
     def send(self, message: EstimateMessage) -> None:
         """Send the estimate of one frame."""
         ...
@@ -59,6 +65,7 @@ MOST_TARGETS = 8
 
 PORTS = {"udp": 9870, "foxglove": 8765}  # PlotJuggler's and Foxglove's own
 _HOSTS = {"udp": "", "foxglove": "127.0.0.1"}
+_SERVERS = ("foxglove",)
 _FORM = re.compile(
     r"(\w+)://(?:\[([0-9a-fA-F:.]+(?:%[\w.-]+)?)\]|([\w.-]*))(?::([^:/]*))?/?"  # IPv6, or a name
 )
@@ -67,11 +74,12 @@ _LONGEST = 253  # characters of a name on the internet
 
 @dataclass(frozen=True)
 class Target:
-    """Destination of messages, and by `scheme` their transport."""
+    """Destination of messages, by `scheme` their transport; `access` where others connect to it."""
 
     scheme: str
     host: str
     port: int
+    access: Access = THIS_MACHINE
 
     def __str__(self) -> str:
         host = f"[{self.host}]" if ":" in self.host else self.host
@@ -102,9 +110,10 @@ def _port(text: str | None, usual: int) -> int:
     return int(text)
 
 
-def targets_of(texts: Sequence[str]) -> tuple[Target, ...]:
-    """The targets with these names; a `Refusal` for duplicates."""
-    targets = tuple(map(target_of, texts))
+def targets_of(texts: Sequence[str], access: Access = THIS_MACHINE) -> tuple[Target, ...]:
+    """The targets with these names, of which servers have `access`; a `Refusal` for duplicates."""
+    found = map(target_of, texts)
+    targets = tuple(replace(t, access=access) if t.scheme in _SERVERS else t for t in found)
     for number, target in enumerate(targets):
         if target in targets[:number]:
             raise Refusal(f"{target} is given twice; give every target once")
@@ -154,7 +163,8 @@ class Latency:
 class TargetStatus:
     """State of a target: `opening`, refused and why, or sent to.
 
-    `sent` and `dropped` count with receivers that have gone.
+    `sent` and `dropped` count with receivers that have gone. `notices` are what a person has to
+    know of those who connect, each once.
     """
 
     target: str
@@ -163,6 +173,7 @@ class TargetStatus:
     sent: int = 0
     dropped: int = 0
     receivers: tuple[Receiver, ...] = ()
+    notices: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -205,7 +216,7 @@ class _OpenTarget:
         name, sender = str(self.target), self.publisher
         if sender is None:
             return TargetStatus(name, not self.refusal, self.refusal)
-        return TargetStatus(name, False, "", *sender.counts, sender.receivers)
+        return TargetStatus(name, False, "", *sender.counts, sender.receivers, sender.notices)
 
     def close(self) -> None:
         if not self._opening.cancel() and self._opening.exception() is None:
@@ -237,9 +248,12 @@ class Publishing:
         self._parts: deque[tuple[float, float, float]] = deque(maxlen=_KEPT)
         self._latency, self._next_check = Latency(), -math.inf
 
-    def request(self, texts: Sequence[str]) -> None:
-        """Publish to these targets; open ones stay open, refused ones are retried."""
-        targets = targets_of(texts)
+    def request(self, texts: Sequence[str], access: Access = THIS_MACHINE) -> None:
+        """Publish to these targets, of which servers have `access`.
+
+        Open ones stay open, refused ones are retried; servers of other access are opened again.
+        """
+        targets = targets_of(texts, access)
         open_already = {p.target: p for p in self._places if p.target in targets and not p.refusal}
         for place in self._places:
             if place.target not in open_already:

@@ -55,6 +55,8 @@ def _connected(family: int, address: object) -> socket.socket:
 class Udp:
     """Sends each message as one datagram."""
 
+    notices = ()
+
     def __init__(self, name: str, made: socket.socket, address: tuple[object, ...]) -> None:
         self._name, self._socket, self._address = name, made, address
         self._sent = self._dropped = 0

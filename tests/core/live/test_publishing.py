@@ -15,6 +15,8 @@ from importlib.resources import as_file, files
 
 import psutil
 import pytest
+from websockets.exceptions import InvalidStatus, WebSocketException
+from websockets.sync.client import connect
 
 from kappaskin import Engine, Refusal, Setup
 from kappaskin.publish import TargetStatus
@@ -259,12 +261,88 @@ def test_both_end_quietly_when_stopped(start, receiver, port) -> None:
         (["sim:", "--foxglove", "nowhere.invalid:1"], "is not known"),
         (["sim:", "--udp", "a:1", "--udp", "A:1"], "twice"),
         (["sim:", "--foxglove", "--seconds", "0"], "above 0 s"),
+        (["sim:", "--foxglove", "--allow-origin", "null"], "expected the origin of a web page"),
+        (["sim:", "--udp", "a:1", "--allow-origin", "https://a"], "give --foxglove"),
     ],
 )
 def test_what_cannot_be_published_is_refused(run, words: list[str], reason: str) -> None:
     code, said, complaint = run("publish", *words)
     assert (code, said) == (2, "")
     assert reason in complaint
+
+
+def knocks(port: int, origin: str | None, query: str = "") -> str:
+    """The first message of a server of Foxglove, or the text of its refusal."""
+    url = f"ws://127.0.0.1:{port}/{query}"
+    try:
+        with connect(url, subprotocols=["foxglove.sdk.v1"], origin=origin) as one:
+            return str(one.recv(30))
+    except InvalidStatus as error:
+        return (error.response.body or b"").decode()
+    except (WebSocketException, OSError):  # it is being opened again
+        return ""
+
+
+def serving(port: int) -> bool:
+    with socket.socket() as one:
+        return one.connect_ex(("127.0.0.1", port)) == 0
+
+
+def test_a_web_page_reads_with_the_option_that_its_refusal_names(start) -> None:
+    page, port = "https://app.foxglove.dev", free_port()
+    words = ("publish", "sim:centre", "--foxglove", f"127.0.0.1:{port}")
+    publishing = start(*words)
+    until(lambda: serving(port))
+    assert "serverInfo" in knocks(port, None)
+    for _ in range(3):
+        assert "serverInfo" not in knocks(port, page)
+    line = publishing.stderr.readline()
+    assert line.startswith(f"kappaskin: foxglove://127.0.0.1:{port}: refused a web page of {page};")
+    option = re.search(r"--allow-origin \S+", line)[0].split()
+    publishing.terminate()
+    assert publishing.communicate(timeout=30)[1] == ""  # once
+    start(*words, *option)
+    until(lambda: serving(port))
+    assert "serverInfo" in knocks(port, page)
+    assert "serverInfo" not in knocks(port, "https://evil.example")
+
+
+@pytest.mark.parametrize("token", ["0123456789abcdef", ""])
+def test_publish_to_other_machines_prints_the_url_with_the_token(start, monkeypatch, token) -> None:
+    monkeypatch.setenv("KAPPASKIN_TOKEN", token)
+    port = free_port()
+    publishing = start("publish", "sim:centre", "--foxglove", f"0.0.0.0:{port}")
+    line = publishing.stderr.readline()
+    printed = re.search(rf"other machines can connect, .*:{port}/\?token=(\S+)\n", line)[1]
+    assert printed == token or (not token and len(printed) >= 22)
+    assert "?token=" in knocks(port, None)
+    assert "serverInfo" in knocks(port, None, f"?token={printed}")
+    assert not any(printed in word for word in psutil.Process(publishing.pid).cmdline())
+
+
+def test_a_token_that_is_too_short_is_refused(start, monkeypatch) -> None:
+    monkeypatch.setenv("KAPPASKIN_TOKEN", "secret")
+    publishing = start("publish", "sim:", "--foxglove", f"0.0.0.0:{free_port()}")
+    said, complaint = publishing.communicate(timeout=30)
+    assert (publishing.returncode, said) == (2, "")
+    assert "expected a token of 16 to 128" in complaint
+    assert "secret" not in complaint
+
+
+def test_other_origins_open_the_server_again_and_leave_the_rest(engine, receiver, port) -> None:
+    served = free_port()
+    targets = [f"udp://127.0.0.1:{port}", f"foxglove://127.0.0.1:{served}"]
+    engine.connect("sim:centre")
+    engine.publish(targets)
+    until(lambda: serving(served))
+    heard(receiver, "contact")
+    before = target(engine)
+    assert "--allow-origin https://a" in knocks(served, "https://a")
+    engine.publish(targets, ["https://a"])
+    until(lambda: "serverInfo" in knocks(served, "https://a"))
+    assert target(engine).sent > before.sent
+    engine.publish(targets)
+    until(lambda: "--allow-origin" in knocks(served, "https://a"))
 
 
 def test_publish_fails_where_there_is_nothing_to_send(run, port) -> None:

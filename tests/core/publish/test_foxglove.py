@@ -18,7 +18,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from kappaskin import Event, Refusal, load_scene
-from kappaskin.publish import SourceState, foxglove
+from kappaskin.publish import Access, SourceState, foxglove, targets_of
 from kappaskin.publish.foxglove import (
     LARGEST,
     MOST_CLIENTS,
@@ -39,7 +39,7 @@ STATE = SourceState("streaming", "sim", "", PRESSED.sensor(), 500.0, 0.0, (EVENT
 TOPICS = {channel.topic: channel.number for channel in CHANNELS}
 
 HELLO = (
-    b"GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    b"GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
     b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n"
     b"Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n"
 )
@@ -49,12 +49,15 @@ PATIENCE = 30.0  # s for what has to come, however busy the machine
 Told = dict[str, Any]
 
 
-@pytest.fixture
-def server() -> Iterator[Foxglove]:
+def free_port() -> int:
     with socket.socket() as found:
         found.bind(("127.0.0.1", 0))
-        port = found.getsockname()[1]
-    made = foxglove.opened(target_of(f"foxglove://:{port}"))
+        return found.getsockname()[1]
+
+
+@pytest.fixture
+def server() -> Iterator[Foxglove]:
+    made = foxglove.opened(target_of(f"foxglove://:{free_port()}"))
     yield made
     made.close()
 
@@ -99,6 +102,16 @@ def asked(one: FoxgloveClient) -> int:
     """How many channels it asked for, once that has been dealt with: the lock is free again."""
     channels = len(one.subscribed)
     return channels if not one._lock.locked() else 0  # noqa: SLF001
+
+
+def read_to_its_end(one: socket.socket) -> bytes:
+    """What comes until the server closes the connection."""
+    one.settimeout(PATIENCE)
+    received = bytearray()
+    with suppress(ConnectionResetError):
+        while data := one.recv(4096):
+            received += data
+    return bytes(received)
 
 
 def until(holds: Callable[[], object], within: float = 30.0) -> None:
@@ -269,6 +282,7 @@ def test_a_client_that_floods_is_let_go(client, server) -> None:
     "data",
     [
         *(b"\x00" * 300, b"GET / HTTP/1.1\r\n\r\n", b"x" * 20000, b""),
+        *(HELLO.replace(b"/ ", b"/\xff "), HELLO.replace(b"localhost", b"\xe9\x00\xff")),
         *(HELLO + b"\xff" * 20, HELLO + b"\x88\x80" + bytes(4), HELLO + b"\x81\x05hello"),
     ],
 )
@@ -276,12 +290,7 @@ def test_garbage_in_place_of_a_handshake_ends_the_connection(server, data: bytes
     with socket.create_connection(place(server)) as one:
         one.sendall(data)
         one.shutdown(socket.SHUT_WR)
-        one.settimeout(PATIENCE)
-        try:
-            while one.recv(4096):
-                pass
-        except ConnectionResetError:
-            pass
+        read_to_its_end(one)
     until(lambda: not server.receivers)
 
 
@@ -338,7 +347,8 @@ def test_a_client_that_never_reads_holds_nobody_up(client, server, message, deaf
 
 
 def test_a_client_that_takes_nothing_for_long_is_let_go(server, message, deaf, monkeypatch) -> None:
-    monkeypatch.setattr("kappaskin.publish.foxglove.STUCK", 0.3)
+    monkeypatch.setattr(foxglove, "PING", 0.1)
+    monkeypatch.setattr(foxglove, "SILENT", 0.2)
     end = time.monotonic() + PATIENCE
     while server.receivers and time.monotonic() < end:
         server.send(message)
@@ -346,16 +356,200 @@ def test_a_client_that_takes_nothing_for_long_is_let_go(server, message, deaf, m
     assert server.counts[1] > 0
 
 
-def test_only_so_many_clients_are_served(server, monkeypatch) -> None:
-    monkeypatch.setattr("kappaskin.publish.foxglove._PATIENCE", 2 * PATIENCE)  # they say nothing
-    many = [socket.create_connection(place(server)) for _ in range(3 * MOST_CLIENTS)]
-    until(lambda: len(server.receivers) == MOST_CLIENTS)
-    closed = [one for one in many[MOST_CLIENTS:] if one.recv(1) == b""]
-    assert len(closed) == 2 * MOST_CLIENTS
-    assert len(server.receivers) == MOST_CLIENTS
-    for one in many:
+def test_only_so_many_clients_are_served(client, server) -> None:
+    every = [client("/contact") for _ in range(MOST_CLIENTS)]
+    with connected(server) as more:
+        read_to_its_end(more)
+    until(lambda: [asked(one) for one in clients(server)] == [1] * MOST_CLIENTS)
+    for one in every:
         one.close()
     until(lambda: not server.receivers)
+
+
+def test_where_all_subscribe_the_newest_is_one_too_many(client, server, message) -> None:
+    every = [client("/contact") for _ in range(MOST_CLIENTS)]
+    pair = {"id": 1, "channelId": TOPICS["/shape"]}
+    words = json.dumps({"op": "subscribe", "subscriptions": [pair]}).encode()
+    with socket.create_connection(place(server)) as more:
+        more.sendall(HELLO + b"\x81" + bytes([0x80 | len(words)]) + bytes(4) + words)
+        read_to_its_end(more)
+    for one in every:
+        reads_a_contact(server, one, message)
+
+
+def reads_a_contact(server: Foxglove, one: ClientConnection, message: EstimateMessage) -> None:
+    """Send until it has one: a message is dropped where the other thread holds the socket."""
+
+    def read() -> bool:
+        server.send(message)
+        with suppress(TimeoutError):
+            return parsed(one.recv(0.5))[2]["kind"] == "contact"
+        return False
+
+    until(read)
+
+
+def in_handshake(server: Foxglove) -> socket.socket:
+    return socket.create_connection(place(server))
+
+
+def connected(server: Foxglove) -> socket.socket:
+    """A client that completes the handshake, and says no more."""
+    made = socket.create_connection(place(server))
+    made.sendall(HELLO)
+    return made
+
+
+@pytest.mark.parametrize("idle", [in_handshake, connected])
+def test_idle_connections_keep_no_viewer_out(client, server, message, idle, monkeypatch) -> None:
+    monkeypatch.setattr(foxglove, "_PATIENCE", 2 * PATIENCE)  # they stay as long as they may
+    with ExitStack() as stack:
+        many = [stack.enter_context(idle(server)) for _ in range(200)]
+        until(lambda: len(server.receivers) == MOST_CLIENTS)
+        viewers = [client("/contact") for _ in range(MOST_CLIENTS)]
+        for viewer in viewers:
+            reads_a_contact(server, viewer, message)
+        assert len(many) > 2 * MOST_CLIENTS >= len(server.receivers)
+
+
+def test_the_oldest_without_a_subscription_makes_room(client, server) -> None:
+    every = [client("/contact") for _ in range(MOST_CLIENTS - 2)]
+    older, younger = client(), client()
+    waiting = [in_handshake(server) for _ in range(MOST_CLIENTS)]
+    until(lambda: len(server.receivers) == 2 * MOST_CLIENTS)  # who waits takes no place of theirs
+    every.append(client("/contact"))
+    with pytest.raises(ConnectionClosed):
+        older.recv(PATIENCE)
+    subscribe(younger, "/contact")
+    until(lambda: sum(map(asked, clients(server))) == MOST_CLIENTS)
+    for one in waiting:
+        one.close()
+    until(lambda: len(server.receivers) == MOST_CLIENTS)
+
+
+def shortened(monkeypatch) -> None:
+    monkeypatch.setattr(foxglove, "PING", 0.1)
+    monkeypatch.setattr(foxglove, "SILENT", 0.4)
+
+
+def test_who_replies_to_no_ping_is_let_go(server, monkeypatch) -> None:
+    shortened(monkeypatch)
+    with connected(server) as one:
+        received = read_to_its_end(one)
+    assert received.endswith(b"\x89\x00")  # one ping, empty
+    until(lambda: not server.receivers)
+
+
+def test_who_replies_stays_with_or_without_subscriptions(client, server, monkeypatch) -> None:
+    shortened(monkeypatch)
+    quiet, subscribed = client(), client("/contact")
+    time.sleep(2)
+    assert len(server.receivers) == 2
+    for one in (quiet, subscribed):
+        assert one.ping().wait(PATIENCE)
+
+
+def test_who_reads_slowly_stays(server, message, deaf, monkeypatch) -> None:
+    shortened(monkeypatch)
+    end = time.monotonic() + 3
+    while time.monotonic() < end:
+        for _ in range(50):
+            server.send(message)
+        deaf.recv(2**15)
+        time.sleep(0.01)
+    (slow,) = server.receivers
+    assert slow.dropped > 0
+    assert slow.sent > 0
+
+
+def test_a_server_that_was_stopped_after_a_ping_reads_the_replies_first(
+    client, server, monkeypatch
+) -> None:
+    shortened(monkeypatch)
+    ping, slept = FoxgloveClient._ping, list[float]()  # noqa: SLF001
+
+    def stopped(self: FoxgloveClient, now: float) -> None:
+        ping(self, now)
+        slept.append(time.sleep(1.0) or now)
+
+    monkeypatch.setattr(FoxgloveClient, "_ping", stopped)
+    one = client("/contact")
+    until(lambda: len(slept) > 1)
+    assert len(server.receivers) == 1
+    assert one.ping().wait(PATIENCE)
+
+
+# Who may connect
+
+
+def refused(server: Foxglove, **wanted: Any) -> tuple[int, str]:
+    """Status and text of the refusal of a handshake."""
+    url = "ws://{}:{}".format(*place(server))
+    with pytest.raises(InvalidStatus) as caught:
+        connect(url, subprotocols=[PROTOCOLS[0]], **wanted)
+    return caught.value.response.status_code, caught.value.response.body.decode()
+
+
+def test_a_web_page_is_refused_and_the_person_told_what_allows_it(server, client) -> None:
+    for _ in range(2):
+        code, text = refused(server, origin="https://app.foxglove.dev")
+        assert code == 403
+    assert "--allow-origin https://app.foxglove.dev" in text
+    until(lambda: server.notices == (text.strip(),))
+    assert refused(server, origin="null")[0] == 403
+    until(lambda: len(server.notices) == 2)
+    client()
+
+
+def test_notices_are_so_many_at_most(server) -> None:
+    for number in range(30):
+        refused(server, origin=f"https://{number}.example")
+    until(lambda: not server.receivers)
+    assert len(server.notices) == 16
+
+
+@pytest.mark.parametrize("host", [b"evil.example", b"", b"localhost\r\nHost: localhost"])
+def test_another_host_is_refused(server, host: bytes) -> None:
+    with socket.create_connection(place(server)) as one:
+        one.sendall(HELLO.replace(b"localhost", host))
+        received = read_to_its_end(one)
+    assert received.startswith(b"HTTP/1.1 403 ")
+    assert b"serverInfo" not in received
+
+
+def test_a_page_that_is_allowed_reads() -> None:
+    page, port = Access(("https://a.example",)), free_port()
+    (target,) = targets_of([f"foxglove://127.0.0.1:{port}"], page)
+    made, url = opened(target), f"ws://127.0.0.1:{port}"
+    try:
+        with connect(url, subprotocols=[PROTOCOLS[0]], origin="https://a.example") as one:
+            assert json.loads(one.recv(PATIENCE))["op"] == "serverInfo"
+    finally:
+        made.close()
+
+
+def test_where_other_machines_connect_a_client_has_the_token() -> None:
+    token = "0123456789abcdef"
+    (target,) = targets_of([f"foxglove://0.0.0.0:{free_port()}"], Access((), token))
+    made = opened(target)
+    url = f"ws://127.0.0.1:{target.port}"
+    try:
+        (invitation,) = made.notices
+        assert invitation.endswith(f":{target.port}/?token={token}")
+        for wrong in ("", "?token=0123456789abcdeg"):
+            with pytest.raises(InvalidStatus, match="401"):
+                connect(url + wrong, subprotocols=[PROTOCOLS[0]])
+        with connect(f"{url}/?token={token}", subprotocols=[PROTOCOLS[0]]) as one:
+            assert json.loads(one.recv(PATIENCE))["op"] == "serverInfo"
+        until(lambda: len(made.notices) == 2)
+        assert token not in made.notices[1]
+    finally:
+        made.close()
+
+
+def test_without_a_token_no_server_is_opened_for_other_machines() -> None:
+    with pytest.raises(Refusal, match="expected a token"):
+        opened(target_of(f"foxglove://0.0.0.0:{free_port()}"))
 
 
 # Opening

@@ -74,7 +74,8 @@ def script_of(session: Session, settings: Settings, folder: Path) -> Script:
         made.append(f"REGION = {_constructor(region)}")
         requests.append("engine.scan(REGION)")
     if settings.targets:
-        requests.append(f"engine.publish({settings.targets!r})")
+        origins = f", {settings.origins!r}" if settings.origins else ""
+        requests.append(f"engine.publish({settings.targets!r}{origins})")
     requests.append(f"engine.connect({_literal(_source(session))})")
     if session.inside:
         made.append(f"SCENE = {_scene(session, settings)}")

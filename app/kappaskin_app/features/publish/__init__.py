@@ -11,7 +11,7 @@ from kappaskin_app.shell.pages import LIVE
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.widgets.parts import ELLIPSIS, text_label
 
-_NAMES = ("send_udp", "udp_to", "serve_foxglove", "foxglove_at")
+_NAMES = ("send_udp", "udp_to", "serve_foxglove", "foxglove_at", "allowed_pages")
 _EVERY = 0.5  # s between two updates of the counts
 _TIP = (
     "Messages sent to each receiver, and those dropped because it was not ready or not found. "
@@ -62,8 +62,9 @@ class PublishPanel(Form):
             if text != label.text():
                 label.setText(text)
             label.setVisible(bool(text))
-        refused = [target.refusal for target in news.targets if target.refusal]
-        self.show_message("\n".join(f"{why}." for why in [self._refusal, *refused] if why))
+        refused = [self._refusal, *(target.refusal for target in news.targets)]
+        notices = [notice for target in news.targets for notice in target.notices]
+        self.show_message("\n".join([*(f"{why}." for why in refused if why), *notices]))
 
 
 def _words(target: TargetStatus) -> list[str]:

@@ -34,7 +34,16 @@ class PublishSettings:
         Text(
             "At",
             "HOST:PORT of the server. 127.0.0.1 accepts connections of this machine only, 0.0.0.0 "
-            "from any machine in the network.",
+            "from any machine in the network that has the token: open the URL shown below.",
+        ),
+    )
+    allowed_pages: str = setting(
+        "",
+        Text(
+            "Allowed pages",
+            "Origins of web pages that may connect, besides those of this machine; separate "
+            "several by commas. https://app.foxglove.dev is Foxglove in the browser, file:// its "
+            "desktop app.",
         ),
     )
 
@@ -44,3 +53,9 @@ class PublishSettings:
         udp = [f"udp://{place.strip()}" for place in self.udp_to.split(",")]
         foxglove = [f"foxglove://{self.foxglove_at.strip()}"]
         return (udp if self.send_udp else []) + (foxglove if self.serve_foxglove else [])
+
+    @property
+    def origins(self) -> list[str]:
+        """The origins of web pages that may connect to the server."""
+        pages = self.allowed_pages.split(",") if self.serve_foxglove else []
+        return [page.strip() for page in pages if page.strip()]

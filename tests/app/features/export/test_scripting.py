@@ -192,6 +192,10 @@ _QUOTED = "title = \"It's \\\\ '''\"\n"
             ('SETUP = Setup(Ni=5, Nj=8, edge="clamped", method="robust")',),
         ),
         (Settings(written=Written(_QUOTED, Path("a.toml"))), (repr(_QUOTED),)),
+        (
+            Settings(serve_foxglove=True, allowed_pages="https://a"),
+            ("engine.publish(['foxglove://127.0.0.1:8765'], ['https://a'])",),
+        ),
     ],
 )
 def test_a_script_is_short_and_says_what_is_asked_for(

@@ -7,6 +7,8 @@ from dataclasses import replace
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QCheckBox, QLabel, QLineEdit, QWidget
+from websockets.exceptions import WebSocketException
+from websockets.sync.client import connect
 
 from kappaskin import Status
 from kappaskin.publish import Latency, PublishStatus, TargetStatus
@@ -65,6 +67,23 @@ def test_what_is_looked_for_or_refused_says_so(panel: PublishPanel) -> None:
     text = told(panel, FINE, TargetStatus("udp://a:1", refusal="udp://a:1: not known"))
     assert "udp://a:1" not in text
     assert panel.message.text() == "udp://a:1: not known."
+
+
+def test_who_was_refused_and_the_url_with_the_token_are_shown(panel: PublishPanel) -> None:
+    url = "other machines can connect, unencrypted, with the token: open ws://robot:1/?token=abc"
+    page = "refused a web page of https://a.example; to allow it, add ..."
+    told(panel, FINE, replace(SERVED, notices=(url, page)))
+    assert panel.message.text() == f"{url}\n{page}"
+    assert panel.message.textInteractionFlags() & Qt.TextInteractionFlag.TextSelectableByMouse
+    told(panel, FINE, SERVED)
+    assert panel.message.text() == ""
+
+
+def test_settings_name_the_pages_that_may_connect() -> None:
+    assert Settings().origins == []
+    some = Settings(serve_foxglove=True, allowed_pages=" https://a, file:// ,")
+    assert some.origins == ["https://a", "file://"]
+    assert replace(some, serve_foxglove=False).origins == []
 
 
 def test_an_address_is_wished_once_it_is_typed(panel: PublishPanel, qtbot) -> None:
@@ -129,6 +148,30 @@ def test_what_is_no_address_is_refused_in_the_panel_and_nothing_is_sent(window, 
     window.requests.set("udp_to", "nowhere.invalid:1")
     until(lambda: "nowhere.invalid is not known" in panel.message.text())
     window.requests.set("send_udp", False)
+    until(lambda: panel.message.text() == "")
+
+
+def test_a_page_that_was_refused_connects_once_it_is_allowed(window, until) -> None:
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        port = found.getsockname()[1]
+    url, page, panel = f"ws://127.0.0.1:{port}", "https://app.foxglove.dev", window.publish
+
+    def reads() -> bool:
+        try:
+            with connect(url, subprotocols=["foxglove.sdk.v1"], origin=page) as one:
+                return "serverInfo" in str(one.recv(30))
+        except (WebSocketException, OSError):
+            return False
+
+    window.requests.set("foxglove_at", f"127.0.0.1:{port}")
+    window.requests.set("serve_foxglove", True)
+    until(lambda: reads() or "Allowed pages" in panel.message.text())
+    assert f"--allow-origin {page} (Allowed pages in the app)" in panel.message.text()
+    window.requests.set("allowed_pages", "null")
+    until(lambda: "Not publishing: expected the origin of a web page" in panel.message.text())
+    window.requests.set("allowed_pages", page)
+    until(reads)
     until(lambda: panel.message.text() == "")
 
 
