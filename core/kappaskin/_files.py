@@ -9,9 +9,31 @@ from functools import cache
 from pathlib import Path
 from typing import BinaryIO
 
+import platformdirs
+
 from kappaskin.errors import Refusal
 
 _ELSEWHERE = "choose another place"
+_NO_HOME = Path(os.devnull, "no-home-directory")  # in which nothing can be written
+
+
+def user_folder(kind: str) -> Path:
+    """Kappaskin's folder of this user for a `kind` of file: cache, config, data, log or state.
+
+    Without a home directory a place where nothing is, and nothing can be written.
+    """
+    try:
+        return Path(getattr(platformdirs, f"user_{kind}_dir")("kappaskin", appauthor=False))
+    except RuntimeError:  # no HOME, and no entry of this user among the system's
+        return _NO_HOME / kind
+
+
+def documents_folder() -> Path:
+    """The user's folder of documents; the present folder without a home directory."""
+    try:
+        return platformdirs.user_documents_path()
+    except RuntimeError:
+        return Path.cwd()
 
 LIMIT = "KAPPASKIN_LIMIT"
 """Environment variable: bytes that reading a file may take, instead of the usual limits."""

@@ -15,6 +15,16 @@ import pytest
 from kappaskin import _files
 from kappaskin._files import LIMIT, Budget, check_memory, replace_whole, replacing, write_whole
 from kappaskin.calibration import Calibration
+
+
+from kappaskin._files import (
+    documents_folder,
+    replace_whole,
+    replacing,
+    user_folder,
+    write_whole,
+)
+from kappaskin.calibration import Calibration, TareStore
 from kappaskin.errors import Refusal
 from kappaskin.mechanics import HeightMap, Mesh
 
@@ -250,3 +260,25 @@ def test_the_memory_is_that_of_the_machine_or_the_container(
     for text, found in (("max", whole), ("500000000\n", 500_000_000), (f"{2**60}", whole)):
         (tmp_path / "memory.max").write_text(text)
         assert memory() == found
+
+
+@pytest.fixture
+def homeless(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A user without a home directory, as the system's `nobody` in a container."""
+    for name in ("HOME", *(name for name in os.environ if name.startswith("XDG_"))):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(os.path, "expanduser", lambda path: path)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="every user has one")
+@pytest.mark.usefixtures("homeless")
+def test_without_a_home_nothing_is_found_and_each_write_is_refused() -> None:
+    for kind in ("cache", "config", "data", "log", "state"):
+        folder = user_folder(kind)
+        assert not list(folder.glob("*"))
+        with pytest.raises(OSError, match="Not a directory"):
+            folder.mkdir(parents=True)
+        with pytest.raises(Refusal, match=r"no-home-directory.*cannot be written"):
+            write_whole(folder / "a", "text")
+    assert TareStore(TareStore.user_folder()).load("SN1").used is None
+    assert documents_folder() == Path.cwd()

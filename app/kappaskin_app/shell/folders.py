@@ -5,8 +5,7 @@ from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
-import platformdirs
-
+from kappaskin._files import documents_folder
 from kappaskin.recording import is_written, unused
 
 RECORDINGS = "Recording (*.mcap)"
@@ -16,7 +15,7 @@ _PART = ".part"
 
 def recordings_folder() -> Path:
     """The default folder of this user's recordings."""
-    return platformdirs.user_documents_path() / "Kappaskin"
+    return documents_folder() / "Kappaskin"
 
 
 def proposed(folder: Path, now: datetime) -> Path:

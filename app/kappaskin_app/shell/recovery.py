@@ -10,10 +10,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import platformdirs
 from PySide6.QtCore import QLockFile, QObject
 
-from kappaskin._files import write_whole
+from kappaskin._files import user_folder, write_whole
 from kappaskin.errors import Refusal
 from kappaskin.live import Engine, ResumeInfo, Status
 from kappaskin_app.guard import guarded
@@ -241,5 +240,4 @@ def _left(recording: str) -> Path | None:
 
 def state_folder() -> Path:
     """Where open windows of this user and machine save their state."""
-    state = platformdirs.user_state_path("kappaskin", appauthor=False)
-    return state / "open" / platform.node()
+    return user_folder("state") / "open" / platform.node()

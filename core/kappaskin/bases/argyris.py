@@ -11,14 +11,13 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-import platformdirs
 import scipy
 from scipy.sparse import block_diag, coo_array, csc_array, diags_array, eye_array
 from scipy.sparse.linalg import eigsh
 from scipy.spatial import Delaunay, KDTree
 from scipy.special import perm
 
-from kappaskin._files import write_whole
+from kappaskin._files import user_folder, write_whole
 from kappaskin.bases.basis import ORDERS, Order
 from kappaskin.bases.product import gauss
 from kappaskin.errors import Refusal
@@ -428,7 +427,7 @@ def _mark(data: bytes) -> bytes:
 
 
 def _folder() -> Path:
-    return platformdirs.user_cache_path("kappaskin", appauthor=False) / "modes"
+    return user_folder("cache") / "modes"
 
 
 def _write(file: Path, arrays: dict[str, Array]) -> None:

@@ -11,7 +11,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from kappaskin._processes import process_context
+from kappaskin._processes import starting_process
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Region
 from kappaskin.frames import Array, Estimate, Event
@@ -96,8 +96,8 @@ class Engine:
     def _start(self, status: Status) -> None:
         self._ring.write_status(status)
         names = self._ring.name, self._compared_ring.name
-        theirs, ours = multiprocessing.Pipe(duplex=False)
-        with process_context() as context:
+        with starting_process() as context:
+            theirs, ours = multiprocessing.Pipe(duplex=False)
             self._process = context.Process(
                 target=serve,
                 args=(theirs, names, self._resume_from, self._patience),

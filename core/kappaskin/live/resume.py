@@ -26,8 +26,7 @@ from pathlib import Path
 from pickle import UnpicklingError
 from typing import Any, cast
 
-import platformdirs
-
+from kappaskin._files import user_folder
 from kappaskin.live.requests import Action, Requested, Update
 
 _LARGEST = 4096  # bytes of a note
@@ -62,8 +61,7 @@ class ResumeInfo:
 
 def resume_folder() -> Path:
     """Folder of the notes of this user's and machine's engines without a window."""
-    state = platformdirs.user_state_path("kappaskin", appauthor=False)
-    return state / "left-alone" / platform.node()
+    return user_folder("state") / "left-alone" / platform.node()
 
 
 def _address(note: Path) -> str:

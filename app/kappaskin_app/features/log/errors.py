@@ -2,6 +2,7 @@
 
 import io
 import json
+import os
 import zipfile
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
@@ -71,7 +72,7 @@ def write_report(
     parts["doctor.json"] = json.dumps(doctor(), indent=1).encode()
     for file in sorted([*logs.glob(f"{LOG}*"), *logs.glob(CRASHES)]):
         parts[file.name] = _read_bytes(file)
-    home = str(Path.home())
+    home = os.path.expanduser("~")  # as it is, where there is none
     for written in (home, json.dumps(home)[1:-1]):  # plain, and as in JSON
         parts = {name: text.replace(written.encode(), b"~") for name, text in parts.items()}
     if contents.estimate is not None:
