@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 _EVERY = 1.0  # s between two lines
 _POLL = 0.05  # s
+_PATIENCE = 10.0  # s that the engine may not respond
 
 Many = Annotated[list[str] | None, Parameter(negative="")]
 Perhaps = Annotated[list[str] | None, Parameter(negative="", consume_multiple=True)]
@@ -74,7 +75,7 @@ def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
         time.sleep(_POLL)
         engine.revive()
         status = engine.status()
-        if engine.given_up:
+        if engine.given_up or engine.silent > _PATIENCE:
             raise Refusal(status.message)
         for target in status.publishing.targets:
             if target.refusal:

@@ -1,7 +1,6 @@
 """Commands on recordings: record, info, verify, repair, export, reconstruct."""
 
 import math
-import shlex
 import sys
 import time
 from dataclasses import replace
@@ -74,9 +73,10 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
                 out.unlink(missing_ok=True)  # ours, with nothing in it
             raise
         status = _ended(engine)
-        if not (engine.alive or out.exists()):
-            return _broken_off(out)
-        written = status.recording
+        why = _UNRESPONSIVE if status.recording.active else "" if engine.alive else _DIED
+    if why and not out.exists():
+        return _broken_off(out, why)
+    written = status.recording
     print(
         f"{written.path}: {written.messages:,} messages in {written.seconds:.1f} s, "
         f"{written.size / 1e6:.1f} MB; {status.accounting.words}"
@@ -100,12 +100,14 @@ def _recorded(
     while True:
         status, now = engine.status(), time.monotonic()
         written = status.recording
+        if not engine.alive or engine.silent > _BEGIN:
+            return status
         if written.trouble and not written.seconds:
             raise Refusal(written.trouble)
         if status.sensor is not known and status.sensor is not None:
             known = status.sensor
             _use_tare(engine, known)
-        if stopped or written.trouble or written.seconds >= seconds or not engine.alive:
+        if stopped or written.trouble or written.seconds >= seconds:
             return status
         if status.state == LOST and known is None:
             raise Refusal(status.message)
@@ -115,15 +117,19 @@ def _recorded(
         time.sleep(_POLL)
 
 
-def _broken_off(out: Path) -> int:
-    """Complete the file of an engine that ended, and report it; the exit code."""
-    from kappaskin.recording import Repaired, part_of
+_DIED = "the engine process ended unexpectedly"
+_UNRESPONSIVE = "the engine process did not respond and was ended"
 
-    part, ended = part_of(out), "the engine process ended unexpectedly"
+
+def _broken_off(out: Path, ended: str) -> int:
+    """Complete the file of an engine that ended, and report it; the exit code."""
+    from kappaskin.recording import Repaired, part_of, repair_command
+
+    part = part_of(out)
     try:
         done = result_of(Repaired.steps(part, out), Repaired)
     except Refusal as reason:
-        repair = shlex.join(["kappaskin", "repair", str(part), "--out", str(out)])
+        repair = repair_command(out)
         raise Refusal(f"{ended}; the recording was not completed: {reason}; try {repair}") from None
     if not done.total:
         raise Refusal(f"{ended}; nothing was recorded: {done.words}")
