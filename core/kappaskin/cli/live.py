@@ -1,6 +1,7 @@
 """Commands on live estimates: publish, listen."""
 
 import math
+import sys
 import time
 from contextlib import closing
 from typing import TYPE_CHECKING, Annotated
@@ -30,7 +31,7 @@ def publish(
     Prints a line a second: frames/s, messages sent and dropped, and the 99th percentile of the
     time from the arrival of a frame until it was sent. The messages are explained in
     `publishing/messages.md` among the resources. Exit code 1 if there was nothing
-    to send.
+    to send, or if the connection was lost in the end.
 
     Example: `kappaskin publish /dev/ttyACM0 --udp 192.168.1.20:9870 --foxglove`
 
@@ -45,7 +46,7 @@ def publish(
     seconds
         How long to publish; until stopped when left out.
     """
-    from kappaskin.live import Engine
+    from kappaskin.live import LOST, Engine
     from kappaskin.publish import targets_of
     from kappaskin.scenes import load_scene
     from kappaskin.sources import SimulatedSource
@@ -64,6 +65,9 @@ def publish(
         engine.publish(targets)
         engine.connect(source)
         status = _watched(engine, time.monotonic() + seconds, stopped)
+    if status.state == LOST:
+        print(f"kappaskin: {status.message}", file=sys.stderr)
+        return FAILED
     return FAILED if math.isnan(status.publishing.latency.whole) else 0
 
 

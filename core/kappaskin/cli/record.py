@@ -41,7 +41,7 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
     Records every byte received and every estimate computed from it, to an MCAP file that Foxglove,
     PlotJuggler and the tools of ROS 2 open. It is called OUT.part until it is complete;
     `kappaskin repair` restores an incomplete one. Exit code 1 if the recording ended early, as on a
-    full disk, or if no readings arrived.
+    full disk, if no readings arrived, or if the connection was lost in the end.
 
     Example: `kappaskin record sim: press.mcap --seconds 10`
 
@@ -54,7 +54,7 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
     seconds
         How long to record.
     """
-    from kappaskin.live import Engine
+    from kappaskin.live import LOST, Engine
     from kappaskin.recording import ReplayedSource
 
     check_time(seconds, "record")
@@ -83,9 +83,10 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
     )
     if written.lost:
         print(f"{written.lost:,} messages were not recorded: the disk is too slow")
-    for why in filter(None, (written.trouble, status.refusal)):
+    gone = status.message if status.state == LOST else ""
+    for why in filter(None, (written.trouble, status.refusal, gone)):
         print(f"kappaskin: {why}", file=sys.stderr)
-    failed = written.trouble or status.refusal or written.lost
+    failed = written.trouble or status.refusal or gone or written.lost
     return FAILED if failed or not status.accounting.accepted else 0
 
 
