@@ -4,6 +4,7 @@ The engine without a window listens at the address in a file, with a key that on
 Nothing is unpickled before both sides have proved that they have the key.
 """
 
+import hashlib
 import os
 import platform
 import secrets
@@ -60,8 +61,12 @@ class ResumeInfo:
 
 
 def resume_folder() -> Path:
-    """Folder of the notes of this user's and machine's engines without a window."""
-    return user_folder("state") / "left-alone" / platform.node()
+    """Folder of the notes of this user's and machine's engines without a window.
+
+    Short, whatever the machine is called: the path of a socket may have some 100 characters.
+    """
+    machine = hashlib.sha256(platform.node().encode(errors="surrogatepass")).hexdigest()[:8]
+    return user_folder("state") / "left-alone" / machine
 
 
 def _address(note: Path) -> str:
