@@ -69,12 +69,13 @@ sys.exit(main(sys.argv[1:]))
 class App:
     """The app in a process of its own, which answers expressions of its window's parts."""
 
-    def __init__(self, display: dict[str, str], home: Path, *arguments: str) -> None:
-        self.home = home
+    def __init__(
+        self, display: dict[str, str], home: Path, *arguments: str, command: str = "app"
+    ) -> None:
         plain = {name: value for name, value in display.items() if not name.startswith("XDG_")}
         self._errors = (home / "errors.txt").open("w+")
         self.process = subprocess.Popen(
-            [sys.executable, "-c", _DRIVEN, "app", *arguments],
+            [sys.executable, "-c", _DRIVEN, command, *arguments],
             env=plain | {"HOME": str(home)},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -162,8 +163,10 @@ def display() -> Iterator[dict[str, str]]:
 
 
 @contextmanager
-def _opened(display: dict[str, str], home: Path, *arguments: str) -> Iterator[App]:
-    app = App(display, home, *arguments)
+def _opened(
+    display: dict[str, str], home: Path, *arguments: str, command: str = "app"
+) -> Iterator[App]:
+    app = App(display, home, *arguments, command=command)
     try:
         yield app
     finally:
@@ -512,3 +515,38 @@ def test_a_wall_clock_that_jumps_changes_no_age_and_no_badge(app: App, tmp_path:
     app.stop_recording()
     _checked(path)
     assert app.end() == 0
+
+
+# For long.
+
+_WARM, _WORKED, _MEGABYTES = 35, 100, 20.0  # s (by then 500 steps can be undone), s, and MB
+_OBJECTS = 500  # that may be added, of some 10,000 frames, draws, events and lines of the log
+_HELD = (
+    "(__import__('gc').collect(), len(__import__('gc').get_objects()), "
+    "__import__('psutil').Process().memory_info().rss / 1e6)[1:]"
+)
+
+
+def test_the_demonstration_with_the_events_of_a_day_adds_no_objects_and_less_than_20_mb(
+    display: dict[str, str], home: Path
+) -> None:
+    """An event and a line of the log each 9 s, a changed setting each 43 s of a day."""
+    with _opened(display, home, command="demo") as app:
+        app.connected().ask(_HELD)  # what it imports stays
+        steps = [
+            "[event_log.note('drill', f'event {n}') for n in range(100)] and None",
+            "[__import__('logging').getLogger('drill').info('line %d', n) for n in range(100)][0]",
+            "[window.history.change('Drill', -1, noise_rms=0.3 + n / 100) for n in range(20)][0]",
+        ]
+        held: list[tuple[int, float]] = []
+        for seconds in (_WARM, _WORKED):
+            for _ in range(seconds):
+                for step in steps:
+                    app.ask(step)
+                time.sleep(1.0)
+            held.append(app.ask(_HELD))
+        (objects, memory), (more_objects, more_memory) = held
+        print(f"{more_objects - objects:+d} objects, {more_memory - memory:+.1f} MB")
+        assert more_objects - objects < _OBJECTS
+        assert more_memory - memory < _MEGABYTES
+        assert app.end() == 0

@@ -38,7 +38,7 @@ LONGEST_NOTE = 500
 """Characters of a note."""
 
 _ORDERLY, _WRITTEN = 2.0, 10.0  # s for an end, and where a recording is to be ended first
-_PATIENCE = 600.0  # s that a recording continues without a window
+_PATIENCE = 1800.0  # s that a recording continues without a window
 _SILENT = 2.0  # s without a report, of an engine that reports ten times a second
 _POLL = 1.0  # s between two polls at most that count as silence: this process may have been stopped
 _DEATHS, _WITHIN = 3, 10.0  # so many in so many s, and the process is not started again
