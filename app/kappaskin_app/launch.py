@@ -192,7 +192,9 @@ def launch(
 
 def _kept_file() -> Path:
     """Where this user's window is kept."""
-    return user_folder("config") / "window.toml"
+    import platformdirs
+
+    return user_folder(platformdirs.user_config_path) / "window.toml"
 
 
 def _theme_in(path: Path) -> "Theme":

@@ -3,37 +3,16 @@
 import os
 import secrets
 import stat
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import BinaryIO
 
-import platformdirs
-
 from kappaskin.errors import Refusal
 
 _ELSEWHERE = "choose another place"
 _NO_HOME = Path(os.devnull, "no-home-directory")  # in which nothing can be written
-
-
-def user_folder(kind: str) -> Path:
-    """Kappaskin's folder of this user for a `kind` of file: cache, config, data, log or state.
-
-    Without a home directory a place where nothing is, and nothing can be written.
-    """
-    try:
-        return Path(getattr(platformdirs, f"user_{kind}_dir")("kappaskin", appauthor=False))
-    except RuntimeError:  # no HOME, and no entry of this user among the system's
-        return _NO_HOME / kind
-
-
-def documents_folder() -> Path:
-    """The user's folder of documents; the present folder without a home directory."""
-    try:
-        return platformdirs.user_documents_path()
-    except RuntimeError:
-        return Path.cwd()
 
 LIMIT = "KAPPASKIN_LIMIT"
 """Environment variable: bytes that reading a file may take, instead of the usual limits."""
@@ -43,6 +22,17 @@ _ALWAYS = 256_000_000  # bytes that any file may declare
 _SHARE = 4  # of the memory
 _UNKNOWN = 4_000_000_000  # bytes of memory, where the system does not say
 _CONTAINER = Path("/sys/fs/cgroup/memory.max")
+
+
+def user_folder(folder: Callable[..., Path]) -> Path:
+    """Kappaskin's own of a user's folders, such as `platformdirs.user_cache_path`.
+
+    Without a home directory a place where nothing is, and nothing can be written.
+    """
+    try:
+        return folder("kappaskin", appauthor=False)
+    except RuntimeError:  # no HOME, and no entry of this user among the system's
+        return _NO_HOME
 
 
 def open_file(path: Path) -> BinaryIO:

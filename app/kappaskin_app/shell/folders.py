@@ -5,7 +5,8 @@ from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
-from kappaskin._files import documents_folder
+import platformdirs
+
 from kappaskin.recording import is_written, unused
 
 RECORDINGS = "Recording (*.mcap)"
@@ -14,8 +15,12 @@ _PART = ".part"
 
 
 def recordings_folder() -> Path:
-    """The default folder of this user's recordings."""
-    return documents_folder() / "Kappaskin"
+    """The default folder of this user's recordings: here, without a home directory."""
+    try:
+        documents = platformdirs.user_documents_path()
+    except RuntimeError:
+        documents = Path.cwd()
+    return documents / "Kappaskin"
 
 
 def proposed(folder: Path, now: datetime) -> Path:

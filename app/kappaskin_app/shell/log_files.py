@@ -10,6 +10,7 @@ from logging.handlers import RotatingFileHandler
 from pathlib import Path
 from types import TracebackType
 
+import platformdirs
 from PySide6.QtCore import QMessageLogContext, QtMsgType, qInstallMessageHandler
 
 from kappaskin._files import user_folder
@@ -29,7 +30,7 @@ _LEVELS = {
 
 def log_folder() -> Path:
     """The folder of this user's log files."""
-    return user_folder("log")
+    return user_folder(platformdirs.user_log_path)
 
 
 class LogFiles:

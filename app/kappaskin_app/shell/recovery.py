@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import platformdirs
 from PySide6.QtCore import QLockFile, QObject
 
 from kappaskin._files import user_folder, write_whole
@@ -246,4 +247,4 @@ def _left(recording: str) -> Path | None:
 
 def state_folder() -> Path:
     """Where open windows of this user and machine save their state."""
-    return user_folder("state") / "open" / platform.node()
+    return user_folder(platformdirs.user_state_path) / "open" / platform.node()

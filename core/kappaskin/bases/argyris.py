@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
+import platformdirs
 import scipy
 from scipy.sparse import block_diag, coo_array, csc_array, diags_array, eye_array
 from scipy.sparse.linalg import eigsh
@@ -427,7 +428,7 @@ def _mark(data: bytes) -> bytes:
 
 
 def _folder() -> Path:
-    return user_folder("cache") / "modes"
+    return user_folder(platformdirs.user_cache_path) / "modes"
 
 
 def _write(file: Path, arrays: dict[str, Array]) -> None:

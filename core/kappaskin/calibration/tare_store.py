@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import platformdirs
 
 from kappaskin._files import open_file, replacing, user_folder
 from kappaskin._toml import table
@@ -51,7 +52,7 @@ class TareStore:
     @staticmethod
     def user_folder() -> Path:
         """The folder of this user's tares."""
-        return user_folder("data") / "tares"
+        return user_folder(platformdirs.user_data_path) / "tares"
 
     def path(self, serial_number: str) -> Path:
         """The file of a sensor of any serial number.

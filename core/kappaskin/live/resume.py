@@ -27,6 +27,8 @@ from pathlib import Path
 from pickle import UnpicklingError
 from typing import Any, cast
 
+import platformdirs
+
 from kappaskin._files import user_folder
 from kappaskin.live.requests import Action, Requested, Update
 
@@ -66,7 +68,7 @@ def resume_folder() -> Path:
     Short, whatever the machine is called: the path of a socket may have some 100 characters.
     """
     machine = hashlib.sha256(platform.node().encode(errors="surrogatepass")).hexdigest()[:8]
-    return user_folder("state") / "left-alone" / machine
+    return user_folder(platformdirs.user_state_path) / "left-alone" / machine
 
 
 def _address(note: Path) -> str:

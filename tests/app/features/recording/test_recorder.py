@@ -268,6 +268,14 @@ def test_names_proposed_are_of_nothing_that_is_there(tmp_path: Path) -> None:
     assert names == [f"kappaskin-20261122-070509{n}.mcap" for n in ("", "-2", "-3")]
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="every user has a home directory")
+def test_without_a_home_directory_recordings_are_proposed_here(monkeypatch) -> None:
+    for name in ("HOME", *(name for name in os.environ if name.startswith("XDG_"))):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(os.path, "expanduser", lambda path: path)
+    assert recordings_folder() == Path.cwd() / "Kappaskin"
+
+
 def test_the_newest_come_first_and_only_eight(tmp_path: Path) -> None:
     for k in range(12):
         path = tmp_path / f"{k}.mcap"
