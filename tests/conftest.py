@@ -228,7 +228,7 @@ def recording(
 ) -> Path:
     """A recording of 2.5 s, 100 frames/s: a note at 0.5 s, 6 x 7 functions from 0.7 s on.
 
-    Nothing came from 1 to 1.8 s.
+    Nothing came from 1 to 1.8 s. It has three chunks at least.
     """
     from kappaskin import Event, Pipeline, Setup, load_scene
     from kappaskin.recording import Recorder
@@ -255,6 +255,7 @@ def recording(
     setups = [Setup()]
     first = source()
     play(first, 0.5)
+    written_out(recorder)
     recorder.add_event(Event(now[0], "note", "the object is changed"))
     play(first, 0.7)
     setups.append(Setup(6, 7))

@@ -1,5 +1,6 @@
 """The commands `app`, `demo` and `replay`, which open the window."""
 
+import ctypes
 import os
 import sys
 from pathlib import Path
@@ -24,6 +25,25 @@ def _require_display() -> None:
             "`xvfb-run kappaskin app`, or `python3 packaging/start.py` in the project's folder, "
             "opens the app on a virtual one"
         )
+    other = os.environ.get("WAYLAND_DISPLAY") or os.environ.get("QT_QPA_PLATFORM", "xcb") != "xcb"
+    if shown and not other and not _answers(shown):
+        raise Refusal(
+            f"expected a display at {shown} (DISPLAY), got no connection; start it, or try "
+            "`xvfb-run -a kappaskin app`"
+        )
+
+
+def _answers(display: str) -> bool:
+    """Whether an X server lets this process connect, or Qt would end it; True if unknown."""
+    try:
+        xcb = ctypes.CDLL("libxcb.so.1")
+    except OSError:  # another system, or one on which `doctor` finds it missing
+        return True
+    xcb.xcb_connect.restype = ctypes.c_void_p
+    connection = ctypes.c_void_p(xcb.xcb_connect(display.encode(), None))
+    refused = bool(xcb.xcb_connection_has_error(connection))
+    xcb.xcb_disconnect(connection)
+    return not refused
 
 
 @app.default

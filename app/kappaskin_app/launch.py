@@ -17,6 +17,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from kappaskin._files import user_folder
 from kappaskin._processes import preload_library
 from kappaskin.errors import Refusal
 
@@ -193,7 +194,7 @@ def _kept_file() -> Path:
     """Where this user's window is kept."""
     import platformdirs
 
-    return platformdirs.user_config_path("kappaskin", appauthor=False) / "window.toml"
+    return user_folder(platformdirs.user_config_path) / "window.toml"
 
 
 def _theme_in(path: Path) -> "Theme":

@@ -5,7 +5,7 @@ import secrets
 import shutil
 import stat
 import tempfile
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import BinaryIO
 from kappaskin.errors import Refusal
 
 _ELSEWHERE = "choose another place"
+_NO_HOME = Path(os.devnull, "no-home-directory")  # in which nothing can be written
 
 LIMIT = "KAPPASKIN_LIMIT"
 """Environment variable: bytes that reading a file may take, instead of the usual limits."""
@@ -23,6 +24,17 @@ _ALWAYS = 256_000_000  # bytes that any file may declare
 _SHARE = 4  # of the memory
 _UNKNOWN = 4_000_000_000  # bytes of memory, where the system does not say
 _CONTAINER = Path("/sys/fs/cgroup/memory.max")
+
+
+def user_folder(folder: Callable[..., Path]) -> Path:
+    """Kappaskin's own of a user's folders, such as `platformdirs.user_cache_path`.
+
+    Without a home directory a place where nothing is, and nothing can be written.
+    """
+    try:
+        return folder("kappaskin", appauthor=False)
+    except RuntimeError:  # no HOME, and no entry of this user among the system's
+        return _NO_HOME
 
 
 def open_file(path: Path) -> BinaryIO:

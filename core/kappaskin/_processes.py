@@ -34,24 +34,43 @@ def process_context() -> Generator[Context]:
     Where the system can, they are forked from a process that has loaded the library and does
     nothing else: one starts in 0.1 s instead of 0.8. A plain fork would copy Qt's threads' locks.
     """
-    context: Context = multiprocessing.get_context("spawn")
-    if "forkserver" in multiprocessing.get_all_start_methods():
-        context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload(["kappaskin.live.loop"])
     # Small products lose by threading, and the threads would take the cores from whoever draws.
     names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
     was = {name: os.environ.get(name) for name in names}
     os.environ.update(dict.fromkeys(names, "1"))
     try:
-        if context.get_start_method() == "forkserver":
-            _start_forkserver()
-        yield context
+        yield _context()
     finally:
         for name, value in was.items():
             if value is None:
                 del os.environ[name]
             else:
                 os.environ[name] = value
+
+
+def _context() -> Context:
+    """The fork server's where there is one: its socket needs a folder for temporary files."""
+    if "forkserver" in multiprocessing.get_all_start_methods():
+        context = multiprocessing.get_context("forkserver")
+        context.set_forkserver_preload(["kappaskin.live.loop"])
+        with suppress(OSError):
+            _start_forkserver()
+            return context
+    return multiprocessing.get_context("spawn")
+
+
+@contextmanager
+def starting_process() -> Generator[Context]:
+    """A `process_context` to start one process in; a `Refusal` where the system starts none."""
+    try:
+        with process_context() as context:
+            yield context
+    except (OSError, EOFError) as error:  # at its end, where the fork server could not fork
+        why = getattr(error, "strerror", None) or "the fork server ended"
+        raise Refusal(
+            f"expected to start another process, got none ({why}); end other programs, or allow "
+            "more processes and open files (ulimit -u, ulimit -n)"
+        ) from error
 
 
 def preload_library() -> None:
@@ -156,9 +175,9 @@ class BackgroundProcess(Generic[_Item]):
 
     def __init__(self, name: str, make: Callable[..., Iterable[_Item]], *about: object) -> None:
         self.done, self._refused = False, cast("Refusal | None", None)
-        ours, theirs = multiprocessing.Pipe(duplex=False)
-        self._pipe = cast("Connection[None, tuple[_Item] | Refusal | None]", ours)
-        with process_context() as context:
+        with starting_process() as context:
+            ours, theirs = multiprocessing.Pipe(duplex=False)
+            self._pipe = cast("Connection[None, tuple[_Item] | Refusal | None]", ours)
             self._process = context.Process(
                 target=_send_items, args=(theirs, make, about), name=name, daemon=True
             )

@@ -69,6 +69,15 @@ def test_a_picture_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
     assert "cannot be written" in done.stderr
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="it has a display of its own")
+def test_a_display_that_does_not_answer_is_named() -> None:
+    gone = {name: value for name, value in os.environ.items() if name != "WAYLAND_DISPLAY"}
+    done = run("--seconds", "1", env=gone | {"DISPLAY": ":9123"})
+    assert done.returncode == 2
+    assert done.stderr.startswith("kappaskin: expected a display at :9123 (DISPLAY), got no conn")
+    assert done.stderr.count("\n") == 1
+
+
 def test_without_a_display_the_remedy_is_named() -> None:
     bare = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
     done = run("--seconds", "1", env=bare)

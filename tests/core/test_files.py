@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import platformdirs
 import pytest
 
 from kappaskin import _files
@@ -26,9 +27,10 @@ from kappaskin._files import (
     remove_folders_left_behind,
     replace_whole,
     replacing,
+    user_folder,
     write_whole,
 )
-from kappaskin.calibration import Calibration
+from kappaskin.calibration import Calibration, TareStore
 from kappaskin.errors import Refusal
 from kappaskin.mechanics import HeightMap, Mesh
 
@@ -392,3 +394,24 @@ def test_only_marked_folders_that_nobody_uses_are_removed(tmp_path: Path, monkey
         assert set(tmp_path.iterdir()) == {*foreign, linked, Path(used)}
     assert not Path(used).exists()
     assert all((folder / "content").exists() for folder in foreign)
+
+
+@pytest.fixture
+def homeless(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A user without a home directory, as the system's `nobody` in a container."""
+    for name in ("HOME", *(name for name in os.environ if name.startswith("XDG_"))):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(os.path, "expanduser", lambda path: path)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="every user has one")
+@pytest.mark.usefixtures("homeless")
+def test_without_a_home_nothing_is_found_and_each_write_is_refused() -> None:
+    for kind in ("cache", "config", "data", "log", "state"):
+        folder = user_folder(getattr(platformdirs, f"user_{kind}_path")) / kind
+        assert not list(folder.glob("*"))
+        with pytest.raises(OSError, match="Not a directory"):
+            folder.mkdir(parents=True)
+        with pytest.raises(Refusal, match=r"no-home-directory.*cannot be written"):
+            write_whole(folder / "a", "text")
+    assert TareStore(TareStore.user_folder()).load("SN1").used is None

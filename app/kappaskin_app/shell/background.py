@@ -235,6 +235,43 @@ class Tasks(QObject):
                 thread.join(max(0.0, end - time.monotonic()))
 
 
+class BackgroundSave(Generic[_Item]):
+    """Saves the newest state of something in a thread, one after the other: a disk may be slow.
+
+    `save` writes a state and returns an error text, which goes to `report` where it changes.
+    """
+
+    def __init__(
+        self, tasks: Tasks, save: Callable[[_Item], str], report: Callable[[str], object]
+    ) -> None:
+        self._save, self._report, self._reported = save, report, ""
+        self._newest: deque[_Item] = deque(maxlen=1)
+        self._writing = threading.Lock()
+        self._task = BackgroundTask(tasks, "", self._take, ended=self._go_on)
+
+    def __call__(self, state: _Item) -> None:
+        """Save `state` soon."""
+        self._newest.append(state)
+        self._go_on()
+
+    def finish(self) -> None:
+        """Save what is not saved yet, before this returns."""
+        self._take(self._write())
+
+    def _go_on(self) -> None:
+        if self._newest and not self._task.running:
+            self._task.run(self._write)
+
+    def _write(self) -> str:
+        with self._writing:
+            return self._save(self._newest.popleft()) if self._newest else self._reported
+
+    def _take(self, wrong: str) -> None:
+        was, self._reported = self._reported, wrong
+        if wrong and wrong != was:
+            self._report(wrong)
+
+
 _EVERY = 40  # ms between two
 
 

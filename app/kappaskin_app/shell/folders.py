@@ -15,8 +15,12 @@ _PART = ".part"
 
 
 def recordings_folder() -> Path:
-    """The default folder of this user's recordings."""
-    return platformdirs.user_documents_path() / "Kappaskin"
+    """The default folder of this user's recordings: here, without a home directory."""
+    try:
+        documents = platformdirs.user_documents_path()
+    except RuntimeError:
+        documents = Path.cwd()
+    return documents / "Kappaskin"
 
 
 def proposed(folder: Path, now: datetime) -> Path:

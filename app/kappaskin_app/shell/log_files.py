@@ -13,6 +13,7 @@ from types import TracebackType
 import platformdirs
 from PySide6.QtCore import QMessageLogContext, QtMsgType, qInstallMessageHandler
 
+from kappaskin._files import user_folder
 from kappaskin_app import guard
 
 LOG, CRASHES = "kappaskin.log", "crashes.log"
@@ -29,7 +30,7 @@ _LEVELS = {
 
 def log_folder() -> Path:
     """The folder of this user's log files."""
-    return platformdirs.user_log_path("kappaskin", appauthor=False)
+    return user_folder(platformdirs.user_log_path)
 
 
 class LogFiles:

@@ -13,10 +13,11 @@ from typing import Any
 import platformdirs
 from PySide6.QtCore import QLockFile, QObject
 
-from kappaskin._files import write_whole
+from kappaskin._files import user_folder, write_whole
 from kappaskin.errors import Refusal
 from kappaskin.live import Engine, ResumeInfo, Status
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.background import BackgroundSave
 from kappaskin_app.shell.centre import BannerAction
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.parts import Parts
@@ -121,6 +122,7 @@ _TIP = (
     "The program ended before its window was closed. What you restore can be undone (Ctrl+Z); "
     "Report saves a file that helps to find the cause."
 )
+_NOT_KEPT = "after a crash the settings of this window could not be restored"
 _SETTINGS = "All settings of that session except a sensor's calibration and tare."
 
 
@@ -141,19 +143,19 @@ class OpenWindow:
         self._file = folder / f"window-{os.getpid()}.json"
         self._lock = _lock(self._file)
         self._lock.tryLock(0)
-        self._kept: LastSession | None = None
 
-    def keep(self, last: LastSession) -> None:
-        """Save the state, if it has changed."""
-        if last == self._kept:
-            return
-        self._kept = last
+    def keep(self, last: LastSession) -> str:
+        """Save the state; returns an error text."""
         data = {
             "settings": json.loads(settings_text(last.settings)),
             "source": last.source,
             "recording": last.recording,
         }
-        write_whole(self._file, json.dumps(data, indent=1))
+        try:
+            write_whole(self._file, json.dumps(data, indent=1), _NOT_KEPT)
+        except Refusal as refusal:
+            return str(refusal)
+        return ""
 
     def close(self) -> None:
         self._file.unlink(missing_ok=True)
@@ -192,6 +194,8 @@ class Recovery(QObject):
         super().__init__(window)
         self._window, last = window, crashed(folder)
         self._open_window, self._next = OpenWindow(folder), 0.0
+        self._save = BackgroundSave(window.tasks, self._open_window.keep, window.notify)
+        self._kept: LastSession | None = None
         window.session.reported.connect(guarded(self._keep))
         # What went on recording by itself was taken over with its settings already.
         if last is not None and window.session.engine.resumed is None:
@@ -203,9 +207,10 @@ class Recovery(QObject):
             self._next = now + _EVERY
             recording = str(status.recording.path) if status.recording.active else ""
             window = self._window
-            self._open_window.keep(
-                LastSession(window.history.settings, window.session.source, recording)
-            )
+            last = LastSession(window.history.settings, window.session.source, recording)
+            if last != self._kept:
+                self._kept = last
+                self._save(last)
 
     def offer(self, last: LastSession) -> None:
         """Offer what is left of the last session in the banner."""
@@ -230,6 +235,7 @@ class Recovery(QObject):
         self._window.history.change("Settings of the last session", -1, **values)
 
     def close(self) -> None:
+        self._save.finish()  # or a thread might still write it
         self._open_window.close()
 
 
@@ -241,5 +247,4 @@ def _left(recording: str) -> Path | None:
 
 def state_folder() -> Path:
     """Where open windows of this user and machine save their state."""
-    state = platformdirs.user_state_path("kappaskin", appauthor=False)
-    return state / "open" / platform.node()
+    return user_folder(platformdirs.user_state_path) / "open" / platform.node()

@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections import deque
 from collections.abc import Callable, Generator
 from contextlib import suppress
 from dataclasses import replace
@@ -40,6 +41,7 @@ from kappaskin_app.shell.simulation import (
 )
 
 _MAKING = "Computing the scene; Ctrl+Z undoes it"
+_BEGUN = 64  # scenes, as many as are cached: the text of each may be a megabyte
 
 _Slow: TypeAlias = Written | tuple[Plate, str]
 _Answer: TypeAlias = tuple[str, tuple[object, ...], Any]
@@ -73,16 +75,16 @@ class ScenePreparation:
         # Refused only where the process died: the scene is computed here then.
         self._task = BackgroundTask(tasks, _MAKING, self._learn, lambda _: None, ended)
         self._slow: _Slow | None = None
-        self._begun: set[_Slow] = set()
+        self._begun: deque[_Slow] = deque(maxlen=_BEGUN)
 
     def ready(self, settings: Settings) -> bool:
         """Whether the scene of `settings` is available at once; if not, start computing it."""
         slow = _slow(settings)
         if self.busy and slow != self._slow:
-            self._begun.discard(self._slow)  # it is not needed any more
+            self._begun.pop()  # it is not needed any more
             self._task.stop()
         if not self.busy and slow is not None and slow not in self._begun:
-            self._begun.add(slow)
+            self._begun.append(slow)
             self._slow = slow
             self._task.compute(_answers, slow)
         return not self.busy

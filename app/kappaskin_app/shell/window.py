@@ -141,7 +141,7 @@ class MainWindow(Parts):
             event.ignore()
             return
         if not self.session.closed:
-            self.saver.write()
+            self.saver.finish()
             self.history.stack.blockSignals(True)  # it emits even during destruction
             self.closing.emit()
             self.tasks.close()

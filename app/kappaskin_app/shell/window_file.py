@@ -16,6 +16,7 @@ from kappaskin._files import replacing
 from kappaskin.errors import Refusal
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.arrangement import AREAS, FLOATING, Layout, Place
+from kappaskin_app.shell.background import BackgroundSave
 from kappaskin_app.shell.menus import Menus
 from kappaskin_app.shell.parts import Parts
 from kappaskin_app.shell.settings import form_field
@@ -284,6 +285,7 @@ class WindowSaver(QObject):
         self._window, self._menus = window, menus
         self._file: WindowFile | None = None
         self._saved = WindowState()
+        self._save = BackgroundSave(window.tasks, self._merge, window.notify)
 
     def begin(self, path: Path) -> None:
         """Restore the window from the file at `path`, and save it there from now on."""
@@ -301,12 +303,18 @@ class WindowSaver(QObject):
             window.notify("; ".join([*([wrong] if wrong else []), *refused]))
 
     def write(self) -> None:
-        """Save the state of the window."""
-        if self._file is None:
-            return
-        before, self._saved = self._saved, self._now()
-        if wrong := self._file.merge(self._saved, before):
-            self._window.notify(wrong)
+        """Save the state of the window soon."""
+        if self._file is not None:
+            self._save(self._now())
+
+    def finish(self) -> None:
+        """Save the state of the window, before this returns."""
+        self.write()
+        self._save.finish()
+
+    def _merge(self, state: WindowState) -> str:
+        before, self._saved = self._saved, state
+        return self._file.merge(state, before) if self._file else ""
 
     def _restore(self, state: WindowState) -> list[str]:
         """Restore a state; returns what was refused."""

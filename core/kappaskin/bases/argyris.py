@@ -18,7 +18,7 @@ from scipy.sparse.linalg import eigsh
 from scipy.spatial import Delaunay, KDTree
 from scipy.special import perm
 
-from kappaskin._files import write_whole
+from kappaskin._files import user_folder, write_whole
 from kappaskin.bases.basis import ORDERS, Order
 from kappaskin.bases.product import gauss
 from kappaskin.errors import Refusal
@@ -428,7 +428,7 @@ def _mark(data: bytes) -> bytes:
 
 
 def _folder() -> Path:
-    return platformdirs.user_cache_path("kappaskin", appauthor=False) / "modes"
+    return user_folder(platformdirs.user_cache_path) / "modes"
 
 
 def _write(file: Path, arrays: dict[str, Array]) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import platformdirs
 
-from kappaskin._files import open_file, replacing
+from kappaskin._files import open_file, replacing, user_folder
 from kappaskin._toml import table
 from kappaskin.calibration.calibration import digest
 from kappaskin.calibration.tare import Tare
@@ -52,7 +52,7 @@ class TareStore:
     @staticmethod
     def user_folder() -> Path:
         """The folder of this user's tares."""
-        return platformdirs.user_data_path("kappaskin", appauthor=False) / "tares"
+        return user_folder(platformdirs.user_data_path) / "tares"
 
     def path(self, serial_number: str) -> Path:
         """The file of a sensor of any serial number.
@@ -70,7 +70,7 @@ class TareStore:
         try:
             with open_file(path) as file:
                 data = file.read(_LARGEST + 1)
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             return SavedTares()
         except OSError as error:
             raise Refusal(f"{path}: cannot be read ({error}); check its permissions") from error

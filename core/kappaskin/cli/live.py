@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 _EVERY = 1.0  # s between two lines
 _POLL = 0.05  # s
+_PATIENCE = 10.0  # s that the engine may not respond
 
 Many = Annotated[list[str] | None, Parameter(negative="")]
 Perhaps = Annotated[list[str] | None, Parameter(negative="", consume_multiple=True)]
@@ -35,7 +36,7 @@ def publish(
     Prints a line a second: frames/s, messages sent and dropped, and the 99th percentile of the
     time from the arrival of a frame until it was sent. The messages are explained in
     `publishing/messages.md` among the resources. Exit code 1 if there was nothing
-    to send.
+    to send, or if the connection was lost in the end.
 
     Example: `kappaskin publish /dev/ttyACM0 --udp 192.168.1.20:9870 --foxglove`
 
@@ -56,7 +57,7 @@ def publish(
     seconds
         How long to publish; until stopped when left out.
     """
-    from kappaskin.live import Engine
+    from kappaskin.live import LOST, Engine
     from kappaskin.publish import targets_of
     from kappaskin.scenes import load_scene
     from kappaskin.sources import SimulatedSource
@@ -77,6 +78,9 @@ def publish(
         engine.publish(targets, allow_origin or ())
         engine.connect(source)
         status = _watched(engine, time.monotonic() + seconds, stopped)
+    if status.state == LOST:
+        print(f"kappaskin: {status.message}", file=sys.stderr)
+        return FAILED
     return FAILED if math.isnan(status.publishing.latency.whole) else 0
 
 
@@ -89,7 +93,7 @@ def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
         time.sleep(_POLL)
         engine.revive()
         status = engine.status()
-        if engine.given_up:
+        if engine.given_up or engine.silent > _PATIENCE:
             raise Refusal(status.message)
         for target in status.publishing.targets:
             if target.refusal:

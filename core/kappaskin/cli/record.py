@@ -1,7 +1,6 @@
 """Commands on recordings: record, info, verify, repair, export, reconstruct."""
 
 import math
-import shlex
 import sys
 import time
 from dataclasses import replace
@@ -42,7 +41,7 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
     Records every byte received and every estimate computed from it, to an MCAP file that Foxglove,
     PlotJuggler and the tools of ROS 2 open. It is called OUT.part until it is complete;
     `kappaskin repair` restores an incomplete one. Exit code 1 if the recording ended early, as on a
-    full disk, or if no readings arrived.
+    full disk, if no readings arrived, or if the connection was lost in the end.
 
     Example: `kappaskin record sim: press.mcap --seconds 10`
 
@@ -55,7 +54,7 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
     seconds
         How long to record.
     """
-    from kappaskin.live import Engine
+    from kappaskin.live import LOST, Engine
     from kappaskin.recording import ReplayedSource
 
     check_time(seconds, "record")
@@ -74,18 +73,20 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
                 out.unlink(missing_ok=True)  # ours, with nothing in it
             raise
         status = _ended(engine)
-        if not (engine.alive or out.exists()):
-            return _broken_off(out)
-        written = status.recording
+        why = _UNRESPONSIVE if status.recording.active else "" if engine.alive else _DIED
+    if why and not out.exists():
+        return _broken_off(out, why)
+    written = status.recording
     print(
         f"{written.path}: {written.messages:,} messages in {written.seconds:.1f} s, "
         f"{written.size / 1e6:.1f} MB; {status.accounting.words}"
     )
     if written.lost:
         print(f"{written.lost:,} messages were not recorded: the disk is too slow")
-    for why in filter(None, (written.trouble, status.refusal)):
+    gone = status.message if status.state == LOST else ""
+    for why in filter(None, (written.trouble, status.refusal, gone)):
         print(f"kappaskin: {why}", file=sys.stderr)
-    failed = written.trouble or status.refusal or written.lost
+    failed = written.trouble or status.refusal or gone or written.lost
     return FAILED if failed or not status.accounting.accepted else 0
 
 
@@ -101,13 +102,15 @@ def _recorded(
         status, now = engine.status(), time.monotonic()
         written = status.recording
         recording = recording if written.active else now
+        if not engine.alive or engine.silent > _BEGIN:
+            return status
         if written.trouble and not written.seconds:
             raise Refusal(written.trouble)
         if status.sensor is not known and status.sensor is not None:
             known = status.sensor
             _use_tare(engine, known)
         over = max(written.seconds, now - recording) >= seconds
-        if stopped or written.trouble or over or not engine.alive:
+        if stopped or written.trouble or over:
             return status
         if status.state == LOST and known is None:
             raise Refusal(status.message)
@@ -117,15 +120,19 @@ def _recorded(
         time.sleep(_POLL)
 
 
-def _broken_off(out: Path) -> int:
-    """Complete the file of an engine that ended, and report it; the exit code."""
-    from kappaskin.recording import Repaired, part_of
+_DIED = "the engine process ended unexpectedly"
+_UNRESPONSIVE = "the engine process did not respond and was ended"
 
-    part, ended = part_of(out), "the engine process ended unexpectedly"
+
+def _broken_off(out: Path, ended: str) -> int:
+    """Complete the file of an engine that ended, and report it; the exit code."""
+    from kappaskin.recording import Repaired, part_of, repair_command
+
+    part = part_of(out)
     try:
         done = result_of(Repaired.steps(part, out), Repaired)
     except Refusal as reason:
-        repair = shlex.join(["kappaskin", "repair", str(part), "--out", str(out)])
+        repair = repair_command(out)
         raise Refusal(f"{ended}; the recording was not completed: {reason}; try {repair}") from None
     if not done.total:
         raise Refusal(f"{ended}; nothing was recorded: {done.words}")

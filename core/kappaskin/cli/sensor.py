@@ -152,6 +152,8 @@ def _take_readings(source: "Source", sensor: "Sensor", taring: "TareMeasurement"
     while not taring.done(time.monotonic()):
         for frame in source.read(_READ):
             taring.take(frame.device_time, frame.host_time, sensor.nominal(frame))
+        if source.trouble:
+            raise Refusal(source.trouble)
         if source.sensor is not sensor:
             raise Refusal("another device was connected, or the same one restarted; tare again")
 

@@ -11,7 +11,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from kappaskin._processes import process_context
+from kappaskin._processes import starting_process
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Region
 from kappaskin.frames import Array, Estimate, Event
@@ -28,7 +28,7 @@ from kappaskin.live.requests import (
 )
 from kappaskin.live.resume import ResumedProcess, ResumeInfo, resume_process
 from kappaskin.live.ring import Ring
-from kappaskin.live.status import LOST, Status
+from kappaskin.live.status import LOST, STREAMING, Status
 from kappaskin.pipeline import Setup
 from kappaskin.publish import access_of, targets_of
 from kappaskin.recording import unused
@@ -38,11 +38,14 @@ LONGEST_NOTE = 500
 """Characters of a note."""
 
 _ORDERLY, _WRITTEN = 2.0, 10.0  # s for an end, and where a recording is to be ended first
-_PATIENCE = 600.0  # s that a recording continues without a window
+_PATIENCE = 1800.0  # s that a recording continues without a window
+_SILENT = 2.0  # s without a report, of an engine that reports ten times a second
+_POLL = 1.0  # s between two polls at most that count as silence: this process may have been stopped
 _DEATHS, _WITHIN = 3, 10.0  # so many in so many s, and the process is not started again
 
 _AGAIN = "the engine process ended unexpectedly and was started again"
 _DIED = "the engine process ended unexpectedly; connect again to restart it"
+_HANGS = "the engine process has not reported for {:.0f} s; connect again if it does not continue"
 _GIVEN_UP = (
     f"the engine process ended {_DEATHS} times within {_WITHIN:g} s and is not started again by "
     "itself; choose a simpler scene or fewer functions, then connect again; the cause is on "
@@ -67,7 +70,9 @@ class Engine:
     ) -> None:
         self._resume_from, self._patience = resume_from, patience
         self._deaths: list[float] = []
-        self._seen = Status()
+        self._seen, self._polled = Status(), time.monotonic()
+        self.silent = 0.0
+        """For how long in s an engine that streams has not reported, as far as it was polled."""
         self._process: BaseProcess | ResumedProcess | None = None
         self.resumed: ResumeInfo | None = None
         process = resume_process(resume_from) if resume_from else None
@@ -94,10 +99,11 @@ class Engine:
         self._requests.connect(process.line, known=process.info.requested.number)
 
     def _start(self, status: Status) -> None:
+        self.silent = 0.0
         self._ring.write_status(status)
         names = self._ring.name, self._compared_ring.name
-        theirs, ours = multiprocessing.Pipe(duplex=False)
-        with process_context() as context:
+        with starting_process() as context:
+            theirs, ours = multiprocessing.Pipe(duplex=False)
             self._process = context.Process(
                 target=serve,
                 args=(theirs, names, self._resume_from, self._patience),
@@ -122,6 +128,7 @@ class Engine:
             generation=was.generation,
             connections=was.connections,
             tare=was.tare,
+            recording=was.recording.broken_off(),
         )
         if events and source is not None:
             fresh = replace(fresh, state=LOST, source=source, message=events[-1].text)
@@ -168,7 +175,10 @@ class Engine:
         return self._process is not None and self._process.is_alive()
 
     def connect(self, source: str) -> None:
-        """Take frames from `source` instead of the present one; restarts a dead process."""
+        """Take frames from `source` instead of the present one; replaces a process that hangs."""
+        if self._process is not None and self.silent >= _SILENT:
+            self._process.kill()
+            self._process.join()
         dead = not self.alive
         if dead:
             self._deaths = []
@@ -247,13 +257,19 @@ class Engine:
 
     def status(self) -> Status:
         # While one is being written there is none to read: then the last one is used.
-        if (read := self._ring.read_status()) is not None:
-            self._seen = read
-            self._requests.acknowledge(read.requested, read.reported)
+        read, was = self._ring.read_status() or self._seen, self._seen
+        self._seen = read
+        self._requests.acknowledge(read.requested, read.reported)
         if not self.alive:
-            message = _GIVEN_UP if self.given_up else _DIED
-            return replace(self._seen, state=LOST, rate=0.0, message=message)
-        return self._seen
+            message, recording = _GIVEN_UP if self.given_up else _DIED, read.recording.broken_off()
+            return replace(read, state=LOST, rate=0.0, message=message, recording=recording)
+        now = time.monotonic()
+        passed, self._polled = min(now - self._polled, _POLL), now
+        hangs = read.reported <= was.reported and read.state == STREAMING and not read.computing
+        self.silent = self.silent + passed if hangs else 0.0
+        if self.silent < _SILENT:
+            return read
+        return replace(read, rate=0.0, message=_HANGS.format(self.silent))
 
     def latest(self, status: Status, sequence: int | None = None) -> Estimate | None:
         """The newest estimate of the generation in `status`, or that of the frame `sequence`.

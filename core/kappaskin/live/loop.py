@@ -53,8 +53,8 @@ class EngineLoop:
         self._source: Source | None = None
         self._health = LiveHealthMonitor()
         self._place = np.full(2, math.nan)  # of the last contact, in m
-        self._recorder = LiveRecorder()
         self._status: Status = ring.read_status() or Status()
+        self._recorder = LiveRecorder(self._status.recording)
         self._tracking: SimulatedTracking | SerialTracking | None = None
         # Two, so that one given up in the middle of a large basis does not hold up the next.
         self._builder = ThreadPoolExecutor(2, "pipeline-builder")

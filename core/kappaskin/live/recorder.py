@@ -14,15 +14,16 @@ from kappaskin.sources import SimulatedSource, Source
 class LiveRecorder:
     """Records the input of a source and the results of a pipeline; `status` has its state.
 
-    No call does anything until `begin`. Only `close` waits for the disk.
+    No call does anything until `begin`, `status` is the one `before`. Only `close` waits for the
+    disk.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, before: RecordingStatus | None = None) -> None:
         self._recorder: Recorder | None = None
         self._newest: Recorder | None = None  # that `status` is of, until it has ended
         self._ending: list[Recorder] = []
         self._live = True  # what a recording brings is not recorded again
-        self.status = RecordingStatus()
+        self.status = before or RecordingStatus()
 
     @property
     def active(self) -> bool:

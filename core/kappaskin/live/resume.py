@@ -4,6 +4,7 @@ The engine without a window listens at the address in a file, with a key that on
 Nothing is unpickled before both sides have proved that they have the key.
 """
 
+import hashlib
 import os
 import platform
 import secrets
@@ -28,6 +29,7 @@ from typing import Any, cast
 
 import platformdirs
 
+from kappaskin._files import user_folder
 from kappaskin.live.requests import Action, Requested, Update
 
 _LARGEST = 4096  # bytes of a note
@@ -61,9 +63,12 @@ class ResumeInfo:
 
 
 def resume_folder() -> Path:
-    """Folder of the notes of this user's and machine's engines without a window."""
-    state = platformdirs.user_state_path("kappaskin", appauthor=False)
-    return state / "left-alone" / platform.node()
+    """Folder of the notes of this user's and machine's engines without a window.
+
+    Short, whatever the machine is called: the path of a socket may have some 100 characters.
+    """
+    machine = hashlib.sha256(platform.node().encode(errors="surrogatepass")).hexdigest()[:8]
+    return user_folder(platformdirs.user_state_path) / "left-alone" / machine
 
 
 def _address(note: Path) -> str:

@@ -1,6 +1,7 @@
 """MCAP writer in a separate thread."""
 
 import itertools
+import shlex
 import threading
 import time
 from collections import deque
@@ -42,6 +43,17 @@ class RecordingStatus:
     messages: int = 0
     lost: int = 0
     trouble: str = ""
+
+    def broken_off(self) -> "RecordingStatus":
+        """The same where the process that was writing it has ended."""
+        path = Path(self.path)
+        if not self.active or path.exists():  # by now it is complete
+            return replace(self, active=False)
+        trouble = (
+            f"the recording {path.name} broke off: the engine process ended unexpectedly; "
+            f"`{repair_command(path)}` completes the file"
+        )
+        return replace(self, active=False, trouble=trouble)
 
 
 class RecordingFile:
@@ -188,6 +200,11 @@ class RecordingFile:
 def part_of(path: Path) -> Path:
     """Path of a recording until it is complete."""
     return path.with_name(path.name + ".part")
+
+
+def repair_command(path: Path) -> str:
+    """The command that completes the recording to be at `path`."""
+    return shlex.join(["kappaskin", "repair", str(part_of(path)), "--out", str(path)])
 
 
 def unused(path: Path) -> Path:

@@ -10,7 +10,13 @@ import pytest
 
 from kappaskin import Refusal, Status
 from kappaskin_app import guard
-from kappaskin_app.shell.background import BackgroundTask, BackgroundThread, Cancelled, Tasks
+from kappaskin_app.shell.background import (
+    BackgroundSave,
+    BackgroundTask,
+    BackgroundThread,
+    Cancelled,
+    Tasks,
+)
 from kappaskin_app.shell.window import MainWindow
 
 _LONG = 600.0  # s: no test waits for it
@@ -302,3 +308,34 @@ def test_a_plan_that_was_cancelled_is_made_at_the_next_look(window: MainWindow) 
     assert not window.planner.waiting
     window.planner.set_active(True)
     assert window.planner.waiting
+
+
+def test_of_what_is_saved_on_a_slow_disk_the_newest_is_last_and_nobody_waits(
+    tasks: Tasks, until
+) -> None:
+    slow, saved, said = threading.Event(), list[int](), list[str]()
+
+    def save(number: int) -> str:
+        slow.wait(_LONG)
+        saved.append(number)
+        return "no room" if number == 9 else ""
+
+    saving = BackgroundSave(tasks, save, said.append)
+    began = time.monotonic()
+    for number in range(5):
+        saving(number)
+    assert time.monotonic() - began < 0.5
+    slow.set()
+    until(lambda: saved[-1:] == [4])
+    assert saved in ([0, 4], [4])
+    for _ in range(2):
+        saving(9)
+        saving.finish()
+        assert saved[-1] == 9
+    until(lambda: not alive())
+    assert said == ["no room"]  # once
+    saving(5)
+    saving.finish()
+    saving(9)
+    saving.finish()
+    assert said == ["no room", "no room"]

@@ -222,6 +222,7 @@ def test_a_window_is_kept_and_comes_back(opened, until, tmp_path: Path, qapp) ->
     other.layouts.choose("Ours")
     assert other.cost.isVisible()
     other.layouts.delete("Ours")
+    other.saver.finish()
     assert from_text(path.read_text()).own == {}
 
 
@@ -235,7 +236,7 @@ def test_a_dock_of_another_version_is_passed_over(bare) -> None:
 
 def test_a_window_that_was_not_asked_to_keeps_nothing(window: MainWindow, tmp_path: Path) -> None:
     window.layouts.save("Mine")
-    window.saver.write()
+    window.saver.finish()
     assert list(tmp_path.iterdir()) == []
 
 

@@ -2,6 +2,7 @@ import json
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from kappaskin_app.shell.recovery import LastSession, OpenWindow, Recovery, crashed, settings_text
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.shell.window_file import WindowFile
 
 LAST = LastSession(Settings(functions_x=5), "sim:circle", "there.mcap")
 
@@ -86,4 +88,39 @@ def test_a_recording_that_is_left_is_offered(
     )
     take.click()
     until(lambda: window.display.badge.state.startswith("REPLAY"))
+    recovering.close()
+
+
+def test_a_disk_that_hangs_leaves_the_window_live(
+    window: MainWindow, tmp_path: Path, until, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hangs, waiting = threading.Event(), threading.Semaphore(0)
+    monkeypatch.setattr(os, "fsync", lambda _: waiting.release() or hangs.wait(60))
+    window.saver.begin(tmp_path / "window.toml")
+    recovering = Recovery(window, tmp_path / "open")
+    try:
+        window.requests.set("theme", "light")
+        window.layouts.save("Mine")
+        until(lambda: waiting.acquire(blocking=False))
+        until(lambda: waiting.acquire(blocking=False))
+        drawn = window.session.estimate.sequence
+        until(lambda: window.session.estimate.sequence > drawn + 100)
+        assert not (tmp_path / "window.toml").exists()
+    finally:
+        hangs.set()
+    recovering.close()
+    window.close()
+    assert WindowFile(tmp_path / "window.toml").read()[0].theme == "light"
+    assert not list((tmp_path / "open").iterdir())
+
+
+def test_where_the_state_cannot_be_saved_it_is_said_once(
+    window: MainWindow, tmp_path: Path, until
+) -> None:
+    texts: list[str] = []
+    window.session.reported.connect(lambda _: texts.append(window.statusBar().currentMessage()))
+    recovering = Recovery(window, tmp_path / "open")
+    (tmp_path / "open").rename(tmp_path / "gone")
+    window.requests.set("functions_x", 5)
+    until(lambda: any("the settings of this window could not be restored" in t for t in texts))
     recovering.close()

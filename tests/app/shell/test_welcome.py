@@ -108,7 +108,7 @@ def test_ways_to_begin_never_cover_the_skin_and_are_not_shown_again_where_unwant
     window.saver.begin(tmp_path / "window.toml")
     window.menus.welcome.begin()
     window.display.centre.banner.buttons[-1].click()
-    window.saver.write()
+    window.saver.finish()
     assert not WindowFile(tmp_path / "window.toml").read()[0].start
     window.menus.welcome.begin()
     assert not window.display.centre.banner.isVisible()

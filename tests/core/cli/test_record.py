@@ -85,6 +85,25 @@ def test_an_engine_that_is_killed_is_told_and_what_it_recorded_is_completed(tmp_
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="no process can be stopped")
+def test_an_engine_that_hangs_is_ended_and_what_it_recorded_is_completed(tmp_path) -> None:
+    path = tmp_path / "a.mcap"
+    patched = "import sys; from kappaskin.cli import main, record; record._BEGIN = 2.0; "
+    patched += f"sys.exit(main(['record', 'sim:circle', {str(path)!r}]))"
+    with subprocess.Popen(
+        [sys.executable, "-c", patched], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        part = part_of(path)
+        begun = lambda: part.exists() and part.stat().st_size > 50_000  # noqa: E731
+        engine_of(process, begun).suspend()
+        told, why = process.communicate(timeout=60)
+    assert (process.returncode, told) == (1, "")
+    assert "the engine process did not respond and was ended; saved up to" in why.splitlines()[-1]
+    with Recording(path) as recording:
+        assert recording.whole
+    assert list(tmp_path.iterdir()) == [path]
+
+
 def test_publishing_ends_where_its_engine_is_killed_again_and_again() -> None:
     command = [sys.executable, "-m", "kappaskin", "publish", "sim:circle", "--udp", "127.0.0.1:9"]
     with subprocess.Popen(

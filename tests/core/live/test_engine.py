@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from itertools import count, cycle
+from itertools import cycle
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TypeVar
@@ -34,6 +34,7 @@ from kappaskin.live import LOST, STREAMING, Engine, Status
 from kappaskin.live.ring import Ring
 from kappaskin.live.status import OFF
 from kappaskin.live.tare_taking import TareStatus
+from kappaskin.recording import RecordingStatus
 
 pytestmark = pytest.mark.slow
 
@@ -468,8 +469,14 @@ def test_revived_it_goes_on_with_what_was_asked_for_last_and_says_so(own_engine,
 
 def deaths_apart(monkeypatch, seconds: float) -> None:
     """Let an engine be started anew each time so long after the last, by its own clock."""
-    times = (n * seconds for n in count(1))
-    clock = SimpleNamespace(monotonic=lambda: next(times))
+    now, revive = [0.0], Engine.revive
+
+    def revive_later(engine: Engine) -> None:
+        now[0] += seconds
+        revive(engine)
+
+    monkeypatch.setattr(Engine, "revive", revive_later)
+    clock = SimpleNamespace(monotonic=lambda: now[0])
     monkeypatch.setattr("kappaskin.live.engine.time", clock)
 
 
@@ -686,6 +693,66 @@ def test_a_tare_ends_with_the_connection(engine: Engine) -> None:
     wait_for(lambda: engine.status().tare.ended > before)
 
     assert engine.status().tare.refusal == "the connection ended; connect again, then tare"
+
+
+def test_a_recording_that_dies_with_its_engine_is_said_to_and_how_it_is_completed(
+    own_engine, tmp_path
+) -> None:
+    engine, path = own_engine, tmp_path / "a b.mcap"
+    engine.record(path)
+    engine.connect("sim:centre")
+    assert wait_for(lambda: engine.status().recording.messages)
+    assert engine.pid is not None
+    os.kill(engine.pid, signal.SIGKILL)
+    broken_off = state(engine, LOST).recording
+    assert not broken_off.active
+    assert broken_off.trouble == (
+        "the recording a b.mcap broke off: the engine process ended unexpectedly; "
+        f"`kappaskin repair '{path}.part' --out '{path}'` completes the file"
+    )
+
+    engine.revive()
+
+    assert engine.status().recording == broken_off
+    assert wait_for(lambda: engine.status().recording.path.endswith("a b-2.mcap"))
+    assert engine.status().recording.trouble == ""
+    engine.record(None)
+    assert wait_for((tmp_path / "a b-2.mcap").exists)
+
+
+def test_one_whose_file_was_complete_when_its_engine_died_is_not_said_to_be_broken(
+    tmp_path,
+) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(b"complete")
+    assert RecordingStatus(str(path), active=True).broken_off() == RecordingStatus(str(path))
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="no process can be stopped")
+def test_one_that_hangs_is_said_to_and_connecting_replaces_it(own_engine, monkeypatch) -> None:
+    engine = own_engine
+    engine.connect("sim:centre")
+    next_estimate(engine)
+    pid = engine.pid
+    assert pid is not None
+    monkeypatch.setattr("kappaskin.live.engine._SILENT", 0.3)
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        assert wait_for(lambda: engine.status().message)
+        status = engine.status()
+        assert "the engine process has not reported for 0 s; connect again" in status.message
+        assert (status.state, status.rate) == (STREAMING, 0.0)
+    finally:
+        os.kill(pid, signal.SIGCONT)
+    assert wait_for(lambda: not engine.status().message)
+    assert engine.status().rate > 0
+
+    os.kill(pid, signal.SIGSTOP)
+    assert wait_for(lambda: engine.status().message)
+    engine.connect("sim:line")
+    assert engine.pid != pid
+    assert wait_for(lambda: engine.status().source == "sim:line")
+    assert state(engine, STREAMING).message == ""
 
 
 def test_a_tare_that_dies_with_its_engine_is_said_to(own_engine) -> None:

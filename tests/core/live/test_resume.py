@@ -23,6 +23,7 @@ from kappaskin.live.resume import (
     ResumedProcess,
     ResumeListener,
     _address,
+    resume_folder,
     resume_process,
 )
 from kappaskin.recording import Recording
@@ -80,6 +81,12 @@ def asked_by(folder: Path) -> Iterator[Callable[..., Sides]]:
         time.sleep(0.05)
     for line in lines:
         line.close()
+
+
+def test_a_socket_fits_whatever_the_machine_is_called(monkeypatch) -> None:
+    monkeypatch.setattr("platform.node", lambda: 16 * "node" + ".internal")
+    monkeypatch.setenv("XDG_STATE_HOME", "/home/a-user-of-twenty-five/.local/state")
+    assert len(_address(resume_folder() / f"{16 * 'a'}.note")) < 104  # of macOS, Linux has 108
 
 
 # The processes.

@@ -71,8 +71,7 @@ def write_report(
     parts["doctor.json"] = json.dumps(doctor(), indent=1).encode()
     for file in sorted([*logs.glob(f"{LOG}*"), *logs.glob(CRASHES)]):
         parts[file.name] = _read_bytes(file)
-    home = str(Path.home())
-    for written in (home, json.dumps(home)[1:-1]):  # plain, and as in JSON
+    for written in _written_home():
         parts = {name: text.replace(written.encode(), b"~") for name, text in parts.items()}
     if contents.estimate is not None:
         parts["shown.npz"] = _readings(contents.estimate)
@@ -84,6 +83,15 @@ def write_report(
                 packed.writestr(name, content)
         yield 1.0
     yield f"{path}: {', '.join(parts)}"
+
+
+def _written_home() -> tuple[str, ...]:
+    """The home folder as texts have it: plain, and as in JSON."""
+    try:
+        home = str(Path.home())
+    except RuntimeError:  # there is none
+        return ()
+    return home, json.dumps(home)[1:-1]
 
 
 def _read_bytes(file: Path) -> bytes:

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin.live import LONGEST_NOTE, Engine, ResumeInfo, Status
-from kappaskin.recording import RecordingStatus, Repaired, RepairTask
+from kappaskin.recording import RecordingStatus, Repaired, RepairTask, part_of
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions
 from kappaskin_app.shell.background import Tasks
@@ -321,12 +321,15 @@ class RecordingControl(QObject):
             return
         if now.trouble and now.trouble != was.trouble:
             self.ended = now.trouble if was.active else ""
-            self._set_message(now.trouble)
+            part = part_of(Path(now.path))
+            self._set_message(now.trouble, damaged=part if part.exists() else None)
             self.notified.emit(now.trouble)
         elif was.active and not now.active:
             self.notified.emit(
                 f"Recorded {now.path}: {duration_of(now.seconds)}, {size_of(now.size)}"
             )
+        if now.active:
+            self.ended = ""
         self.changed.emit()
 
     def _show_actions(self) -> None:

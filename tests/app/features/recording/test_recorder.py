@@ -2,6 +2,7 @@
 
 import os
 import shlex
+import signal
 import sys
 from contextlib import closing
 from datetime import datetime
@@ -110,6 +111,25 @@ def test_one_that_ends_by_itself_says_so_until_it_is_seen(
     until(lambda: window.display.badge.state == "SIM")  # what is live goes on
     _mark(window).clicked.emit()
     until(lambda: not _mark(window).isVisible())
+
+
+def test_one_that_breaks_off_with_the_engine_is_said_to_while_the_next_goes_on(
+    window: MainWindow, until, tmp_path: Path
+) -> None:
+    texts: list[str] = []
+    window.recorder.notified.connect(texts.append)
+    window.recorder.begin(tmp_path / "x.mcap")
+    until(lambda: window.recorder.written.messages > 0)
+    assert window.session.engine.pid is not None
+    os.kill(window.session.engine.pid, signal.SIGKILL)
+    until(lambda: window.recorder.written.path.endswith("x-2.mcap"))
+    assert [text.partition(":")[0] for text in texts] == ["the recording x.mcap broke off"]
+    assert window.recorder.message == texts[0]
+    assert window.recorder.damaged == tmp_path / "x.mcap.part"
+    assert window.recording.offer.isVisibleTo(window.recording)
+    window.actions_by_name["record"].trigger()
+    until(lambda: (tmp_path / "x-2.mcap").exists() and not window.recorder.recording)
+    until(lambda: not _mark(window).isVisible())  # the error was of the one before
 
 
 def test_nothing_is_ever_written_over(window: MainWindow, tmp_path: Path, until) -> None:
@@ -246,6 +266,14 @@ def test_names_proposed_are_of_nothing_that_is_there(tmp_path: Path) -> None:
         names.append(path.name)
         path.with_name(path.name + suffix).write_bytes(b"")
     assert names == [f"kappaskin-20261122-070509{n}.mcap" for n in ("", "-2", "-3")]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="every user has a home directory")
+def test_without_a_home_directory_recordings_are_proposed_here(monkeypatch) -> None:
+    for name in ("HOME", *(name for name in os.environ if name.startswith("XDG_"))):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(os.path, "expanduser", lambda path: path)
+    assert recordings_folder() == Path.cwd() / "Kappaskin"
 
 
 def test_the_newest_come_first_and_only_eight(tmp_path: Path) -> None:
