@@ -22,7 +22,12 @@ Perhaps = Annotated[list[str] | None, Parameter(negative="", consume_multiple=Tr
 
 
 def publish(
-    source: str, *, udp: Many = None, foxglove: Perhaps = None, seconds: float = math.inf
+    source: str,
+    *,
+    udp: Many = None,
+    foxglove: Perhaps = None,
+    seconds: float = math.inf,
+    trust: Switch = False,
 ) -> int:
     """Publish contact, shape and error bars of every estimate, until stopped (Ctrl+C).
 
@@ -43,6 +48,8 @@ def publish(
         Serve Foxglove at HOST:PORT, or without one at 127.0.0.1:8765; give it after the source.
     seconds
         How long to publish; until stopped when left out.
+    trust
+        Let the scene name files outside its folder.
     """
     from kappaskin.live import Engine
     from kappaskin.publish import targets_of
@@ -57,11 +64,11 @@ def publish(
         raise Refusal("expected a receiver: give --udp HOST:PORT, or --foxglove")
     targets_of(targets)  # or refused here
     if source.startswith(SimulatedSource.SCHEME):
-        load_scene(source.removeprefix(SimulatedSource.SCHEME))  # or refused here
+        load_scene(source.removeprefix(SimulatedSource.SCHEME), trust)  # or refused here
     stopped = stops()
     with Engine() as engine:
         engine.publish(targets)
-        engine.connect(source)
+        engine.connect(source, trust)
         status = _watched(engine, time.monotonic() + seconds, stopped)
     return FAILED if math.isnan(status.publishing.latency.whole) else 0
 

@@ -36,7 +36,7 @@ _POLL = 0.05  # s
 _BEGIN = 10.0  # s within which something must come
 
 
-def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
+def record(source: str, out: Path, *, seconds: float = math.inf, trust: Switch = False) -> int:
     """Record a source to a file, until stopped (Ctrl+C).
 
     Records every byte received and every estimate computed from it, to an MCAP file that Foxglove,
@@ -54,6 +54,8 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
         The file; it must not exist yet.
     seconds
         How long to record.
+    trust
+        Let the scene name files outside its folder.
     """
     from kappaskin.live import Engine
     from kappaskin.recording import ReplayedSource
@@ -65,7 +67,7 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
     with Engine() as engine:
         # Before there is a source, so that nothing of it is missed.
         engine.record(out)
-        engine.connect(source)
+        engine.connect(source, trust)
         try:
             with ProgressLine() as show_progress:
                 status = _recorded(engine, seconds, stopped, show_progress)

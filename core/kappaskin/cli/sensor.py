@@ -45,6 +45,7 @@ def calibrate(
     seconds: float = 1.0,
     hold: float = 0.0,
     dwell: float | None = None,
+    trust: Switch = False,
     json: Switch = False,
 ) -> int:
     """Calibrate a sensor against cylinders of known radius.
@@ -69,6 +70,8 @@ def calibrate(
     dwell
         Do not wait for Enter: a device that moves automatically stays on each cylinder for this
         many seconds.
+    trust
+        Let the scene name files outside its folder.
     json
         Print one JSON object with every channel instead of a summary.
     """
@@ -86,6 +89,7 @@ def calibrate(
             seconds=seconds,
             hold=hold,
             dwell=dwell,
+            trust=trust,
         )
         report = calibrated(sweep, sensor, datetime.now(UTC))
         report.calibration.save(out)
@@ -99,7 +103,7 @@ def calibrate(
 _READ = 0.05  # s that one read may wait
 
 
-def tare(source: str, *, undo: Switch = False) -> None:
+def tare(source: str, *, undo: Switch = False, trust: Switch = False) -> None:
     """Tare a sensor: take its readings at rest as its zero.
 
     Refused, with the reason, while the skin is loaded or moves. The tare is saved under the
@@ -113,6 +117,8 @@ def tare(source: str, *, undo: Switch = False) -> None:
         `sim:`, `sim:SCENE`, or a port or URL for pyserial.
     undo
         Stop using this sensor's tare instead of taking one.
+    trust
+        Let the scene name files outside its folder.
     """
     # All of it before the source is opened: while modules load, readings wait.
     from kappaskin.calibration import TareMeasurement, TareStore
@@ -121,7 +127,7 @@ def tare(source: str, *, undo: Switch = False) -> None:
     from kappaskin.sources import open_source
 
     tares = TareStore(TareStore.user_folder())
-    with closing(open_source(source)) as opened:
+    with closing(open_source(source, trust)) as opened:
         sensor = _answering(opened)
         if undo:
             tares.use(sensor.serial_number, None)
@@ -182,7 +188,12 @@ def _print_tare(taken: "Tare", before: "Tare | None") -> None:
 
 
 def press(
-    source: str, *, quick: Switch = False, patience: float = 20.0, json: Switch = False
+    source: str,
+    *,
+    quick: Switch = False,
+    patience: float = 20.0,
+    trust: Switch = False,
+    json: Switch = False,
 ) -> int:
     """Verify the channel map: press one element after the other and see which one responds.
 
@@ -200,6 +211,8 @@ def press(
         columns or components are exchanged, but not every pair of elements.
     patience
         Seconds to wait for a response before asking for the next element.
+    trust
+        Let the scene name files outside its folder.
     json
         Print one JSON object with every press and the map that was found.
     """
@@ -212,6 +225,7 @@ def press(
             lambda line: print(line, file=sys.stderr, flush=True),
             quick=quick,
             patience=patience,
+            trust=trust,
         )
     except KeyboardInterrupt:
         print(file=sys.stderr)
@@ -264,7 +278,13 @@ def monitor(port: str, *, seconds: float = math.inf, reset: Switch = False) -> i
     return FAILED if listening.lost or not listening.accounting().accepted else 0
 
 
-def device(scene: str = "", *, rate: float | None = None, dwell: float | None = None) -> None:
+def device(
+    scene: str = "",
+    *,
+    rate: float | None = None,
+    dwell: float | None = None,
+    trust: Switch = False,
+) -> None:
     """Run a simulated sensor on a pseudo-terminal, like a real one on a serial port.
 
     Prints one JSON line with the port, then serves until stopped (Ctrl+C); then prints on standard
@@ -280,11 +300,13 @@ def device(scene: str = "", *, rate: float | None = None, dwell: float | None = 
         Frames per second; the scene's when left out.
     dwell
         Seconds on each cylinder, in the scene `calibration`; one when left out.
+    trust
+        Let the scene name files outside its folder.
     """
     from kappaskin.scenes import load_scene
     from kappaskin.sources import PseudoDevice
 
-    played = load_scene(scene)
+    played = load_scene(scene, trust)
     if dwell is not None:
         if played.laid is None:
             raise Refusal(

@@ -167,14 +167,17 @@ class Engine:
     def alive(self) -> bool:
         return self._process is not None and self._process.is_alive()
 
-    def connect(self, source: str) -> None:
-        """Take frames from `source` instead of the present one; restarts a dead process."""
+    def connect(self, source: str, trust: bool = False) -> None:
+        """Take frames from `source` instead of the present one; restarts a dead process.
+
+        With `trust` a scene may name files outside its folder.
+        """
         dead = not self.alive
         if dead:
             self._deaths = []
             self._requests.disconnect()
             self._requests.change(recording=None)
-        self._requests.change(source=source, scene=None, speed=1.0, looped=False)
+        self._requests.change(source=source, trust=trust, scene=None, speed=1.0, looped=False)
         if dead:
             self._start_again()
 

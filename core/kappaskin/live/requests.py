@@ -74,7 +74,8 @@ Action = Seek | StepFrames | TakeTare | Note | RestartEffects
 class Requested:
     """All that is requested of the engine; another engine can continue with it.
 
-    Lasting settings come first: a scene or recording plays at `speed`, `looped` or not, and
+    Lasting settings come first: with `trust` the scene that `source` names may name files outside
+    its folder, a scene or recording plays at `speed`, `looped` or not, and
     `window_state` is stored for a window that resumes the engine. `actions` are the last ones, each
     with the `number` of the value that added it; `changed` has the number with which each setting
     was last requested. `over` ends the engine.
@@ -85,6 +86,7 @@ class Requested:
     region: Region = field(default_factory=Region)
     targets: tuple[str, ...] = ()
     source: str | None = None
+    trust: bool = False
     scene: Scene | None = None
     recording: Path | None = None
     speed: float = 1.0
