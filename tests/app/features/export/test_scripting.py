@@ -192,6 +192,10 @@ _QUOTED = "title = \"It's \\\\ '''\"\n"
             ('SETUP = Setup(Ni=5, Nj=8, edge="clamped", method="robust")',),
         ),
         (Settings(written=Written(_QUOTED, Path("a.toml"))), (repr(_QUOTED),)),
+        (
+            Settings(written=Written("", Path("a.toml"), frozenset({Path("b.stl")}))),
+            ('a.toml"), trust=True)',),
+        ),
     ],
 )
 def test_a_script_is_short_and_says_what_is_asked_for(
