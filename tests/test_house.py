@@ -133,6 +133,23 @@ def test_a_file_is_written_whole_by_one_helper() -> None:
     assert taken == set()
 
 
+_PRINTERS = ("kappaskin.cli.common", "kappaskin.studies.drills.host")
+
+
+def test_text_reaches_a_terminal_by_one_helper() -> None:
+    found = {
+        module: [
+            node.lineno
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+            if node.func.id == "print"
+        ]
+        for module, tree in modules().items()
+        if module not in _PRINTERS
+    }
+    assert {module: lines for module, lines in found.items() if lines} == {}
+
+
 def test_core_is_sixteen_rooms() -> None:
     folders = {file.parent.name for file in PACKAGES["kappaskin"].glob("*/__init__.py")}
     assert folders == set(ROOMS)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from kappaskin.cli.common import FAILED, Switch, Whole, check_time, print_json, stops
+from kappaskin.cli.common import FAILED, Switch, Whole, check_time, print_json, show, stops
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
@@ -88,9 +88,9 @@ def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
                 raise Refusal(target.refusal)
         if time.monotonic() - printed >= _EVERY:
             printed, line = time.monotonic(), _line(status)
-            print(line, flush=True)
+            show(line)
     if (last := _line(status)) != line:
-        print(last)
+        show(last)
     return status
 
 
@@ -142,7 +142,7 @@ def listen(*, udp: Whole = 9870, seconds: float = math.inf, json: Switch = False
                 if json:
                     print_json(message)
                 else:
-                    print(*lines, sep="\n", end="\n" if lines else "", flush=bool(lines))
+                    show(*lines)
     if not json:
-        print(listener.summary)
+        show(listener.summary)
     return 0 if listener.contacts else FAILED

@@ -2,7 +2,6 @@
 
 import math
 import shlex
-import sys
 import time
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -19,10 +18,12 @@ from kappaskin.cli.common import (
     Switch,
     allow,
     check_time,
+    lined,
     pair,
     print_result,
     result_of,
     save_arrays,
+    show,
     stops,
 )
 from kappaskin.errors import Refusal
@@ -79,14 +80,14 @@ def record(source: str, out: Path, *, seconds: float = math.inf, trust: Switch =
         if not (engine.alive or out.exists()):
             return _broken_off(out)
         written = status.recording
-    print(
+    show(
         f"{written.path}: {written.messages:,} messages in {written.seconds:.1f} s, "
         f"{written.size / 1e6:.1f} MB; {status.accounting.words}"
     )
     if written.lost:
-        print(f"{written.lost:,} messages were not recorded: the disk is too slow")
+        show(f"{written.lost:,} messages were not recorded: the disk is too slow")
     for why in filter(None, (written.trouble, status.refusal)):
-        print(f"kappaskin: {why}", file=sys.stderr)
+        show(f"kappaskin: {why}", error=True)
     failed = written.trouble or status.refusal or written.lost
     return FAILED if failed or not status.accounting.accepted else 0
 
@@ -130,7 +131,7 @@ def _broken_off(out: Path) -> int:
     if not done.total:
         raise Refusal(f"{ended}; nothing was recorded: {done.words}")
     part.unlink()
-    print(f"kappaskin: {ended}; saved up to then: {out}: {done.words}", file=sys.stderr)
+    show(f"kappaskin: {ended}; saved up to then: {out}: {done.words}", error=True)
     return FAILED
 
 
@@ -193,9 +194,7 @@ def _contents_text(file: Path, contents: dict[str, Any]) -> str:
         lines.append(f"{name}:" if contents[name] else f"{name}: none")
         lines += [f"  {line}" for line in contents[name]]
     counts = sorted(contents["messages"].items())
-    return "\n".join(
-        [*lines, "messages:", *(f"  {count:>10,}  {topic}" for topic, count in counts)]
-    )
+    return lined([*lines, "messages:", *(f"  {count:>10,}  {topic}" for topic, count in counts)])
 
 
 def _contents(recording: "Recording") -> dict[str, Any]:
@@ -240,7 +239,7 @@ def verify(file: Path, *, limit: Limit = "") -> int:
     allow(limit)
     with BackgroundProcess[float | Verification]("verify", Verification.steps, file) as work:
         verdict = result_of(work.wait(), Verification)
-    print(f"{file}: {verdict.words}")
+    show(f"{file}: {verdict.words}")
     return 0 if verdict.same else FAILED
 
 
@@ -267,11 +266,11 @@ def repair(file: Path, *, out: Path, limit: Limit = "") -> int:
     allow(limit)
     done = result_of(Repaired.steps(file, out), Repaired)
     if not (done.total or done.attachments):
-        print(f"{file}: {done.words}")
+        show(f"{file}: {done.words}")
         return _NOTHING
-    print(f"{out}: {done.words}")
+    show(f"{out}: {done.words}")
     for topic, count in sorted(done.messages.items()):
-        print(f"  {count:>10,}  {topic}")
+        show(f"  {count:>10,}  {topic}")
     return FAILED if done.lost else 0
 
 
@@ -317,8 +316,8 @@ def export(
             done = result_of(exporting.wait(), Exported)
     except KeyboardInterrupt:
         raise Refusal("stopped before the end; nothing was written") from None
-    print(*exporting.files, sep="\n")
-    print(done.words, file=sys.stderr)
+    show(*exporting.files)
+    show(done.words, error=True)
 
 
 def reconstruct(
@@ -370,4 +369,4 @@ def reconstruct(
     functions = pair(basis, "a basis")
     found = reconstructed(readings, functions, points, edge, method, contact, objects)
     save_arrays(out, found)
-    print(f"{out}: {len(found['coefficients'])} shapes", file=sys.stderr)
+    show(f"{out}: {len(found['coefficients'])} shapes", error=True)

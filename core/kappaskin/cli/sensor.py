@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kappaskin.cli.common import FAILED, Switch, check_time, print_result, stops
+from kappaskin.cli.common import FAILED, Switch, check_time, lined, print_result, show, stops
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
@@ -27,14 +27,18 @@ def _millimetres(text: str) -> tuple[float, ...]:
 
 
 def _answer_to(question: str) -> str:
-    print(question, end="", file=sys.stderr, flush=True)
+    show(question, error=True, end="")
     if answer := sys.stdin.readline() if sys.stdin else "":
         return answer
-    print(file=sys.stderr)
+    show("", error=True)
     raise Refusal(
         "standard input ended before the last step, nothing was written; run this in a terminal, "
         "or give --dwell if the device moves to the cylinders automatically"
     )
+
+
+def _report(text: str) -> None:
+    show(*text.split("\n"), error=True)
 
 
 def calibrate(
@@ -85,7 +89,7 @@ def calibrate(
             source,
             None if radii is None else _millimetres(radii),
             _answer_to,
-            lambda line: print(line, file=sys.stderr),
+            _report,
             seconds=seconds,
             hold=hold,
             dwell=dwell,
@@ -94,9 +98,9 @@ def calibrate(
         report = calibrated(sweep, sensor, datetime.now(UTC))
         report.calibration.save(out)
     except KeyboardInterrupt:
-        print(file=sys.stderr)
+        show("", error=True)
         raise Refusal("stopped before the last step; nothing was written") from None
-    print_result(report.to_json(), json, lambda: "\n".join(report.summary()))
+    print_result(report.to_json(), json, lambda: lined(report.summary()))
     return FAILED if report.failed else 0
 
 
@@ -131,7 +135,7 @@ def tare(source: str, *, undo: Switch = False, trust: Switch = False) -> None:
         sensor = _answering(opened)
         if undo:
             tares.use(sensor.serial_number, None)
-            print(f"{sensor.name} {sensor.serial_number}: no tare is in use")
+            show(f"{sensor.name} {sensor.serial_number}: no tare is in use")
             return
         used = None if sensor.simulated else tares.load(sensor.serial_number).fit_for(sensor)
         taring = TareMeasurement(sensor, time.monotonic())
@@ -140,10 +144,10 @@ def tare(source: str, *, undo: Switch = False, trust: Switch = False) -> None:
         taken = taring.tare(LoadDetector(sensor), _rest(sensor, used), now, opened.temperature)
     _print_tare(taken, used)
     if sensor.simulated:
-        print("not saved: the sensor is simulated")
+        show("not saved: the sensor is simulated")
     else:
         tares.add(taken)
-        print(f"saved in {tares.path(sensor.serial_number)}")
+        show(f"saved in {tares.path(sensor.serial_number)}")
 
 
 def _answering(source: "Source") -> "Sensor":
@@ -178,13 +182,13 @@ def _print_tare(taken: "Tare", before: "Tare | None") -> None:
 
     offset, error = (math.sqrt(float(np.nanmean(x**2))) for x in (taken.offset, taken.offset_sd))
     warm = "" if taken.temperature is None else f" at {taken.temperature:.1f} degrees Celsius"
-    print(
+    show(
         f"{taken.name} {taken.serial_number}: {np.isfinite(taken.offset).sum()} of {len(taken)} "
         f"channels tared{warm}, offsets of {offset:.3g} +- {error:.2g} 1/m (RMS)"
     )
     if before is not None:
         moved = math.sqrt(float(np.nanmean((taken.offset - before.offset) ** 2)))
-        print(f"{moved:.3g} 1/m (RMS) from the tare of {before.date:%Y-%m-%d %H:%M}")
+        show(f"{moved:.3g} 1/m (RMS) from the tare of {before.date:%Y-%m-%d %H:%M}")
 
 
 def press(
@@ -222,13 +226,13 @@ def press(
     try:
         test, verdict = press_elements(
             source,
-            lambda line: print(line, file=sys.stderr, flush=True),
+            _report,
             quick=quick,
             patience=patience,
             trust=trust,
         )
     except KeyboardInterrupt:
-        print(file=sys.stderr)
+        show("", error=True)
         raise Refusal("stopped before the last element; the map was not verified") from None
     value = {
         "confirmed": verdict.confirmed,
@@ -238,7 +242,7 @@ def press(
             {"asked": p.target, "verdict": p.verdict, "answered": p.element} for p in test.done
         ],
     }
-    print_result(value, json, lambda: "\n".join(verdict.words))
+    print_result(value, json, lambda: lined(verdict.words))
     return 0 if verdict.confirmed else FAILED
 
 
@@ -273,8 +277,8 @@ def monitor(port: str, *, seconds: float = math.inf, reset: Switch = False) -> i
             listening.reset()
         while not (stopped or listening.lost) and time.monotonic() < end:
             for line in listening.read(_WAIT):
-                print(line, flush=True)
-    print(listening.summary())
+                show(line)
+    show(listening.summary())
     return FAILED if listening.lost or not listening.accounting().accepted else 0
 
 
@@ -315,7 +319,7 @@ def device(
         played = replace(played, laid=replace(played.laid, dwell=dwell))
     server = PseudoDevice(played if rate is None else replace(played, rate=rate))
     stopped = stops()
-    print(json.dumps({"port": server.port, "rate": server.rate}), flush=True)
+    show(json.dumps({"port": server.port, "rate": server.rate}))
     server.serve(lambda: bool(stopped))
     server.close()
-    print(json.dumps({"spent": server.spent, "unsent": server.unsent}), file=sys.stderr)
+    show(json.dumps({"spent": server.spent, "unsent": server.unsent}), error=True)

@@ -1,6 +1,5 @@
 """Commands of studies and of the paper's tables and figures."""
 
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,6 +16,7 @@ from kappaskin.cli.common import (
     print_json,
     print_result,
     save_arrays,
+    show,
 )
 from kappaskin.errors import Refusal
 from kappaskin.studies import FIGURES
@@ -78,7 +78,7 @@ def simulate(
 
     found = simulated_readings(load_scene(scene, trust), frames, seed)
     save_arrays(out, found)
-    print(f"{out}: {frames} frames", file=sys.stderr)
+    show(f"{out}: {frames} frames", error=True)
 
 
 def _measured(scene: "Scene") -> "list[Cost | Refused]":
@@ -118,11 +118,11 @@ def _settings(scene: "Scene", found: "list[Cost | Refused]", json: bool) -> None
     if json:
         print_json(cost_rows(scene, found))
         return
-    print(costs_text(scene, found), end="\n\n", flush=True)
+    show(*costs_text(scene, found).split("\n"), "")
     try:
         _effects(scene, json)
     except Refusal as refusal:  # the settings' table is worth its minute all the same
-        print(f"What each effect costs cannot be measured: {refusal}")
+        show(f"What each effect costs cannot be measured: {refusal}")
 
 
 def cost(
@@ -285,8 +285,8 @@ def study(
             raise Refusal(
                 f"stopped; the results so far are in {path}; the same command resumes"
             ) from None
-    print(table_text(loaded, points))
-    print(f"kappaskin report {path} writes the report", file=sys.stderr)
+    show(*table_text(loaded, points).split("\n"))
+    show(f"kappaskin report {path} writes the report", error=True)
     return FAILED if any(point.failures for point in points) else 0
 
 
@@ -305,7 +305,7 @@ def report(folder: Path) -> None:
     """
     from kappaskin.studies import write_report
 
-    print(*write_report(folder), sep="\n")
+    show(*write_report(folder))
 
 
 # Commands of the paper: tables, figures
