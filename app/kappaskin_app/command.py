@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cyclopts import App
 
-from kappaskin.cli import Limit, allow
+from kappaskin.cli import Limit, Switch, allow
 from kappaskin.errors import Refusal, lacking
 
 app = App(name="app", help_format="markdown")
@@ -55,6 +55,7 @@ def run(
     seconds: float | None = None,
     screenshot: Path | None = None,
     limit: Limit = "",
+    trust: Switch = False,
 ) -> None:
     """Open the desktop app on a source of readings, or on a file.
 
@@ -70,11 +71,13 @@ def run(
         Close after this many seconds; the window opens with the default theme and layout.
     screenshot
         Save a picture of the window just before it closes.
+    trust
+        Let the scene named here, by FILE or the source, name files outside its folder.
     """
     allow(limit)
     if file is not None and not file.is_file():
         raise Refusal(f"{file}: no such file; check its name")
-    _open(source, seconds, screenshot, file=file)
+    _open(source, seconds, screenshot, file=file, trust=trust)
 
 
 @demo.default
@@ -104,6 +107,7 @@ def _open(
     screenshot: Path | None,
     presenting: bool = False,
     file: Path | None = None,
+    trust: bool = False,
 ) -> None:
     if seconds is not None and not 0 < seconds <= _LONGEST:
         raise Refusal(f"expected seconds above zero, {_LONGEST:g} at most, got {seconds}")
@@ -113,7 +117,7 @@ def _open(
     from kappaskin_app.launch import launch
 
     try:
-        launch(source, seconds, screenshot, presenting, file)
+        launch(source, seconds, screenshot, presenting, file, trust)
     except ImportError as error:
         raise lacking("app", "the desktop app", error) from error
 

@@ -5,12 +5,21 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
+from kappaskin._text import printable
+
 log = logging.getLogger("kappaskin")
 
 # Not its docstring, which Qt would have to make for each of its own methods.
 _NAMES = ("__module__", "__name__", "__qualname__")
 
 _listeners: list[Callable[[str], None]] = []
+
+
+class PrintableFormatter(logging.Formatter):
+    """Lines of a log, with escapes for what cannot be seen in a message."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return printable(super().format(record), keep="\n")
 
 
 def on_failure(listener: Callable[[str], None]) -> None:

@@ -42,8 +42,12 @@ _LOADED = {
 _BEHIND = 5  # of 19 steps that drawing stands behind the engine when both want a core
 
 
-def opened(source: str, kept: Path | None = None) -> "tuple[QApplication, MainWindow]":
+def opened(
+    source: str, kept: Path | None = None, trusted: frozenset[Path] = frozenset()
+) -> "tuple[QApplication, MainWindow]":
     """The application and its window, shown, on `source` or on what the last window left.
+
+    The `trusted` scenes, absolute paths, may name files outside their folders.
 
     Where the window is `kept` in a file it begins as it was, and until the skin is drawn a splash
     says what is being loaded; a script that opens a window for some seconds needs neither.
@@ -54,7 +58,7 @@ def opened(source: str, kept: Path | None = None) -> "tuple[QApplication, MainWi
         splash = _splash(kept) if kept is not None else None
         # Beside: the engine's process starts while this one loads VTK.
         with ThreadPoolExecutor(1) as beside:
-            starting = beside.submit(_connected, source)
+            starting = beside.submit(_connected, source, _scene_of(source) in trusted)
             try:
                 for module, words in _LOADED.items():
                     if splash is not None:
@@ -71,7 +75,7 @@ def opened(source: str, kept: Path | None = None) -> "tuple[QApplication, MainWi
 
         if splash is not None:
             splash.say("Building the window")
-        window = MainWindow([made() for made in FEATURES], source, engine)
+        window = MainWindow([made() for made in FEATURES], source, engine, trusted)
     except BaseException:
         engine.close()
         raise
@@ -128,13 +132,18 @@ def _stand_behind() -> None:
         os.nice(_BEHIND)
 
 
-def _connected(source: str) -> "Engine":
+def _scene_of(source: str) -> Path:
+    """The scene file that a source may name, absolute."""
+    return Path(source.removeprefix("sim:").strip()).absolute()
+
+
+def _connected(source: str, trust: bool) -> "Engine":
     """An engine that reads `source`, or one that still records for an earlier window."""
     from kappaskin.live import Engine, resume_folder
 
     engine = Engine(resume_from=resume_folder())
     if engine.resumed is None:
-        engine.connect(source)
+        engine.connect(source, trust)
     return engine
 
 
@@ -144,10 +153,12 @@ def launch(
     screenshot: Path | None = None,
     presenting: bool = False,
     file: Path | None = None,
+    trust: bool = False,
 ) -> None:
     """Show the window on `source`; after `seconds` save `screenshot`, if any, and close.
 
     While it is `presenting`, what is felt fills the screen. A `file` is opened as one dropped is.
+    With `trust` the scene of either may name files outside its folder.
     """
     # A signal may come in the middle of loading or of a drawing, where closing or raising would
     # leave things behind: it is only noted, and the loop closes the window.
@@ -156,7 +167,9 @@ def launch(
         signal.signal(number, lambda got, _: asked.append(got))
     log_files = _logbook()
     # What a script opens for some seconds is the same whatever was before.
-    application, window = opened(source, _kept_file() if seconds is None else None)
+    scenes = (_scene_of(source), Path(file or "").absolute()) if trust else ()
+    window_file = _kept_file() if seconds is None else None
+    application, window = opened(source, window_file, frozenset(scenes))
     recovering = _recovering(window)
     full_screen = window.layouts.full_screen
     if presenting and full_screen is not None and not window.session.engine.resumed:

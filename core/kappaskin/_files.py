@@ -120,6 +120,11 @@ def _said(count: int) -> str:
     return f"{count} bytes"
 
 
+def why_unread(error: Exception) -> str:
+    """The reason for a refusal of a file; nothing that may quote the file's contents."""
+    return f" ({error.strerror or error})" if isinstance(error, OSError) else ""
+
+
 @contextmanager
 def replacing(path: Path, remedy: str = _ELSEWHERE) -> Generator[Path]:
     """A new file to write to in the block, which replaces the one at `path` when the block ends.

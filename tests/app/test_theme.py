@@ -245,7 +245,7 @@ def test_a_window_that_is_switched_is_as_one_that_began_so(
 
     found = list[dict[str, QImage]]()
     for begun in THEMES:
-        monkeypatch.setattr(shell, "settings_for", lambda _, begun=begun: Settings(theme=begun))
+        monkeypatch.setattr(shell, "settings_for", lambda *_, begun=begun: Settings(theme=begun))
         window = opened("sim:")
         show_much(window, *felt)
         qtbot.wait(100)

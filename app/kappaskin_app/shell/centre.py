@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from kappaskin._text import printable
 from kappaskin_app.guard import guarded
 from kappaskin_app.widgets.layout import Flow
 
@@ -42,6 +43,7 @@ class ActionBanner(QWidget):
         self.setObjectName("offer")
         self.setAccessibleName("Banner")
         self.words, self.away = QLabel(), QToolButton()
+        self.words.setTextFormat(Qt.TextFormat.PlainText)
         self.buttons: list[QPushButton] = []
         self.away.setText("\N{MULTIPLICATION SIGN}")
         self.away.setAccessibleName("Close the banner")
@@ -64,7 +66,7 @@ class ActionBanner(QWidget):
         for button in self.buttons:
             self._flow.removeWidget(button)
             button.deleteLater()
-        self.words.setText(words)
+        self.words.setText(printable(words, keep="\n"))
         self.words.setToolTip(tip)
         self.buttons = [self._button(each) for each in offered]
         for before, after in pairwise([self, *self.buttons, self.away]):

@@ -47,7 +47,7 @@ class LogFiles:
         )
         for handler in self._handlers:
             handler.setLevel(logging.WARNING)
-            handler.setFormatter(logging.Formatter(_LINE))
+            handler.setFormatter(guard.PrintableFormatter(_LINE))
             logging.getLogger().addHandler(handler)
         self._crashes = (folder / CRASHES).open("a", encoding="utf-8")
         self._crashes.write(f"{datetime.now():%Y-%m-%d %H:%M:%S} started, process {os.getpid()}\n")

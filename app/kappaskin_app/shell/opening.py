@@ -8,12 +8,14 @@ from PySide6.QtCore import QEvent, QMimeData, QObject, Signal
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QKeyEvent
 from PySide6.QtWidgets import QFileDialog, QMenu, QWidget
 
+from kappaskin._text import printable
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.work_dialog import with_ending
+from kappaskin_app.widgets.parts import plain_tip
 
 MOST_RECENT = 12
 SCENES = "Scene (*.toml)"
@@ -176,10 +178,10 @@ class Opening(QObject):
         there = file.is_file()
         action = self.menu.addAction(_shown(file) if there else f"{_shown(file)}  (missing)")
         action.setEnabled(there)
-        action.setToolTip(str(file) if there else f"{file} was moved or deleted")
+        action.setToolTip(plain_tip(str(file) if there else f"{file} was moved or deleted"))
         action.triggered.connect(guarded(lambda *_: self.open(file)))
 
 
 def _shown(file: Path) -> str:
     """The name of a file in a menu, where & would mark a letter."""
-    return file.name.replace("&", "&&")
+    return printable(file.name).replace("&", "&&")

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from kappaskin._text import printable
 from kappaskin.live import Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.settings import Settings
@@ -40,6 +41,7 @@ class Panel(QGroupBox):
     def __init__(self, title: str, parent: QWidget | None = None) -> None:
         super().__init__(title, parent)
         self.message = QLabel(wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
+        self.message.setTextFormat(Qt.TextFormat.PlainText)
         how = Qt.TextInteractionFlag
         self.message.setTextInteractionFlags(
             how.TextSelectableByMouse | how.TextSelectableByKeyboard
@@ -78,7 +80,7 @@ class Panel(QGroupBox):
         """Show an alarm or a hint below; nothing where `text` is empty."""
         if (text, hint) != (self.message.text(), self._hint):
             self._hint = hint
-            self.message.setText(text)
+            self.message.setText(printable(text, keep="\n"))
             self.message.setForegroundRole(FAINT if hint else ALERT)
         self.message.setVisible(bool(text))
 

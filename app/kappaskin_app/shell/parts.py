@@ -3,6 +3,7 @@
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QMainWindow
 
+from kappaskin._text import printable
 from kappaskin.live import Engine
 from kappaskin_app.guard import log
 from kappaskin_app.shell.actions import Actions
@@ -54,6 +55,7 @@ class Parts(QMainWindow):
 
     def notify(self, text: str) -> None:
         """Show a message for some seconds."""
+        text = printable(text)
         self.statusBar().showMessage(text, 10_000)
         if text:
             log.info("%s", text)

@@ -11,6 +11,7 @@ from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from kappaskin._files import write_whole
+from kappaskin._text import printable
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
 from kappaskin_app.shell.session import Session
@@ -31,7 +32,7 @@ def caption_of(status: Status, at: float, now: datetime) -> str:
         for name, found in (("calibration", setup.calibration), ("tare", setup.tare)):
             if found is not None:
                 parts.append(f"{name} of {found.date:%Y-%m-%d %H:%M} ({found.digest[:8]})")
-    return "  \N{MIDDLE DOT}  ".join(parts)
+    return printable("  \N{MIDDLE DOT}  ".join(parts))
 
 
 def caption_now(session: Session) -> str:

@@ -35,7 +35,11 @@ def settings_text(settings: Settings) -> str:
     """JSON of all settings except those that belong to a sensor."""
     data = {f.name: getattr(settings, f.name) for f in fields(settings)}
     written = data["written"]
-    data["written"] = written and {"text": written.text, "file": str(written.file)}
+    data["written"] = written and {
+        "text": written.text,
+        "file": str(written.file),
+        "trust": written.trust is True or [str(file) for file in written.trust or ()],
+    }
     for name in OF_SENSORS:
         del data[name]
     return json.dumps({"version": VERSION, "settings": data}, indent=1)
@@ -63,8 +67,10 @@ def _value(name: str, value: Any) -> Any:
     was = getattr(_DEFAULTS, name)
     if name == "written":
         try:
-            return value and Written(str(value["text"]), Path(value["file"]))
-        except (TypeError, KeyError) as error:
+            trust = value and value.get("trust", ())
+            trusted = trust is True or frozenset(map(Path, trust or ()))
+            return value and Written(str(value["text"]), Path(value["file"]), trusted or False)
+        except (TypeError, KeyError, AttributeError) as error:
             raise Refusal(
                 f"{name}: expected text and file, got {value!r:.40}; leave it out"
             ) from error

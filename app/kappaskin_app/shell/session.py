@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Callable, Generator
 from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, TypeAlias
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
@@ -157,6 +158,7 @@ class Session(QObject):
     (empty when it is). `source_changing` precedes another source or a disconnection,
     `source_changed` brings the new one. `base` is the setup of a recording, for what no setting
     determines. `pause_requested` requests that a scene or recording be paused or continued.
+    `trusted` are the scenes, as absolute paths, that may name files outside their folders.
     """
 
     refused = Signal(str)
@@ -175,6 +177,7 @@ class Session(QObject):
         super().__init__(parent)
         self._history = history
         self._settings = history.settings
+        self.trusted: frozenset[Path] = frozenset()
         self.engine = engine
         self.scene = self._planned = scene_of(replace(history.settings, written=None))
         self.refusal = ""
@@ -246,11 +249,12 @@ class Session(QObject):
         self.source, self.estimate = source.strip(), None
         self._turned_at = time.monotonic()
         self.source_changed.emit(self.source)
+        trust = Path(self.source.removeprefix("sim:")).absolute() in self.trusted
         if not already:
-            self.engine.connect(self.source)
+            self.engine.connect(self.source, trust)
         if self.inside:
             self._restarts = True
-            self._history.change("Simulated skin", -1, **source_settings(self.source))
+            self._history.change("Simulated skin", -1, **source_settings(self.source, trust))
             self._play()
 
     def go_on(self, left: ResumeInfo) -> None:

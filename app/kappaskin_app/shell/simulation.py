@@ -164,7 +164,7 @@ def _read(written: Written) -> Scene:
 
 def _scene_or_refusal(written: Written) -> Scene | str:
     try:
-        scene = read_scene(written.text, written.file)
+        scene = read_scene(written.text, written.file, written.trust)
         planned_scene(scene)
     except Refusal as refusal:
         return str(refusal).replace(str(written.file), written.file.name)
@@ -205,11 +205,12 @@ def _check_on(loads: tuple[Load, ...], plate: Plate) -> None:
         ) from refusal
 
 
-def source_settings(source: str) -> dict[str, Any]:
+def source_settings(source: str, trust: bool = False) -> dict[str, Any]:
     """The settings that change when the simulation `source` is started.
 
-    The name of a load case selects it in the panel; any other name is that of a scene file. An
-    unknown name is reported by the engine. Without a name the last scene is simulated.
+    With `trust` its scene may name files outside its folder. The name of a load case selects it in
+    the panel; any other name is that of a scene file. An unknown name is reported by the engine.
+    Without a name the last scene is simulated.
     """
     name = source.removeprefix("sim:")
     if not name:
@@ -217,18 +218,18 @@ def source_settings(source: str) -> dict[str, Any]:
     if name in READY_CASES:
         return {"written": None, "load_case": name}
     try:
-        return {"written": written(scene_file(name))}
+        return {"written": written(scene_file(name), trust)}
     except Refusal:
         return {"written": None}
 
 
-def written(file: Path) -> Written:
+def written(file: Path, trust: bool = False) -> Written:
     """The text of the scene in `file`; raises `Refusal` for a file that is no scene."""
     if file.is_file() and (size := file.stat().st_size) > _LARGEST:
         raise Refusal(
             f"{file}: expected a scene of at most {_LARGEST} bytes, got {size}; check its name"
         )
-    return Written(read_scene_text(file), file)
+    return Written(read_scene_text(file), file, trust)
 
 
 def text_of(settings: Settings) -> str:
@@ -236,11 +237,10 @@ def text_of(settings: Settings) -> str:
     return settings.written.text if settings.written else write_scene(scene_of(settings))
 
 
-def settings_for(source: str) -> Settings:
+def settings_for(source: str, trust: bool = False) -> Settings:
     """The initial settings on `source`."""
-    return (
-        replace(Settings(), **source_settings(source)) if source.startswith("sim:") else Settings()
-    )
+    simulated = source.startswith("sim:")
+    return replace(Settings(), **(source_settings(source, trust) if simulated else {}))
 
 
 def with_consequences(settings: Settings, scene: Scene, name: str, value: Any) -> dict[str, Any]:

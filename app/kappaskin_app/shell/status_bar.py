@@ -1,7 +1,7 @@
 """The status bar: messages, warnings, the object in contact, background tasks."""
 
 import numpy as np
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QStatusBar, QToolButton, QWidget
 
@@ -22,6 +22,7 @@ class Activity(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.words, self.cancel = QLabel(), QToolButton()
+        self.words.setTextFormat(Qt.TextFormat.PlainText)
         self.words.setToolTip(_ACTIVITY_TIP)
         self.cancel.setText("Cancel")
         self.cancel.setToolTip("Cancel this task.")

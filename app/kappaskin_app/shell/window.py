@@ -41,11 +41,13 @@ class MainWindow(Parts):
         features: Sequence[Feature],
         source: str = "sim:",
         engine: Engine | None = None,
+        trusted: frozenset[Path] = frozenset(),
     ) -> None:
         handed = engine.resumed if engine else None
         if handed and source == "sim:":  # no other source was requested
             source = handed.requested.source or source
         super().__init__(settings_left(handed) if handed else settings_for(source), engine)
+        self.session.trusted = trusted
         self.setObjectName("kappaskin")
         self.setWindowTitle("Kappaskin")
         self.menus = Menus(self)

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QDialog,
     QFormLayout,
@@ -15,6 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from kappaskin._text import printable
 from kappaskin.errors import Refusal
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import BackgroundTask, Tasks, Work
@@ -54,6 +56,7 @@ class WorkDialog(QDialog):
         self.bar.setSizePolicy(keeping)
         self.bar.hide()  # while there is no progress to show
         self.words.setWordWrap(True)
+        self.words.setTextFormat(Qt.TextFormat.PlainText)
         self.to = QLineEdit()
         self.choose_file = browse_button(self._choose_file)
         self.needed, self.inputs = [self.to], list[QWidget]((self.to, self.choose_file))
@@ -135,7 +138,7 @@ class WorkDialog(QDialog):
     def _end(self, words: str) -> None:
         """End the task, and show `words`."""
         self.task.stop()
-        self.words.setText(words)
+        self.words.setText(printable(words, keep="\n"))
         high = self.heightForWidth(self.width())
         self.resize(self.width(), max(self.height(), high))  # or the fields would be pressed flat
         self._allow()

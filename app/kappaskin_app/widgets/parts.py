@@ -1,8 +1,10 @@
 """Small widgets and texts: labels, headings, buttons, numbers with errors."""
 
+from html import escape
+
 import numpy as np
-from PySide6.QtCore import QEvent, Qt
-from PySide6.QtGui import QKeyEvent
+from PySide6.QtCore import QEvent
+from PySide6.QtGui import QKeyEvent, Qt
 from PySide6.QtWidgets import (
     QApplication,
     QDoubleSpinBox,
@@ -11,6 +13,8 @@ from PySide6.QtWidgets import (
     QPushButton,
     QWidget,
 )
+
+from kappaskin._text import printable
 
 ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
 
@@ -34,6 +38,13 @@ def with_error(value: float, sd: float, digits: int, unit: str = "", sign: str =
 def sentence(text: str) -> str:
     text = text[:1].upper() + text[1:]
     return text if not text or text.endswith((".", "?", "!")) else f"{text}."
+
+
+def plain_tip(text: str) -> str:
+    """A tooltip that Qt shows as it is: it takes what looks like markup for such."""
+    text = printable(text, keep="\n")
+    rich = f"<p style='white-space: pre-wrap'>{escape(text)}</p>"
+    return rich if Qt.mightBeRichText(text) else text
 
 
 def text_label(text: str = "", tip: str = "") -> QLabel:

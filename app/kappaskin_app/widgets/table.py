@@ -5,7 +5,9 @@ from collections.abc import Collection, Sequence
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem
 
+from kappaskin._text import printable
 from kappaskin_app.widgets.lettering import RIGHT
+from kappaskin_app.widgets.parts import plain_tip
 
 _ROOM = 5  # px above and below a line together
 
@@ -68,6 +70,6 @@ class Table(QTableWidget):
             if column in self._right:
                 item.setTextAlignment(RIGHT)
             self.setItem(row, column, item)
-        item.setText(text)
-        item.setToolTip(tip)
+        item.setText(printable(text, keep="\n"))
+        item.setToolTip(plain_tip(tip))
         return item

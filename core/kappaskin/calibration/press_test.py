@@ -283,9 +283,9 @@ def _finger(scene: Scene) -> Callable[[int], Scene]:
     return pressed
 
 
-def _simulated(name: str, quick: bool, report: Report) -> PressTest:
-    """The scene called `name`, pressed as fast as it can be computed."""
-    clock, pressed = VirtualClock(), _finger(load_scene(name))
+def _simulated(scene: Scene, quick: bool, report: Report) -> PressTest:
+    """The test of the scene, pressed as fast as it can be computed."""
+    clock, pressed = VirtualClock(), _finger(scene)
     bare = replace(pressed(0), stimuli=())
     source = SimulatedSource(bare, clock, clock.sleep)
     test = PressTest(source.sensor, PressTest.choose_elements(bare.layout, quick))
@@ -319,19 +319,21 @@ def _wait(
 
 
 def press_elements(
-    name: str, report: Report, *, quick: bool, patience: float
+    name: str, report: Report, *, quick: bool, patience: float, trust: bool = False
 ) -> tuple[PressTest, MapVerdict]:
     """The test of the source called `name` and its verdict on the channel map.
 
     Asks for each element, or where `quick` for a few of a grid, and notices what responds. A
     simulation presses by itself. After `patience` s without a response the next one is asked for.
+    With `trust` a scene may name files outside its folder.
     """
     if not 0 < patience <= _LONGEST:
         raise Refusal(
             f"expected a waiting time above zero and at most {_LONGEST:g} s, got {patience:g}"
         )
     if name.startswith(SimulatedSource.SCHEME):
-        test = _simulated(name.removeprefix(SimulatedSource.SCHEME), quick, report)
+        scene = load_scene(name.removeprefix(SimulatedSource.SCHEME), trust)
+        test = _simulated(scene, quick, report)
         return test, test.verdict()
     with closing(open_source(name)) as source:
         listener = DeviceReadings(source)

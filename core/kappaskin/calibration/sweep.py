@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.frames import COMPONENTS, OVERTAKEN, Array, Frame
-from kappaskin.scenes import load_scene
+from kappaskin.scenes import Scene, load_scene
 from kappaskin.scenes.cylinders import (
     ADVICE,
     CylinderStep,
@@ -206,9 +206,9 @@ def _steps(
     return schedule(radii or radii_for(sensor), hold, sensor.layout.patch.strip)
 
 
-def _simulated(name: str, radii: tuple[float, ...] | None, hold: float, dwell: float) -> Source:
-    """The scene called `name`, laid on the cylinders as fast as it can be computed."""
-    clock, scene = VirtualClock(), load_scene(name)
+def _laid(scene: Scene, radii: tuple[float, ...] | None, hold: float, dwell: float) -> Source:
+    """The scene, laid on the cylinders as fast as it can be computed."""
+    clock = VirtualClock()
     laid = Presentation(_steps(scene.sensor(), radii, hold), dwell)
     return SimulatedSource(scene.laid_on(laid), clock, clock.sleep)
 
@@ -323,12 +323,14 @@ def take_sweep(
     seconds: float = 1.0,
     hold: float = 0.0,
     dwell: float | None = None,
+    trust: bool = False,
 ) -> tuple[Sensor, Sweep]:
     """The sensor of the source called `name`, and its sweep over cylinders of `radii` in m.
 
     Without radii they are those that it can read (`radii_for`). Prompts for each cylinder and
     averages `seconds` of frames on it. There is no prompt when the source goes through the steps
-    by itself, from its own time 0 on and for `dwell` s each, as a simulation does.
+    by itself, from its own time 0 on and for `dwell` s each, as a simulation does. With `trust` a
+    scene may name files outside its folder.
     """
     for what, value in (("seconds", seconds), ("dwell", dwell or seconds), ("hold", hold or 1.0)):
         if not 0 < value <= _LONGEST:
@@ -336,7 +338,8 @@ def take_sweep(
     simulated = name.startswith(SimulatedSource.SCHEME)
     if simulated:
         dwell = dwell or seconds
-        source = _simulated(name.removeprefix(SimulatedSource.SCHEME), radii, hold, dwell)
+        scene = load_scene(name.removeprefix(SimulatedSource.SCHEME), trust)
+        source = _laid(scene, radii, hold, dwell)
     else:
         source = open_source(name)
     with closing(source):

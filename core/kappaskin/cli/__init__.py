@@ -13,7 +13,9 @@ from cyclopts import App, CycloptsError, Group
 from kappaskin.cli.common import FAILED as FAILED
 from kappaskin.cli.common import REFUSED as REFUSED
 from kappaskin.cli.common import Limit as Limit
+from kappaskin.cli.common import Switch as Switch
 from kappaskin.cli.common import allow as allow
+from kappaskin.cli.common import show
 from kappaskin.errors import Refusal
 
 app = App(
@@ -68,6 +70,8 @@ def _typed(arguments: list[str] | None) -> str:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; the exit code is 0 when done, 1 or 2 as `FAILED` and `REFUSED` say."""
+    if reconfigure := getattr(sys.stdout, "reconfigure", None):
+        reconfigure(errors="backslashreplace")  # where a terminal has no such letter
     _add_commands()
     typed = _typed(arguments)
     if not typed:
@@ -77,14 +81,14 @@ def main(arguments: list[str] | None = None) -> int:
         sys.stdout.flush()
         return int(code or 0)
     except Refusal as refusal:
-        print(f"kappaskin: {refusal}", file=sys.stderr)
+        show(f"kappaskin: {refusal}", error=True)
         return REFUSED
     except CycloptsError as error:
         named = f"kappaskin {typed}".strip()
-        print(f"kappaskin: {error} See `{named} --help`.", file=sys.stderr)
+        show(*f"kappaskin: {error} See `{named} --help`.".splitlines(), error=True)
         return REFUSED
     except MemoryError as error:
-        print(f"kappaskin: {error}; reduce the requested size, or the resolution", file=sys.stderr)
+        show(f"kappaskin: {error}; reduce the requested size, or the resolution", error=True)
         return REFUSED
     except BrokenPipeError:
         # Whoever read our output has gone; what is still buffered must have somewhere to go.

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from cyclopts import Parameter, Token
 
+from kappaskin._text import printable
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
@@ -88,6 +89,12 @@ def check_time(seconds: float, what: str) -> None:
         raise Refusal(f"expected a time above 0 s ({what}), got {seconds:g}")
 
 
+def show(*lines: object, error: bool = False, end: str = "\n") -> None:
+    """Print lines at once, on standard error if `error`; what cannot be seen in them as escapes."""
+    for line in lines:
+        print(printable(str(line)), end=end, file=sys.stderr if error else sys.stdout, flush=True)
+
+
 class ProgressLine:
     """Progress on standard error: a line that changes on a terminal, elsewhere one now and then.
 
@@ -100,17 +107,18 @@ class ProgressLine:
 
     def __call__(self, line: str) -> None:
         if self._terminal:
-            print(f"\r\x1b[K{line}", end="", file=sys.stderr, flush=True)
+            print("\r\x1b[K", end="", file=sys.stderr)
+            show(line, error=True, end="")
         elif time.monotonic() - self._logged > self._log_every:
             self._logged = time.monotonic()
-            print(line, file=sys.stderr, flush=True)
+            show(line, error=True)
 
     def __enter__(self) -> "ProgressLine":
         return self
 
     def __exit__(self, *_: object) -> None:
         if self._terminal:
-            print(file=sys.stderr)
+            show("", error=True)
 
 
 def result_of(items: Iterable[object], kind: type[_Kind]) -> _Kind:
@@ -125,7 +133,7 @@ def result_of(items: Iterable[object], kind: type[_Kind]) -> _Kind:
 
 def print_json(value: Any) -> None:
     """Print one JSON value on a line."""
-    print(json.dumps(value, allow_nan=False))
+    show(json.dumps(value, allow_nan=False))
 
 
 def print_result(value: Any, as_json: bool, text: Callable[[], str]) -> None:
@@ -133,7 +141,12 @@ def print_result(value: Any, as_json: bool, text: Callable[[], str]) -> None:
     if as_json:
         print_json(value)
     else:
-        print(text())
+        show(*text().split("\n"))
+
+
+def lined(lines: Iterable[str]) -> str:
+    """The lines as a text; a line break in one of them is an escape."""
+    return "\n".join(map(printable, lines))
 
 
 def save_arrays(out: Path, arrays: "Mapping[str, NDArray[Any]]") -> None:

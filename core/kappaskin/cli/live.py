@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from kappaskin.cli.common import FAILED, Switch, Whole, check_time, print_json, stops
+from kappaskin.cli.common import FAILED, Switch, Whole, check_time, print_json, show, stops
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ def publish(
     foxglove: Perhaps = None,
     allow_origin: Many = None,
     seconds: float = math.inf,
+    trust: Switch = False,
 ) -> int:
     """Publish contact, shape and error bars of every estimate, until stopped (Ctrl+C).
 
@@ -56,6 +57,8 @@ def publish(
         several times.
     seconds
         How long to publish; until stopped when left out.
+    trust
+        Let the scene name files outside its folder.
     """
     from kappaskin.live import LOST, Engine
     from kappaskin.publish import targets_of
@@ -72,14 +75,14 @@ def publish(
         raise Refusal("--allow-origin is for pages that connect to a server: give --foxglove")
     targets_of(targets)  # or refused here
     if source.startswith(SimulatedSource.SCHEME):
-        load_scene(source.removeprefix(SimulatedSource.SCHEME))  # or refused here
+        load_scene(source.removeprefix(SimulatedSource.SCHEME), trust)  # or refused here
     stopped = stops()
     with Engine() as engine:
         engine.publish(targets, allow_origin or ())
-        engine.connect(source)
+        engine.connect(source, trust)
         status = _watched(engine, time.monotonic() + seconds, stopped)
     if status.state == LOST:
-        print(f"kappaskin: {status.message}", file=sys.stderr)
+        show(f"kappaskin: {status.message}", error=True)
         return FAILED
     return FAILED if math.isnan(status.publishing.latency.whole) else 0
 
@@ -101,9 +104,9 @@ def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
         _print_notices(status.publishing.targets, noticed)
         if time.monotonic() - printed >= _EVERY:
             printed, line = time.monotonic(), _line(status)
-            print(line, flush=True)
+            show(line)
     if (last := _line(status)) != line:
-        print(last)
+        show(last)
     return status
 
 
@@ -114,7 +117,7 @@ def _print_notices(targets: "tuple[TargetStatus, ...]", printed: set[str]) -> No
             text = f"kappaskin: {target.target}: {notice}"
             if text not in printed:
                 printed.add(text)
-                print(text, file=sys.stderr, flush=True)
+                show(text, error=True)
 
 
 def _line(status: "Status") -> str:
@@ -165,7 +168,7 @@ def listen(*, udp: Whole = 9870, seconds: float = math.inf, json: Switch = False
                 if json:
                     print_json(message)
                 else:
-                    print(*lines, sep="\n", end="\n" if lines else "", flush=bool(lines))
+                    show(*lines)
     if not json:
-        print(listener.summary)
+        show(listener.summary)
     return 0 if listener.contacts else FAILED

@@ -1,7 +1,6 @@
 """Commands on recordings: record, info, verify, repair, export, reconstruct."""
 
 import math
-import sys
 import time
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -18,10 +17,12 @@ from kappaskin.cli.common import (
     Switch,
     allow,
     check_time,
+    lined,
     pair,
     print_result,
     result_of,
     save_arrays,
+    show,
     stops,
 )
 from kappaskin.errors import Refusal
@@ -35,7 +36,7 @@ _POLL = 0.05  # s
 _BEGIN = 10.0  # s within which something must come
 
 
-def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
+def record(source: str, out: Path, *, seconds: float = math.inf, trust: Switch = False) -> int:
     """Record a source to a file, until stopped (Ctrl+C).
 
     Records every byte received and every estimate computed from it, to an MCAP file that Foxglove,
@@ -53,6 +54,8 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
         The file; it must not exist yet.
     seconds
         How long to record.
+    trust
+        Let the scene name files outside its folder.
     """
     from kappaskin.live import LOST, Engine
     from kappaskin.recording import ReplayedSource
@@ -64,7 +67,7 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
     with Engine() as engine:
         # Before there is a source, so that nothing of it is missed.
         engine.record(out)
-        engine.connect(source)
+        engine.connect(source, trust)
         try:
             with ProgressLine() as show_progress:
                 status = _recorded(engine, seconds, stopped, show_progress)
@@ -77,15 +80,15 @@ def record(source: str, out: Path, *, seconds: float = math.inf) -> int:
     if why and not out.exists():
         return _broken_off(out, why)
     written = status.recording
-    print(
+    show(
         f"{written.path}: {written.messages:,} messages in {written.seconds:.1f} s, "
         f"{written.size / 1e6:.1f} MB; {status.accounting.words}"
     )
     if written.lost:
-        print(f"{written.lost:,} messages were not recorded: the disk is too slow")
+        show(f"{written.lost:,} messages were not recorded: the disk is too slow")
     gone = status.message if status.state == LOST else ""
     for why in filter(None, (written.trouble, status.refusal, gone)):
-        print(f"kappaskin: {why}", file=sys.stderr)
+        show(f"kappaskin: {why}", error=True)
     failed = written.trouble or status.refusal or gone or written.lost
     return FAILED if failed or not status.accounting.accepted else 0
 
@@ -137,7 +140,7 @@ def _broken_off(out: Path, ended: str) -> int:
     if not done.total:
         raise Refusal(f"{ended}; nothing was recorded: {done.words}")
     part.unlink()
-    print(f"kappaskin: {ended}; saved up to then: {out}: {done.words}", file=sys.stderr)
+    show(f"kappaskin: {ended}; saved up to then: {out}: {done.words}", error=True)
     return FAILED
 
 
@@ -200,9 +203,7 @@ def _contents_text(file: Path, contents: dict[str, Any]) -> str:
         lines.append(f"{name}:" if contents[name] else f"{name}: none")
         lines += [f"  {line}" for line in contents[name]]
     counts = sorted(contents["messages"].items())
-    return "\n".join(
-        [*lines, "messages:", *(f"  {count:>10,}  {topic}" for topic, count in counts)]
-    )
+    return lined([*lines, "messages:", *(f"  {count:>10,}  {topic}" for topic, count in counts)])
 
 
 def _contents(recording: "Recording") -> dict[str, Any]:
@@ -247,7 +248,7 @@ def verify(file: Path, *, limit: Limit = "") -> int:
     allow(limit)
     with BackgroundProcess[float | Verification]("verify", Verification.steps, file) as work:
         verdict = result_of(work.wait(), Verification)
-    print(f"{file}: {verdict.words}")
+    show(f"{file}: {verdict.words}")
     return 0 if verdict.same else FAILED
 
 
@@ -274,11 +275,11 @@ def repair(file: Path, *, out: Path, limit: Limit = "") -> int:
     allow(limit)
     done = result_of(Repaired.steps(file, out), Repaired)
     if not (done.total or done.attachments):
-        print(f"{file}: {done.words}")
+        show(f"{file}: {done.words}")
         return _NOTHING
-    print(f"{out}: {done.words}")
+    show(f"{out}: {done.words}")
     for topic, count in sorted(done.messages.items()):
-        print(f"  {count:>10,}  {topic}")
+        show(f"  {count:>10,}  {topic}")
     return FAILED if done.lost else 0
 
 
@@ -324,8 +325,8 @@ def export(
             done = result_of(exporting.wait(), Exported)
     except KeyboardInterrupt:
         raise Refusal("stopped before the end; nothing was written") from None
-    print(*exporting.files, sep="\n")
-    print(done.words, file=sys.stderr)
+    show(*exporting.files)
+    show(done.words, error=True)
 
 
 def reconstruct(
@@ -377,4 +378,4 @@ def reconstruct(
     functions = pair(basis, "a basis")
     found = reconstructed(readings, functions, points, edge, method, contact, objects)
     save_arrays(out, found)
-    print(f"{out}: {len(found['coefficients'])} shapes", file=sys.stderr)
+    show(f"{out}: {len(found['coefficients'])} shapes", error=True)

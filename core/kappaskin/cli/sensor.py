@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kappaskin.cli.common import FAILED, Switch, check_time, print_result, stops
+from kappaskin.cli.common import FAILED, Switch, check_time, lined, print_result, show, stops
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
@@ -27,14 +27,18 @@ def _millimetres(text: str) -> tuple[float, ...]:
 
 
 def _answer_to(question: str) -> str:
-    print(question, end="", file=sys.stderr, flush=True)
+    show(question, error=True, end="")
     if answer := sys.stdin.readline() if sys.stdin else "":
         return answer
-    print(file=sys.stderr)
+    show("", error=True)
     raise Refusal(
         "standard input ended before the last step, nothing was written; run this in a terminal, "
         "or give --dwell if the device moves to the cylinders automatically"
     )
+
+
+def _report(text: str) -> None:
+    show(*text.split("\n"), error=True)
 
 
 def calibrate(
@@ -45,6 +49,7 @@ def calibrate(
     seconds: float = 1.0,
     hold: float = 0.0,
     dwell: float | None = None,
+    trust: Switch = False,
     json: Switch = False,
 ) -> int:
     """Calibrate a sensor against cylinders of known radius.
@@ -69,6 +74,8 @@ def calibrate(
     dwell
         Do not wait for Enter: a device that moves automatically stays on each cylinder for this
         many seconds.
+    trust
+        Let the scene name files outside its folder.
     json
         Print one JSON object with every channel instead of a summary.
     """
@@ -82,24 +89,25 @@ def calibrate(
             source,
             None if radii is None else _millimetres(radii),
             _answer_to,
-            lambda line: print(line, file=sys.stderr),
+            _report,
             seconds=seconds,
             hold=hold,
             dwell=dwell,
+            trust=trust,
         )
         report = calibrated(sweep, sensor, datetime.now(UTC))
         report.calibration.save(out)
     except KeyboardInterrupt:
-        print(file=sys.stderr)
+        show("", error=True)
         raise Refusal("stopped before the last step; nothing was written") from None
-    print_result(report.to_json(), json, lambda: "\n".join(report.summary()))
+    print_result(report.to_json(), json, lambda: lined(report.summary()))
     return FAILED if report.failed else 0
 
 
 _READ = 0.05  # s that one read may wait
 
 
-def tare(source: str, *, undo: Switch = False) -> None:
+def tare(source: str, *, undo: Switch = False, trust: Switch = False) -> None:
     """Tare a sensor: take its readings at rest as its zero.
 
     Refused, with the reason, while the skin is loaded or moves. The tare is saved under the
@@ -113,6 +121,8 @@ def tare(source: str, *, undo: Switch = False) -> None:
         `sim:`, `sim:SCENE`, or a port or URL for pyserial.
     undo
         Stop using this sensor's tare instead of taking one.
+    trust
+        Let the scene name files outside its folder.
     """
     # All of it before the source is opened: while modules load, readings wait.
     from kappaskin.calibration import TareMeasurement, TareStore
@@ -121,11 +131,11 @@ def tare(source: str, *, undo: Switch = False) -> None:
     from kappaskin.sources import open_source
 
     tares = TareStore(TareStore.user_folder())
-    with closing(open_source(source)) as opened:
+    with closing(open_source(source, trust)) as opened:
         sensor = _answering(opened)
         if undo:
             tares.use(sensor.serial_number, None)
-            print(f"{sensor.name} {sensor.serial_number}: no tare is in use")
+            show(f"{sensor.name} {sensor.serial_number}: no tare is in use")
             return
         used = None if sensor.simulated else tares.load(sensor.serial_number).fit_for(sensor)
         taring = TareMeasurement(sensor, time.monotonic())
@@ -134,10 +144,10 @@ def tare(source: str, *, undo: Switch = False) -> None:
         taken = taring.tare(LoadDetector(sensor), _rest(sensor, used), now, opened.temperature)
     _print_tare(taken, used)
     if sensor.simulated:
-        print("not saved: the sensor is simulated")
+        show("not saved: the sensor is simulated")
     else:
         tares.add(taken)
-        print(f"saved in {tares.path(sensor.serial_number)}")
+        show(f"saved in {tares.path(sensor.serial_number)}")
 
 
 def _answering(source: "Source") -> "Sensor":
@@ -174,17 +184,22 @@ def _print_tare(taken: "Tare", before: "Tare | None") -> None:
 
     offset, error = (math.sqrt(float(np.nanmean(x**2))) for x in (taken.offset, taken.offset_sd))
     warm = "" if taken.temperature is None else f" at {taken.temperature:.1f} degrees Celsius"
-    print(
+    show(
         f"{taken.name} {taken.serial_number}: {np.isfinite(taken.offset).sum()} of {len(taken)} "
         f"channels tared{warm}, offsets of {offset:.3g} +- {error:.2g} 1/m (RMS)"
     )
     if before is not None:
         moved = math.sqrt(float(np.nanmean((taken.offset - before.offset) ** 2)))
-        print(f"{moved:.3g} 1/m (RMS) from the tare of {before.date:%Y-%m-%d %H:%M}")
+        show(f"{moved:.3g} 1/m (RMS) from the tare of {before.date:%Y-%m-%d %H:%M}")
 
 
 def press(
-    source: str, *, quick: Switch = False, patience: float = 20.0, json: Switch = False
+    source: str,
+    *,
+    quick: Switch = False,
+    patience: float = 20.0,
+    trust: Switch = False,
+    json: Switch = False,
 ) -> int:
     """Verify the channel map: press one element after the other and see which one responds.
 
@@ -202,6 +217,8 @@ def press(
         columns or components are exchanged, but not every pair of elements.
     patience
         Seconds to wait for a response before asking for the next element.
+    trust
+        Let the scene name files outside its folder.
     json
         Print one JSON object with every press and the map that was found.
     """
@@ -211,12 +228,13 @@ def press(
     try:
         test, verdict = press_elements(
             source,
-            lambda line: print(line, file=sys.stderr, flush=True),
+            _report,
             quick=quick,
             patience=patience,
+            trust=trust,
         )
     except KeyboardInterrupt:
-        print(file=sys.stderr)
+        show("", error=True)
         raise Refusal("stopped before the last element; the map was not verified") from None
     value = {
         "confirmed": verdict.confirmed,
@@ -226,7 +244,7 @@ def press(
             {"asked": p.target, "verdict": p.verdict, "answered": p.element} for p in test.done
         ],
     }
-    print_result(value, json, lambda: "\n".join(verdict.words))
+    print_result(value, json, lambda: lined(verdict.words))
     return 0 if verdict.confirmed else FAILED
 
 
@@ -261,12 +279,18 @@ def monitor(port: str, *, seconds: float = math.inf, reset: Switch = False) -> i
             listening.reset()
         while not (stopped or listening.lost) and time.monotonic() < end:
             for line in listening.read(_WAIT):
-                print(line, flush=True)
-    print(listening.summary())
+                show(line)
+    show(listening.summary())
     return FAILED if listening.lost or not listening.accounting().accepted else 0
 
 
-def device(scene: str = "", *, rate: float | None = None, dwell: float | None = None) -> None:
+def device(
+    scene: str = "",
+    *,
+    rate: float | None = None,
+    dwell: float | None = None,
+    trust: Switch = False,
+) -> None:
     """Run a simulated sensor on a pseudo-terminal, like a real one on a serial port.
 
     Prints one JSON line with the port, then serves until stopped (Ctrl+C); then prints on standard
@@ -282,11 +306,13 @@ def device(scene: str = "", *, rate: float | None = None, dwell: float | None = 
         Frames per second; the scene's when left out.
     dwell
         Seconds on each cylinder, in the scene `calibration`; one when left out.
+    trust
+        Let the scene name files outside its folder.
     """
     from kappaskin.scenes import load_scene
     from kappaskin.sources import PseudoDevice
 
-    played = load_scene(scene)
+    played = load_scene(scene, trust)
     if dwell is not None:
         if played.laid is None:
             raise Refusal(
@@ -295,7 +321,7 @@ def device(scene: str = "", *, rate: float | None = None, dwell: float | None = 
         played = replace(played, laid=replace(played.laid, dwell=dwell))
     server = PseudoDevice(played if rate is None else replace(played, rate=rate))
     stopped = stops()
-    print(json.dumps({"port": server.port, "rate": server.rate}), flush=True)
+    show(json.dumps({"port": server.port, "rate": server.rate}))
     server.serve(lambda: bool(stopped))
     server.close()
-    print(json.dumps({"spent": server.spent, "unsent": server.unsent}), file=sys.stderr)
+    show(json.dumps({"spent": server.spent, "unsent": server.unsent}), error=True)

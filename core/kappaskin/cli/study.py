@@ -1,6 +1,5 @@
 """Commands of studies and of the paper's tables and figures."""
 
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,6 +16,7 @@ from kappaskin.cli.common import (
     print_json,
     print_result,
     save_arrays,
+    show,
 )
 from kappaskin.errors import Refusal
 from kappaskin.studies import FIGURES
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from kappaskin.studies import Cost, Refused
 
 
-def plan(scene: str = "", *, json: Switch = False) -> None:
+def plan(scene: str = "", *, trust: Switch = False, json: Switch = False) -> None:
     """Show which effects a scene needs at its requested accuracy, and why.
 
     Example: `kappaskin plan tapping`
@@ -35,19 +35,23 @@ def plan(scene: str = "", *, json: Switch = False) -> None:
     ----------
     scene
         The name of a ready scene, or a file that ends in .toml; the default one when left out.
+    trust
+        Let the scene name files outside its folder.
     json
         Print one JSON object, with an entry for every known effect, instead of a table.
     """
     from kappaskin.scenes import load_scene
     from kappaskin.studies import plan_rows, plan_text
 
-    on = load_scene(scene)
+    on = load_scene(scene, trust)
     rows = plan_rows(on)
     value = {"scene": on.name, "accuracy": on.choice.accuracy, "effects": rows}
     print_result(value, json, lambda: plan_text(on, rows))
 
 
-def simulate(scene: str = "", *, frames: Whole, out: Path, seed: Whole | None = None) -> None:
+def simulate(
+    scene: str = "", *, frames: Whole, out: Path, seed: Whole | None = None, trust: Switch = False
+) -> None:
     """Simulate a scene into an NPZ file.
 
     It contains `counts` and `curvature` (T, 3, P), the `truth` (T, Ni, Nj) in m, `time` (T,) in s,
@@ -66,13 +70,15 @@ def simulate(scene: str = "", *, frames: Whole, out: Path, seed: Whole | None = 
         The seed of the random numbers; the scene's when left out.
     out
         The file to write.
+    trust
+        Let the scene name files outside its folder.
     """
     from kappaskin.scenes import load_scene
     from kappaskin.studies import simulated_readings
 
-    found = simulated_readings(load_scene(scene), frames, seed)
+    found = simulated_readings(load_scene(scene, trust), frames, seed)
     save_arrays(out, found)
-    print(f"{out}: {frames} frames", file=sys.stderr)
+    show(f"{out}: {frames} frames", error=True)
 
 
 def _measured(scene: "Scene") -> "list[Cost | Refused]":
@@ -112,11 +118,11 @@ def _settings(scene: "Scene", found: "list[Cost | Refused]", json: bool) -> None
     if json:
         print_json(cost_rows(scene, found))
         return
-    print(costs_text(scene, found), end="\n\n", flush=True)
+    show(*costs_text(scene, found).split("\n"), "")
     try:
         _effects(scene, json)
     except Refusal as refusal:  # the settings' table is worth its minute all the same
-        print(f"What each effect costs cannot be measured: {refusal}")
+        show(f"What each effect costs cannot be measured: {refusal}")
 
 
 def cost(
@@ -125,6 +131,7 @@ def cost(
     effects: Switch = False,
     within: Pair | None = None,
     plot: Path | None = None,
+    trust: Switch = False,
     json: Switch = False,
 ) -> int:
     """Measure the cost of accuracy: error, time and memory of every method and setting.
@@ -146,6 +153,8 @@ def cost(
         conversion included, such as 0.02mm or 20um; or what is missing, with exit code 1.
     plot
         The file, SVG or PNG, to draw error against time into.
+    trust
+        Let the scene name files outside its folder.
     json
         Print one JSON list of rows instead of a table, of the settings, or with --effects of the
         effects; with --within one object.
@@ -159,7 +168,7 @@ def cost(
             "expected --effects without --within and --plot, which are about settings; leave it or "
             "them out"
         )
-    on = load_scene(scene)
+    on = load_scene(scene, trust)
     if effects:
         _effects(on, json)
         return 0
@@ -276,8 +285,8 @@ def study(
             raise Refusal(
                 f"stopped; the results so far are in {path}; the same command resumes"
             ) from None
-    print(table_text(loaded, points))
-    print(f"kappaskin report {path} writes the report", file=sys.stderr)
+    show(*table_text(loaded, points).split("\n"))
+    show(f"kappaskin report {path} writes the report", error=True)
     return FAILED if any(point.failures for point in points) else 0
 
 
@@ -296,7 +305,7 @@ def report(folder: Path) -> None:
     """
     from kappaskin.studies import write_report
 
-    print(*write_report(folder), sep="\n")
+    show(*write_report(folder))
 
 
 # Commands of the paper: tables, figures

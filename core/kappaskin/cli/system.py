@@ -10,7 +10,7 @@ from dataclasses import asdict
 from importlib import metadata
 from typing import TYPE_CHECKING, Any, Literal
 
-from kappaskin.cli.common import FAILED, ProgressLine, Switch, print_result
+from kappaskin.cli.common import FAILED, ProgressLine, Switch, lined, print_result, show
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ def _port_text(found: "Diagnosis") -> str:
     if received := found.accounting.bytes_in:
         lines.append(_line("losses", f"{found.accounting.words}, in {received:,} bytes"))
     lines += [_line(event.kind, event.text) for event in found.events if event.kind != "met"]
-    return "\n".join([*lines, _line("verdict", found.why or "well")])
+    return lined([*lines, _line("verdict", found.why or "well")])
 
 
 _DEAF = "unknown: no reply to pings"
@@ -166,7 +166,7 @@ def _machine_text(found: dict[str, Any]) -> str:
         lines.append("Install the desktop app's packages with: pip install 'kappaskin[app]'")
     if found["install"]:
         lines.append(f"Install what is missing with: sudo {found['install']}")
-    return "\n".join(lines)
+    return lined(lines)
 
 
 def drill(source: str = "", *, json: Switch = False, long: Switch = False) -> int:
@@ -220,4 +220,4 @@ def install_completion(
         raise Refusal(f"the shell was not detected ({error}); give it with --shell") from error
     except OSError as error:
         raise Refusal(f"completion cannot be written ({error}); check the permissions") from error
-    print(f"{file}: installed; open a new shell to use it")
+    show(f"{file}: installed; open a new shell to use it")

@@ -174,8 +174,11 @@ class Engine:
     def alive(self) -> bool:
         return self._process is not None and self._process.is_alive()
 
-    def connect(self, source: str) -> None:
-        """Take frames from `source` instead of the present one; replaces a process that hangs."""
+    def connect(self, source: str, trust: bool = False) -> None:
+        """Take frames from `source` instead of the present one; replaces a process that hangs.
+
+        With `trust` a scene may name files outside its folder.
+        """
         if self._process is not None and self.silent >= _SILENT:
             self._process.kill()
             self._process.join()
@@ -184,7 +187,7 @@ class Engine:
             self._deaths = []
             self._requests.disconnect()
             self._requests.change(recording=None)
-        self._requests.change(source=source, scene=None, speed=1.0, looped=False)
+        self._requests.change(source=source, trust=trust, scene=None, speed=1.0, looped=False)
         if dead:
             self._start_again()
 

@@ -149,7 +149,7 @@ class EngineLoop:
         """Open the source; `status` says why it cannot be, and a port is then retried."""
         self._again = math.inf
         try:
-            self._source = open_source(name)
+            self._source = open_source(name, self._requests.requested.trust)
             self._recorder.connect(self._source)
             self._status = replace(self._status, state=WAITING, source=name, message="")
         except SourceError as error:

@@ -75,10 +75,11 @@ Action = Seek | StepFrames | TakeTare | Note | RestartEffects
 class Requested:
     """All that is requested of the engine; another engine can continue with it.
 
-    Lasting settings come first: `targets` that are servers have `access`, a scene or recording
-    plays at `speed`, `looped` or not, and `window_state` is stored for a window that resumes the
-    engine. `actions` are the last ones, each with the `number` of the value that added it;
-    `changed` has the number with which each setting was last requested. `over` ends the engine.
+    Lasting settings come first: `targets` that are servers have `access`, with `trust` the scene
+    that `source` names may name files outside its folder, a scene or recording plays at `speed`,
+    `looped` or not, and `window_state` is stored for a window that resumes the engine. `actions`
+    are the last ones, each with the `number` of the value that added it; `changed` has the number
+    with which each setting was last requested. `over` ends the engine.
     """
 
     setup: Setup = field(default_factory=Setup)
@@ -87,6 +88,7 @@ class Requested:
     targets: tuple[str, ...] = ()
     access: Access = THIS_MACHINE
     source: str | None = None
+    trust: bool = False
     scene: Scene | None = None
     recording: Path | None = None
     speed: float = 1.0

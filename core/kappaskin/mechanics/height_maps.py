@@ -15,7 +15,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin._files import check_memory, open_file, read_file
+from kappaskin._files import check_memory, open_file, read_file, why_unread
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics.rigid_objects import check_sizes
@@ -142,7 +142,9 @@ def _read_array(path: Path) -> Array:
             warnings.simplefilter("ignore")  # of a header as Python 2 wrote it
             stored = cast("NDArray[Any]", np.lib.format.open_memmap(path, mode="r"))
     except _NO_ARRAY as error:
-        raise Refusal(f"expected an array in {path}, as numpy.save writes it: {error}") from error
+        raise Refusal(
+            f"expected an array in {path}, as numpy.save writes it{why_unread(error)}"
+        ) from error
     _check_pixels(path, stored.shape)
     if stored.dtype.kind not in "buif":
         raise Refusal(f"expected real numbers in {path}, got {stored.dtype}")
@@ -165,7 +167,7 @@ def _read_picture(path: Path) -> Array:
     except Refusal:
         raise
     except (OSError, ValueError, SyntaxError, struct.error, Image.DecompressionBombError) as error:
-        raise Refusal(f"expected a PNG picture in {path}: {error}") from error
+        raise Refusal(f"expected a PNG picture in {path}{why_unread(error)}") from error
 
 
 _READERS: dict[str, Callable[[Path], Array]] = {".npy": _read_array, ".png": _read_picture}
@@ -252,7 +254,9 @@ class Mesh:
         except Refusal:
             raise
         except _UNREADABLE as error:
-            raise Refusal(f"cannot read a mesh from {path}: {error}") from error
+            raise Refusal(
+                f"cannot read a mesh from {path}{why_unread(error)}; export the object again"
+            ) from error
         if not len(mesh.faces):
             raise Refusal(f"expected triangles in {path}, found none; export the object again")
         return cls(unit * np.array(mesh.vertices, float), np.array(mesh.faces, np.intp))

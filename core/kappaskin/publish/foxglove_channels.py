@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import scipy
 
+from kappaskin._text import printable
 from kappaskin.bases import CurvatureMap
 from kappaskin.frames import COMPONENTS, Array, Event
 from kappaskin.pipeline import Pipeline
@@ -116,7 +117,7 @@ def moment(seconds: float) -> str:
 def logged(event: Event, when: float) -> bytes:
     """An event as a line of a log; it happened `when`, in s since 1970."""
     level = _WARNING if event.kind in _GRAVE else _INFORMATION
-    text = f"{event.kind}: {event.text}"
+    text = printable(f"{event.kind}: {event.text}")
     return (
         f'{{"timestamp":{moment(when)},"level":{level},"message":{json.dumps(text)},'
         '"name":"kappaskin","file":"","line":0}'

@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
+from kappaskin._text import printable
 from kappaskin.estimation import Fit
 from kappaskin.frames import Estimate, Event
 from kappaskin.pipeline import REPORTED, Number, Pipeline, Reported, ReportedQuantity, numbers_of
@@ -225,8 +226,8 @@ class SourceState:
             "timestamp": round(time.time(), 6),
             "state": self.state,
             "source": self.source,
-            "message": self.message[:_LONGEST],
-            "sensor": sensor.name[:_LONGEST] if sensor else "",
+            "message": printable(self.message)[:_LONGEST],
+            "sensor": printable(sensor.name)[:_LONGEST] if sensor else "",
             **dict(zip(STATUS_NUMBERS, numbers, strict=True)),
         }
         return json.dumps(fields, allow_nan=False).encode()

@@ -8,6 +8,7 @@ import time
 from contextlib import suppress
 from typing import Any, cast
 
+from kappaskin._text import printable
 from kappaskin.errors import Refusal
 from kappaskin.publish.message import LARGEST, VERSION, EstimateMessage, SourceState
 from kappaskin.publish.publishing import Receiver, Target, reason
@@ -170,7 +171,7 @@ class UdpListener:
             if state != self._state:
                 lines.append(f"status    {state}")
             self._state = state
-        return [f"{time.monotonic() - self._began:9.3f} s  {_plain(line)}" for line in lines]
+        return [f"{time.monotonic() - self._began:9.3f} s  {printable(line)}" for line in lines]
 
     def _gap(self, number: object) -> list[str]:
         last, self._number = self._number, number if isinstance(number, int) else None
@@ -219,11 +220,6 @@ def _understood(data: bytes) -> JsonMessage | None:
     kind, version = message.get("kind"), message.get("version")
     known = kind in ("contact", "shape", "status") and version == VERSION
     return message if known else None
-
-
-def _plain(line: str) -> str:
-    """The text without characters that would control a terminal."""
-    return "".join(c if c.isprintable() else "?" for c in line)
 
 
 def _figure(message: JsonMessage, key: str, scale: float, how: str) -> str:

@@ -131,7 +131,7 @@ class MessageLayout:
         if primitive := _PRIMITIVES.get(name):
             self._add(path, primitive, None, self._fixed.get(path))
         elif name == "string":
-            text = str(self._fixed[path]).encode() + b"\0"
+            text = str(self._fixed[path]).encode(errors="backslashreplace") + b"\0"
             self._add(f"{path}.length", _LENGTH, None, len(text))
             self._add(path, np.dtype(f"S{len(text)}"), None, text, aligned=1)
         else:

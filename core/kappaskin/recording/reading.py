@@ -251,7 +251,7 @@ class Recording:
     def _check(self, magic: bytes) -> None:
         if magic != MAGIC:
             raise Refusal(
-                f"{self.path}: expected a recording (an MCAP file), got {magic!r}; "
+                f"{self.path}: expected a recording (an MCAP file), got another file; "
                 "`kappaskin record` makes one"
             )
         try:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from kappaskin._state import StateArrays, Stateful
+from kappaskin._text import printable
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Estimate, Event, Frame, Truth
 from kappaskin.pipeline import Pipeline, setup_to_text
@@ -117,7 +118,7 @@ class Recorder:
         try:
             text = write_scene(scene)
         except Refusal as refusal:  # an object from a file of its own, say
-            text = f"# {scene.name}: {refusal}\n"
+            text = f"# {printable(f'{scene.name}: {refusal}')}\n"
         self._file.attach(name, "application/toml", text.encode())
 
     def set_up(self, pipeline: Pipeline) -> None:

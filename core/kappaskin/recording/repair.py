@@ -143,10 +143,7 @@ class _Repair:
         elif (found := self._next_chunk(0)) < self._size:
             self._at = self._lost = found
         else:
-            raise Refusal(
-                f"{self._path}: expected a recording (an MCAP file), got "
-                f"{self._data[: len(MAGIC)]!r}"
-            )
+            raise Refusal(f"{self._path}: expected a recording (an MCAP file), got another file")
         self._writer.start(profile, library)
         self._expect(library)
 

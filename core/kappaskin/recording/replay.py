@@ -294,4 +294,4 @@ def _brief(event: Event) -> Event:
     return Event(event.time, event.kind[:_LONGEST], event.text[:_LONGEST])
 
 
-register_scheme(ReplayedSource.SCHEME, lambda name: ReplayedSource(Path(name)))
+register_scheme(ReplayedSource.SCHEME, lambda name, _: ReplayedSource(Path(name)))

@@ -6,9 +6,11 @@ from kappaskin.scenes.effect_plan import plan as plan
 from kappaskin.scenes.effect_plan import planned as planned
 from kappaskin.scenes.read import SCENES as SCENES
 from kappaskin.scenes.read import TABLE_1_NOISE as TABLE_1_NOISE
+from kappaskin.scenes.read import Trust as Trust
 from kappaskin.scenes.read import check_elements as check_elements
 from kappaskin.scenes.read import check_sides as check_sides
 from kappaskin.scenes.read import load_scene as load_scene
+from kappaskin.scenes.read import named_file as named_file
 from kappaskin.scenes.read import read_scene as read_scene
 from kappaskin.scenes.read import read_scene_text as read_scene_text
 from kappaskin.scenes.read import scene_file as scene_file

@@ -1,16 +1,17 @@
 """Reading scene files: strict, and every refusal names its line."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import fields, replace
 from functools import partial
 from importlib.resources import files
+from os.path import isfile
 from pathlib import Path
 from typing import Any, cast, get_type_hints
 
 import numpy as np
 
-from kappaskin._files import read_file
+from kappaskin._files import read_file, why_unread
 from kappaskin._schema import Within
 from kappaskin._toml import TomlTable, parsed
 from kappaskin.bases import basis_for
@@ -68,6 +69,9 @@ CHAINS = {"modern": Transduction(), "second": SECOND_GENERATION, "first": FIRST_
 LOOPS = {"second": SECOND_GENERATION_LOOPS, "first": FIRST_GENERATION_LOOPS}
 """Electronics and loops that a scene may say are like those of a prototype."""
 
+Trust = bool | Collection[Path]
+"""Whether a scene may name any file, or which ones outside its folder."""
+
 _LARGEST_SCENE = 2**21  # bytes: more takes longer than a few seconds to read
 _LARGEST_RECORD = 2**22  # bytes of a recorded motion
 
@@ -91,10 +95,13 @@ def scene_file(name: str = "") -> Path:
     return _FOLDER / f"{name}{_ENDING}"
 
 
-def load_scene(name: str = "") -> Scene:
-    """The ready scene `name`, the default one when empty; or that in the TOML file of that name."""
+def load_scene(name: str = "", trust: Trust = False) -> Scene:
+    """The ready scene `name`, the default one when empty; or that in the TOML file of that name.
+
+    `trust` as of `named_file`.
+    """
     file = scene_file(name)
-    return read_scene(read_scene_text(file), file)
+    return read_scene(read_scene_text(file), file, trust)
 
 
 def read_scene_text(file: Path) -> str:
@@ -106,14 +113,37 @@ def read_scene_text(file: Path) -> str:
         raise Refusal(f"{file}: cannot be read as a scene ({error}); check its name") from error
 
 
-def read_scene(text: str, file: Path) -> Scene:
-    """The scene in the `text` of `file`; files that it names are in the same folder."""
-    return scene_of(TomlTable(parsed(text, file), text, str(file)), file)
+def read_scene(text: str, file: Path, trust: Trust = False) -> Scene:
+    """The scene in the `text` of `file`; `trust` as of `named_file`."""
+    return scene_of(TomlTable(parsed(text, file), text, str(file)), file, trust)
 
 
-def scene_of(top: TomlTable, file: Path) -> Scene:
-    """The scene in the table `top` of a file; keys of other readers are left unread."""
-    name, folder = file.stem.removesuffix(".scene"), file.parent
+def named_file(name: str, folder: Path, trust: Trust = False) -> Path:
+    """The path, without links, of the file that a scene in `folder` calls `name`.
+
+    A `Refusal` where it is not in the folder, unless there is `trust`: `name` must be relative,
+    without .., and no link may lead out.
+    """
+    try:
+        path, inside = (folder / name).resolve(), folder.resolve()
+    except (OSError, RuntimeError, ValueError) as error:  # a name that no file has, links in a ring
+        raise Refusal(f"expected the name of a file, got {name!r:.200}") from error
+    trusted = trust if isinstance(trust, bool) else path in trust
+    plain = not Path(name).is_absolute() and ".." not in Path(name).parts
+    if not (trusted or (plain and path.is_relative_to(inside))):
+        raise Refusal(
+            "expected the name of a file in the folder of the scene, without a link out of it, got "
+            f"{name!r:.200}; copy the file there, or give --trust if you trust the scene"
+        )
+    return path
+
+
+def scene_of(top: TomlTable, file: Path, trust: Trust = False) -> Scene:
+    """The scene in the table `top` of a file; keys of other readers are left unread.
+
+    `trust` as of `named_file`.
+    """
+    name, find = file.stem.removesuffix(".scene"), partial(_named_file, file.parent, trust)
     if (version := SCENE.value(top, "format")) != FORMAT:
         raise top.refusal(
             f"expected a scene of format {FORMAT}, got {version}; update kappaskin"
@@ -134,7 +164,7 @@ def scene_of(top: TomlTable, file: Path) -> Scene:
             "touch",
         )
     stimuli = tuple(
-        _stimulus(table, plate, lambda load, by: scaled_to(plate, load, by, basis()), folder)
+        _stimulus(table, plate, lambda load, by: scaled_to(plate, load, by, basis()), find)
         for table in top.tables("touch")
     )
     electronics = _electronics(top.table("electronics"))
@@ -288,13 +318,16 @@ def _wanted(table: TomlTable) -> set[str]:
     return {*EFFECT.value(table, "on"), *(() if isinstance(named, str) else named)}
 
 
+_Find = Callable[[TomlTable, str], Path]  # the file that a table names at a key
+
+
 def _stimulus(
-    table: TomlTable, plate: Plate, moved: Callable[[Load, float], Load], folder: Path
+    table: TomlTable, plate: Plate, moved: Callable[[Load, float], Load], find: _Find
 ) -> Stimulus:
     """The stimulus of a [[touch]] table; `moved` gives a load a displacement in m."""
     what: Load | Indenter
     if (name := TOUCH.value(table, "what")) in OBJECTS:
-        what = table.make(Indenter, rigid=_object(table, OBJECTS[name].made, folder))
+        what = table.make(Indenter, rigid=_object(table, OBJECTS[name].made, find))
     else:
         what = load = table.make(cast("type[Load]", LOADS[name].made))
         if "displacement" in table:
@@ -307,37 +340,38 @@ def _stimulus(
     force = TOUCH.limits["force"]
     if what.force is not None and what.force not in force:
         raise table.refusal(f"expected a force of {force}, got {what.force:g}", "force")
-    made = Stimulus(what, _motion(table, folder))
+    made = Stimulus(what, _motion(table, find))
     table.done()
     with table.blamed():
         made.check(plate)
     return made
 
 
-def _object(table: TomlTable, kind: type[RigidObject], folder: Path) -> RigidObject:
-    """The rigid object that the table describes, read from a file in `folder` if it has one."""
+def _object(table: TomlTable, kind: type[RigidObject], find: _Find) -> RigidObject:
+    """The rigid object that the table describes, read from a file if it has one."""
     with table.blamed():
         if kind is Mesh:
-            return Mesh.read(_scene_file(table, "file", folder), TOUCH.value(table, "unit"))
+            return Mesh.read(find(table, "file"), TOUCH.value(table, "unit"))
         if kind is HeightMap:
             sizes = (TOUCH.value(table, key) for key in ("length", "width", "relief"))
-            return HeightMap.read(_scene_file(table, "file", folder), *sizes)
+            return HeightMap.read(find(table, "file"), *sizes)
         return table.make(kind)
 
 
-def _scene_file(table: TomlTable, key: str, folder: Path) -> Path:
-    """The file that the table names, in the folder of the scene."""
-    file = folder / TOUCH.value(table, key)
-    if not file.is_file():
-        raise table.refusal(
-            f"expected the name of a file in the folder of the scene, "
-            f"got {str(file)!r:.200}, which does not exist",
-            key,
-        )
+def _named_file(folder: Path, trust: Trust, table: TomlTable, key: str) -> Path:
+    """The file that the table names at `key`."""
+    name = TOUCH.value(table, key)
+    with table.blamed(key):
+        file = named_file(name, folder, trust)
+        if not isfile(file):  # which raises nothing, whatever the name
+            raise Refusal(
+                f"expected the name of a file in the folder of the scene, "
+                f"got {str(folder / name)!r:.200}, which does not exist"
+            )
     return file
 
 
-def _motion(table: TomlTable, folder: Path) -> Motion | None:
+def _motion(table: TomlTable, find: _Find) -> Motion | None:
     given = [key for key in ("path", "orbit", "recorded") if key in table]
     if len(given) > 1:
         raise table.refusal(f"expected one motion, got {' and '.join(given)}", given[1])
@@ -348,7 +382,7 @@ def _motion(table: TomlTable, folder: Path) -> Motion | None:
         return made
     if "recorded" in table:
         with table.blamed("recorded"):
-            return _recorded(_scene_file(table, "recorded", folder))
+            return _recorded(find(table, "recorded"))
     steps = [_step(step) for step in table.tables("path")]
     with table.blamed("path"):
         return MotionPath(tuple(steps)) if "path" in table else None
@@ -368,11 +402,11 @@ def _recorded(file: Path) -> RecordedMotion:
         rows = np.array([line.split(",") for line in lines if line.strip()], float)
     except (OSError, ValueError) as error:
         raise Refusal(
-            f"{file}: expected a CSV of numbers time,dx,dy,amount in s, m, m and shares: {error}; "
-            "correct it, or keep fewer lines"
+            f"{file}: expected a CSV of numbers time,dx,dy,amount in s, m, m and shares"
+            f"{why_unread(error)}; correct it, or keep fewer lines"
         ) from error
     if heading.replace(" ", "") != "time,dx,dy,amount":
-        raise Refusal(f"{file}: expected a first line time,dx,dy,amount, got {heading!r:.80}")
+        raise Refusal(f"{file}: expected a first line time,dx,dy,amount, got another one")
     if rows.shape[1:] != (4,):
         raise Refusal(f"{file}: expected lines of four numbers, got an array of {rows.shape}")
     return RecordedMotion(rows[:, 0], rows[:, 1:])

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from kappaskin._text import printable
 from kappaskin.errors import SourceError
 from kappaskin.frames import Event, Frame
 from kappaskin.sources import information
@@ -156,7 +157,7 @@ class WireMonitor:
                 self._connection.refusal or "connection lost: unplugged, or closed by the other end"
             )
             lines.append(str(why))
-        return [f"{self._clock() - self._began:9.3f} s  {_plain(line)}" for line in lines]
+        return [f"{self._clock() - self._began:9.3f} s  {printable(line)}" for line in lines]
 
     def _gap(self, sequence: int) -> list[str]:
         last, self._last = self._last, sequence
@@ -241,11 +242,6 @@ class WireMonitor:
 
     def close(self) -> None:
         self._connection.close()
-
-
-def _plain(text: str) -> str:
-    """The text without what would steer a terminal: a device may send anything."""
-    return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
 def _line(kind: str, sequence: int | None, words: str, device_time: float | None = None) -> str:

@@ -133,11 +133,17 @@ def _sensor(table: TomlTable) -> Sensor:
     check_edge(patch, values["edge"])
     plate = Plate(patch, **{name: values[name] for name in fields_of(Plate).keys() & values.keys()})
     wired = values["channel_map"]
+    names = [  # half a pair of surrogates, which JSON may have, could be written to no file
+        values[name].encode(errors="backslashreplace").decode()
+        for name in ("name", "serial_number", "firmware")
+    ]
     return Sensor(
         _layout(patch, values),
         _transduction(table),
         plate,
-        *(values[name] for name in ("edge", "rate", "name", "serial_number", "firmware")),
+        values["edge"],
+        values["rate"],
+        *names,
         simulated=values["simulated"],
         channel_map=None if wired is None else np.array(wired, np.intp),
     )

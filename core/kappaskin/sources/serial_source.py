@@ -498,4 +498,4 @@ class _RecordingTap:
             recorder.connected(self._information)
 
 
-register_scheme("", SerialSource)
+register_scheme("", lambda name, _: SerialSource(name))

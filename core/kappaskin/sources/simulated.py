@@ -207,4 +207,6 @@ class SimulatedSource:
         """Nothing is held open."""
 
 
-register_scheme(SimulatedSource.SCHEME, lambda name: SimulatedSource(load_scene(name)))
+register_scheme(
+    SimulatedSource.SCHEME, lambda name, trust: SimulatedSource(load_scene(name, trust))
+)

@@ -78,20 +78,21 @@ class Source(Protocol):
     def close(self) -> None: ...
 
 
-_schemes: dict[str, Callable[[str], Source]] = {}
+_schemes: dict[str, Callable[[str, bool], Source]] = {}
 
 
-def register_scheme(scheme: str, opened: Callable[[str], Source]) -> None:
+def register_scheme(scheme: str, opened: Callable[[str, bool], Source]) -> None:
     """Open names that begin with `scheme`, such as `replay:`, by `opened` with what follows it.
 
-    The empty scheme opens every other name.
+    It is also called with the `trust` of `open_source`. The empty scheme opens every other name.
     """
     _schemes[scheme] = opened
 
 
-def open_source(name: str) -> Source:
+def open_source(name: str, trust: bool = False) -> Source:
     """The source called `name`: `sim:`, `sim:SCENE`, `replay:FILE`, or what pyserial opens.
 
+    With `trust` a scene may name files outside its folder.
     `replay:` is registered by the room `recording`, as soon as that is imported.
     """
     if not name.strip():
@@ -99,4 +100,4 @@ def open_source(name: str) -> Source:
             "expected a source: sim:, sim:SCENE, replay:FILE, a port or a URL; got an empty name"
         )
     scheme = max((scheme for scheme in _schemes if name.startswith(scheme)), key=len)
-    return _schemes[scheme](name.removeprefix(scheme))
+    return _schemes[scheme](name.removeprefix(scheme), trust)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kappaskin._text import printable
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.scenes import EffectSelection, Plan, Scene, Simulator, plan
@@ -145,7 +146,7 @@ def plan_text(scene: Scene, rows: list[dict[str, Any]]) -> str:
     """The rows of `plan_rows` for people, those of the scene first."""
     there = [row for row in rows if row["microseconds"] is not None]
     lines = [
-        f"{scene.title}: errors as shares of the peak curvature, of which "
+        f"{printable(scene.title)}: errors as shares of the peak curvature, of which "
         f"{scene.choice.accuracy:.2g} may be omitted",
         "",
         f"{'effect':<18}{'size':>9}{'error':>9}{'us':>7}  kept  why",

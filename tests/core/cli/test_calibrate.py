@@ -73,7 +73,7 @@ def test_json_tells_every_channel_and_nothing_else(run, tmp_path) -> None:
 
 def test_a_hold_tells_the_creep_that_a_scene_has(run, tmp_path, monkeypatch) -> None:
     creeping = replace(SCENE, effects=(Creep(0.05, 2.0), *SCENE.effects[1:]))
-    monkeypatch.setattr("kappaskin.calibration.sweep.load_scene", lambda name: creeping)
+    monkeypatch.setattr("kappaskin.calibration.sweep.load_scene", lambda *_: creeping)
     out = tmp_path / "s.toml"
     _, printed, told = run("calibrate", "sim:creeping", "--out", out, "--hold", "10", *FAST)
     assert "held for 10 s" in told
@@ -93,7 +93,7 @@ def test_a_channel_that_fails_gives_1_and_a_file_without_it(run, tmp_path, monke
             return lambda curvature, _: curvature * alive
 
     broken = replace(SCENE, effects=(Broken(), GaussianNoise(0.2)))
-    monkeypatch.setattr("kappaskin.calibration.sweep.load_scene", lambda name: broken)
+    monkeypatch.setattr("kappaskin.calibration.sweep.load_scene", lambda *_: broken)
     out = tmp_path / "s.toml"
 
     code, printed, _ = run("calibrate", "sim:broken", "--out", out, *FAST)

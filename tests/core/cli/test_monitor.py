@@ -121,7 +121,7 @@ def test_bytes_thrown_away_are_told_by_their_reason(device) -> None:
 
 def test_a_refusal_is_told_in_the_devices_words_without_what_steers_a_terminal(device) -> None:
     refused = encode_reply(0, 1.0, Command(4, 5, b""), Fault.OUT_OF_RANGE, b"too \x1b[2Jfast\n")
-    assert "to #4 rate: refused (3): too ?[2Jfast?" in device.says(refused)
+    assert "to #4 rate: refused (3): too \\x1b[2Jfast\\n" in device.says(refused)
 
 
 def test_after_silence_the_usual_causes_are_named(device) -> None:

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from kappaskin._text import printable
 from kappaskin.calibration import Calibration
 from kappaskin.live import Status
 from kappaskin.sensing import Sensor
@@ -22,6 +23,7 @@ from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.form import pass_window_keys
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.settings import calibration_text
+from kappaskin_app.widgets.parts import plain_tip
 from kappaskin_app.widgets.text import COMMAND, day
 
 _PERIOD = 1000  # ms between two searches
@@ -95,6 +97,7 @@ class ConnectionPanel(Panel):
         self.disconnect_button.setObjectName("disconnect")
         self.disconnect_button.setToolTip("Close the source (Ctrl+D).")
         self.device, self.losses = QLabel(wordWrap=True), QLabel(wordWrap=True)  # pyright: ignore[reportCallIssue]
+        self.device.setTextFormat(Qt.TextFormat.PlainText)
         self.losses.setToolTip("Messages lost and bytes discarded since the source was connected.")
         self.copy_button = QPushButton("Copy the command")
         self.copy_button.setToolTip("Copy the command in the message above, for a terminal.")
@@ -132,7 +135,7 @@ class ConnectionPanel(Panel):
         self._selected = next(known, absent)
         listed = self._selected and _port_text(self._selected)
         words = _SIMULATED[1] if chosen == _SIMULATED[0] else listed
-        self.sources.setToolTip(f"{words or chosen}\n\n{_TIP}")
+        self.sources.setToolTip(plain_tip(f"{words or chosen}\n\n{_TIP}"))
 
     def show_ports(self, ports: list[Port]) -> None:
         """List these and the simulation; the selected device stays selected under a new name."""
@@ -154,7 +157,9 @@ class ConnectionPanel(Panel):
             self.sources.addItem(_SIMULATED[1], _SIMULATED[0])
             for place, port in enumerate(self._ports, 1):
                 self.sources.addItem(_abbreviated(_port_text(port)), port.port)
-                self.sources.setItemData(place, _port_text(port), Qt.ItemDataRole.ToolTipRole)
+                self.sources.setItemData(
+                    place, plain_tip(_port_text(port)), Qt.ItemDataRole.ToolTipRole
+                )
         # Wider than the panel, or the list would cut off the serial numbers of two of a kind.
         self.sources.view().setMinimumWidth(self.sources.view().sizeHintForColumn(0) + _MARGIN)
 
@@ -197,7 +202,8 @@ class ConnectionPanel(Panel):
 
 def _port_text(port: Port) -> str:
     """Description of a port, and whether this user may open it."""
-    return port.words if port.opened else f"{port.words}  (no permission)"
+    words = printable(port.words)
+    return words if port.opened else f"{words}  (no permission)"
 
 
 def _abbreviated(words: str) -> str:
@@ -224,8 +230,9 @@ def _sensor_text(sensor: Sensor, calibration: Calibration | None) -> str:
     a, b, radius = (round(1e3 * length, 1) for length in (patch.a, patch.b, patch.radius))
     bent = f", radius {radius:g} mm" if patch.base_curvature else ""
     health = f"\n{dead} of {sensing.size} channels dead" if dead else ""
+    name = printable(f"{sensor.name} ({sensor.serial_number})")
     calibrated = f"\n{calibration_text(calibration)}" if calibration else ""
     return (
-        f"{sensor.name} ({sensor.serial_number})\n{sensor.layout}, {sensor.edge}{health}\n"
+        f"{name}\n{sensor.layout}, {sensor.edge}{health}\n"
         f"{a:g} x {b:g} mm{bent}, up to {sensor.rate:g} frames/s{calibrated}"
     )

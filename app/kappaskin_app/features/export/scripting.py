@@ -130,10 +130,12 @@ def _scene(session: Session, settings: Settings) -> str:
     written = settings.written
     if written is None or session.refusal:
         return _read(write_scene(session.scene), OWN)
+    trust = ", trust=True" if written.trust else ""
     if not _is_in_its_file(written):
-        return _read(written.text, written.file.absolute())
+        return _read(written.text, written.file.absolute(), trust)
     ready = written.file.stem in SCENES and scene_file(written.file.stem) == written.file
-    return f"load_scene({_literal(written.file.stem if ready else str(written.file.absolute()))})"
+    name = written.file.stem if ready else str(written.file.absolute())
+    return f"load_scene({_literal(name)}{trust})"
 
 
 def _is_in_its_file(written: Written) -> bool:
@@ -143,7 +145,7 @@ def _is_in_its_file(written: Written) -> bool:
         return False
 
 
-def _read(text: str, file: Path) -> str:
+def _read(text: str, file: Path, trust: str = "") -> str:
     plain = "'''" not in text and "\\" not in text and not text.endswith("'")
     quoted = f"'''{text}'''" if plain else repr(text)
-    return f"read_scene({quoted}, Path({_literal(str(file))}))"
+    return f"read_scene({quoted}, Path({_literal(str(file))}){trust})"

@@ -106,6 +106,7 @@ _STEPS, _TEXT, _LINE = 40, 2000, 300  # steps; letters of a step, and of a line 
 _HEAD = re.compile(r"\+\+\+\n(.*?)^\+\+\+\n", re.DOTALL | re.MULTILINE)
 _STEP = re.compile(r"^## +(.+)$", re.MULTILINE)
 _BLOCK = re.compile(r"^```toml\n(.*?)^```[ \t]*$", re.DOTALL | re.MULTILINE)
+_FOREIGN = re.compile(r"!\[|<[a-zA-Z/!?]")  # Qt would read the files that these name
 _AT_LINE = re.compile(r"\(at line (\d+), column \d+\)")
 
 _HEAD_KEYS = {"format", "title", "minutes", "learn", "set"}
@@ -183,6 +184,11 @@ def _step(name: str, title: str, text: str, begin: int, end: int, usual: dict[st
     if not 1 <= len(words) <= _TEXT:
         raise Refusal(
             f"{name}, line {line}: expected a text of 1 to {_TEXT} characters, got {len(words)}"
+        )
+    if found := _FOREIGN.search(words):
+        raise Refusal(
+            f"{name}, line {line}: expected a text without pictures and HTML, got {found[0]}; "
+            "leave it out, or write a space after <"
         )
     at = line if not blocks else _line(text, begin + blocks[0].start(1))
     table = _Table.parse(name, blocks[0][1] if blocks else "", at)

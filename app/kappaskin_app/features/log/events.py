@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from kappaskin._text import printable
 from kappaskin.frames import Event
 from kappaskin.live import Status
 
@@ -81,7 +82,7 @@ def _lines(events: Sequence[Event]) -> list[str]:
     off = time.time() - time.monotonic()
     return [
         f"{time.strftime('%H:%M:%S', time.localtime(off + event.time))}  {event.kind}:  "
-        f"{event.text}"
+        f"{printable(event.text)}"
         for event in events
     ]
 

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin_app.guard import guarded, log
+from kappaskin_app.guard import PrintableFormatter, guarded, log
 from kappaskin_app.theme import current, follow_look
 from kappaskin_app.widgets.table import Table
 
@@ -45,7 +45,7 @@ class LogBuffer(logging.Handler):
 
     def __init__(self) -> None:
         super().__init__()
-        self.setFormatter(logging.Formatter("%(message)s"))
+        self.setFormatter(PrintableFormatter("%(message)s"))
         self.lines: deque[LogLine] = deque(maxlen=_KEPT)
         self.count = 0
         self._level = log.level

@@ -7,6 +7,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QFileDialog, QWidget
 
+from kappaskin._text import printable
 from kappaskin.errors import Damaged
 from kappaskin.frames import Event
 from kappaskin.live import Status
@@ -356,7 +357,8 @@ class PlaybackControl(QObject):
     def _show_title(self, replay: Replay | None) -> None:
         title = "Kappaskin"
         if replay is not None and self.summary is not None:
-            title = f"{self.summary.path.name}, recorded {day(replay.begun)} \N{EN DASH} Kappaskin"
+            name = printable(self.summary.path.name)
+            title = f"{name}, recorded {day(replay.begun)} \N{EN DASH} Kappaskin"
         if title != self._window.windowTitle():
             self._window.setWindowTitle(title)
 

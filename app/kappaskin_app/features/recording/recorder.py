@@ -266,6 +266,7 @@ class RecordingControl(QObject):
         box = QMessageBox(self._window)
         box.setIcon(QMessageBox.Icon.Question)
         box.setWindowTitle("Close while recording")
+        box.setTextFormat(Qt.TextFormat.PlainText)
         box.setText(f"{Path(self.written.path).name} is being recorded.")
         box.setInformativeText("Closing the window ends the recording; the file is complete.")
         roles = QMessageBox.ButtonRole

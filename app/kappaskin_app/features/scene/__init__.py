@@ -86,8 +86,9 @@ class SceneFeature:
             )
         load = touches[0].load
         x, y = (float(value) for value in load.centre())
-        mesh = {"what": "mesh", "file": str(file.absolute()), "unit": _MILLIMETRE}
-        self.editing.replace_object(mesh, x, y, load.force)
+        found = file.resolve()
+        mesh = {"what": "mesh", "file": str(found), "unit": _MILLIMETRE}
+        self.editing.replace_object(mesh, x, y, load.force, found)
         self._shell.opening.note(file)
         self._shell.notify(f"{file.name} is the object; its unit is taken as millimetres")
 

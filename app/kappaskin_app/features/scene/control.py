@@ -84,7 +84,7 @@ class SceneControl(QObject):
     def play(self, file: Path) -> None:
         """Simulate the scene in a file, from its beginning."""
         try:
-            self._editing.play(written(file))
+            self._editing.play(written(file, file.absolute() in self._session.trusted))
             if not _is_built_in(file):
                 self._opening.note(file)
         except Refusal as refusal:

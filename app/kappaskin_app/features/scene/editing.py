@@ -6,9 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from kappaskin._files import write_whole
+from kappaskin._files import read_file, write_whole
+from kappaskin.errors import Refusal
 from kappaskin.mechanics import Load
-from kappaskin_app.features.scene.scene_text import forced, replaced, scaled, shifted
+from kappaskin.scenes import named_file
+from kappaskin_app.features.scene.scene_text import forced, named, put, replaced, scaled, shifted
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.effects import effect_name
 from kappaskin_app.shell.history import History
@@ -47,19 +49,33 @@ class SceneEditing:
         if (written := self._edited(text)) is not None:
             self._history.request("written", written=written)
 
-    def _edited(self, text: str) -> Written | None:
-        """The scene with another text; None if the text is the same."""
+    def _edited(self, text: str, *trusted: Path) -> Written | None:
+        """The scene with another text, which may name the `trusted` files; None if it is the same.
+
+        These were selected in the window.
+        """
         now = self._history.settings.written
         if now is not None and text == now.text:
             return None
-        return Written(text, OWN if now is None else now.file)
+        now = now or Written("", OWN)
+        if trusted and now.trust is not True:
+            now = replace(now, trust=frozenset(trusted).union(now.trust or ()))
+        return replace(now, text=text)
 
     def save(self, file: Path) -> None:
-        """Write the scene to a file, which becomes its file; a `Refusal` where that fails."""
+        """Write the scene to a file, which becomes its file; a `Refusal` where that fails.
+
+        Files that it names are copied to the same folder.
+        """
         settings = self._history.settings
-        write_whole(file, text_of(settings))
-        if settings.written is not None:
-            self._history.change("Save the scene", -1, written=replace(settings.written, file=file))
+        if settings.written is None:
+            write_whole(file, text_of(settings))
+            return
+        text = _with_files_in(file.parent, settings.written)
+        write_whole(file, text)
+        self._history.change(
+            "Save the scene", -1, written=replace(settings.written, text=text, file=file)
+        )
 
     def force(self, effect: str, how: str) -> None:
         """Force an effect on or off, or by plan; raises `Refusal` for a text that is no TOML."""
@@ -67,14 +83,20 @@ class SceneEditing:
         if written is not None:
             self._history.change(f"Selection of {effect_name(effect).lower()}", -1, written=written)
 
-    def replace_object(self, table: Mapping[str, Any], x: float, y: float, force: float) -> None:
-        """Replace the object by that of the TOML `table`, at (x, y) in m with `force` in N."""
+    def replace_object(
+        self, table: Mapping[str, Any], x: float, y: float, force: float, *trusted: Path
+    ) -> None:
+        """Replace the object by that of the TOML `table`, at (x, y) in m with `force` in N.
+
+        The table may name the `trusted` files.
+        """
         written = self._edited(
             replaced(
                 text_of(self._history.settings),
                 0,
                 {**table, "x": round(x, 6), "y": round(y, 6), "force": float(f"{force:.4g}")},
-            )
+            ),
+            *trusted,
         )
         if written is not None:
             self._history.change("Select the object", -1, written=written)
@@ -140,3 +162,45 @@ class SceneEditing:
         elif self._held is None:
             self._history.cancel(self._gesture)
         self._gesture, self._held = -1, None
+
+
+_LARGEST = 2**30  # bytes of a file that is copied
+
+
+def _with_files_in(folder: Path, written: Written) -> str:
+    """The text, with the files that it names in `folder` or below: those elsewhere are copied.
+
+    What cannot be read stays as it is. A `Refusal` where another file has the name of a copy.
+    """
+    text = written.text
+    try:
+        files = named(text)
+    except Refusal:  # no TOML
+        return text
+    for place, name in files:
+        try:
+            file = named_file(name, written.file.parent, written.trust)
+            inside = file.is_relative_to(folder.resolve())
+            content = b"" if inside else read_file(file, _LARGEST)
+        except (Refusal, OSError):
+            continue
+        if not inside:
+            _copy(content, folder / file.name)
+        relative = file.relative_to(folder.resolve()) if inside else Path(file.name)
+        text = put(text, place, relative.as_posix())
+    return text
+
+
+def _copy(content: bytes, to: Path) -> None:
+    try:
+        there = read_file(to, _LARGEST)
+    except FileNotFoundError:
+        write_whole(to, content)
+        return
+    except OSError as error:
+        raise Refusal(f"{to}: cannot be read ({error}); save the scene elsewhere") from error
+    if there != content:
+        raise Refusal(
+            f"{to}: expected no other file of the name of one that the scene needs; save the scene "
+            "in another folder, or rename one of them"
+        )

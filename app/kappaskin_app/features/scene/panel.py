@@ -26,6 +26,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from kappaskin._text import printable
 from kappaskin_app.features.scene.gallery import GalleryPanel
 from kappaskin_app.features.scene.plan import EffectsPanel
 from kappaskin_app.features.scene.scene_form import SceneForm
@@ -201,6 +202,8 @@ class SceneEditor(QWidget):
         super().__init__()
         self.form, self.text = SceneForm(), SceneText()
         self.name, self.message = QLabel(), text_label()
+        for label in (self.name, self.message):
+            label.setTextFormat(Qt.TextFormat.PlainText)
         self.message.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.save = button(
             "Save as\N{HORIZONTAL ELLIPSIS}",
@@ -232,7 +235,7 @@ class SceneEditor(QWidget):
 
     def show_scene(self, text: str, name: str) -> None:
         """Show the text of the scene `name`."""
-        self.name.setText(name)
+        self.name.setText(printable(name))
         self.text.show_text(text)
         self.form.show_text(text)
 
@@ -240,7 +243,8 @@ class SceneEditor(QWidget):
         """Show why the text is refused, and mark its line; nothing if it is not."""
         line = _LINE.search(why)
         self.text.show_error(int(line[1]) if line else 0)
-        self.message.setText(f"The previous scene is still simulated: {why}" if why else "")
+        said = printable(f"The previous scene is still simulated: {why}")
+        self.message.setText(said if why else "")
         self.message.setVisible(bool(why))
 
 

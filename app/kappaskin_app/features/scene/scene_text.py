@@ -324,6 +324,19 @@ def replaced(text: str, touch: int, values: Mapping[str, Any]) -> str:
     return tomlkit.dumps(document)
 
 
+def named(text: str) -> list[tuple[Place, str]]:
+    """The files that a scene names, each with its place; raises `Refusal` for invalid TOML."""
+    many = parsed(text).get("touch", ())
+    each = {("touch",): many} if isinstance(many, Mapping) else {}
+    each |= {("touch", n): one for n, one in enumerate(many)} if not each else {}
+    return [
+        ((*place, key), str(one[key]))
+        for place, one in each.items()
+        for key in ("file", "recorded")
+        if isinstance(one, Mapping) and isinstance(one.get(key), str)
+    ]
+
+
 def _touch(document: Any, touch: int) -> Any:
     many = document.get("touch", ())
     each = [many] if isinstance(many, AbstractTable) else many  # a single table is an array of one

@@ -131,10 +131,14 @@ class Skin:
 
 @dataclass(frozen=True)
 class Written:
-    """The TOML `text` of a scene; its name and the paths in it are those of `file`."""
+    """The TOML `text` of a scene; its name and the paths in it are those of `file`.
+
+    `trust` says whether, or which, files outside the folder of `file` it may name.
+    """
 
     text: str
     file: Path
+    trust: bool | frozenset[Path] = False
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from kappaskin._text import printable
 from kappaskin.bases import Basis
 from kappaskin.contact import surface_geometry
 from kappaskin.errors import Refusal
@@ -146,7 +147,8 @@ class StlSurfaces(SurfaceWriter):
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         length = np.linalg.norm(normals, axis=-1, keepdims=True)
         facets["normal"] = normals / np.where(length > 0, length, 1.0)
-        head = f"{self.info.program}, {self.info.sensor.name}, {frame.at:.6f} s, in m"
+        name = printable(self.info.sensor.name)
+        head = f"{self.info.program}, {name}, {frame.at:.6f} s, in m"
         # Shorter than 80 bytes it is filled with zeros.
         with path.open("wb") as file:
             file.write(np.array(head.encode("ascii", "replace")[:80], "S80").tobytes())

@@ -15,6 +15,7 @@ from typing import IO, Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from kappaskin._text import json_cells
 from kappaskin.errors import lacking
 from kappaskin.pipeline import ACROSS, ALONG, ELEMENT, REPORTED, Getter
 from kappaskin.recording.export.request import ExportedFrame, ExportRequest, RecordingInfo
@@ -153,7 +154,7 @@ class CsvTable(TableWriter):
         self._file = self.path.open("w", encoding="utf-8", newline="\n")
         facts = self.info.facts | {"columns": {c.name: c.text for c in self.columns}}
         heads = [head for column in self.columns for head in column.heads()]
-        lines = [f"# {name}: {json.dumps(value)}" for name, value in facts.items()]
+        lines = [f"# {name}: {json_cells(value)}" for name, value in facts.items()]
         try:
             self._file.write("\n".join([*lines, ",".join(heads), ""]))
         except OSError:  # nobody else closes what was not begun

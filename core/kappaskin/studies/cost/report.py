@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from kappaskin._files import write_whole
+from kappaskin._text import printable
 from kappaskin.errors import Refusal
 from kappaskin.scenes import Scene
 from kappaskin.studies.cost import (
@@ -108,7 +109,7 @@ def effects_text(scene: Scene, setting: Setting, found: Sequence[EffectCost]) ->
     """The costs `found` of effects, with `setting`, as a table."""
     how = setting.method, "{} x {} functions".format(*setting.functions)
     lines = [
-        f"What each effect costs in the scene {scene.name}, with {', '.join(how)}",
+        f"What each effect costs in the scene {printable(scene.name)}, with {', '.join(how)}",
         "us      computing time that it adds to a simulated frame",
         "bound   largest change of a reading if it is omitted, as a share of the peak",
         f"RMS     error over the skin, mean of {FRAMES} frames all over the scene",
@@ -149,8 +150,9 @@ def costs_text(scene: Scene, costs: Sequence[Cost | Refused]) -> str:
 
 def _intro(scene: Scene) -> str:
     patch, each = scene.plate.patch, scene.transduction.channel_time
+    name = printable(scene.name)
     return f"""\
-What accuracy costs in the scene {scene.name}: a {patch.name}, {1e6 * each:g} us per channel
+What accuracy costs in the scene {name}: a {patch.name}, {1e6 * each:g} us per channel
 frame   median from readings to coefficients, and over numpy.linalg.lstsq on the same operator
 scan    conversion of the channels; set-up to the first answer, memory at its highest point
 RMS     error over the skin, mean of {DRAWS} frames with the scene's noise; exact: without noise

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from kappaskin._files import write_whole
+from kappaskin._text import cell, printable
 from kappaskin.studies.design.measures import MEASURES, StudyMeasure
 from kappaskin.studies.design.results import (
     Mean,
@@ -102,7 +103,7 @@ def table_text(study: Study, known: Sequence[PointResults]) -> str:
         "  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
         for row in rows
     ]
-    title = f"{study.title}: means with their 95 % intervals"
+    title = f"{printable(study.title)}: means with their 95 % intervals"
     return "\n".join([title, "", *lines, *([""] if remarks_on(study, known) else []),
                       *remarks_on(study, known)])  # fmt: skip
 
@@ -115,7 +116,8 @@ def table_csv(study: Study, known: Sequence[PointResults]) -> str:
     write([*study.places, *(f"{name} {part}{_unit(name, part)}" for name in study.measures
                             for part in parts), "blocks", "blocks failed"])  # fmt: skip
     for one in known:
-        values = [value if isinstance(value, str | float | int) else value_text(value)
+        values = [cell(value) if isinstance(value, str)
+                  else value if isinstance(value, float | int) else value_text(value)
                   for value in one.point.values.values()]  # fmt: skip
         figures = list[Any]()
         for name in study.measures:
@@ -173,11 +175,12 @@ def page_of(study: Study, known: Sequence[PointResults], figures: Mapping[str, s
         "are bit-identical, except times.</p>",
         f"<pre>{html.escape(study.text)}</pre>",
     ]
-    return (
+    return printable(
         f"<!doctype html>\n<html lang='en'><head><meta charset='utf-8'><meta name='viewport' "
         f"content='width=device-width'><title>{html.escape(study.title)}</title>"
         f"<style>{_STYLE}</style></head><body>\n" + "\n".join(filter(None, parts))
-        + "\n</body></html>\n"
+        + "\n</body></html>\n",
+        keep="\n\t",
     )  # fmt: skip
 
 

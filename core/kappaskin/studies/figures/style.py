@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from kappaskin._text import printable
 from kappaskin.errors import lacking
 from kappaskin.frames import Array
 
@@ -114,7 +115,8 @@ def place(figure: Figure, box: tuple[float, float, float, float], **kind: Any) -
 def write(figure: Figure, x: float, y: float, text: str, **look: Any) -> None:
     """Text that begins at `x`, `y` in mm of the sheet; a minus is as wide as a plus."""
     W, H = figure.get_size_inches() * 25.4
-    figure.text(x / W, y / H, re.sub(r"-(?=\d)", "−", text), **look)
+    text = printable(re.sub(r"-(?=\d)", "−", text), keep="\n")
+    figure.text(x / W, y / H, text, parse_math=False, **look)  # a name may have a $
 
 
 def letter(figure: Figure, x: float, y: float, text: str, title: str) -> None:

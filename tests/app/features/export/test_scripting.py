@@ -196,6 +196,10 @@ _QUOTED = "title = \"It's \\\\ '''\"\n"
             Settings(serve_foxglove=True, allowed_pages="https://a"),
             ("engine.publish(['foxglove://127.0.0.1:8765'], ['https://a'])",),
         ),
+        (
+            Settings(written=Written("", Path("a.toml"), frozenset({Path("b.stl")}))),
+            ('a.toml"), trust=True)',),
+        ),
     ],
 )
 def test_a_script_is_short_and_says_what_is_asked_for(

@@ -279,3 +279,20 @@ def test_figures_without_an_estimate_are_settings_and_nothing_else() -> None:
     assert set(found) == set(KINDS)
     assert found["functions_x"] == 8.0
     assert math.isnan(found["error_rms"])
+
+
+@pytest.mark.parametrize(
+    "says",
+    [
+        "![picture](/etc/passwd)",
+        "![picture][one]\n\n[one]: /etc/passwd",
+        "<img src=/etc/passwd>",
+        "<table background=/etc/passwd>",
+        "</b>",
+        "<!-- hidden -->",
+    ],
+)
+def test_a_text_that_names_files_is_refused_with_its_line(says: str) -> None:
+    with pytest.raises(Refusal, match=r"x, line 7: expected a text without pictures and HTML"):
+        lesson_of(f"{HEAD}## One\nText\n{says}\n", "x")
+    assert lesson_of(f"{HEAD}## One\nIf force < 2 and x<3! [a link](b)\n", "x").steps
