@@ -19,7 +19,7 @@ ROOMS = (
 LIMITS = {
     "modules": 325,  # _text; publish.access, the one check of who connects
     "statements": 35_617,  # limits of what comes in, floods, leftovers, access, text from outside
-    # _files: one way to read and write a file; _text: text from outside. For every room and the app.
+    # _files: one way to read and write files; _text: text from outside. For all rooms and the app.
     "loose modules of core": 10,
     "loose modules of the app": 8,
     "names of the library": 55,

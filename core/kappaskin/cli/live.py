@@ -1,7 +1,6 @@
 """Commands on live estimates: publish, listen."""
 
 import math
-import sys
 import time
 from contextlib import closing
 from typing import TYPE_CHECKING, Annotated
