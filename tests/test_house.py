@@ -151,6 +151,21 @@ def test_text_reaches_a_terminal_by_one_helper() -> None:
     assert {module: lines for module, lines in found.items() if lines} == {}
 
 
+def test_labels_show_markup_as_it_is() -> None:
+    """A label that is no `Label` takes what looks like markup, as in a device's name, for such."""
+    found = {
+        module: [
+            node.lineno
+            for node in ast.walk(tree)
+            if (isinstance(node, ast.Call) and ast.unparse(node.func) == "QLabel")
+            or (isinstance(node, ast.ClassDef) and "QLabel" in map(ast.unparse, node.bases))
+        ]
+        for module, tree in modules().items()
+    }
+    assert [module for module, lines in found.items() if lines] == ["kappaskin_app.widgets.parts"]
+    assert len(found["kappaskin_app.widgets.parts"]) == 1
+
+
 def test_core_is_sixteen_rooms() -> None:
     folders = {file.parent.name for file in PACKAGES["kappaskin"].glob("*/__init__.py")}
     assert folders == set(ROOMS)

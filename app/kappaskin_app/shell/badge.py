@@ -4,13 +4,13 @@ import math
 
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QAction, QColor, QFontInfo, QMouseEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import QLabel, QSizePolicy, QToolBar, QWidget
+from PySide6.QtWidgets import QSizePolicy, QToolBar, QWidget
 
 from kappaskin.live import Status
 from kappaskin.recording import Replay
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
 from kappaskin_app.theme import Theme, current
-from kappaskin_app.widgets.parts import sentence
+from kappaskin_app.widgets.parts import Label, sentence
 
 LIVE, SIM, WAITING = "LIVE", "SIM", "WAITING"
 STALE, LOST, OFF = "STALE", "LOST", "OFF"
@@ -54,7 +54,7 @@ def origin(state: str) -> str:
     return state.partition(_BESIDE)[0]
 
 
-class Badge(QLabel):
+class Badge(Label):
     """Shows one of the states in its colour; `clicked` requests the event log."""
 
     clicked = Signal()

@@ -8,7 +8,6 @@ from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QCursor, QResizeEvent
 from PySide6.QtWidgets import (
     QHBoxLayout,
-    QLabel,
     QMenu,
     QPushButton,
     QToolButton,
@@ -19,6 +18,7 @@ from PySide6.QtWidgets import (
 from kappaskin._text import printable
 from kappaskin_app.guard import guarded
 from kappaskin_app.widgets.layout import Flow
+from kappaskin_app.widgets.parts import Label, plain_tip
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,7 @@ class ActionBanner(QWidget):
         super().__init__(parent)
         self.setObjectName("offer")
         self.setAccessibleName("Banner")
-        self.words, self.away = QLabel(), QToolButton()
-        self.words.setTextFormat(Qt.TextFormat.PlainText)
+        self.words, self.away = Label(), QToolButton()
         self.buttons: list[QPushButton] = []
         self.away.setText("\N{MULTIPLICATION SIGN}")
         self.away.setAccessibleName("Close the banner")
@@ -67,7 +66,7 @@ class ActionBanner(QWidget):
             self._flow.removeWidget(button)
             button.deleteLater()
         self.words.setText(printable(words, keep="\n"))
-        self.words.setToolTip(tip)
+        self.words.setToolTip(plain_tip(tip))
         self.buttons = [self._button(each) for each in offered]
         for before, after in pairwise([self, *self.buttons, self.away]):
             QWidget.setTabOrder(before, after)

@@ -15,7 +15,6 @@ from PySide6.QtWidgets import (
     QFrame,
     QHeaderView,
     QKeySequenceEdit,
-    QLabel,
     QLineEdit,
     QTabWidget,
     QToolButton,
@@ -33,6 +32,7 @@ from kappaskin_app.shell.parts import Parts
 from kappaskin_app.shell.settings import form_field
 from kappaskin_app.shell.settings.form_fields import Choice
 from kappaskin_app.widgets.layout import scroll_to
+from kappaskin_app.widgets.parts import Label, plain_tip
 
 _NOT_NOW = "not available with the present settings"
 
@@ -288,7 +288,7 @@ def row(texts: tuple[str, str, str], of: object, grey: bool = False) -> QTreeWid
     made.setSizeHint(0, QSize(0, QFontMetrics(QApplication.font()).height() + _ROOM))
     faint = QApplication.palette().placeholderText()
     for column in range(2):
-        made.setToolTip(column, texts[column])
+        made.setToolTip(column, plain_tip(texts[column]))
         if grey or column:
             made.setForeground(column, faint)
     return made
@@ -310,7 +310,7 @@ class Finder(QDialog):
         self.setWindowTitle("Find a command")
         self._window, self._get_entries, self._entries = parent, entries, list[FinderEntry]()
         self.recent: list[str] = []
-        self.line, self.hint = QLineEdit(), QLabel(_HINT)
+        self.line, self.hint = QLineEdit(), Label(_HINT)
         self.list = Listing(self.line)
         self.line.setPlaceholderText(
             "A command, a setting, a scene, a panel, a file\N{HORIZONTAL ELLIPSIS}"

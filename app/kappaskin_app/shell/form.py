@@ -21,7 +21,6 @@ from PySide6.QtWidgets import (
     QComboBox,
     QDoubleSpinBox,
     QFormLayout,
-    QLabel,
     QLineEdit,
     QMenu,
     QSizePolicy,
@@ -37,6 +36,7 @@ from kappaskin.live import Status
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.settings import Settings, form_field
 from kappaskin_app.shell.settings.form_fields import Choice, FormField, Range, Several, Switch, Text
+from kappaskin_app.widgets.parts import Label
 
 _ITS = QKeySequence.StandardKey
 _LEFT = (_ITS.Undo, _ITS.Redo, _ITS.DeleteEndOfLine)  # the last is Ctrl+K to an editor
@@ -341,7 +341,7 @@ class Form(Panel):
         editor.widget.setObjectName(name)
         pass_window_keys(editor.widget)
         self._editors[name] = editor
-        label = QLabel("" if isinstance(how, Switch) else how.label)
+        label = Label("" if isinstance(how, Switch) else how.label)
         label.setBuddy(editor.widget)
         label.setToolTip(how.tip)
         self.form.addRow(label, self.field(name, editor.widget))

@@ -12,7 +12,7 @@ from kappaskin_app.shell.finder import EntrySource, Finder, entries_in
 from kappaskin_app.shell.parts import EDIT, FILE, HELP, VIEW, Parts
 from kappaskin_app.shell.shortcuts import ShortcutDialog
 from kappaskin_app.shell.welcome import Welcome
-from kappaskin_app.widgets.parts import ELLIPSIS
+from kappaskin_app.widgets.parts import ELLIPSIS, plain_tip
 
 _LONGEST = 60  # characters of a step in a menu
 _TIPS = {
@@ -47,7 +47,7 @@ class UndoActions(QObject):
             word, action = name.capitalize(), self._actions[name]
             cut = text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}{ELLIPSIS}"
             action.setText(f"&{word}: {cut.replace('&', '&&')}" if text else f"&{word}")
-            action.setToolTip(f"{word}: {text}" if text else _TIPS[name])
+            action.setToolTip(plain_tip(f"{word}: {text}") if text else _TIPS[name])
             self._actions.allow(name, "" if text else f"there is nothing to {name}")
 
 

@@ -6,7 +6,6 @@ from PySide6.QtWidgets import (
     QApplication,
     QGroupBox,
     QHBoxLayout,
-    QLabel,
     QToolButton,
     QVBoxLayout,
     QWidget,
@@ -18,6 +17,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.theme import ALERT, FAINT, current, follow_look
 from kappaskin_app.widgets.layout import scroll_to
+from kappaskin_app.widgets.parts import Label
 from kappaskin_app.widgets.text import COMMAND
 
 _GROWN = 20  # ms after which the page of a panel that grew has grown too
@@ -40,8 +40,7 @@ class Panel(QGroupBox):
 
     def __init__(self, title: str, parent: QWidget | None = None) -> None:
         super().__init__(title, parent)
-        self.message = QLabel(wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
-        self.message.setTextFormat(Qt.TextFormat.PlainText)
+        self.message = Label(wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
         how = Qt.TextInteractionFlag
         self.message.setTextInteractionFlags(
             how.TextSelectableByMouse | how.TextSelectableByKeyboard
@@ -49,7 +48,7 @@ class Panel(QGroupBox):
         self._hint = False
         self._grown = QTimer(self, singleShot=True, interval=_GROWN)  # pyright: ignore[reportCallIssue]
         self._grown.timeout.connect(guarded(self._scroll_to_message))
-        self.about = QLabel(wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
+        self.about = Label(rich=True, wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
         self.about.setForegroundRole(FAINT)
         self.about.setTextInteractionFlags(how.TextBrowserInteraction)
         self.about.linkActivated.connect(self.guide_requested)

@@ -6,7 +6,6 @@ from PySide6.QtWidgets import (
     QDialog,
     QFormLayout,
     QKeySequenceEdit,
-    QLabel,
     QLineEdit,
     QTreeWidgetItem,
     QVBoxLayout,
@@ -18,7 +17,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions, plain
 from kappaskin_app.shell.finder import Listing, best, clearable, row, score
 from kappaskin_app.shell.history import History
-from kappaskin_app.widgets.parts import button, in_a_row
+from kappaskin_app.widgets.parts import Label, button, in_a_row
 
 _MOUSE = "Drag the red arrow to move the load, drag elsewhere to turn, wheel to zoom."
 _SIZE = 620, 640  # px
@@ -49,7 +48,7 @@ class ShortcutDialog(QDialog):
         clearable(self.edit)
         self.edit.setAccessibleName("Shortcut of the selected command")
         self.edit.setToolTip("Press the new shortcut of the selected command.")
-        self.name, self.message = QLabel(), QLabel(_MOUSE, wordWrap=True)  # pyright: ignore[reportCallIssue]
+        self.name, self.message = Label(), Label(_MOUSE, wordWrap=True)  # pyright: ignore[reportCallIssue]
         self.reset = button(
             "&Reset this", "reset-key", "Restore the default shortcut of this command."
         )

@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QGuiApplication, QMouseEvent, QPainter, QPaint
 from PySide6.QtWidgets import QApplication, QLabel, QVBoxLayout, QWidget
 
 from kappaskin_app.theme import FAINT, current
-from kappaskin_app.widgets.parts import ELLIPSIS
+from kappaskin_app.widgets.parts import ELLIPSIS, Label
 
 if TYPE_CHECKING:
     from kappaskin_app.shell.parts import Parts
@@ -27,12 +27,12 @@ class Splash(QWidget):
         # Closed before there is a window, it would end the program.
         self.setAttribute(Qt.WidgetAttribute.WA_QuitOnClose, False)
         self._watching: QMetaObject.Connection | None = None
-        self.words = QLabel()
+        self.words = Label()
         self.words.setForegroundRole(FAINT)
         layout = QVBoxLayout(self)
         margin = self.fontMetrics().height()
         layout.setContentsMargins(2 * margin, margin, 2 * margin, margin)
-        for label in (_name(), QLabel("The shape of a skin from its curvature"), self.words):
+        for label in (_name(), Label("The shape of a skin from its curvature"), self.words):
             layout.addWidget(label)
         self.setFixedSize(_WIDTH * self.fontMetrics().averageCharWidth(), self.sizeHint().height())
         self.move(QGuiApplication.primaryScreen().geometry().center() - self.rect().center())
@@ -68,7 +68,7 @@ class Splash(QWidget):
 
 
 def _name() -> QLabel:
-    name = QLabel("Kappaskin")
+    name = Label("Kappaskin")
     font = name.font()
     font.setPointSizeF(2 * font.pointSizeF())
     font.setBold(True)

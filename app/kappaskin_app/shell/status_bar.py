@@ -1,15 +1,16 @@
 """The status bar: messages, warnings, the object in contact, background tasks."""
 
 import numpy as np
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtGui import QPalette
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QStatusBar, QToolButton, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QStatusBar, QToolButton, QWidget
 
 from kappaskin.estimation import FAULTS
 from kappaskin.frames import Estimate
 from kappaskin_app.theme import ALERT
 from kappaskin_app.widgets.layout import row
 from kappaskin_app.widgets.line import Line
+from kappaskin_app.widgets.parts import Label
 
 _ACTIVITY_TIP = "Background tasks."
 
@@ -21,8 +22,7 @@ class Activity(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.words, self.cancel = QLabel(), QToolButton()
-        self.words.setTextFormat(Qt.TextFormat.PlainText)
+        self.words, self.cancel = Label(), QToolButton()
         self.words.setToolTip(_ACTIVITY_TIP)
         self.cancel.setText("Cancel")
         self.cancel.setToolTip("Cancel this task.")
@@ -78,7 +78,7 @@ def warnings(estimate: Estimate, strained: int) -> str:
     return words[:1].upper() + words[1:]
 
 
-class Notice(QLabel):
+class Notice(Label):
     """Shows a hint, or a warning in the colour of alarms."""
 
     def __init__(self, hint: str) -> None:

@@ -3,12 +3,10 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QDialog,
     QFormLayout,
     QHBoxLayout,
-    QLabel,
     QLineEdit,
     QProgressBar,
     QPushButton,
@@ -20,6 +18,7 @@ from kappaskin._text import printable
 from kappaskin.errors import Refusal
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import BackgroundTask, Tasks, Work
+from kappaskin_app.widgets.parts import Label
 
 _WIDTH = 560  # px
 
@@ -49,14 +48,13 @@ class WorkDialog(QDialog):
         self.task = BackgroundTask(tasks, task, self._take, self._refuse, cancelled=cancelled)
         self.setWindowTitle(title)
         self.setMinimumWidth(_WIDTH)
-        self.form, self.bar, self.words = QFormLayout(), QProgressBar(), QLabel()
+        self.form, self.bar, self.words = QFormLayout(), QProgressBar(), Label()
         self.bar.setRange(0, 1000)
         keeping = self.bar.sizePolicy()
         keeping.setRetainSizeWhenHidden(True)
         self.bar.setSizePolicy(keeping)
         self.bar.hide()  # while there is no progress to show
         self.words.setWordWrap(True)
-        self.words.setTextFormat(Qt.TextFormat.PlainText)
         self.to = QLineEdit()
         self.choose_file = browse_button(self._choose_file)
         self.needed, self.inputs = [self.to], list[QWidget]((self.to, self.choose_file))
@@ -70,7 +68,7 @@ class WorkDialog(QDialog):
 
     def _add_file(self, words: str, line: QLineEdit, button: QPushButton) -> None:
         """Add a line for a path, called `words`, with a button to choose it."""
-        label, row = QLabel(words), QHBoxLayout()
+        label, row = Label(words), QHBoxLayout()
         label.setBuddy(line)
         row.addWidget(line, 1)
         row.addWidget(button)

@@ -3,10 +3,11 @@
 import numpy as np
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
-from PySide6.QtWidgets import QLabel, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QToolButton, QVBoxLayout, QWidget
 
 from kappaskin_app.theme import DIVERGING, SEQUENTIAL, Colours
 from kappaskin_app.widgets.lettering import read_from_afar
+from kappaskin_app.widgets.parts import Label
 from kappaskin_app.widgets.text import in_digits
 from kappaskin_app.widgets.tint import Tint
 
@@ -136,12 +137,12 @@ class SkinScale(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.what = QLabel(alignment=Qt.AlignmentFlag.AlignHCenter)  # pyright: ignore[reportCallIssue]
+        self.what = Label(rich=True, alignment=Qt.AlignmentFlag.AlignHCenter)  # pyright: ignore[reportCallIssue]
         self.bar, self.lock = ColourBar(), LockButton()
         self.bar.show_scale(SEQUENTIAL, (0.0, 1.0), "mm")
         self.lock.wanted.connect(self.lock_wanted)
         self._symbol = ""
-        self.times = QLabel(alignment=Qt.AlignmentFlag.AlignHCenter)  # pyright: ignore[reportCallIssue]
+        self.times = Label(alignment=Qt.AlignmentFlag.AlignHCenter)  # pyright: ignore[reportCallIssue]
         self.times.setToolTip(
             "Vertical exaggeration in use: the one set under View, or less where it would not fit."
         )

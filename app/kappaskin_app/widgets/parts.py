@@ -47,13 +47,22 @@ def plain_tip(text: str) -> str:
     return rich if Qt.mightBeRichText(text) else text
 
 
-def text_label(text: str = "", tip: str = "") -> QLabel:
-    label = QLabel(text, wordWrap=True)  # pyright: ignore[reportCallIssue]
+class Label(QLabel):
+    """A label that shows markup as it is, unless its own text is `rich`."""
+
+    def __init__(self, text: str = "", *, rich: bool = False, **properties: object) -> None:
+        super().__init__(text, **properties)  # pyright: ignore[reportArgumentType, reportCallIssue]
+        kind = Qt.TextFormat.RichText if rich else Qt.TextFormat.PlainText
+        self.setTextFormat(kind)
+
+
+def text_label(text: str = "", tip: str = "", *, rich: bool = False) -> Label:
+    label = Label(text, rich=rich, wordWrap=True)  # pyright: ignore[reportCallIssue]
     label.setToolTip(tip)
     return label
 
 
-class Heading(QLabel):
+class Heading(Label):
     """A label in bold letters, so many `times` as large as those of now."""
 
     def __init__(self, times: float) -> None:

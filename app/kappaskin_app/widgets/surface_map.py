@@ -3,12 +3,13 @@
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from kappaskin.frames import Array
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, SEQUENTIAL, Colours, current, follow_look
 from kappaskin_app.widgets.colour_bar import ColourBar
 from kappaskin_app.widgets.line import Line
+from kappaskin_app.widgets.parts import Label
 from kappaskin_app.widgets.tint import Tint
 
 _DOT = 1.8  # px, the radius of a point
@@ -96,7 +97,7 @@ class SurfaceMap(QWidget):
 
     def __init__(self, title: str, unit: str, tip: str) -> None:
         super().__init__()
-        self.title, self.words = QLabel(title), Line()
+        self.title, self.words = Label(title), Line()
         bold = self.title.font()
         bold.setBold(True)
         self.title.setFont(bold)

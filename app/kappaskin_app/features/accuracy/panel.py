@@ -6,7 +6,6 @@ from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtWidgets import (
     QGridLayout,
     QHBoxLayout,
-    QLabel,
     QProgressBar,
     QSlider,
     QVBoxLayout,
@@ -25,7 +24,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.effects import EffectsTable
 from kappaskin_app.theme import ALERT, FAINT, follow_look, grown, slider_style
 from kappaskin_app.widgets.line import Line
-from kappaskin_app.widgets.parts import ELLIPSIS, button, sentence, text_label
+from kappaskin_app.widgets.parts import ELLIPSIS, Label, button, sentence, text_label
 from kappaskin_app.widgets.plots import LogAxis
 from kappaskin_app.widgets.text import NONE, duration, length
 
@@ -51,7 +50,7 @@ class CostPanel(QWidget):
             "Largest permissible RMS error of the shape. Releasing the slider selects the setting "
             "that reaches it with the least computing time (Ctrl+Z undoes)."
         )
-        self.required_text = QLabel()
+        self.required_text = Label()
         self.cheapest = text_label()
         self.cheapest.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.again = button(
@@ -63,7 +62,7 @@ class CostPanel(QWidget):
         self.bar = QProgressBar(textVisible=False)  # pyright: ignore[reportCallIssue]
         self.bar.setFixedHeight(8)
         self.bar.setToolTip("Measured settings.")
-        self.count, self.message = QLabel(), text_label()
+        self.count, self.message = Label(), text_label()
         self.effects, self.no_effects = EffectsTable(), text_label()
         self.no_effects.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.no_effects.setForegroundRole(FAINT)
@@ -101,7 +100,7 @@ class CostPanel(QWidget):
             "second; the error is known in simulations only.",
         }
         for row, (name, tip) in enumerate(tips.items()):
-            label = QLabel(name)
+            label = Label(name)
             label.setToolTip(tip)
             grid.addWidget(label, row, 0)
             for column, what in enumerate(("RMS error", "time"), 1):
@@ -111,7 +110,7 @@ class CostPanel(QWidget):
         grid.setColumnStretch(2, 3)
         right.addLayout(grid)
         accuracy = QHBoxLayout()
-        label = QLabel("Re&quired accuracy")
+        label = Label("Re&quired accuracy")
         label.setBuddy(self.required)
         label.setToolTip(self.required.toolTip())
         accuracy.addWidget(label)
@@ -140,7 +139,7 @@ class CostPanel(QWidget):
 
     def _make_effects(self) -> QWidget:
         """The table of effects, with its title."""
-        title = QLabel("Cost of each effect")
+        title = Label("Cost of each effect")
         bold = title.font()
         bold.setBold(True)
         title.setFont(bold)

@@ -1,11 +1,12 @@
 """Pages of the calibration: start, steps and result."""
 
+from html import escape
+
 import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QFormLayout,
     QGridLayout,
-    QLabel,
     QLineEdit,
     QProgressBar,
     QVBoxLayout,
@@ -27,6 +28,7 @@ from kappaskin_app.theme import current, follow_look
 from kappaskin_app.widgets.parts import (
     ELLIPSIS,
     Heading,
+    Label,
     button,
     in_a_row,
     number,
@@ -68,7 +70,7 @@ class StartPage(QWidget):
             ("Time per step", self.seconds),
             ("Initial hold", self.hold),
         ):
-            label = QLabel(words)
+            label = Label(words)
             label.setBuddy(editor)
             label.setToolTip(editor.toolTip())
             form.addRow(label, editor)
@@ -114,7 +116,7 @@ class CylinderStepPage(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.number = QLabel()
+        self.number = Label()
         self.bar = QProgressBar(textVisible=False)  # pyright: ignore[reportCallIssue]
         self.bar.setFixedHeight(8)
         self.bar.setToolTip("Progress of the steps.")
@@ -134,7 +136,7 @@ class CylinderStepPage(QWidget):
         self.read = QGridLayout()
         self.read.setVerticalSpacing(2)
         self.heading = text_label()
-        self.cells = [[QLabel() for _ in range(3)] for _ in COMPONENTS]
+        self.cells = [[Label() for _ in range(3)] for _ in COMPONENTS]
         self._arrange()
 
     def _arrange(self) -> None:
@@ -145,11 +147,11 @@ class CylinderStepPage(QWidget):
             ("noise", "Standard deviation of one frame, the median of the elements."),
         )
         for column, (words, tip) in enumerate(heads):
-            head = QLabel(f"<i>{words}</i>")
+            head = Label(f"<i>{words}</i>", rich=True)
             head.setToolTip(tip)
             self.read.addWidget(head, 0, column, Qt.AlignmentFlag.AlignRight)
         for row, name in enumerate(COMPONENTS, 1):
-            self.read.addWidget(QLabel(name), row, 0)
+            self.read.addWidget(Label(name), row, 0)
             for column, cell in enumerate(self.cells[row - 1], 1):
                 self.read.addWidget(cell, row, column, Qt.AlignmentFlag.AlignRight)
         around = QVBoxLayout(self)
@@ -234,12 +236,13 @@ class ResultPage(QWidget):
         super().__init__()
         self.passed = Heading(1.3)
         self.errors = text_label(
+            rich=True,
             tip="RMS of the residuals from the cylinders' curvature, and the largest difference of "
             "readings at falling and rising radius. Both with a straight line for each gage pair "
-            "(section 5 of the paper), and with hysteresis compensated."
+            "(section 5 of the paper), and with hysteresis compensated.",
         )
         self.map, self.plot, self.channel = PassMap(), LoopPlot(), text_label()
-        self.worst = text_label(tip="Click a channel to see its readings.")
+        self.worst = text_label(tip="Click a channel to see its readings.", rich=True)
         self.worst.setTextInteractionFlags(
             Qt.TextInteractionFlag.LinksAccessibleByMouse
             | Qt.TextInteractionFlag.LinksAccessibleByKeyboard
@@ -301,7 +304,7 @@ class ResultPage(QWidget):
         elements, failures = len(report.passed) // 3, dict(report.calibration.failures)
         lines = [
             f'<a href="{c}" style="color: {current().accent}">{_name(c, elements)}</a>: '
-            + failures.get(c, f"error {report.fitted.left_out[c]:.2f} 1/m")
+            + escape(failures.get(c, f"error {report.fitted.left_out[c]:.2f} 1/m"))
             for c in self._worst
         ]
         self.worst.setText("<br>".join(["Worst:", *lines]))

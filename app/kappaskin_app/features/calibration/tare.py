@@ -14,7 +14,7 @@ from kappaskin_app.shell.history import History
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.session import RECORDED
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.widgets.parts import button, in_a_row, sentence, text_label
+from kappaskin_app.widgets.parts import button, in_a_row, plain_tip, sentence, text_label
 
 
 class TareController(QObject):
@@ -218,7 +218,7 @@ class TarePanel(Panel):
         why_not = tare_controller.why_not if tare_controller else ""
         self.take.setEnabled(tare_controller is not None and not why_not)
         self.take.setText("Taring\N{HORIZONTAL ELLIPSIS}" if status.tare.taking else "Tare now")
-        self.take.setToolTip(why_not or _TAKE)
+        self.take.setToolTip(plain_tip(why_not or _TAKE))
         alarm = (tare_controller.message if tare_controller else "") or unfit(tare, status)
         hint = "" if status.tare.taking else why_not
         self.show_message(sentence(alarm or hint), hint=not alarm)

@@ -7,7 +7,6 @@ from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
     QHBoxLayout,
-    QLabel,
     QLineEdit,
     QPushButton,
     QWidget,
@@ -23,7 +22,7 @@ from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.form import pass_window_keys
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.settings import calibration_text
-from kappaskin_app.widgets.parts import plain_tip
+from kappaskin_app.widgets.parts import Label, plain_tip
 from kappaskin_app.widgets.text import COMMAND, day
 
 _PERIOD = 1000  # ms between two searches
@@ -96,8 +95,7 @@ class ConnectionPanel(Panel):
         self.disconnect_button = QPushButton("Disconnect")
         self.disconnect_button.setObjectName("disconnect")
         self.disconnect_button.setToolTip("Close the source (Ctrl+D).")
-        self.device, self.losses = QLabel(wordWrap=True), QLabel(wordWrap=True)  # pyright: ignore[reportCallIssue]
-        self.device.setTextFormat(Qt.TextFormat.PlainText)
+        self.device, self.losses = Label(wordWrap=True), Label(wordWrap=True)  # pyright: ignore[reportCallIssue]
         self.losses.setToolTip("Messages lost and bytes discarded since the source was connected.")
         self.copy_button = QPushButton("Copy the command")
         self.copy_button.setToolTip("Copy the command in the message above, for a terminal.")

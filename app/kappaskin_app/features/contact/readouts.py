@@ -10,7 +10,7 @@ from kappaskin.frames import Contact, Estimate
 from kappaskin.pipeline import REPORTED, Readout, Reported, readouts_of
 from kappaskin_app.theme import FAINT, follow_look
 from kappaskin_app.widgets.line import Line
-from kappaskin_app.widgets.parts import with_error
+from kappaskin_app.widgets.parts import Label, with_error
 from kappaskin_app.widgets.text import NONE
 
 _COARSE_SD = 0.02  # mm: smaller error bars need one more digit
@@ -95,7 +95,7 @@ class Readouts(QWidget):
         self._names: list[QLabel] = []
         self._numbers: dict[str, Line] = {}
         for key, (name, tip) in FIELDS.items():
-            above, below = QLabel(name), Line(NONE)
+            above, below = Label(name), Line(NONE)
             bold = below.font()
             bold.setWeight(QFont.Weight.DemiBold)
             below.setFont(bold)

@@ -4,11 +4,12 @@ from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QPixmap, QResizeEvent
-from PySide6.QtWidgets import QDialog, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QVBoxLayout, QWidget
 
 from kappaskin._files import TemporaryFolder
 from kappaskin.studies import write_figures
 from kappaskin_app.shell.background import BackgroundTask, Tasks
+from kappaskin_app.widgets.parts import Label
 
 TITLES = {
     "fig1": "Fig. 1: the construction, and a linear sensor",
@@ -31,7 +32,7 @@ class FigureWindow(QDialog):
         self.name = name
         self._room = TemporaryFolder()
         self._picture = QPixmap()
-        self.label = QLabel("Computing\N{HORIZONTAL ELLIPSIS}")
+        self.label = Label("Computing\N{HORIZONTAL ELLIPSIS}")
         self.label.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.label.setMinimumSize(320, 200)
         around = QVBoxLayout(self)

@@ -140,7 +140,7 @@ class PressPage(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.words, self.last, self.verdict = (text_label() for _ in range(3))
+        self.words, self.last, self.verdict = (text_label(rich=True) for _ in range(3))
         self.last.setForegroundRole(FAINT)
         bold = self.verdict.font()
         bold.setWeight(QFont.Weight.DemiBold)

@@ -9,7 +9,6 @@ from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPainterPath, Q
 from PySide6.QtWidgets import (
     QGridLayout,
     QHBoxLayout,
-    QLabel,
     QScrollArea,
     QSizePolicy,
     QVBoxLayout,
@@ -23,6 +22,7 @@ from kappaskin_app.shell.colouring import SHADES
 from kappaskin_app.theme import DARK_INK, WANTED, Colours, current, follow_look
 from kappaskin_app.widgets.colour_bar import ColourBar, LockButton
 from kappaskin_app.widgets.line import Line
+from kappaskin_app.widgets.parts import Label
 from kappaskin_app.widgets.tint import Tint
 
 _LETTERS: dict[str, str] = dict(
@@ -244,7 +244,7 @@ class Heatmap(QWidget):
     def __init__(self, name: str) -> None:
         super().__init__()
         self.name, self._shade = name, SHADES[name]
-        self._title = QLabel(f"<b>{self._shade.symbol}</b>")
+        self._title = Label(f"<b>{self._shade.symbol}</b>", rich=True)
         self._title.setToolTip(self._shade.tip)
         self.value = Line()
         self.value.setToolTip("The element under the mouse, else the largest reading.")
@@ -357,7 +357,7 @@ class HeatmapGrid(QScrollArea):
     def __init__(self) -> None:
         super().__init__()
         self.heatmaps = {name: Heatmap(name) for name in SHADES}
-        self._none = QLabel("Select heatmaps under View.", alignment=Qt.AlignmentFlag.AlignCenter)  # pyright: ignore[reportCallIssue]
+        self._none = Label("Select heatmaps under View.", alignment=Qt.AlignmentFlag.AlignCenter)  # pyright: ignore[reportCallIssue]
         self._shown: tuple[str, ...] | None = None
         whole = QWidget()
         self._grid = QGridLayout(whole)

@@ -13,6 +13,7 @@ from kappaskin_app.features.lessons.progress import Progress
 from kappaskin_app.shell.settings import Settings, form_field
 from kappaskin_app.shell.settings.form_fields import Choice, Range, Several, Switch
 from kappaskin_app.theme import LIGHT, palette
+from kappaskin_app.widgets.parts import Label
 
 _WIDTH, _MARGIN = 1000, 24  # px
 
@@ -62,14 +63,13 @@ def sheet(
 
 
 def _words(text: str) -> QLabel:
-    label = QLabel(text, wordWrap=True)  # pyright: ignore[reportCallIssue]
-    label.setTextFormat(Qt.TextFormat.RichText)
+    label = Label(text, rich=True, wordWrap=True)  # pyright: ignore[reportCallIssue]
     return label
 
 
 def _picture(view: QPixmap) -> QLabel:
     width = _WIDTH - 2 * _MARGIN
-    label = QLabel()
+    label = Label()
     ratio = view.devicePixelRatio()
     if view.width() > width * ratio:
         view = view.scaledToWidth(round(width * ratio), Qt.TransformationMode.SmoothTransformation)

@@ -8,7 +8,6 @@ from PySide6.QtGui import QKeyEvent, QMouseEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
     QHBoxLayout,
-    QLabel,
     QLayout,
     QLineEdit,
     QListWidget,
@@ -24,17 +23,16 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import pass_window_keys
 from kappaskin_app.theme import ALERT, current, follow_look, series
 from kappaskin_app.widgets.layout import scrolled
-from kappaskin_app.widgets.parts import ELLIPSIS, button, in_a_row, text_label
+from kappaskin_app.widgets.parts import ELLIPSIS, Label, button, in_a_row, text_label
 
 _RIGHT = 3  # of the series: green, told apart from the colour of alarms
 
 
-class _Words(QLabel):
+class _Words(Label):
     """The text of an option, which a click selects; a radio button's own does not wrap."""
 
     def __init__(self, text: str, radio: QRadioButton) -> None:
         super().__init__(text, wordWrap=True)  # pyright: ignore[reportCallIssue]
-        self.setTextFormat(Qt.TextFormat.PlainText)
         self._radio = radio
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
@@ -59,8 +57,6 @@ class QuestionView(QWidget):
         self.number = QLineEdit()
         self.check = button("&Check", "check-answer", "Check the answer (Enter).")
         self.show_how = button("S&how me", "show-how", "Apply the solution; Ctrl+Z undoes it.")
-        for label in (self.text, self.feedback):
-            label.setTextFormat(Qt.TextFormat.PlainText)
         self._stack = QVBoxLayout(self)
         self._stack.setContentsMargins(0, 6, 0, 0)
         self._stack.addWidget(self.text)
@@ -96,7 +92,7 @@ class QuestionView(QWidget):
         self.number.setMaximumWidth(12 * self.number.fontMetrics().averageCharWidth())
         self.number.setMaxLength(20)
         pass_window_keys(self.number)
-        row = in_a_row(self.number, QLabel(unit))
+        row = in_a_row(self.number, Label(unit))
         row.addStretch(1)
         self._stack.addLayout(row)
 
@@ -162,7 +158,6 @@ class LessonStepPage(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.title, self.text = text_label(), text_label()
-        self.title.setTextFormat(Qt.TextFormat.PlainText)
         self.text.setTextFormat(Qt.TextFormat.MarkdownText)
         self.text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         bold = self.title.font()
@@ -254,9 +249,7 @@ class ListPage(QWidget):
         self.list.setTextElideMode(Qt.TextElideMode.ElideRight)
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.about, self.message = text_label(), text_label()
-        self.message.setTextFormat(Qt.TextFormat.PlainText)
         self.message.setForegroundRole(ALERT)
-        self.about.setTextFormat(Qt.TextFormat.PlainText)
         self.about.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.about.setMinimumHeight(5 * self.about.fontMetrics().lineSpacing())
         self.begin = button(
@@ -323,8 +316,7 @@ class EndPage(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.text = text_label()
-        self.text.setTextFormat(Qt.TextFormat.RichText)
+        self.text = text_label(rich=True)
         prompt = text_label("Your name, for the figure:")
         self.name = QLineEdit()
         self.name.setObjectName("student")

@@ -1,10 +1,9 @@
 """The lesson panel: the list, a step, the end."""
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
     QHBoxLayout,
-    QLabel,
     QProgressBar,
     QStackedWidget,
     QVBoxLayout,
@@ -15,7 +14,7 @@ from kappaskin_app.features.lessons.pages import EndPage, LessonStepPage, ListPa
 from kappaskin_app.features.lessons.teaching import Teaching
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import FAINT, current, follow_look
-from kappaskin_app.widgets.parts import button
+from kappaskin_app.widgets.parts import Label, button
 
 
 class LessonPanel(QWidget):
@@ -29,8 +28,7 @@ class LessonPanel(QWidget):
         self.pages = QStackedWidget()
         for page in (self.step, self.end):
             self.pages.addWidget(page)
-        self.where, self.bar = QLabel(), QProgressBar()
-        self.where.setTextFormat(Qt.TextFormat.PlainText)
+        self.where, self.bar = Label(), QProgressBar()
         self.where.setForegroundRole(FAINT)
         self.bar.setTextVisible(False)
         self.bar.setFixedHeight(4)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QCheckBox, QFileDialog, QLabel, QToolButton, QWidget
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QToolButton, QWidget
 
 from kappaskin._files import replacing
 from kappaskin.cli.system import examine
@@ -31,6 +31,7 @@ from kappaskin_app.shell.work_dialog import (
     with_suffix,
 )
 from kappaskin_app.theme import current, follow_look
+from kappaskin_app.widgets.parts import Label
 
 if TYPE_CHECKING:
     from kappaskin_app.shell.window import MainWindow
@@ -123,7 +124,7 @@ class ReportDialog(WorkDialog):
         self._contents, self._logs = contents, logs
         self.readings = QCheckBox("&With the present readings")
         self.inputs.append(self.readings)
-        explanation = QLabel(_CONTENTS)
+        explanation = Label(_CONTENTS)
         explanation.setWordWrap(True)
         self.to.setToolTip("The zip file to write; check it before you send it.")
         self.readings.setToolTip("The readings of one frame, as numbers.")

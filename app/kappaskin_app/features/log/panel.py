@@ -9,7 +9,6 @@ from PySide6.QtGui import QColor, QGuiApplication
 from PySide6.QtWidgets import (
     QComboBox,
     QHBoxLayout,
-    QLabel,
     QPushButton,
     QVBoxLayout,
     QWidget,
@@ -17,6 +16,7 @@ from PySide6.QtWidgets import (
 
 from kappaskin_app.guard import PrintableFormatter, guarded, log
 from kappaskin_app.theme import current, follow_look
+from kappaskin_app.widgets.parts import Label
 from kappaskin_app.widgets.table import Table
 
 _KEPT = 1000
@@ -90,7 +90,7 @@ class LogPanel(QWidget):
         super().__init__()
         self._buffer, self._seen = buffer, -1
         self._lines: list[LogLine] = []
-        self.level, self.nothing = QComboBox(), QLabel(_NOTHING)
+        self.level, self.nothing = QComboBox(), Label(_NOTHING)
         for words, level in _LEVELS:
             self.level.addItem(words, level)
         self.level.setAccessibleName("Level")

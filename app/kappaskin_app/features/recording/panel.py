@@ -9,7 +9,7 @@ from kappaskin_app.features.recording.recorder import RecordingControl, duration
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.widgets.line import Line
-from kappaskin_app.widgets.parts import ELLIPSIS, button, in_a_row, sentence
+from kappaskin_app.widgets.parts import ELLIPSIS, button, in_a_row, plain_tip, sentence
 
 _RECORD = "Start or stop recording to a file (Ctrl+Shift+R)."
 _NOTE = "Add a note to the event log and the recording (Ctrl+Shift+N)."
@@ -67,10 +67,10 @@ class RecordingPanel(Panel):
         written = recorder.written
         self.record.setText("Stop" if recorder.recording else f"Record{ELLIPSIS}")
         self.record.setEnabled(not recorder.why_not)
-        self.record.setToolTip(recorder.why_not or _RECORD)
+        self.record.setToolTip(plain_tip(recorder.why_not or _RECORD))
         how = f"{duration_of(written.seconds)}, {size_of(written.size)}"
         self.what.show_text(f"{how}: {Path(written.path).name}" if written.messages else "")
-        self.what.setToolTip(written.path)
+        self.what.setToolTip(plain_tip(written.path))
         self.what.setVisible(bool(written.messages))
         message = playback.message or recorder.message
         alarm = bool(playback.alarming if playback.message else recorder.alarming)

@@ -35,6 +35,7 @@ from kappaskin_app.shell.work_dialog import (
 )
 from kappaskin_app.theme import current
 from kappaskin_app.widgets.lettering import LEFT
+from kappaskin_app.widgets.parts import plain_tip
 
 _WIDTH, _TEXT = 92, 22  # px: of all, and to where the words begin
 _HOUR = 3600.0  # s, from which there is room for the time alone
@@ -79,12 +80,14 @@ class RecordingMark(QWidget):
             head = head if written.seconds >= _HOUR else f"REC {head}"
             self._show(head, f"{written.lost} lost" if written.lost else size, written.lost > 0)
             self.setToolTip(
-                f"Recording to {written.path}: {size}, {written.lost} messages lost.\n"
-                "Messages are lost when the disk is too slow."
+                plain_tip(
+                    f"Recording to {written.path}: {size}, {written.lost} messages lost.\n"
+                    "Messages are lost when the disk is too slow."
+                )
             )
         else:
             self._show("REC ended", "with an error", True)
-            self.setToolTip(f"{trouble}\n\nClick to remove this mark.")
+            self.setToolTip(plain_tip(f"{trouble}\n\nClick to remove this mark."))
         self.setAccessibleName(f"{self.head}, {self.below}")
 
     def _show(self, head: str, below: str, bad: bool) -> None:

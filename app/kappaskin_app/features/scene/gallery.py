@@ -247,8 +247,6 @@ class GalleryPanel(QWidget):
         follow_look(self, self._fit)
 
     def _lay_out(self) -> None:
-        for label in (self.title, self.text, self.file):
-            label.setTextFormat(Qt.TextFormat.PlainText)
         self.file.setForegroundRole(FAINT)
         bold = self.title.font()
         bold.setBold(True)

@@ -17,7 +17,6 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import (
     QHBoxLayout,
-    QLabel,
     QPlainTextEdit,
     QSplitter,
     QTabWidget,
@@ -34,7 +33,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.form import for_the_window
 from kappaskin_app.theme import ALERT, current, follow_look
-from kappaskin_app.widgets.parts import button, text_label
+from kappaskin_app.widgets.parts import Label, button, text_label
 
 _PAUSE = 300  # ms without a key until a typed text is used
 _NUMBER_MARGIN = 6  # px
@@ -201,9 +200,7 @@ class SceneEditor(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.form, self.text = SceneForm(), SceneText()
-        self.name, self.message = QLabel(), text_label()
-        for label in (self.name, self.message):
-            label.setTextFormat(Qt.TextFormat.PlainText)
+        self.name, self.message = Label(), text_label()
         self.message.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.save = button(
             "Save as\N{HORIZONTAL ELLIPSIS}",

@@ -4,7 +4,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, QSignalBlocker, Signal
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QComboBox, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QVBoxLayout, QWidget
 
 from kappaskin.live import Status
 from kappaskin.scenes import EffectSelection, Scene
@@ -16,6 +16,7 @@ from kappaskin_app.shell.effects import effect_description, effect_name
 from kappaskin_app.shell.session import Session
 from kappaskin_app.theme import current, follow_look
 from kappaskin_app.widgets.lettering import LEFT
+from kappaskin_app.widgets.parts import Label
 from kappaskin_app.widgets.table import Table
 from kappaskin_app.widgets.text import duration
 
@@ -99,7 +100,7 @@ class EffectsPanel(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.summary = QLabel(wordWrap=True)  # pyright: ignore[reportCallIssue]
+        self.summary = Label(wordWrap=True)  # pyright: ignore[reportCallIssue]
         self.table = Table(
             "effects", "Effects of the scene", _COLUMNS, _TIPS, (_SIZE, _ERROR, _TIME), (_WHY,)
         )

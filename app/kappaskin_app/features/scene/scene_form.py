@@ -32,6 +32,7 @@ from kappaskin_app.features.scene.sections import (
     sections_of,
 )
 from kappaskin_app.guard import guarded
+from kappaskin_app.widgets.parts import Label
 
 _BUTTON, _EDGE = 20, 9  # px: size of a small button, margin of the last one
 _NO_ARROW = "QToolButton::menu-indicator { image: none; }"
@@ -58,7 +59,7 @@ class SectionBox(QGroupBox):
         self._corner = self._buttons(section) if section.title else QWidget()
         self._corner.setParent(self)
         if not (section.rows or section.sections or section.adding):
-            default = QLabel("Default")
+            default = Label("Default")
             default.setEnabled(False)
             self.grid.addWidget(default, 0, 0)
 
@@ -98,7 +99,7 @@ class SectionBox(QGroupBox):
 
     def _add_row(self, row: Row) -> None:
         editor = self._editor(row)
-        label = QLabel(row.key.label)
+        label = Label(row.key.label)
         label.setToolTip(row.key.explained)
         label.setBuddy(editor.stops[0])
         self.labels.append(label)
@@ -124,7 +125,7 @@ class SectionBox(QGroupBox):
         heading = QWidget()
         across = QHBoxLayout(heading)
         across.setContentsMargins(0, 4, 0, 0)
-        label = QLabel(part.title)
+        label = Label(part.title)
         font = label.font()
         font.setBold(True)
         label.setFont(font)

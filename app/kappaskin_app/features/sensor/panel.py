@@ -3,8 +3,6 @@
 import math
 from contextlib import suppress
 
-from PySide6.QtWidgets import QLabel
-
 from kappaskin.bases import edges_of
 from kappaskin.errors import Refusal
 from kappaskin.estimation import ScanTradeoff
@@ -15,6 +13,7 @@ from kappaskin_app.shell.form import Form, SimulationForm
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.scene import SHAPES
 from kappaskin_app.shell.simulation import patch_of
+from kappaskin_app.widgets.parts import Label
 
 _PREPARING = "Computing this skin; the previous one is shown until then."
 _NUMBERS = ("side_x", "side_y", "base_radius", "rim_radius")
@@ -32,8 +31,8 @@ class ShapePanel(SimulationForm):
 
     def __init__(self) -> None:
         super().__init__("Shape", ("shape", *_NUMBERS, "edge"))
-        self.opening = QLabel()
-        self._opening_name = QLabel("Opening angle")
+        self.opening = Label()
+        self._opening_name = Label("Opening angle")
         self._opening_name.setToolTip("The angle of the arc: its length over its radius.")
         self.form.insertRow(len(_NUMBERS) + 1, self._opening_name, self.opening)
         self._refusal, self._preparing = "", False
@@ -120,14 +119,14 @@ class ElectronicsPanel(SimulationForm):
 
     def __init__(self) -> None:
         super().__init__("Electronics", ("electronics", "bits", "conversion_time"))
-        self._facts = [QLabel() for _ in range(3)]
+        self._facts = [Label() for _ in range(3)]
         rows = (
             ("Frame", "Largest frame rate: one over the conversion time of all channels."),
             ("Step", "The curvature of one count, and the range of the converter."),
             ("Strain", "Curvature at a gage strain of 1 %, the elastic limit of metal foil."),
         )
         for (name, tip), fact in zip(rows, self._facts, strict=True):
-            label = QLabel(name)
+            label = Label(name)
             for widget in (label, fact):
                 widget.setToolTip(tip)
             self.form.addRow(label, fact)

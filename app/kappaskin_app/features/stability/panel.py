@@ -5,7 +5,6 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QGridLayout,
     QHBoxLayout,
-    QLabel,
     QSpinBox,
     QVBoxLayout,
     QWidget,
@@ -19,7 +18,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.badge import in_use
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.theme import ALERT, FAINT, follow_look, grown
-from kappaskin_app.widgets.parts import ELLIPSIS, button, sentence, text_label
+from kappaskin_app.widgets.parts import ELLIPSIS, Label, button, sentence, text_label
 
 _COLUMNS = 3
 _MODE_WIDTH = 210  # px
@@ -47,7 +46,7 @@ class StabilityPanel(QWidget):
         self.number.setObjectName("shape-number")
         self.number.setKeyboardTracking(False)
         self.number.setToolTip("Number of the mode, the most observable one first.")
-        self.of, self.mode_text = QLabel(), text_label()
+        self.of, self.mode_text = Label(), text_label()
         self.on_skin = QCheckBox("Show on the skin")
         self.on_skin.setChecked(True)
         self.on_skin.setToolTip(
@@ -69,7 +68,7 @@ class StabilityPanel(QWidget):
 
     def _lay_out(self) -> None:
         selection = QHBoxLayout()
-        label = QLabel("M&ode")
+        label = Label("M&ode")
         label.setBuddy(self.number)
         for widget in (label, self.number, self.of):
             selection.addWidget(widget)

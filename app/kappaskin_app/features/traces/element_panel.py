@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from kappaskin.frames import COMPONENTS, Array
 from kappaskin.pipeline import REPORTED
+from kappaskin_app.widgets.parts import Label
 from kappaskin_app.widgets.plots import Curve, CurvePlot
 
 TRACED = tuple(quantity for quantity in REPORTED if quantity.traced)
@@ -26,9 +27,8 @@ class ElementPanel(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.title, self.facts = QLabel(_NONE), QLabel()
+        self.title, self.facts = Label(_NONE, rich=True), Label(rich=True)
         for label in (self.title, self.facts):
-            label.setTextFormat(Qt.TextFormat.RichText)
             label.setWordWrap(True)
             label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.button = QPushButton("Plo&t")
