@@ -185,7 +185,7 @@ def test_repair_tells_by_its_exit_code_what_was_lost(recorded, tmp_path, capsys)
 class StuckEngine:
     """An engine that records, and reports nothing more."""
 
-    alive = True
+    alive, silent = True, 0.0
 
     def status(self) -> Status:
         return Status(recording=RecordingStatus("a.mcap", active=True))
