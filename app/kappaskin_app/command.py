@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cyclopts import App
 
-from kappaskin.cli import Limit, Switch, allow
+from kappaskin.cli import Limit, Switch, allow, check_output
 from kappaskin.errors import Refusal, lacking
 
 app = App(name="app", help_format="markdown")
@@ -112,8 +112,9 @@ def _open(
     if seconds is not None and not 0 < seconds <= _LONGEST:
         raise Refusal(f"expected seconds above zero, {_LONGEST:g} at most, got {seconds}")
     _require_display()
-    if screenshot is not None and seconds is None:
-        seconds = _SETTLE
+    if screenshot is not None:
+        check_output(screenshot, *filter(None, [file, source.partition(":")[2]]))
+        seconds = _SETTLE if seconds is None else seconds
     from kappaskin_app.launch import launch
 
     try:

@@ -15,6 +15,7 @@ from kappaskin.cli.common import REFUSED as REFUSED
 from kappaskin.cli.common import Limit as Limit
 from kappaskin.cli.common import Switch as Switch
 from kappaskin.cli.common import allow as allow
+from kappaskin.cli.common import check_output as check_output
 from kappaskin.cli.common import show
 from kappaskin.errors import Refusal
 

@@ -8,6 +8,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -87,6 +88,14 @@ def check_time(seconds: float, what: str) -> None:
     """Raise a `Refusal` unless there is time to do `what`."""
     if not seconds > 0:
         raise Refusal(f"expected a time above 0 s ({what}), got {seconds:g}")
+
+
+def check_output(out: Path, *read: str | Path) -> None:
+    """Raise a `Refusal` where the file `out` is one of those that are `read`."""
+    for file in map(Path, read):
+        with suppress(OSError, ValueError):  # there is none, or it is the name of something else
+            if out.samefile(file):
+                raise Refusal(f"{out}: is read too; expected another file to write to")
 
 
 def show(*lines: object, error: bool = False, end: str = "\n") -> None:

@@ -16,6 +16,7 @@ from kappaskin.cli.common import (
     ProgressLine,
     Switch,
     allow,
+    check_output,
     check_time,
     lined,
     pair,
@@ -374,6 +375,7 @@ def reconstruct(
     from kappaskin.pipeline import reconstruct as reconstructed
 
     allow(limit)
+    check_output(out, readings)
     points = pair(grid, "a grid") if grid else None
     functions = pair(basis, "a basis")
     found = reconstructed(readings, functions, points, edge, method, contact, objects)

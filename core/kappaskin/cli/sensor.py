@@ -10,7 +10,16 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kappaskin.cli.common import FAILED, Switch, check_time, lined, print_result, show, stops
+from kappaskin.cli.common import (
+    FAILED,
+    Switch,
+    check_output,
+    check_time,
+    lined,
+    print_result,
+    show,
+    stops,
+)
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
@@ -83,6 +92,7 @@ def calibrate(
     from kappaskin.calibration import calibrate as calibrated
     from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
 
+    check_output(out, source.removeprefix("sim:"))
     Calibration.check_writable(out)
     try:
         sensor, sweep = take_sweep(

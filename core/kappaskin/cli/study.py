@@ -12,6 +12,7 @@ from kappaskin.cli.common import (
     ProgressLine,
     Switch,
     Whole,
+    check_output,
     pair,
     print_json,
     print_result,
@@ -76,6 +77,7 @@ def simulate(
     from kappaskin.scenes import load_scene
     from kappaskin.studies import simulated_readings
 
+    check_output(out, scene)
     found = simulated_readings(load_scene(scene, trust), frames, seed)
     save_arrays(out, found)
     show(f"{out}: {frames} frames", error=True)

@@ -14,8 +14,8 @@ import numpy as np
 import psutil
 import pytest
 
-from kappaskin import Patch, Plate, PointLoad, SensorLayout, SineBasis
-from kappaskin.cli import REFUSED, app
+from kappaskin import Patch, Plate, PointLoad, SensorLayout, SineBasis, load_scene, write_scene
+from kappaskin.cli import REFUSED, app, main
 from kappaskin.cli.common import ProgressLine
 from kappaskin.estimation import METHODS
 
@@ -398,3 +398,22 @@ def test_a_command_computes_in_one_thread_unless_it_is_told_otherwise(asked, thr
 )
 def test_half_a_thing_is_refused(run, command) -> None:
     refused(run(*command, "2.5"), "expected a whole number such as 2, got '2.5'")
+
+
+def test_an_output_that_is_also_the_input_is_refused(tmp_path, capsys) -> None:
+    scene, readings = tmp_path / "a.toml", tmp_path / "a.npz"
+    scene.write_text(write_scene(load_scene("centre")))
+    assert main(["simulate", str(scene), "--frames", "2", "--out", str(readings)]) == 0
+    link = tmp_path / "link.npz"
+    link.symlink_to(readings)
+    before = {file: file.read_bytes() for file in (scene, readings)}
+
+    for arguments in (
+        ["reconstruct", str(readings), "--out", str(readings)],
+        ["reconstruct", str(readings), "--out", str(link)],
+        ["simulate", str(scene), "--frames", "2", "--out", str(scene)],
+        ["calibrate", f"sim:{scene}", "--out", str(scene)],
+    ):
+        assert main(arguments) == 2
+        assert "is read too; expected another file to write to" in capsys.readouterr().err
+    assert {file: file.read_bytes() for file in before} == before
