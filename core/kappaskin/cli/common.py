@@ -8,7 +8,6 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -93,9 +92,12 @@ def check_time(seconds: float, what: str) -> None:
 def check_output(out: Path, *read: str | Path) -> None:
     """Raise a `Refusal` where the file `out` is one of those that are `read`."""
     for file in map(Path, read):
-        with suppress(OSError, ValueError):  # there is none, or it is the name of something else
-            if out.samefile(file):
-                raise Refusal(f"{out}: is read too; expected another file to write to")
+        try:
+            same = out.samefile(file)
+        except (OSError, ValueError):  # there is none, or it is the name of something else
+            same = False
+        if same:
+            raise Refusal(f"{out}: is read too; expected another file to write to")
 
 
 def show(*lines: object, error: bool = False, end: str = "\n") -> None:
