@@ -101,7 +101,7 @@ def _recorded(
     from kappaskin.live import LOST, STREAMING
 
     began = recording = time.monotonic()
-    known: Sensor | None = None
+    known = 0  # connections whose tare is in use
     while True:
         status, now = engine.status(), time.monotonic()
         written = status.recording
@@ -110,15 +110,15 @@ def _recorded(
             return status
         if written.trouble and not written.seconds:
             raise Refusal(written.trouble)
-        if status.sensor is not known and status.sensor is not None:
-            known = status.sensor
-            _use_tare(engine, known)
+        if status.connections != known and status.sensor is not None:
+            known = status.connections
+            _use_tare(engine, status.sensor)
         over = max(written.seconds, now - recording) >= seconds
         if stopped or written.trouble or over:
             return status
-        if status.state == LOST and known is None:
+        if status.state == LOST and not known:
             raise Refusal(status.message)
-        if status.state != STREAMING and known is None and now - began > _BEGIN:
+        if status.state != STREAMING and not known and now - began > _BEGIN:
             raise Refusal(f"{status.source}: no readings within {_BEGIN:g} s")
         show_progress(_line(status))
         time.sleep(_POLL)

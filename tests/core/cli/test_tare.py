@@ -1,5 +1,6 @@
 """Taking a tare from a source: told, kept for the device, refused with its reason."""
 
+import json
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from kappaskin import PointLoad, Scene, load_scene
+from kappaskin import PointLoad, Recording, Scene, load_scene
 from kappaskin.calibration import TareStore
 from kappaskin.cli import main
 
@@ -42,6 +43,19 @@ def device_of(scene) -> Iterator[str]:
 def folder(tmp_path, monkeypatch):
     monkeypatch.setattr("kappaskin.calibration.TareStore.user_folder", lambda: tmp_path / "tares")
     return tmp_path / "tares"
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_recording_has_its_settings_before_and_with_the_tare_once_each(tmp_path) -> None:
+    out = tmp_path / "a.mcap"
+    with device_of(AT_REST) as port:
+        assert main(["tare", port]) == 0
+        assert main(["record", port, str(out), "--seconds", "1"]) == 0
+
+    with Recording(out) as recording:
+        setups = [json.loads(text)["tare"] for _, text in recording.setups()]
+    assert len(setups) <= 2
+    assert setups[-1]
 
 
 def test_a_tare_is_told_and_kept_and_undone(folder, capsys):
