@@ -39,6 +39,7 @@ LONGEST_NOTE = 500
 
 _ORDERLY, _WRITTEN = 2.0, 10.0  # s for an end, and where a recording is to be ended first
 _PATIENCE = 1800.0  # s that a recording continues without a window
+_PREPARING = 0.2  # of its silence counts where it prepares a setup, which may hold it up
 _SILENT = 2.0  # s without a report, of an engine that reports ten times a second
 _POLL = 1.0  # s between two polls at most that count as silence: this process may have been stopped
 _DEATHS, _WITHIN = 3, 10.0  # so many in so many s, and the process is not started again
@@ -268,8 +269,9 @@ class Engine:
             return replace(read, state=LOST, rate=0.0, message=message, recording=recording)
         now = time.monotonic()
         passed, self._polled = min(now - self._polled, _POLL), now
-        hangs = read.reported <= was.reported and read.state == STREAMING and not read.computing
-        self.silent = self.silent + passed if hangs else 0.0
+        hangs = read.reported <= was.reported and read.state == STREAMING
+        weight = _PREPARING if read.computing else 1.0
+        self.silent = self.silent + weight * passed if hangs else 0.0
         if self.silent < _SILENT:
             return read
         return replace(read, rate=0.0, message=_HANGS.format(self.silent))

@@ -45,6 +45,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path / "tares"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 def test_a_recording_has_its_settings_before_and_with_the_tare_once_each(tmp_path) -> None:
     out = tmp_path / "a.mcap"

@@ -755,6 +755,22 @@ def test_one_that_hangs_is_said_to_and_connecting_replaces_it(own_engine, monkey
     assert state(engine, STREAMING).message == ""
 
 
+@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="no process can be stopped")
+def test_one_that_hangs_while_it_prepares_a_setup_is_said_to(own_engine, monkeypatch) -> None:
+    engine = own_engine
+    engine.connect("sim:centre")
+    next_estimate(engine)
+    engine.set_up(Setup(Ni=36, Nj=36, method="tracking"))
+    assert wait_for(lambda: engine.status().computing)
+    monkeypatch.setattr("kappaskin.live.engine._SILENT", 0.3)
+    assert engine.pid is not None
+    os.kill(engine.pid, signal.SIGSTOP)
+    try:
+        assert wait_for(lambda: "has not reported" in engine.status().message)
+    finally:
+        os.kill(engine.pid, signal.SIGCONT)
+
+
 def test_a_tare_that_dies_with_its_engine_is_said_to(own_engine) -> None:
     engine = own_engine
     engine.connect("sim:centre")
