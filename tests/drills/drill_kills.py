@@ -63,7 +63,7 @@ def _blocks(engine: psutil.Process) -> set[Path]:
     """The blocks of shared memory of an engine, where the system lists them."""
     maps = Path(f"/proc/{engine.pid}/maps")
     text = maps.read_text("utf-8") if maps.exists() else ""
-    return {Path(name) for name in re.findall(r"/dev/shm/psm_\w+", text)}
+    return {Path(name) for name in re.findall(r"/dev/shm/kappaskin-[\w-]+", text)}
 
 
 def _lost(path: Path, killed: float) -> float:

@@ -315,7 +315,7 @@ def test_killed_at_any_time_of_its_start_it_leaves_nothing_and_the_next_starts(
 def _blocks(pid: int) -> set[Path]:
     """The blocks of shared memory of a process."""
     maps = Path(f"/proc/{pid}/maps").read_text("utf-8")
-    return {Path(name) for name in re.findall(r"/dev/shm/psm_\w+", maps)}
+    return {Path(name) for name in re.findall(r"/dev/shm/kappaskin-[\w-]+", maps)}
 
 
 def _until(holds: Callable[[], bool], within: float = 10.0) -> None:

@@ -141,6 +141,9 @@ class _StampedText(NamedTuple):
     text: str
 
 
+_PER_COLUMN = 400  # bytes of its heading and texts
+
+
 def recording_info(recording: Recording, request: ExportRequest) -> RecordingInfo:
     """Facts for files of the requested span; a `Refusal` where there were two devices."""
     path = recording.path
@@ -162,8 +165,9 @@ def recording_info(recording: Recording, request: ExportRequest) -> RecordingInf
             f"{path}: was recorded without settings until {request.end:g} s, so no frame was "
             "computed; export a later span"
         )
-    functions = (max(setup[name] for setup in setups) for name in ("Ni", "Nj"))
-    return RecordingInfo(_facts(recording, devices[0].text, sensor, setups), sensor, (*functions,))
+    Ni, Nj = (max(setup[name] for setup in setups) for name in ("Ni", "Nj"))
+    recording.budget.take(_PER_COLUMN * Ni * Nj, f"a table of {Ni} x {Nj} coefficients")
+    return RecordingInfo(_facts(recording, devices[0].text, sensor, setups), sensor, (Ni, Nj))
 
 
 def another(at: float) -> str:
