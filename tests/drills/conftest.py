@@ -1,4 +1,4 @@
-"""Drills: faults made on purpose. A run of all of them writes the table of the guide."""
+"""Drills: faults made on purpose. A run of a file's cases writes its row of the guide's table."""
 
 import ast
 from collections import Counter
@@ -22,15 +22,24 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
+    config = session.config
+    if config.option.keyword or any("::" in argument for argument in config.args):
+        return  # a row is of all cases of a file
     files = sorted(Path(__file__).parent.glob("drill_*.py"))
-    if session.config.option.keyword or set(files) - set(_outcomes):
-        return  # the table is of a whole run
-    page, _, _ = PAGE.read_text("utf-8").partition(_HEAD)
-    PAGE.write_text(page + _HEAD + "".join(map(_row, files)), "utf-8")
+    page, head, table = PAGE.read_text("utf-8").partition(_HEAD)
+    rows = {row.split(" | ")[0]: f"{row}\n" for row in table.splitlines()}
+    rows |= {_name(file): _row(file) for file in _outcomes}
+    kept = [rows[_name(file)] for file in files if _name(file) in rows]
+    PAGE.write_text(page + head + "".join(kept), "utf-8")
+
+
+def _name(file: Path) -> str:
+    """The first cell of the row of a file."""
+    name = (ast.get_docstring(ast.parse(file.read_text("utf-8"))) or "").splitlines()[0]
+    return f"| {name.rstrip('.')}"
 
 
 def _row(file: Path) -> str:
-    name = (ast.get_docstring(ast.parse(file.read_text("utf-8"))) or "").splitlines()[0]
     outcomes = _outcomes[file]
     said = ", ".join(f"{outcomes[word]} {word}" for word in ("failed", "skipped") if outcomes[word])
-    return f"| {name.rstrip('.')} | {outcomes.total()} | {said or 'all passed'} |\n"
+    return f"{_name(file)} | {outcomes.total()} | {said or 'all passed'} |\n"
