@@ -97,7 +97,7 @@ def check_output(out: Path, *read: str | Path) -> None:
         except (OSError, ValueError):  # there is none, or it is the name of something else
             same = False
         if same:
-            raise Refusal(f"{out}: is read too; expected another file to write to")
+            raise Refusal(f"{out}: is also the input; choose another file to write to")
 
 
 def show(*lines: object, error: bool = False, end: str = "\n") -> None:

@@ -39,7 +39,7 @@ LONGEST_NOTE = 500
 
 _ORDERLY, _WRITTEN = 2.0, 10.0  # s for an end, and where a recording is to be ended first
 _PATIENCE = 1800.0  # s that a recording continues without a window
-_PREPARING = 0.2  # of its silence counts where it prepares a setup, which may hold it up
+_PREPARING = 0.2  # share of its silence that counts while it prepares a setup, which delays it
 _SILENT = 2.0  # s without a report, of an engine that reports ten times a second
 _POLL = 1.0  # s between two polls at most that count as silence: this process may have been stopped
 _DEATHS, _WITHIN = 3, 10.0  # so many in so many s, and the process is not started again

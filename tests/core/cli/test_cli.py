@@ -415,5 +415,5 @@ def test_an_output_that_is_also_the_input_is_refused(tmp_path, capsys) -> None:
         ["calibrate", f"sim:{scene}", "--out", str(scene)],
     ):
         assert main(arguments) == 2
-        assert "is read too; expected another file to write to" in capsys.readouterr().err
+        assert "is also the input; choose another file to write to" in capsys.readouterr().err
     assert {file: file.read_bytes() for file in before} == before
