@@ -6,7 +6,6 @@ Prints how long after the time given that was, and what processor time it took h
 import math
 import sys
 import time
-from pathlib import Path
 from typing import Any
 
 from kappaskin.cli import main
@@ -14,11 +13,11 @@ from kappaskin.cli import main
 _LOOK = 1  # ms
 
 
-def _watched(source: str, kept: Path | None = None) -> Any:
+def _watched(*arguments: Any) -> Any:
     """The window, which closes as soon as the skin was drawn."""
     from PySide6.QtCore import QTimer  # not before the app does
 
-    application, window = opened(source, kept)
+    application, window = opened(*arguments)
 
     def look() -> None:
         if any(math.isfinite(age) for _, age in window.features["membrane"].membrane.ages):
