@@ -1,3 +1,4 @@
+import math
 import time
 from dataclasses import asdict
 
@@ -9,6 +10,7 @@ from PySide6.QtWidgets import QApplication, QLabel, QScrollBar, QWidget
 
 from kappaskin import Engine, Estimate
 from kappaskin.live import Status
+from kappaskin_app.shell import badge
 from kappaskin_app.shell import window as shell
 from kappaskin_app.shell.badge import GAP, LIVE, LOST, OFF, REPLAY, SIM, STALE, WAITING, colour_of
 from kappaskin_app.shell.settings import Settings
@@ -243,6 +245,7 @@ def test_a_window_that_is_switched_is_as_one_that_began_so(
     def pictures() -> dict[str, QImage]:
         return {name: part.grab().toImage() for name, part in parts_of(window).items()}
 
+    monkeypatch.setattr(badge, "_STALE_AFTER", math.inf)  # however long a picture takes
     found = list[dict[str, QImage]]()
     for begun in THEMES:
         monkeypatch.setattr(shell, "settings_for", lambda *_, begun=begun: Settings(theme=begun))

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import (
     QAbstractButton,
     QAbstractSlider,
@@ -45,6 +46,10 @@ def nothing_chosen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         monkeypatch.setattr(QFileDialog, ask, lambda *_: ("", ""))
 
 
+def _timers(window: MainWindow) -> list[QTimer]:
+    return window.findChildren(QTimer)
+
+
 def _after(window: MainWindow, act: Callable[[], object]) -> None:
     """Do something, let the window live on, and close what it opened."""
     act()
@@ -53,6 +58,8 @@ def _after(window: MainWindow, act: Callable[[], object]) -> None:
         index = window.history.stack.index()
         for _ in range(3):
             QApplication.processEvents()
+        while any(timer.isActive() and not timer.interval() for timer in _timers(window)):
+            QApplication.processEvents()  # a turn with much to draw leaves those of no time waiting
     for dialog in window.findChildren(QDialog):
         dialog.reject()
 
