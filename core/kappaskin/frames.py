@@ -70,10 +70,12 @@ class Contact:
     """A contact: `position` (2,) in m with `position_sd` (2,) in m, and how hard it is.
 
     `force` and `force_sd` in N, `displacement` and `displacement_sd` in m, of the skin at the
-    contact; `spare` readings more than a point load needs tell the noise. `single` says whether one
-    point load fits the readings as well as the shape. `near_rim` warns that the contact is
-    too near a held edge, where no force moves the skin, for a reliable position and force.
-    Every number is NaN when the readings hold no contact that stands out of the noise.
+    contact; `spare` readings more than a load needs tell the noise. `single` says whether one
+    load on a small area fits the readings as well as the shape. `near_rim` warns that the contact
+    is too near a held edge, where no force moves the skin, for a reliable position and force.
+    `size` and `size_sd` in m^2 are the squared radius of the disc that the load is spread over;
+    NaN where the skin does not tell it. Every number is NaN when the readings hold no contact that
+    stands out of the noise.
     """
 
     position: Array
@@ -85,6 +87,8 @@ class Contact:
     spare: int
     single: bool
     near_rim: bool
+    size: float = math.nan
+    size_sd: float = math.nan
 
     @property
     def present(self) -> bool:
@@ -104,6 +108,17 @@ class Contact:
     def displacement_95(self) -> float:
         """Half width in m of the 95 % interval of the displacement, by Student's t."""
         return self._reach * self.displacement_sd
+
+    @property
+    def load_radius(self) -> float:
+        """Radius in m of the disc that the load is spread over."""
+        return math.sqrt(self.size)
+
+    @property
+    def load_radius_95(self) -> Array:
+        """The 95 % interval (2,) in m of the load's radius, by Student's t."""
+        reach = self._reach * self.size_sd
+        return np.sqrt(np.maximum([self.size - reach, self.size + reach], 0.0))
 
     @property
     def _reach(self) -> float:

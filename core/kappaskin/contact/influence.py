@@ -1,0 +1,383 @@
+"""Influence of a load: what the elements read of a load at any place on the skin, of any size."""
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+from typing import Protocol, cast
+
+import numpy as np
+import scipy
+
+from kappaskin.bases import ProductBasis, SineBasis, basis_for
+from kappaskin.frames import Array
+from kappaskin.mechanics import Compliance, Plate
+from kappaskin.sensing import SensorLayout
+from kappaskin.skin import Patch
+
+
+class Influence(Protocol):
+    """What C channels read of a load anywhere on a skin."""
+
+    unit: float
+    """The load in N that the readings are of."""
+    sized: bool
+    """Whether they depend on the size of the load; else they are those of a point load."""
+
+    def at(self, x: float, y: float, s: float) -> None:
+        """Write the readings in 1/m of a load at (x, y) in m into the first row of `out` (4, C).
+
+        And their derivatives by x, y and s; the load is spread over a disc of radius sqrt(s) in m.
+        """
+        ...
+
+    def trust(self, s: float, share: float) -> Array | None:
+        """Weights (P,) of the elements around the last place; None where all are 1.
+
+        The readings of one that lies under the load depend on how it is spread over it: its
+        variance is 1 + `share`.
+        """
+        ...
+
+    def gives(self) -> float:
+        """Displacement of the skin in m per N under a load at the last place."""
+        ...
+
+
+def influence_of(
+    plate: Plate, layout: SensorLayout, edge: str, functions: int, out: Array
+) -> Influence:
+    """The influence of loads, converged where the skin is a plate or a shell on a rectangle.
+
+    On strips, disks, polygons and drum heads it is that of a basis of so many `functions` each way.
+    """
+    if type(plate.patch) is not Patch or plate.patch.strip or not _is_stiff(plate):
+        return _OfFunctions(plate, layout, edge, functions, out)
+    return _OfPlate(plate, layout, edge, out)
+
+
+class _OfFunctions:
+    """As the functions of a basis follow it."""
+
+    unit, sized = 1.0, False
+
+    def __init__(
+        self, plate: Plate, layout: SensorLayout, edge: str, functions: int, out: Array
+    ) -> None:
+        self._basis = basis_for(plate.patch, edge, functions, 1 if plate.patch.strip else functions)
+        compliance = plate.compliance(self._basis)
+        self._readings = compliance.after(layout.curvature_operator(self._basis)).T.copy()
+        self._C, self._out = compliance.after(np.eye(self._basis.size)), out
+        self._jet = np.zeros((3, self._basis.size))
+
+    def at(self, x: float, y: float, s: float) -> None:
+        self._jet = self._basis.jet(x, y)[:3]
+        np.dot(self._jet, self._readings, self._out[:3])
+
+    def trust(self, s: float, share: float) -> Array | None:
+        return None
+
+    def gives(self) -> float:
+        f = self._jet[0]
+        return float(f.dot(self._C).dot(f))
+
+
+# A point load bends a plate without bound around itself, which no sum of few waves follows. So the
+# readings are taken apart: what grows without bound is that of a plate without edges, in closed
+# form; the rest, which the edges make, is smooth: summed until it stands, once per setup, and
+# interpolated.
+#
+# A disc of radius r (s = r^2) on a plate without edges (Timoshenko, Theory of plates and shells,
+# art. 16 to 19): with t = x^2 + y^2 and m = max(s, t), in units of P / (8 pi D),
+#     w_xx = A + B x^2,   w_yy = A + B y^2,   w_xy = B x y,
+#     A = ln m + (s + t) / (2 m) and any constant,   B = (2 - s / m) / m.
+# Derivatives: A_t = B / 2, B_t = -2 (1 - s / m) / m^2, A_s = (1 - t / (2 m)) / m, B_s = -1 / m^2.
+# A Gaussian load of standard deviation sd, with u = t / (2 sd^2):
+#     A = ln t + E1(u) + (1 - exp(-u)) / u,   B = 2 (1 - (1 - exp(-u)) / u) / t.
+
+
+class _Disc:
+    """Readings of short gages at `positions` (P, 2) under a disc on a plate without edges.
+
+    A call writes them and their derivatives into `out` (4, 3 P). It takes a third of a whole
+    contact: numpy is quickest with arrays that exist already, of one shape.
+    """
+
+    def __init__(self, positions: Array, out: Array) -> None:
+        P = len(positions)
+        self._positions, self._out = positions.T.copy(), list(out.reshape(12, P))
+        self._d, self.t = np.empty((2, P)), np.empty(P)
+        self._numbers = list(np.repeat([[0.5], [1.0], [2.0], [4.0]], P, axis=1))
+        self._work = list(np.empty((12, P)))
+
+    def __call__(self, x: float, y: float, s: float) -> None:
+        add, subtract, multiply, t = np.add, np.subtract, np.multiply, self.t
+        half, one, two, four = self._numbers
+        size, m, q, qq, v, w, B, b, x2, y2, e, f = self._work
+        xx, yy, xy, xx_x, yy_x, xy_x, xx_y, yy_y, xy_y, xx_s, yy_s, xy_s = self._out
+        subtract(((x,), (y,)), self._positions, self._d)
+        dx, dy = self._d
+        multiply(dx, dx, x2)
+        multiply(dy, dy, y2)
+        add(x2, y2, t)
+        size.fill(s)
+        np.maximum(t, size, out=m)
+        np.divide(one, m, q)
+        multiply(q, q, qq)
+        multiply(size, q, v)
+        multiply(t, q, w)
+        subtract(two, v, B)
+        multiply(B, q, B)
+        subtract(v, one, b)
+        multiply(b, qq, b)
+        multiply(b, four, b)  # 2 B_t
+        add(v, w, v)  # v w is v + w - 1, as one of them is 1
+        multiply(v, half, v)
+        np.log(m, m)
+        add(m, v, m)  # A, and 1/2
+        multiply(w, half, w)
+        subtract(one, w, w)
+        multiply(w, q, w)  # A_s
+        multiply(dx, dy, v)
+        multiply(B, x2, xx)
+        add(xx, m, xx)
+        multiply(B, y2, yy)
+        add(yy, m, yy)
+        multiply(B, v, xy)
+        multiply(qq, x2, xx_s)
+        subtract(w, xx_s, xx_s)
+        multiply(qq, y2, yy_s)
+        subtract(w, yy_s, yy_s)
+        multiply(qq, v, xy_s)
+        np.negative(xy_s, xy_s)
+        multiply(b, x2, e)
+        add(e, B, e)
+        multiply(b, y2, f)
+        add(f, B, f)
+        multiply(e, dy, xy_x)
+        multiply(e, dy, xx_y)
+        multiply(f, dx, xy_y)
+        multiply(f, dx, yy_x)
+        add(B, B, B)
+        add(e, B, e)
+        multiply(e, dx, xx_x)
+        add(f, B, f)
+        multiply(f, dy, yy_y)
+
+
+_DIAGONAL = math.sqrt(0.5)
+_WAYS = np.array([(1, 0), (0, 1), (_DIAGONAL, _DIAGONAL), (_DIAGONAL, -_DIAGONAL)])
+"""Directions of the gages: along x, along y, and along both diagonals."""
+_ENDS = np.concatenate([_WAYS, -_WAYS])
+
+
+class _DiscOnGages:
+    """As `_Disc`, for gages of a `length`: what the slope along them differs by at their ends."""
+
+    def __init__(self, positions: Array, length: float, out: Array) -> None:
+        self._positions, self._length = positions.T, length
+        self._out, self.t = out.reshape(4, 3, -1), np.empty(len(positions))
+
+    def __call__(self, x: float, y: float, s: float) -> None:
+        d, out = np.array([[x], [y]]) - self._positions, self._out
+        np.sum(d * d, axis=0, out=self.t)
+        D = d[:, None] + self._length / 2 * _ENDS.T[..., None]
+        t: Array = np.sum(D * D, axis=0)
+        m = np.maximum(t, s)
+        q = 1 / m
+        A, B = np.log(m) + 0.5 + (s / 2) * t * q * q, (2 - s * q) * q
+        nx, ny = np.concatenate([_WAYS, _WAYS]).T[..., None]
+        along = D[0] * nx + D[1] * ny
+        by_x, by_y = (B * D[0] * along + A * nx, B * D[1] * along + A * ny)
+        slopes = np.stack([A * along, by_x, by_y, q * (1 - 0.5 * t * q) * along])
+        xx, yy, rising, falling = np.moveaxis((slopes[:, :4] - slopes[:, 4:]) / self._length, 1, 0)
+        out[:, 0], out[:, 1], out[:, 2] = xx, yy, (rising - falling) / 2
+
+
+_NEAREST = 1e-6  # of a standard deviation: nearer, a Gaussian load bends the plate no more
+
+
+def _gaussian(d: Array, sd: float) -> tuple[Array, Array]:
+    """A and B (...) of a Gaussian load, by `d` (2, ...) to its centre."""
+    t = np.maximum(d[0] ** 2 + d[1] ** 2, (_NEAREST * sd) ** 2)
+    u = t / (2 * sd**2)
+    mean: Array = -np.expm1(-u) / u
+    integral = cast("Array", scipy.special.exp1(u))
+    return np.log(t) + 0.5 + integral + mean, 2 * (1 - mean) / t
+
+
+def _under_gaussian(d: Array, sd: float, gage_length: float) -> Array:
+    """Curvature (3, ...) read at `d` (2, ...) from the centre of a Gaussian load."""
+    if not gage_length:
+        A, B = _gaussian(d, sd)
+        return np.stack([A + B * d[0] ** 2, A + B * d[1] ** 2, B * d[0] * d[1]])
+
+    def slope(x: float, y: float, along: float) -> Array:
+        D = d + (along * np.array([x, y])).reshape(2, *[1] * (d.ndim - 1))
+        return _gaussian(D, sd)[0] * (x * D[0] + y * D[1])
+
+    half = gage_length / 2
+    ways: list[tuple[float, float]] = _WAYS.tolist()
+    means = [(slope(x, y, half) - slope(x, y, -half)) / gage_length for x, y in ways]
+    return np.stack([means[0], means[1], (means[2] - means[3]) / 2])
+
+
+_NODES = 41  # along the shorter side
+_MOST_BYTES = 64e6  # of a table
+_SD = 0.02  # of the shorter side, of the Gaussian load that the table is summed for
+_VANISHED = 5.3  # k sd, beyond which a Gaussian load moves less than 1e-6 of what a point load does
+_MOST_WAVES = 256  # along a side
+_MIXED = 24  # functions along a side where a load mixes them
+_MIXED_SD = 3.0  # over the largest wave number of those
+_TOGETHER = 200  # elements: 100 MB
+
+
+def _is_stiff(plate: Plate) -> bool:
+    """Whether the skin bends as a plate up to the distance of two nodes from a load."""
+    D, near = plate.rigidity, min(plate.patch.a, plate.patch.b) / (_NODES - 1)
+    return max(plate.tension * near**2, plate.foundation * near**4) < D
+
+
+_CUBICS = np.linalg.inv(np.vander(np.arange(4.0), increasing=True).T).T
+"""Lagrange's cubics through four even nodes, by the powers of the place."""
+_BESIDE = 2.5  # of a load's squared radius: an element as far off does not lie under it
+
+
+class _OfPlate:
+    """A plate's or a shell's: in closed form what grows without bound, and a table of the rest."""
+
+    sized = True
+
+    def __init__(self, plate: Plate, layout: SensorLayout, edge: str, out: Array) -> None:
+        self.unit = 8 * math.pi * plate.rigidity
+        positions, length = layout.positions, layout.gage_length
+        self._table, self._gives, sd = _rest_of(plate, edge, positions.tobytes(), length)
+        patch, (ny, nx) = plate.patch, self._gives.shape
+        self._steps = patch.a / (nx - 1), patch.b / (ny - 1)
+        self._last = nx - 4, ny - 4
+        self._out, self._smooth = out, sd**2 / 2
+        self._disc = _DiscOnGages(positions, length, out) if length else _Disc(positions, out)
+        self._weights, self._node = np.zeros((4, 2, 16)), (0, 0)
+        self._both, self._cubics = self._weights.reshape(4, 32), np.empty((4, 4))
+        self._block = lru_cache(16)(self._block_at)
+
+    def _block_at(self, i: int, j: int) -> Array:
+        return self._table[:, j : j + 4, i : i + 4].reshape(32, -1)
+
+    def at(self, x: float, y: float, s: float) -> None:
+        self._disc(x, y, s)
+        (hx, hy), (last_x, last_y), weights = self._steps, self._last, self._weights
+        i, j = min(max(int(x / hx) - 1, 0), last_x), min(max(int(y / hy) - 1, 0), last_y)
+        u, v = x / hx - i, y / hy - j
+        uu, vv = u * u, v * v
+        powers = (
+            (1.0, u, uu, u * uu),
+            (0.0, 1 / hx, 2 * u / hx, 3 * uu / hx),
+            (1.0, v, vv, v * vv),
+            (0.0, 1 / hy, 2 * v / hy, 3 * vv / hy),
+        )
+        cubics = np.dot(powers, _CUBICS, self._cubics)
+        # Value and slopes along x and y; the fourth, which is mixed, gives way to that by size.
+        pairs = (cubics[2:, None, :, None] * cubics[None, :2, None]).reshape(4, 16)
+        weights[:, 0] = pairs
+        # The mean over a disc of what is smooth is its value and s/8 of its Laplacian.
+        np.multiply(pairs, s / 8 - self._smooth, weights[:, 1])
+        weights[3, 0] = 0.0
+        np.multiply(pairs[0], 0.125, weights[3, 1])
+        self._node = i, j
+        self._out += self._both.dot(self._block(i, j))
+
+    def trust(self, s: float, share: float) -> Array | None:
+        t = self._disc.t
+        if t.min() > _BESIDE * s:
+            return None
+        under = t * (-2 / s)
+        np.exp(under, under)
+        under *= share
+        under += 1
+        return np.reciprocal(under, under)
+
+    def gives(self) -> float:
+        i, j = self._node
+        return float(self._weights[0, 0].dot(self._gives[j : j + 4, i : i + 4].ravel()))
+
+
+@lru_cache(4)
+def _rest_of(
+    plate: Plate, edge: str, places: bytes, gage_length: float
+) -> tuple[Array, Array, float]:
+    """What the edges make of a load at each node, in the units of `_disc`.
+
+    A table (2, ny, nx, C) of the readings of a Gaussian load less those on a plate without edges,
+    and their Laplacian by the place of the load; displacements (ny, nx) in m per N under a point
+    load; and the standard deviation of the Gaussian in m.
+    """
+    patch, positions = plate.patch, np.frombuffer(places).reshape(-1, 2)
+    x, y = patch.grid(*_nodes(patch, len(positions)))
+    basis, along_x, along_y, sd = _summed(patch, edge, x, y)
+    compliance, unit = plate.compliance(basis), 8 * math.pi * plate.rigidity
+    parts = list[Array]()
+    for part in np.array_split(positions, -(-len(positions) // _TOGETHER)):
+        layout = replace(SensorLayout.scattered(patch, part), gage_length=gage_length)
+        M = compliance.after(layout.curvature_operator(basis)).reshape(-1, *basis.shape)
+        rest = unit * (along_x @ (M @ along_y.T)).T.reshape(len(y), len(x), 3, len(part))
+        d = part.T[:, None, None] - np.stack(np.meshgrid(x, y))[..., None]
+        rest -= np.moveaxis(_under_gaussian(d, sd, gage_length), 0, 2)
+        parts.append(rest)
+    rest = np.concatenate(parts, axis=3).reshape(len(y), len(x), -1)
+    spread = _second(rest, y, 0) + _second(rest, x, 1)
+    return np.stack([rest, spread]), _displacement(basis, compliance, x, y), sd
+
+
+def _nodes(patch: Patch, elements: int) -> tuple[int, int]:
+    """Nodes along x and y: as near one another along both, and within the memory."""
+    near = min(patch.a, patch.b) / (_NODES - 1)
+    most = _MOST_BYTES / (2 * 8 * 3 * elements)
+    near = max(near, math.sqrt(patch.a * patch.b / most))
+    nx, ny = (max(math.ceil(side / near * (1 - 1e-9)) + 1, 5) for side in (patch.a, patch.b))
+    return nx, ny
+
+
+def _summed(
+    patch: Patch, edge: str, x: Array, y: Array
+) -> tuple[ProductBasis, Array, Array, float]:
+    """Functions, their means (nx, Ni), (ny, Nj) under Gaussians at the nodes, and the sd in m."""
+    sides = patch.a, patch.b
+    if edge in ("hinged", "sliding"):
+        sd = max(_SD * min(sides), _VANISHED * max(sides) / (math.pi * _MOST_WAVES))
+        Ni, Nj = (math.ceil(_VANISHED * side / (math.pi * sd)) for side in sides)
+        sines = SineBasis(patch, Ni, Nj)
+        along_x, along_y = (
+            np.sin(np.multiply.outer(at, k)) * np.exp(-((sd * k) ** 2) / 2)
+            for at, k in zip((x, y), sines.wavenumbers, strict=True)
+        )
+        return sines, along_x, along_y, sd
+    mixed = cast("ProductBasis", basis_for(patch, edge, _MIXED, _MIXED))
+    sd = _MIXED_SD * max(sides) / (math.pi * _MIXED)
+    z, weights = np.polynomial.hermite_e.hermegauss(9)
+    near_x, near_y = (
+        np.clip(np.add.outer(at, sd * z), 0.0, side).ravel()
+        for at, side in zip((x, y), sides, strict=True)
+    )
+    grid, shares = mixed.on_grid(near_x, near_y), weights / weights.sum()
+    along_x = np.einsum("q,pqn->pn", shares, grid.X.reshape(len(x), len(z), -1))
+    along_y = np.einsum("q,pqn->pn", shares, grid.Y.reshape(len(y), len(z), -1))
+    return mixed, along_x, along_y, sd
+
+
+def _second(values: Array, nodes: Array, axis: int) -> Array:
+    """Second derivative of `values` along `axis`, by differences."""
+    f, out = np.moveaxis(values, axis, 0), np.empty_like(values)
+    second = np.moveaxis(out, axis, 0)
+    second[1:-1] = f[2:] - 2 * f[1:-1] + f[:-2]
+    second[0] = 2 * f[0] - 5 * f[1] + 4 * f[2] - f[3]
+    second[-1] = 2 * f[-1] - 5 * f[-2] + 4 * f[-3] - f[-4]
+    return out / (nodes[1] - nodes[0]) ** 2
+
+
+def _displacement(basis: ProductBasis, compliance: Compliance, x: Array, y: Array) -> Array:
+    """Displacement (ny, nx) in m per N under a point load at each node."""
+    grid = basis.on_grid(x, y)
+    if compliance.values.ndim == 1 and compliance.volume is None:
+        return grid.Y**2 @ compliance.values.reshape(basis.shape).T @ (grid.X**2).T
+    f = basis.at(np.stack(np.meshgrid(x, y), -1).reshape(-1, 2))
+    return np.vecdot(compliance.after(f), f).reshape(len(y), len(x))
