@@ -44,9 +44,7 @@ class HingedPlate:
 
     def displacement(self, load, places):
         """Displacement (G,) in m at `places` (G, 2) in m."""
-        k, l = self.waves()
-        x, y = places.T
-        return _summed(_coefficients(self, load), np.sin(np.outer(x, k)), np.sin(np.outer(y, l)))
+        return self.surface(self.coefficients(load), places)
 
     def readings(self, load, elements, gage_length=0.0):
         """Curvature xx, yy, xy (3, P) in 1/m at `elements` (P, 2) in m.
@@ -54,8 +52,32 @@ class HingedPlate:
         Each is the mean over gages of `gage_length` in m: xx along x, yy along y; xy is half of
         what the mean normal curvatures along the two diagonals differ by.
         """
-        c, (k, l) = _coefficients(self, load), self.waves()
-        kx, ly = np.outer(elements[:, 0], k), np.outer(elements[:, 1], l)
+        return self.curvature(self.coefficients(load), elements, gage_length)
+
+    def coefficients(self, load):
+        """c_ij (modes, modes) in m: the force on a mode over a b / 4 D (k_i^2 + l_j^2)^2."""
+        return self.forces(load) / self.stiffness
+
+    def forces(self, load):
+        """The work of a load on each mode per m: (modes, modes) in N."""
+        k, l = self.waves()
+        mean = _mean(self, replace(load, x=0.0, y=0.0, force=1.0))
+        return load.force * mean * np.outer(np.sin(k * load.x), np.sin(l * load.y))
+
+    @property
+    def stiffness(self):
+        """Of each mode (modes, modes) in N/m."""
+        return self.a * self.b / 4 * self.rigidity * _squares(self) ** 2
+
+    def surface(self, c, places):
+        """Displacement (G,) of the modes `c` (modes, modes), both in m."""
+        (k, l), (x, y) = self.waves(), places.T
+        return _summed(c, np.sin(np.outer(x, k)), np.sin(np.outer(y, l)))
+
+    def curvature(self, c, elements, gage_length=0.0):
+        """Readings (3, P) of the modes `c` (modes, modes) in m."""
+        (k, l), (x, y) = self.waves(), elements.T
+        kx, ly = np.outer(x, k), np.outer(y, l)
         by_xx, by_yy, by_xy = _gages(self, gage_length)
         return np.stack(
             [
@@ -71,19 +93,15 @@ class HingedPlate:
         return n / self.a, n / self.b
 
 
-def _coefficients(plate, load):
-    """c_ij = 4 P / (a b D (k_i^2 + l_j^2)^2) times the mean of the mode over the load."""
+@cache
+def _squares(plate):
     k, l = plate.waves()
-    per_newton = _per_newton(plate, replace(load, x=0.0, y=0.0, force=1.0))
-    return load.force * per_newton * np.outer(np.sin(k * load.x), np.sin(l * load.y))
+    return np.add.outer(k**2, l**2)
 
 
 @cache
-def _per_newton(plate, load):
-    k, l = plate.waves()
-    squares = np.add.outer(k**2, l**2)
-    softness = 4 / (plate.a * plate.b * plate.rigidity * squares**2)
-    return softness * load.mean(np.sqrt(squares))
+def _mean(plate, load):
+    return load.mean(np.sqrt(_squares(plate)))
 
 
 # The mean of a wave k over a length L is sinc(k L / 2) times its middle. Along a diagonal, x and y

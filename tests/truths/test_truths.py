@@ -1,14 +1,18 @@
 """The truths that estimators are tested against, against published numbers and each other."""
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+from numpy.polynomial import Legendre, Polynomial
 from numpy.polynomial.legendre import leggauss
+from scipy.optimize import brentq
 
 from navier import HingedPlate, Load
 from sanders import CylinderShell
+from von_karman import INPLANE, StretchingPlate
 
 UNIT = HingedPlate(1.0, 1.0, 1.0)
 
@@ -231,3 +235,107 @@ def test_a_pair_of_gages_reads_what_both_faces_stretch():
     K = shell.reader(place[None])(load)[:, 0]
 
     np.testing.assert_allclose(K, _of_two_faces(shell, load, place), rtol=2e-3)
+
+
+# Von Karman's plate
+
+
+def _uniform(plate, q):
+    """The work of a pressure in N/m^2 on each sine per m."""
+    i = np.arange(1, plate.sines + 1)
+    mean = (1 - np.cos(np.pi * i)) / (np.pi * i)
+    return q * plate.a * plate.b * np.outer(mean, mean)
+
+
+@pytest.mark.parametrize(("inplane", "w"), [("held", 0.422), ("straight", 0.422)])
+def test_a_plate_under_pressure_stretches_as_levys(inplane, w):
+    E, h, nu = 1.0, 0.01, 0.316
+    plate = StretchingPlate(1.0, 1.0, **_sheet(E, nu, h), inplane=inplane)
+
+    c = plate.equilibrium(_uniform(plate, 12.1 * E * h**4))
+
+    middle = np.outer(*(np.sin(np.arange(1, plate.sines + 1) * np.pi / 2),) * 2)
+    assert np.sum(c * middle) / h == pytest.approx(w, abs=5e-4)
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.334, 0.90), (0.871, 0.59), (1.593, 0.33)])
+def test_a_held_plate_gives_way_to_a_central_force_by_less_the_further_it_goes(share, told):
+    plate, load, middle = StretchingPlate(), Load(0.05, 0.05), np.array([[0.05, 0.05]])
+
+    def reached(force):
+        return plate.displacement(replace(load, force=force), middle)[0] / plate.thickness
+
+    force = brentq(lambda force: reached(force) - share, 1e-3, 0.1, rtol=1e-5)
+    linear = HingedPlate().displacement(replace(load, force=force), middle)[0] / plate.thickness
+    assert share / linear == pytest.approx(told, abs=0.005)
+
+
+@pytest.mark.parametrize("inplane", INPLANE)
+def test_a_small_force_does_not_stretch_a_plate(inplane):
+    load, places = Load(0.03, 0.06, 1e-5, radius=3e-3), np.array([[0.04, 0.05], [0.085, 0.015]])
+    plate = StretchingPlate(inplane=inplane, sines=12, polynomials=16)
+
+    for of_plate, of_hinged in zip(
+        (plate.displacement(load, places), plate.readings(load, places, 5e-3)),
+        (HingedPlate().displacement(load, places), HingedPlate().readings(load, places, 5e-3)),
+        strict=True,
+    ):
+        np.testing.assert_allclose(of_plate, of_hinged, rtol=1e-4)
+
+
+def _membrane_energy(plate, c):
+    return plate.energy(c, np.zeros_like(c)) - np.sum(_bending(plate) * c**2) / 2
+
+
+def _bending(plate):
+    return HingedPlate(plate.a, plate.b, plate.rigidity, plate.sines).stiffness
+
+
+# The other way to the membrane's energy, by Airy's stress function p of N_xx = p_yy, N_yy = p_xx:
+# it solves (p_xxxx + 2 p_xxyy + p_yyyy) / (E h) = w_xy^2 - w_xx w_yy, and the energy is half the
+# integral of (p_xx + p_yy)^2 / (E h). On edges that a diaphragm holds p is a sum of sines, beside
+# an even shear; where they are free, p and its slope vanish there.
+
+
+def _bumpy(sines=6):
+    scale = 0.01 * 0.5 ** np.arange(sines)
+    return np.random.default_rng(0).normal(size=(sines, sines)) * np.outer(scale, scale)
+
+
+def _at_points(count=200):
+    t, weights = leggauss(count)
+    k = np.pi * np.arange(1, 7)
+    turns = np.outer((t + 1) / 2, k)
+    return t, weights / 2, np.sin(turns), k * np.cos(turns), -(k**2) * np.sin(turns)
+
+
+def _gauss_curvature(c):
+    _, _, S, C, S2 = _at_points()
+    return (C @ c @ C.T) ** 2 - (S2 @ c @ S.T) * (S @ c @ S2.T)
+
+
+def test_diaphragm_edges_agree_with_a_stress_function():
+    plate, c = StretchingPlate(1.0, 1.0, 1.0, 0.01, 0.3, "diaphragm", 6, 24), _bumpy()
+    (t, weights, S, C, _), Eh = _at_points(), 12 * 0.91 / 0.01**2
+
+    n = np.pi * np.arange(1, 101)
+    waves = np.sin(np.outer((t + 1) / 2, n)) * weights[:, None]
+    p = 4 * waves.T @ _gauss_curvature(c) @ waves / np.add.outer(n**2, n**2)
+    shear = weights @ ((C @ c @ S.T) * (S @ c @ C.T)) @ weights
+    expected = Eh * np.sum(p**2) / 8 + Eh / (4 * 1.3) * shear**2
+    assert _membrane_energy(plate, c) == pytest.approx(expected, rel=1e-6)
+
+
+def test_free_edges_agree_with_a_stress_function():
+    plate, c = StretchingPlate(1.0, 1.0, 1.0, 0.01, 0.3, "free", 6, 24), _bumpy()
+    (t, weights, *_), Eh = _at_points(), 12 * 0.91 / 0.01**2
+
+    clamped = Polynomial([1, 0, -1]) ** 2
+    made = [clamped * Legendre.basis(k).convert(kind=Polynomial) for k in range(18)]
+    F, F2 = (np.stack([p.deriv(m)(t) for p in made], -1) * 2**m for m in (0, 2))
+    laplacian = np.einsum("xi,yj->xyij", F2, F) + np.einsum("xi,yj->xyij", F, F2)
+    W = np.sqrt(np.outer(weights, weights))[..., None, None]
+    A = (W * laplacian).reshape(len(t) ** 2, -1)
+    b = F.T @ (np.outer(weights, weights) * _gauss_curvature(c)) @ F
+    expected = Eh / 2 * b.ravel() @ np.linalg.solve(A.T @ A, b.ravel())
+    assert _membrane_energy(plate, c) == pytest.approx(expected, rel=1e-6)
