@@ -61,8 +61,11 @@ class HingedPlate:
     def forces(self, load):
         """The work of a load on each mode per m: (modes, modes) in N."""
         k, l = self.waves()
-        mean = _mean(self, replace(load, x=0.0, y=0.0, force=1.0))
-        return load.force * mean * np.outer(np.sin(k * load.x), np.sin(l * load.y))
+        return load.force * self.mean(load) * np.outer(np.sin(k * load.x), np.sin(l * load.y))
+
+    def mean(self, load):
+        """Mean (modes, modes) of each mode over a load, wherever it is, by that in its middle."""
+        return _mean(self, replace(load, x=0.0, y=0.0, force=1.0))
 
     @property
     def stiffness(self):

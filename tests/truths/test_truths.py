@@ -9,8 +9,10 @@ import pytest
 from numpy.polynomial import Legendre, Polynomial
 from numpy.polynomial.legendre import leggauss
 from scipy.optimize import brentq
+from scipy.special import j0
 
 from navier import HingedPlate, Load
+from rigid import Compliance, ball
 from sanders import CylinderShell
 from von_karman import INPLANE, StretchingPlate
 
@@ -339,3 +341,79 @@ def test_free_edges_agree_with_a_stress_function():
     b = F.T @ (np.outer(weights, weights) * _gauss_curvature(c)) @ F
     expected = Eh / 2 * b.ravel() @ np.linalg.solve(A.T @ A, b.ravel())
     assert _membrane_energy(plate, c) == pytest.approx(expected, rel=1e-6)
+
+
+# A ball on a plate
+
+MIDDLE = np.array([[0.05, 0.05]])
+
+
+@cache
+def _tiles(pitch=1e-3, count=31):
+    return Compliance(HingedPlate(), 0.05, 0.05, pitch, count)
+
+
+@pytest.mark.parametrize(("radius", "depth"), [(0.02, 4e-3), (0.1, 2e-3), (0.3, 3e-3)])
+def test_an_object_pushes_where_it_touches_and_nowhere_enters(radius, depth):
+    pressed = _tiles().press(ball(radius), depth)
+
+    assert pressed.forces.min() == 0
+    assert pressed.gap.min() > -1e-12
+    assert np.abs(pressed.gap[pressed.forces > 0]).max() < 1e-12
+
+
+def test_the_force_is_what_the_work_of_sinking_takes():
+    step, (less, here, more) = (
+        1e-6,
+        (_tiles().press(ball(0.3), 3e-3 + d) for d in (-1e-6, 0.0, 1e-6)),
+    )
+
+    assert (more.energy - less.energy) / (2 * step) == pytest.approx(here.force, rel=1e-6)
+
+
+@pytest.mark.parametrize(("radius", "depth"), [(0.02, 5e-3), (0.04, 2e-3), (0.04, 5e-3)])
+def test_a_small_ball_touches_a_thin_plate_in_a_single_node(radius, depth):
+    tiles = _tiles(0.7e-3, 15)
+
+    pressed = tiles.press(ball(radius), depth)
+
+    assert np.flatnonzero(pressed.forces).tolist() == [7 * 15 + 7]
+    assert pressed.force == pytest.approx(
+        depth / HingedPlate().displacement(Load(0.05, 0.05, radius=tiles.radius), MIDDLE)[0],
+        rel=1e-3,
+    )
+
+
+@pytest.mark.parametrize("radius", [0.15, 0.2, 0.3])
+def test_a_large_ball_bears_on_a_ring(radius):
+    depth = 3e-3
+    # A plate that lies on a ball has its curvature and no load, so that it bears on a rim: a ring
+    # of radius c under which it is as deep and curved as the ball. The mean over a ring is J_0.
+    plate = HingedPlate()
+    k, l = plate.waves()
+    waves = np.sqrt(np.add.outer(k**2, l**2))
+
+    def under_ring(c):
+        made = plate.coefficients(Load(0.05, 0.05)) * j0(waves * c)
+        return plate.surface(made, MIDDLE)[0], -plate.curvature(made, MIDDLE)[0, 0]
+
+    def too_curved(c):
+        deep, curved = under_ring(c)
+        return curved / deep - 1 / (radius * depth)
+
+    c = brentq(too_curved, 1e-3, 30e-3)
+
+    pressed = _tiles().press(ball(radius), depth)
+    assert pressed.force == pytest.approx(depth / under_ring(c)[0], rel=2e-3)
+    away = np.hypot(*(pressed.places - 0.05).T)
+    assert away @ pressed.forces / pressed.force == pytest.approx(c, rel=1e-2)
+
+
+def test_readings_under_an_object_are_those_of_its_forces():
+    elements = np.array([[0.03, 0.06], [0.08, 0.02]])
+    tiles = _tiles(0.7e-3, 15)
+
+    K = tiles.press(ball(0.02), 4e-3).readings(elements)
+
+    one = HingedPlate().readings(Load(0.05, 0.05, radius=tiles.radius), elements)
+    np.testing.assert_allclose(K, 4e-3 / tiles.G[7 * 16, 7 * 16] * one, rtol=1e-9)
