@@ -1,0 +1,133 @@
+"""Navier's hinged plate: displacement and curvature under a load, summed to 240 modes each way.
+
+It shares no code with the library that it tests. Displacement is positive inward, and curvature
+the plain second derivatives f_xx, f_yy and f_xy.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+from scipy.special import j1
+
+
+@dataclass(frozen=True)
+class Load:
+    """A force in N at (x, y) in m: at a point, even over a disc of `radius`, or Gaussian with `sd`.
+
+    Radius and sd in m; a disc and nearly all of a Gaussian lie inside the plate.
+    """
+
+    x: float
+    y: float
+    force: float = 1.0
+    radius: float = 0.0
+    sd: float = 0.0
+
+    def mean(self, k):
+        """Mean over the load of a wave of wave number k in 1/m, at its middle 1.
+
+        Over a circle it is J_0(k r), by Helmholtz's equation; from it come disc and Gaussian.
+        """
+        t = np.maximum(k * self.radius, 1e-12)
+        return 2 * j1(t) / t * np.exp(-((k * self.sd) ** 2) / 2)
+
+
+@dataclass(frozen=True)
+class HingedPlate:
+    """A plate of a x b in m and flexural `rigidity` D in N m, hinged along its rim."""
+
+    a: float = 0.1
+    b: float = 0.1
+    rigidity: float = 3.7e-3
+    modes: int = 240
+
+    def displacement(self, load, places):
+        """Displacement (G,) in m at `places` (G, 2) in m."""
+        return self.surface(self.coefficients(load), places)
+
+    def readings(self, load, elements, gage_length=0.0):
+        """Curvature xx, yy, xy (3, P) in 1/m at `elements` (P, 2) in m.
+
+        Each is the mean over gages of `gage_length` in m: xx along x, yy along y; xy is half of
+        what the mean normal curvatures along the two diagonals differ by.
+        """
+        return self.curvature(self.coefficients(load), elements, gage_length)
+
+    def coefficients(self, load):
+        """c_ij (modes, modes) in m: the force on a mode over a b / 4 D (k_i^2 + l_j^2)^2."""
+        return self.forces(load) / self.stiffness
+
+    def forces(self, load):
+        """The work of a load on each mode per m: (modes, modes) in N."""
+        k, l = self.waves()
+        return load.force * self.mean(load) * np.outer(np.sin(k * load.x), np.sin(l * load.y))
+
+    def mean(self, load):
+        """Mean (modes, modes) of each mode over a load, wherever it is, by that in its middle."""
+        return _mean(self, replace(load, x=0.0, y=0.0, force=1.0))
+
+    @property
+    def stiffness(self):
+        """Of each mode (modes, modes) in N/m."""
+        return self.a * self.b / 4 * self.rigidity * _squares(self) ** 2
+
+    def surface(self, c, places):
+        """Displacement (G,) of the modes `c` (modes, modes), both in m."""
+        (k, l), (x, y) = self.waves(), places.T
+        return _summed(c, np.sin(np.outer(x, k)), np.sin(np.outer(y, l)))
+
+    def curvature(self, c, elements, gage_length=0.0):
+        """Readings (3, P) of the modes `c` (modes, modes) in m."""
+        (k, l), (x, y) = self.waves(), elements.T
+        kx, ly = np.outer(x, k), np.outer(y, l)
+        by_xx, by_yy, by_xy = _gages(self, gage_length)
+        return np.stack(
+            [
+                _summed(c * by_xx, np.sin(kx), np.sin(ly)),
+                _summed(c * by_yy, np.sin(kx), np.sin(ly)),
+                _summed(c * by_xy, np.cos(kx), np.cos(ly)),
+            ]
+        )
+
+    def waves(self):
+        """Wave numbers (modes,) along x and along y in 1/m."""
+        n = np.pi * np.arange(1, self.modes + 1)
+        return n / self.a, n / self.b
+
+
+@cache
+def _squares(plate):
+    k, l = plate.waves()
+    return np.add.outer(k**2, l**2)
+
+
+@cache
+def _mean(plate, load):
+    return load.mean(np.sqrt(_squares(plate)))
+
+
+# The mean of a wave k over a length L is sinc(k L / 2) times its middle. Along a diagonal, x and y
+# both move by t in [-h, h], h = L / sqrt(8), and a gage reads (f_xx + f_yy) / 2 + f_xy, along the
+# other one (f_xx + f_yy) / 2 - f_xy. Of f = sin(k x) sin(l y) half of what they differ by is
+# cos(k x) cos(l y) times
+#     k l <cos(k t) cos(l t)> - (k^2 + l^2) / 2 <sin(k t) sin(l t)>
+#     = ((k + l)^2 sinc((k + l) h) - (k - l)^2 sinc((k - l) h)) / 4,  <> the mean over t.
+
+
+@cache
+def _gages(plate, L):
+    k, l = np.ix_(*plate.waves())
+    h, both, difference = L / np.sqrt(8), k + l, k - l
+    xy = (both**2 * _sinc(both * h) - difference**2 * _sinc(difference * h)) / 4
+    return -(k**2) * _sinc(k * L / 2), -(l**2) * _sinc(l * L / 2), xy
+
+
+def _sinc(t):
+    return np.sinc(t / np.pi)
+
+
+def _summed(c, X, Y):
+    """Sum over i and j of c_ij X_i Y_j at each place; places of one column share a product."""
+    columns, which = np.unique(X, axis=0, return_inverse=True)
+    return np.einsum("pj,pj->p", (columns @ c)[which.ravel()], Y)
