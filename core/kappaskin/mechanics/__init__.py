@@ -21,3 +21,4 @@ from kappaskin.mechanics.rigid_objects import Punch as Punch
 from kappaskin.mechanics.rigid_objects import RigidObject as RigidObject
 from kappaskin.mechanics.rigid_objects import Sphere as Sphere
 from kappaskin.mechanics.rigid_objects import Wedge as Wedge
+from kappaskin.mechanics.stretching import Stretching as Stretching
