@@ -152,6 +152,12 @@ class Plate:
         """How its edge is held in its plane, one of `INPLANE`."""
         return self.inplane or ("hoop" if self.patch.base_curvature else "held")
 
+    @property
+    def stretches(self) -> bool:
+        """Whether it is a flat rectangle or strip of known thickness, as `Stretching` needs."""
+        flat = type(self.patch) is Patch and not self.patch.base_curvature
+        return flat and self.thickness is not None
+
     def modulus(self, h: float) -> float:
         """Young's modulus E = 12 (1 - nu^2) D / h^3 in Pa of a sheet of thickness `h` in m."""
         return 12 * (1 - self.poisson**2) * self.rigidity / h**3

@@ -1,7 +1,7 @@
 """Stretching: the forces by which a thin flat plate resists as its middle surface stretches."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import cached_property
 
 import numpy as np
@@ -30,10 +30,15 @@ from kappaskin.mechanics.plate import Plate
 _MORE_THAN_W = 8
 _LEAST = 16  # polynomials along a side
 
-_TOLERANCE = 1e-9  # of the force
+_TOLERANCE = 1e-8  # of the force
+_SLOW = 0.3  # of itself: a gradient that a step leaves larger calls for another Hessian
+_LEAST_STIFF = 1e-3  # of the stiffness in bending
 _ROUNDING = 1e-13  # of the largest eigenvalue
 _SLACK = 1e-10  # of the energy, for rounding
 _STEPS = 100
+
+
+_Solver = Callable[[Array], Array]
 
 
 class Stretching:
@@ -45,7 +50,7 @@ class Stretching:
 
     def __init__(self, plate: Plate, basis: Basis) -> None:
         h, patch = plate.thickness, plate.patch
-        if h is None or patch.base_curvature or not isinstance(basis, ProductBasis):
+        if h is None or not plate.stretches or not isinstance(basis, ProductBasis):
             raise Refusal(
                 "stretching needs a flat rectangular plate or strip whose thickness is given, got "
                 f"a {patch.name} with thickness {h} m and base curvature {patch.base_curvature:g}"
@@ -66,6 +71,8 @@ class Stretching:
         numbers = np.arange(m * n).reshape(2, m // 2, 2, n // 2)
         self._order = numbers.swapaxes(1, 2).reshape(4, -1)
         self._stiffness = self._inverse(self._membrane_compliance(A, B, wx, wy, h))
+        self._last: tuple[Array, ...] = ()
+        self._solve: _Solver | None = None
 
     def _membrane_compliance(self, A: Array, B: Array, wx: Array, wy: Array, h: float) -> Array:
         """S (m n, m n) in 1/N of products of the functions (3, m, Gx) in x and (3, n, Gy) in y."""
@@ -159,11 +166,13 @@ class Stretching:
         return vectors[:, there] * np.sqrt(values[there])
 
     # With q = L p the energy is p'p/2 + q'f(q)/4 - F'q, for f is of the third degree. Where the
-    # membrane is compressed its Hessian I + L'KL may be indefinite.
-    def __call__(self, modal: Array, after: Array | None = None) -> Array:
+    # membrane is compressed its Hessian I + L'KL may be indefinite. One Hessian serves as long as
+    # it brings the gradient down.
+    def __call__(self, modal: Array) -> Array:
         """Coefficients (Ni, Nj) in m under modal forces (Ni, Nj) in N, by Newton's method.
 
-        The search starts `after` other coefficients. Raises a `Refusal` where it does not converge.
+        The search starts from the last ones found: asked in order, that is quick. Raises a
+        `Refusal` where it does not converge.
         """
         L, shape = self._root, modal.shape
         target = L.T @ modal.ravel()
@@ -174,18 +183,19 @@ class Stretching:
             energy = p @ p / 2 + np.vdot(q, f) / 4 - target @ p
             return float(energy), p + L.T @ f.ravel() - target, q
 
-        p = self._first(target)
-        if after is not None:
-            p = np.linalg.lstsq(L, after.ravel(), rcond=None)[0].astype(float)
-        energy, gradient, q = state(p)
+        p = min((*self._last, self._first(target)), key=lambda p: state(p)[0])
+        (energy, gradient, q), before = state(p), math.inf
         for _ in range(_STEPS):
-            if np.linalg.norm(gradient) <= _TOLERANCE * np.linalg.norm(target):
+            size = float(np.linalg.norm(gradient))
+            if size <= _TOLERANCE * np.linalg.norm(target):
+                self._last = (p,)
                 return q
-            step = _descent(np.eye(len(p)) + L.T @ self.tangent(q) @ L, gradient)
-            share = 1.0
-            while (new := state(p + share * step))[0] > energy + _SLACK * abs(energy):
-                share /= 2
-            p, (energy, gradient, q) = p + share * step, new
+            if (solve := self._solve) is None or size > _SLOW * before:
+                self._solve = solve = _solver(np.eye(len(p)) + L.T @ self.tangent(q) @ L)
+            step, before = -solve(gradient), size
+            while (new := state(p + step))[0] > energy + _SLACK * abs(energy):
+                step = step / 2
+            p, (energy, gradient, q) = p + step, new
         raise Refusal(
             f"the deflection of a plate that stretches did not converge in {_STEPS} steps; use "
             "less force or a thicker plate, or omit its thickness"
@@ -209,13 +219,15 @@ class Stretching:
         return self(modal)
 
 
-def _descent(H: Array, gradient: Array) -> Array:
-    """Newton's step; with an indefinite Hessian `H` by the sizes of its eigenvalues."""
+def _solver(H: Array) -> _Solver:
+    """What solves with the Hessian `H`, with the sizes of its eigenvalues if some are negative."""
     try:
-        return -scipy.linalg.cho_solve(scipy.linalg.cho_factor(H), gradient)
+        factor = scipy.linalg.cho_factor(H)
+        return lambda gradient: scipy.linalg.cho_solve(factor, gradient)
     except np.linalg.LinAlgError:
         values, vectors = np.linalg.eigh(H)
-        return -vectors @ ((vectors.T @ gradient) / np.maximum(np.abs(values), 1e-3))
+        sizes = np.maximum(np.abs(values), _LEAST_STIFF)
+        return lambda gradient: vectors @ ((vectors.T @ gradient) / sizes)
 
 
 def _even(count: int) -> int:
@@ -244,3 +256,16 @@ def _sandwich(along_x: Array, field: Array, along_y: Array) -> Array:
     (K, I, Gx), (L, J, Gy) = along_x.shape, along_y.shape
     flat = along_x.reshape(K * I, Gx) @ field @ along_y.reshape(L * J, Gy).T
     return flat.reshape(K, I, L, J).swapaxes(1, 2).reshape(K * L, I * J)
+
+
+def deflection_of(plate: Plate, basis: Basis) -> Callable[[Array], Array]:
+    """Modal forces (Ni, Nj) in N to coefficients in m; it stretches where that can be computed."""
+    return Stretching(plate, basis) if plate.stretches else plate.compliance(basis)
+
+
+def shapes_under(plate: Plate, basis: Basis, forces: Array) -> Array:
+    """Coefficients (S, N) in m under modal `forces` (S, N) in N, one moment after the other."""
+    if not plate.stretches:
+        return plate.compliance(basis).after(forces)
+    stretching, each = Stretching(plate, basis), forces.reshape(-1, *basis.shape)
+    return np.array([stretching(force) for force in each]).reshape(forces.shape)
