@@ -107,8 +107,9 @@ def _plate(patch: Patch, found: dict[str, Array], inplane: str) -> Plate:
     for name in _SKIN:
         if name in found and found[name].size != 1:
             raise Refusal(f"expected one {name}, got shape {found[name].shape}")
-    told = {name: float(found[name].item()) for name in _SKIN if name in found}
-    return Plate(patch, **({"rigidity": 1.0} | told), inplane=inplane)
+    told: dict[str, Any] = {"rigidity": 1.0, "inplane": inplane}
+    told |= {name: float(found[name].item()) for name in _SKIN if name in found}
+    return Plate(patch, **told)
 
 
 def _patch(path: Path, size: Array, radius: Array, outline: Array | None) -> Patch:
