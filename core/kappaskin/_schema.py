@@ -254,8 +254,8 @@ class Part:
         """The value of a key in `table`, or its default, unless another `default` is given."""
         key = self.key(name)
         usual = key.default if default is REQUIRED else default
-        if key.choices:
-            return table.choose(name, {choice: choice for choice, _ in key.choices}, usual)
+        if key.choices and name in table:  # no default need be among them
+            return table.choose(name, {choice: choice for choice, _ in key.choices})
         return table.get(name, key.kind, usual, key.limits)
 
     def make(

@@ -49,7 +49,7 @@ from kappaskin_app.shell.settings.scene import FREE_CASES, READY_CASES, SHAPES, 
 
 _PLACING = ("load_case", "size", "size_y", "shape", "side_x", "side_y", "rim_radius")
 """Settings whose change can move a free load over the rim."""
-_TABLE_1 = ("shape", "side_x", "side_y", "edge", "tension", "foam", "fluid")
+_TABLE_1 = ("shape", "side_x", "side_y", "edge", "tension", "foam", "fluid", "thickness")
 NO_ELEMENTS: dict[str, Any] = {"region_elements": (), "dead_elements": ()}
 """Selections of elements by number, cleared when the elements change."""
 
@@ -111,7 +111,15 @@ def patch_of(settings: Settings) -> Patch:
 def plate_of(settings: Settings) -> Plate:
     """The plate of the `settings`, without elements."""
     s = settings
-    return Plate(patch_of(s), tension=s.tension, foundation=s.foam, fluid=s.fluid)
+    return Plate(
+        patch_of(s),
+        tension=s.tension,
+        foundation=s.foam,
+        fluid=s.fluid,
+        poisson=s.poisson,
+        thickness=s.thickness or None,
+        inplane=s.inplane,
+    )
 
 
 def elements_of(settings: Settings) -> tuple[int, int]:
@@ -264,6 +272,7 @@ def with_consequences(settings: Settings, scene: Scene, name: str, value: Any) -
         offered = edges_of(patch_of(replace(settings, **changed)))
         changed |= {"edge": offered[0]} if settings.edge not in offered else {}
         changed |= {"fit_edge": ""} if settings.fit_edge not in offered else {}
+        changed |= {"inplane": ""}  # a bent skin and a flat one are held in other ways
     if name == "electronics":
         converter = _CHAINS[value].converter
         changed |= {"bits": converter.bits, "conversion_time": converter.conversion_time}

@@ -348,7 +348,8 @@ def reconstruct(
     1/m with NaN for a missing reading, and optionally `sigma` in 1/m and `radius` in m, the base
     radius along x (infinite when flat). A `size` (1,) with `positions` (P, 1) is a strip, for
     which only curvature xx is used. An `outline` in m is a polygon (V, 2) or the radius of a disk.
-    With a `rigidity` in N m, forces are computed too.
+    With a `rigidity` in N m, forces are computed too; a `thickness` in m, `poisson` and `inplane`
+    (held, diaphragm, free; hoop of a bent skin) say how the skin stretches.
 
     Example: `kappaskin reconstruct in.npz --basis 8x8 --out out.npz --grid 101x101`
 

@@ -51,7 +51,16 @@ class Compliance:
 # Tension: a skin that the pressure T H blows up has the energy T area - p volume, of which the
 # second variation is T (|grad f|^2 - H^2 f^2): nil for a rigid translation.
 
-_THICKNESS = 0.25e-3  # m of a skin whose axial stiffness nobody gave: substrate and gages
+USUAL_THICKNESS = 0.25e-3
+"""Thickness in m of a bent skin that was given none: substrate and gages."""
+
+INPLANE = ("held", "diaphragm", "free", "hoop")
+"""Boundary conditions in the plane of the skin, along its edge.
+
+`held`: no displacement. `diaphragm`: no membrane force across the edge, no displacement along it.
+`free`: no membrane force across the edge, no shear. `hoop`, of a bent skin: the straight edges hold
+the hoop displacement and leave the axial one free, the curved ones hold the radial and the hoop.
+"""
 
 
 @dataclass(frozen=True)
@@ -64,7 +73,10 @@ class Plate:
     of a cylinder skin, which stretches along its axis as it bends: E h of a uniform sheet; None
     means a sheet 0.25 mm thick, as the paper's skin, and zero one that stretches freely, which is
     far too soft. `rim_stiffness` in N/m per m of an elastic rim: the default lets it give by
-    0.2 mm under a load that presses the default skin of 0.1 x 0.1 m in by 5 mm.
+    0.2 mm under a load that presses the default skin of 0.1 x 0.1 m in by 5 mm. `thickness` h in m
+    of a uniform sheet: a flat skin that was given none does not stretch, a bent one is 0.25 mm
+    thick. `inplane` is how its edge is held in its plane, one of `INPLANE`; empty means `held`, of
+    a bent skin `hoop`.
     """
 
     patch: Patch
@@ -75,6 +87,8 @@ class Plate:
     poisson: float = 0.3
     axial_stiffness: float | None = None
     rim_stiffness: float = 2e3
+    thickness: float | None = None
+    inplane: str = ""
 
     def __post_init__(self) -> None:
         for value, expected in (
@@ -92,6 +106,26 @@ class Plate:
             )
         if not -1 < self.poisson <= 0.5:
             raise Refusal(f"expected -1 < Poisson's ratio <= 0.5, got {self.poisson}")
+        self._check_sheet()
+
+    def _check_sheet(self) -> None:
+        h = self.thickness
+        if h is not None and not 0 < h <= min(self.patch.a, self.patch.b):
+            raise Refusal(
+                f"expected a thickness above zero, at most the skin's shorter side in m, got {h}"
+            )
+        if h is not None and not self.rigidity:
+            raise Refusal(
+                "expected a rigidity above zero in N m with a thickness: its modulus follows from "
+                "both; omit the thickness of a drum head"
+            )
+        flat = not self.patch.base_curvature
+        possible = INPLANE[:-1] if flat else INPLANE
+        if self.inplane and self.inplane not in possible:
+            raise Refusal(
+                f"expected inplane among {', '.join(possible)} for a {'flat' if flat else 'bent'} "
+                f"skin, got {self.inplane!r:.40}"
+            )
 
     @classmethod
     def of_material(cls, patch: Patch, E: float, nu: float, h: float) -> "Plate":
@@ -104,13 +138,36 @@ class Plate:
                 f"expected E > 0 Pa, h > 0 m and -1 < nu <= 0.5, got E={E}, nu={nu}, h={h}"
             )
         D = E * h**3 / (12 * (1 - nu**2))
-        return cls(patch, D, poisson=nu, axial_stiffness=E * h)
+        return cls(patch, D, poisson=nu, thickness=h)
+
+    @property
+    def sheet_thickness(self) -> float | None:
+        """Thickness h in m by which it stretches; None for a flat skin that was given none."""
+        if self.thickness is None and self.patch.base_curvature:
+            return USUAL_THICKNESS
+        return self.thickness
+
+    @property
+    def inplane_edge(self) -> str:
+        """How its edge is held in its plane, one of `INPLANE`."""
+        return self.inplane or ("hoop" if self.patch.base_curvature else "held")
+
+    @property
+    def stretches(self) -> bool:
+        """Whether it is a flat rectangle or strip of known thickness, as `Stretching` needs."""
+        flat = type(self.patch) is Patch and not self.patch.base_curvature
+        return flat and self.thickness is not None
+
+    def modulus(self, h: float) -> float:
+        """Young's modulus E = 12 (1 - nu^2) D / h^3 in Pa of a sheet of thickness `h` in m."""
+        return 12 * (1 - self.poisson**2) * self.rigidity / h**3
 
     @property
     def stretching(self) -> float:
-        """Axial stiffness C in N/m; of a uniform sheet it is 12 (1 - nu^2) D / h^2."""
+        """Axial stiffness C in N/m; of a uniform sheet E h, as if 0.25 mm thick if unknown."""
         if self.axial_stiffness is None:
-            return 12 * (1 - self.poisson**2) * self.rigidity / _THICKNESS**2
+            h = self.thickness or USUAL_THICKNESS
+            return self.modulus(h) * h
         return self.axial_stiffness
 
     def check(self, load: Load) -> None:

@@ -23,7 +23,8 @@ from kappaskin.skin import Disk, Patch, Polygon
 
 _NEEDED = "size (2,) in m, positions (P, 2) in m and curvature (T, 3, P) or (3, P) in 1/m"
 
-_NAMES = ("size", "positions", "curvature", "sigma", "radius", "outline", "rigidity")
+_SKIN = ("rigidity", "thickness", "poisson")
+_NAMES = ("size", "positions", "curvature", "sigma", "radius", "outline", *_SKIN, "inplane")
 _HEADER = 2**16  # bytes of a member that say what it holds
 _READ_AS = 8  # bytes of each number in memory
 
@@ -79,8 +80,8 @@ def _declared(archive: zipfile.ZipFile, name: str) -> tuple[tuple[int, ...], int
     return shape, kind.itemsize
 
 
-def _read(path: Path) -> dict[str, Array]:
-    """The arrays of a readings file as numbers; nothing in it is ever executed."""
+def _read(path: Path) -> tuple[dict[str, Array], str]:
+    """The arrays of a readings file as numbers, and `inplane`; nothing in it is ever executed."""
     try:
         found = _arrays(path)
     except FileNotFoundError as error:
@@ -92,10 +93,23 @@ def _read(path: Path) -> dict[str, Array]:
     for name in ("size", "positions", "curvature"):
         if name not in found:
             raise Refusal(f"{path}: has no {name!r} (it has {sorted(found)}); expected {_NEEDED}")
+    inplane = found.pop("inplane", np.array(""))
+    if inplane.dtype.kind != "U" or inplane.size != 1:
+        raise Refusal(f"{path}: expected inplane to be one text, got {inplane.dtype}")
     for name, values in found.items():
         if values.dtype.kind not in "fiu":
             raise Refusal(f"{path}: expected {name} to be real numbers, got {values.dtype}")
-    return {name: values.astype(float) for name, values in found.items()}
+    return {name: values.astype(float) for name, values in found.items()}, str(inplane.item())
+
+
+def _plate(patch: Patch, found: dict[str, Array], inplane: str) -> Plate:
+    """The skin by the numbers in the file; without a rigidity of 1 N m."""
+    for name in _SKIN:
+        if name in found and found[name].size != 1:
+            raise Refusal(f"expected one {name}, got shape {found[name].shape}")
+    told: dict[str, Any] = {"rigidity": 1.0, "inplane": inplane}
+    told |= {name: float(found[name].item()) for name in _SKIN if name in found}
+    return Plate(patch, **told)
 
 
 def _patch(path: Path, size: Array, radius: Array, outline: Array | None) -> Patch:
@@ -191,7 +205,7 @@ def reconstruct(
     `method` one of `METHODS`. With `contact` also what `_contacts` gives, with `objects`
     what `_objects` gives besides.
     """
-    found = _read(readings)
+    found, inplane = _read(readings)
     curvature, sigma = found["curvature"], found.get("sigma")
     radius = found.get("radius", np.array(np.inf))
     patch = _patch(readings, found["size"], radius, found.get("outline"))
@@ -217,15 +231,12 @@ def reconstruct(
         x, y = patch.grid(*grid)
         out |= {"grid_x": x, "grid_y": y, "w": functions.on_grid(x, y)(out["coefficients"])}
     if contact or objects:
-        rigidity = found.get("rigidity")
-        if rigidity is not None and rigidity.size != 1:
-            raise Refusal(f"expected one rigidity in N m, got shape {rigidity.shape}")
-        plate = Plate(patch, 1.0 if rigidity is None else float(rigidity.item()))
+        plate = _plate(patch, found, inplane)
         fitter = estimator_for(method, functions, layout)
         contact_of = PointContact(plate, layout, edge)
         fits = [fitter(frame) for frame in curvature]
         contacts = [contact_of(one.curvature, one) for one in fits]
-        out |= _contacts(fits, contacts, forces=rigidity is not None)
+        out |= _contacts(fits, contacts, forces="rigidity" in found)
         if objects:
             find = ObjectFinder(plate, layout, edge)
             noises = [float(one.noise) for one in fits]

@@ -19,6 +19,7 @@ from kappaskin.scenes.effects import (
     Saturation,
     Size,
     Skew,
+    StretchingEffect,
     Tension,
 )
 from kappaskin.scenes.scene import EffectSelection, Scene, survey
@@ -74,6 +75,8 @@ def effects_of(scene: Scene) -> dict[str, Effect]:
         there.append(Foam(plate.foundation))
     if plate.fluid:
         there.append(Fluid())
+    if plate.stretches and plate.thickness is not None:
+        there.append(StretchingEffect(plate.thickness))
     if layout.gage_length:
         there.append(GageLength(layout.gage_length))
     if dead := tuple(np.flatnonzero(~layout.live.any(axis=0)).tolist()):

@@ -10,7 +10,15 @@ import numpy as np
 from kappaskin.bases import Basis, basis_for
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.mechanics import Indentation, IndentationSolver, Load, Plate, PointLoad
+from kappaskin.mechanics import (
+    Indentation,
+    IndentationSolver,
+    Load,
+    Plate,
+    PointLoad,
+    Stretching,
+    shapes_under,
+)
 from kappaskin.scenes.cylinders import Presentation
 from kappaskin.scenes.effects import EFFECTS, Effect, ReadingEffect, Survey
 from kappaskin.scenes.stimulus import Indenter, Motion, Stimulus, contact_of
@@ -173,7 +181,7 @@ class Scene:
 
 
 def scaled_to(plate: Plate, load: Load, displacement: float, basis: Basis) -> Load:
-    """The load whose point of application moves by `displacement` in m."""
+    """The load whose point of application moves by `displacement` in m, stretched if it is."""
     compliance = plate.compliance(basis)
     at = float(basis.at(load.centre()[None])[0] @ compliance(load.modal(basis)).ravel())
     if not at / load.force > 1e-12 * np.max(compliance.values):
@@ -181,7 +189,21 @@ def scaled_to(plate: Plate, load: Load, displacement: float, basis: Basis) -> Lo
             f"expected a load that moves the skin at its position, got {load}; the edges are "
             "held: choose a position further inside"
         )
-    return load.scaled(displacement / at)
+    scaled = load.scaled(displacement / at)
+    if not plate.stretches or not displacement:
+        return scaled
+    from scipy.optimize import brentq  # slow to import, and seldom needed
+
+    stretching, modal = Stretching(plate, basis), scaled.modal(basis)
+    there = basis.at(load.centre()[None])[0] / displacement
+
+    def beyond(times: float) -> float:
+        return float(there @ stretching(times * modal).ravel()) - 1
+
+    most = 1.0
+    while beyond(most) < 0:
+        most *= 2
+    return scaled.scaled(float(brentq(beyond, most / 2, most)) if most > 1 else 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,13 +286,14 @@ def survey(scene: Scene) -> Survey:
     layout = replace(scene.layout, gage_length=0.0)
     times = np.array(scene.survey_times)
     M = layout.curvature_operator(basis)
-    compliance = scene.plate.compliance(basis)
     pressing = LoadingHistory(scene, scene.plate)
     step = min([_STEP, *(np.diff(s.motion.moments).min() / 4 for s in scene.stimuli if s.motion)])
     pairs = [(pressing(t), pressing(t + step) if scene.moves else None) for t in times.tolist()]
     forces = np.array([now.force.ravel() for now, _ in pairs])
     later = np.array([(then or now).force.ravel() for now, then in pairs])
-    c = compliance.after(forces)
+    # In turn, so that what stretches is sought from where it was.
+    both = np.stack([forces, later], axis=1).reshape(-1, basis.size)
+    c, then = shapes_under(scene.plate, basis, both).reshape(-1, 2, basis.size).swapaxes(0, 1)
     curvature = (c @ M.T).reshape(len(times), 3, len(layout))
     if scene.laid is not None:
         laid = [np.repeat(scene.laid.curvature(t), len(layout)) for t in times.tolist()]
@@ -286,7 +309,7 @@ def survey(scene: Scene) -> Survey:
         forces,
         c,
         curvature,
-        np.abs(compliance.after(later - forces) @ M.T).max(axis=0) / step,
+        np.abs((then - c) @ M.T).max(axis=0) / step,
         scene.survey_duration,
         read_after,
     )

@@ -11,6 +11,7 @@ from kappaskin._schema import Key, Part, PartKind, Unit, Within, fields_of
 from kappaskin._toml import REQUIRED
 from kappaskin.bases import EDGES
 from kappaskin.mechanics import (
+    INPLANE,
     Block,
     Cylinder,
     DiscLoad,
@@ -158,6 +159,23 @@ SKIN = Part(
             Unit.same("N/m"),
             limits=Within(1e-9, 1e12, "N/m", or_zero=True),
             example=1e4,
+        ),
+        "thickness": Key(
+            "Thickness",
+            "Thickness of a uniform sheet, by which it resists stretching. A flat skin without one "
+            "does not stretch; a bent one is 0.25 mm thick.",
+            _UM,
+            limits=Within(1e-7, 0.1, "m"),
+            example=2.5e-4,
+        ),
+        "inplane": Key(
+            "Held in its plane",
+            "Boundary condition in the plane of the skin. Held: no displacement; diaphragm: no "
+            "force across the edge, no displacement along it; free: neither force nor shear; hoop, "
+            "of a bent skin: the straight edges hold the hoop displacement and leave the axial one "
+            "free. Held unless given, hoop for a bent skin.",
+            choices=tuple((one, one.capitalize()) for one in INPLANE),
+            example="diaphragm",
         ),
     },
     (Plate, Scene, Patch),

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from kappaskin.frames import Array, Frame, Truth
-from kappaskin.mechanics import Load
+from kappaskin.mechanics import Load, deflection_of
 from kappaskin.scenes.effect_plan import effects_of, kept_effects
 from kappaskin.scenes.effects import (
     CorruptedFrames,
@@ -99,10 +99,8 @@ class Simulator:
         if GageLength not in kinds:
             layout = replace(layout, gage_length=0.0)
         self._basis = scene.basis
-        self._pressing, self._compliance = (
-            LoadingHistory(scene, plate),
-            plate.compliance(self._basis),
-        )
+        self._pressing = LoadingHistory(scene, plate)
+        self._deflection = deflection_of(plate, self._basis)
         self._take_stimuli()
         self._skewed = Skew in kinds
         self._scan = scene.sensor().scan()
@@ -116,7 +114,7 @@ class Simulator:
         if self._still is not None:
             return self._still
         pressed = self._pressed(time)
-        truth = Truth(self._compliance(pressed.force), pressed.contact, self.scene.edge)
+        truth = Truth(self._deflection(pressed.force), pressed.contact, self.scene.edge)
         if not self.scene.moves:
             self._still = truth
         return truth
@@ -132,7 +130,7 @@ class Simulator:
             return first
         # The parabola through start, middle and end, at the share s of the scan.
         middle, last = (
-            self._sensed(self._compliance(self._pressed(t).force))
+            self._sensed(self._deflection(self._pressed(t).force))
             for t in (time + scan.duration / 2, time + scan.duration)
         )
         s = np.zeros(len(first))

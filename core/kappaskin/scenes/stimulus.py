@@ -390,6 +390,12 @@ class Stimulus:
         """Refuse what does not touch `plate`, at rest or wherever it presses while it moves."""
         poses = _poses(self.motion, plate.patch) if self.motion else []
         if isinstance(self.what, Indenter):
+            if plate.stretches and self.what.depth is not None:
+                raise Refusal(
+                    "expected a force in N for an object on a flat skin of known thickness, got a "
+                    f"depth of {self.what.depth:g} m, which is computed only for a skin that does "
+                    "not stretch; give the force, or omit the thickness"
+                )
             self.what.check(plate.patch, Pose())
             for pose in poses if self.motion else [Pose()]:
                 if pose.amount:

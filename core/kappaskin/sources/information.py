@@ -59,7 +59,7 @@ SENSOR = Part(
             name: _SKIN.key(name)
             for name in (
                 *("edge", "fluid", "tension", "foundation", "poisson"),
-                *("rim_stiffness", "axial_stiffness"),
+                *("rim_stiffness", "axial_stiffness", "thickness", "inplane"),
             )
         },
         "grid": replace(_ELEMENTS.key("grid"), default=None),
@@ -102,6 +102,7 @@ def sensor_to_json(sensor: Sensor) -> str:
         "positions": None if layout.shape else layout.positions.tolist(),
         "dead_channels": np.flatnonzero(~layout.live.ravel()).tolist(),
         "channel_map": None if wired is None else wired.tolist(),
+        "inplane": sensor.plate.inplane or None,
     }
     values |= {name: asdict(getattr(sensor.transduction, name)) for name in _CHAIN}
     written = {name: values[name] for name in SENSOR.keys if values[name] is not None}

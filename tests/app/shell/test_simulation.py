@@ -72,6 +72,14 @@ def test_what_is_below_and_how_it_is_held_is_in_the_scene() -> None:
     assert (scene.edge, scene.sensor().edge) == ("sliding", "sliding")
 
 
+def test_the_skin_stretches_as_the_panel_says() -> None:
+    plate = scene_of(Settings(thickness=3e-4, poisson=0.4, inplane="free")).plate
+    assert (plate.thickness, plate.poisson, plate.inplane) == (3e-4, 0.4, "free")
+    assert scene_of(Settings()).plate.thickness is None
+    scene = scene_of(Settings(inplane="free"))
+    assert with_consequences(Settings(inplane="free"), scene, "shape", "strip")["inplane"] == ""
+
+
 def test_a_bent_skin_is_an_even_sheet_as_thick_as_its_gages() -> None:
     plate = scene_of(on("cylinder")).plate
     E = 12 * (1 - plate.poisson**2) * plate.rigidity / 250e-6**3

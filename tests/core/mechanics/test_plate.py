@@ -131,6 +131,38 @@ def test_a_material_that_cannot_be_is_refused(material):
         Plate.of_material(SQUARE, E, nu, h)
 
 
+def test_a_skin_of_known_thickness_has_the_modulus_of_its_rigidity():
+    plate = Plate.of_material(SQUARE, E=2e9, nu=0.3, h=1e-3)
+
+    assert plate.thickness == plate.sheet_thickness == 1e-3
+    assert plate.modulus(1e-3) == pytest.approx(2e9)
+    assert plate.stretching == pytest.approx(2e6)
+
+
+def test_how_a_skin_is_held_in_its_plane_unless_told():
+    flat, bent = Plate(SQUARE), Plate(Patch(0.04, 0.03, 0.0129))
+
+    assert (flat.sheet_thickness, flat.inplane_edge) == (None, "held")
+    assert (bent.sheet_thickness, bent.inplane_edge) == (0.25e-3, "hoop")
+    assert Plate(SQUARE, inplane="free").inplane_edge == "free"
+
+
+@pytest.mark.parametrize(
+    ("told", "expected"),
+    [
+        ({"thickness": 0.0}, "expected a thickness above zero"),
+        ({"thickness": math.nan}, "expected a thickness above zero"),
+        ({"thickness": 0.2}, "at most the skin's shorter side"),
+        ({"thickness": 1e-3, "rigidity": 0.0, "tension": 1.0}, "omit the thickness of a drum head"),
+        ({"inplane": "hoop"}, "expected inplane among held, diaphragm, free for a flat skin"),
+        ({"inplane": "glued"}, "got 'glued'"),
+    ],
+)
+def test_a_sheet_that_cannot_be_is_refused(told, expected):
+    with pytest.raises(Refusal, match=expected):
+        Plate(SQUARE, **told)
+
+
 @pytest.mark.parametrize("rigidity", [0.0, -1.0, math.nan, math.inf])
 def test_a_rigidity_that_cannot_be_is_refused(rigidity):
     with pytest.raises(Refusal, match=f"rigidity above zero in N m, got {rigidity}"):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kappaskin import GaussianLoad, PointLoad, Refusal, load_scene
-from kappaskin.mechanics import Cylinder, Mesh
+from kappaskin.mechanics import Cylinder, Mesh, Stretching
 from kappaskin.scenes import SCENES, Indenter, read_scene
 
 HEAD = "format = 1\n\n[skin]\nsize = [0.1, 0.1]\n"
@@ -51,6 +51,24 @@ def test_what_a_file_says_is_what_the_scene_is():
     assert not scene.layout.live[:, 3].any()
     assert scene.transduction.converter.bits == 12
     assert scene.choice.auto
+
+
+def test_a_displacement_of_a_skin_that_stretches_takes_more_force():
+    touch = '[[touch]]\nwhat = "point"\nx = 0.03\ny = 0.05\ndisplacement = -1e-3\n'
+    loose, sheet = read(HEAD + touch), read(HEAD + "thickness = 0.25e-3\n" + touch)
+
+    c = Stretching(sheet.plate, sheet.basis).deflection(sheet.loads)
+
+    assert sheet.basis.value(0.03, 0.05, c) == pytest.approx(-1e-3, rel=1e-6)
+    assert sheet.loads[0].force < 3 * loose.loads[0].force < 0
+
+
+def test_an_object_at_a_depth_is_refused_on_a_skin_that_stretches():
+    ball = '[[touch]]\nwhat = "sphere"\nx = 0.05\ny = 0.05\nradius = 0.02\ndepth = 1e-3\n'
+
+    with pytest.raises(Refusal, match="give the force, or omit the thickness"):
+        read(HEAD + "thickness = 0.25e-3\n" + ball)
+    read(HEAD + "thickness = 0.25e-3\n" + ball.replace("depth = 1e-3", "force = 0.1"))
 
 
 def test_a_displacement_stands_for_the_force_that_makes_it():

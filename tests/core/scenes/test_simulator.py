@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from kappaskin import Patch, Plate, PointLoad, Refusal, Scene, SensorLayout, Simulator, load_scene
-from kappaskin.scenes import Orbit
+from kappaskin.mechanics import Stretching
+from kappaskin.scenes import EffectSelection, Orbit, plan
 from kappaskin.scenes.cylinders import CylinderStep, Presentation
 from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, Creep, GaussianNoise, UniformNoise
 
@@ -36,6 +37,48 @@ def test_effects_of_no_size_change_nothing():
     without_size = replace(QUIET, effects=(UniformNoise(0.0), GaussianNoise(0.0)))
 
     np.testing.assert_array_equal(counts(without_size), counts(QUIET))
+
+
+SHEET = replace(QUIET, plate=Plate(PATCH, thickness=0.25e-3))
+LIGHT = {"auto": True, "accuracy": 0.01}
+
+
+def largest_deflection(scene):
+    truth = Simulator(scene).frame(0, lambda: 0.0).truth
+    return scene.basis.value(0.03, 0.06, truth.coefficients)
+
+
+def test_a_skin_of_known_thickness_stretches():
+    truth = Simulator(SHEET).frame(0, lambda: 0.0).truth
+
+    c = Stretching(SHEET.plate, SHEET.basis).deflection(SHEET.loads)
+
+    np.testing.assert_allclose(truth.coefficients, c, rtol=0, atol=1e-7 * np.abs(c).max())
+    assert largest_deflection(SHEET) < 0.5 * largest_deflection(QUIET)
+    without = replace(SHEET, choice=EffectSelection(off=frozenset({"stretching", "finite-slope"})))
+    assert largest_deflection(without) == largest_deflection(QUIET)
+
+
+@pytest.mark.parametrize(("force", "kept"), [(0.15, True), (1e-4, False)])
+def test_stretching_is_simulated_where_the_deflection_calls_for_it(force, kept):
+    scene = replace(SHEET.touched_by(PointLoad(0.03, 0.06, force)), choice=EffectSelection(**LIGHT))
+
+    entry = next(entry for entry in plan(scene) if entry.name == "stretching")
+
+    assert entry.kept == kept
+    assert entry.size.number == pytest.approx(largest_deflection(scene) / 0.25e-3, rel=0.1)
+
+
+def test_a_moving_load_stretches_the_skin_as_a_still_one_does():
+    moving = SHEET.touched_by(PointLoad(0.03, 0.06, 0.15), motion=Orbit(0.01, 1.0))
+    simulator = Simulator(moving)
+    times = [0.1, 0.11, 0.6, 0.12]
+
+    found = [simulator.reading(moving.sensor().scan(), time)[0].coefficients for time in times]
+
+    for time, c in zip(times, found, strict=True):
+        still = Simulator(SHEET.touched_by(*moving.loads_at(time))).frame(0, lambda: 0.0).truth
+        np.testing.assert_allclose(c, still.coefficients, rtol=0, atol=1e-6 * np.abs(c).max())
 
 
 def test_effects_add_up():

@@ -310,6 +310,8 @@ def scenes(draw) -> Scene:
         foundation=draw(st.sampled_from([0.0, 3e-5, 1e12])),
         fluid=draw(st.booleans()),
         axial_stiffness=draw(st.none() | numbers),
+        thickness=draw(st.sampled_from([None, 0.2e-3, 1e-3])),
+        inplane=draw(st.sampled_from(["", "held", "free"])),
     )
     scene = Scene(
         "a scene",

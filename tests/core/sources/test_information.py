@@ -83,6 +83,15 @@ def test_all_that_holds_the_skin_survives() -> None:
     assert same(sensor_from_json(sensor_to_json(sensor)), sensor)
 
 
+def test_how_the_skin_stretches_survives() -> None:
+    plate = Plate(PATCH, thickness=0.3e-3, inplane="diaphragm")
+    sensor = sensor_on(SensorLayout.regular(PATCH, 3, 2), plate=plate)
+
+    assert same(sensor_from_json(sensor_to_json(sensor)), sensor)
+    with pytest.raises(SourceError, match="expected inplane among held, diaphragm, free"):
+        sensor_from_json(json.dumps(said(inplane="hoop")))
+
+
 def test_every_outline_and_edge_survives(held_skin) -> None:
     layout = SensorLayout.regular(held_skin.patch, 3, 1 if held_skin.patch.strip else 3)
     sensor = sensor_on(layout, edge=held_skin.edge)

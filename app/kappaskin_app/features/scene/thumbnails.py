@@ -10,6 +10,7 @@ from PySide6.QtGui import QColor, QImage, QLinearGradient, QPainter, QPen, QPoly
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Indices, Mask
+from kappaskin.mechanics import shapes_under
 from kappaskin.scenes import AppliedLoads, Indenter, LoadingHistory, Scene, Stimulus, load_scene
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import BackgroundTask, Tasks
@@ -135,7 +136,7 @@ def _hardest(scene: Scene, skin: DrawnSkin) -> tuple[Array, AppliedLoads | None]
     pressing, basis = LoadingHistory(scene, scene.plate), scene.basis
     pressed = [pressing(t) for t in times]
     forces = np.array([moment.force.ravel() for moment in pressed])
-    c = scene.plate.compliance(basis).after(forces)
+    c = shapes_under(scene.plate, basis, forces)
     most = int(np.argmax(np.sum(forces * c, axis=1)))
     return basis.on_grid(x, y)(c[most].reshape(basis.shape)), pressed[most]
 

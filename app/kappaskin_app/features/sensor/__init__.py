@@ -8,6 +8,7 @@ from kappaskin_app.features.sensor.panel import (
     GagesPanel,
     RegionPanel,
     ShapePanel,
+    StretchingPanel,
     SupportPanel,
 )
 from kappaskin_app.guard import guarded
@@ -25,6 +26,7 @@ class SensorFeature:
         add, session = shell.panels.add, shell.session
         self.shape, self.elements = add(SKIN, ShapePanel()), add(SKIN, ElementsPanel())
         self.support = add(SKIN, SupportPanel())
+        self.stretching = add(SKIN, StretchingPanel())
         self.electronics = add(SENSOR, ElectronicsPanel())
         self.gages = add(SENSOR, GagesPanel())
         self.region = add(SENSOR, RegionPanel())

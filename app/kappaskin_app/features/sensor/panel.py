@@ -7,6 +7,7 @@ from kappaskin.bases import edges_of
 from kappaskin.errors import Refusal
 from kappaskin.estimation import ScanTradeoff
 from kappaskin.live import Status
+from kappaskin.mechanics import INPLANE
 from kappaskin.sensing import Sensor
 from kappaskin_app.shell.badge import in_use
 from kappaskin_app.shell.form import Form, SimulationForm
@@ -92,6 +93,27 @@ class SupportPanel(SimulationForm):
 
     def __init__(self) -> None:
         super().__init__("Support", ("tension", "foam", "fluid"))
+
+
+class StretchingPanel(SimulationForm):
+    """The form of thickness, Poisson's ratio and how the edge is held in the plane."""
+
+    purpose = (
+        "How the simulated skin resists stretching (von K\u00e1rm\u00e1n): pressed in by its "
+        "thickness h, a flat skin whose edge is held in its plane is about twice as stiff. Of flat "
+        "skins, a rectangle or strip of known thickness stretches. "
+        "E = 12 (1 \u2212 \u03bd\u00b2) D / h\u00b3."
+    )
+    guide_page = "scenes"
+
+    def __init__(self) -> None:
+        super().__init__("Stretching", ("thickness", "poisson", "inplane"))
+
+    def show_settings(self, settings: Settings) -> None:
+        super().show_settings(settings)
+        with suppress(Refusal):  # shown with the shape
+            flat = not patch_of(settings).base_curvature
+            self.offer("inplane", ("", *(INPLANE[:-1] if flat else INPLANE)))
 
 
 _SELECT = "Click elements on a heatmap to select them."

@@ -127,6 +127,21 @@ class Skin:
     tension: float = setting_of_key(_SKIN.key("tension"), 0.0, decimals=1, most=1000.0)
     foam: float = setting_of_key(_SKIN.key("foundation"), 0.0, step=1e3, decimals=1, most=1e7)
     fluid: bool = setting_of_key(_SKIN.key("fluid"), False)
+    thickness: float = setting_of_key(
+        _SKIN.key("thickness"),
+        0.0,
+        step=1e-5,
+        limits=None,
+        least=0.0,
+        most=5e-3,
+        tip=f"{_SKIN.key('thickness').tip} 0: not given.",
+    )
+    poisson: float = setting_of_key(
+        _SKIN.key("poisson"), 0.3, step=0.01, decimals=2, least=0.0, most=0.5
+    )
+    inplane: str = setting_of_key(
+        _SKIN.key("inplane"), "", choices=(("", "Default"), *_SKIN.key("inplane").choices)
+    )
 
 
 @dataclass(frozen=True)

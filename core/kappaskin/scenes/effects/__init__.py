@@ -32,9 +32,10 @@ from kappaskin.scenes.effects.gages import Temperature as Temperature
 from kappaskin.scenes.effects.gages import Tolerance as Tolerance
 from kappaskin.scenes.effects.skin import Fluid as Fluid
 from kappaskin.scenes.effects.skin import Foam as Foam
+from kappaskin.scenes.effects.skin import StretchingEffect as StretchingEffect
 from kappaskin.scenes.effects.skin import Tension as Tension
 
-_SKIN = (Tension, Foam, Fluid)
+_SKIN = (Tension, Foam, Fluid, StretchingEffect)
 _GAGES = (
     *(FiniteSlopeEffect, GageLength, DeadElements),
     *(StrainLimit, Hysteresis, Creep, Temperature, Tolerance, IntermittentElements),

@@ -16,7 +16,7 @@ from kappaskin._schema import parameters
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.mechanics import Plate
+from kappaskin.mechanics import Plate, shapes_under
 from kappaskin.scenes.effects.at_work import RunningEffect as RunningEffect
 from kappaskin.sensing import SensorLayout, Transduction
 
@@ -31,7 +31,7 @@ def _check_ranges(name: str, effect: object) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """S moments of a scene of `duration` s, as linear theory on the whole plate has them.
+    """S moments of a scene of `duration` s, as the theory of the whole plate has them.
 
     `coefficients` (S, N) in m at `times` (S,) in s are of `basis`; `forces` (S, N) in N the modal
     forces that make them, all zero where the skin lies on a cylinder; `curvature` (S, 3, P) in 1/m
@@ -70,16 +70,18 @@ class Survey:
         return float(np.sqrt(bent / most)) if most else 0.0
 
     @cached_property
-    def _whole(self) -> Array:
-        return self._on(self.plate)
+    def _shapes(self) -> dict[Plate, Array]:
+        return {self.plate: self.coefficients}
 
-    def _on(self, plate: Plate) -> Array:
-        # A compliance is symmetric: the rows are C F.
-        return plate.compliance(self.basis).after(self.forces) @ self.operator.T
+    def shapes_on(self, plate: Plate) -> Array:
+        """Coefficients (S, N) in m for the same forces on another `plate`."""
+        if plate not in self._shapes:
+            self._shapes[plate] = shapes_under(plate, self.basis, self.forces)
+        return self._shapes[plate]
 
     def readings_on(self, plate: Plate) -> Array:
         """Readings (S, 3 P) of point-like elements for the same forces on another `plate`."""
-        return self._whole if plate == self.plate else self._on(plate)
+        return self.shapes_on(plate) @ self.operator.T
 
     @cached_property
     def slopes(self) -> Array:

@@ -1,4 +1,4 @@
-"""Support of the skin in addition to its stiffness: tension, foam and fluid."""
+"""What resists besides the skin's stiffness in bending: tension, foam, fluid and stretching."""
 
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
@@ -90,3 +90,32 @@ class Fluid(_Backing):
         deflection = c @ basis.at(points).T
         most = float(np.abs(deflection).max(initial=0.0) * weights.sum())
         return float(np.abs(deflection @ weights).max(initial=0.0)) / most if most else 0.0
+
+
+@dataclass(frozen=True)
+class StretchingEffect(SkinEffect):
+    """A flat sheet of `thickness` h in m stretches as it deflects (von Karman).
+
+    Disks, polygons and bent skins do not here: for those there is no such computation.
+    """
+
+    name: ClassVar = "stretching"
+    elsewhere: ClassVar = "set thickness in [skin]"
+    formula: ClassVar = "largest deflection over thickness"
+
+    thickness: float
+
+    def of(self, plate: Plate) -> Plate:
+        return replace(plate, thickness=self.thickness)
+
+    def off(self, plate: Plate) -> Plate:
+        return replace(plate, thickness=None)
+
+    def size(self, survey: Survey) -> Size:
+        whole, bare = self.of(survey.plate), self.off(survey.plate)
+        if not whole.stretches:
+            return NOTHING
+        deflections = survey.shapes_on(whole) @ survey.basis.at(survey.layout.positions).T
+        change = survey.readings_on(whole) - survey.readings_on(bare)
+        number = float(np.abs(deflections).max(initial=0.0)) / self.thickness
+        return Size(number, survey.share(change))

@@ -12,6 +12,7 @@ from kappaskin.bases import basis_for
 from kappaskin.errors import Refusal
 from kappaskin.estimation import METHODS, Estimator, estimator_for
 from kappaskin.frames import Array
+from kappaskin.mechanics import shapes_under
 from kappaskin.scenes import (
     AppliedLoads,
     EffectSelection,
@@ -109,8 +110,8 @@ class Bench:
     @cached_property
     def _truth(self) -> Array:
         """Coefficients (T, Nr) in m of what the skin does."""
-        compliance = self.scene.plate.compliance(self.scene.basis)
-        return np.array([compliance(pressed.force).ravel() for pressed in self._pressed])
+        forces = np.array([pressed.force.ravel() for pressed in self._pressed])
+        return shapes_under(self.scene.plate, self.scene.basis, forces)
 
     def _skin(self, elements: tuple[int, int] | None) -> _SkinReadings:
         if elements not in self._skins:

@@ -96,7 +96,7 @@ def test_whatever_a_plain_scene_may_have_besides_makes_a_valid_one(folder: Path)
 
 def test_every_effect_that_has_numbers_of_its_own_can_be_added() -> None:
     follow = {"tension", "foam", "fluid", "dead", "gage-length", "finite-slope"}
-    follow |= {"skew", "saturation", "quantisation"}
+    follow |= {"skew", "saturation", "quantisation", "stretching"}
     assert set(PARTS["effects"].kinds) == set(EFFECTS) - follow
 
 

@@ -7,7 +7,7 @@ from kappaskin import PointLoad, Region, Status
 from kappaskin.estimation import ScanTradeoff
 from kappaskin.scenes.effects import SECOND_GENERATION_LOOPS, Creep, Tolerance, UniformNoise
 from kappaskin.sensing import SECOND_GENERATION
-from kappaskin_app.features.sensor.panel import RegionPanel
+from kappaskin_app.features.sensor.panel import RegionPanel, StretchingPanel
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.scene import SHAPES
 from kappaskin_app.shell.simulation import region_of, scene_of, with_consequences
@@ -128,3 +128,14 @@ def test_a_strip_tells_where_the_contact_is_along_it_alone(qapp) -> None:
     panel.show_status(Status(state="streaming", sensor=sensor, region=region), True)
     assert "at best: \N{PLUS-MINUS SIGN}0.04 mm, " in panel.message.text()
     assert "\N{PLUS-MINUS SIGN}0.02 mm with all channels." in panel.message.text()
+
+
+@pytest.mark.parametrize(("shape", "possible"), [("flat", False), ("cylinder", True)])
+def test_a_hoop_is_held_on_a_bent_skin_alone(qapp, shape, possible) -> None:
+    panel = StretchingPanel()
+
+    panel.show_settings(Settings(shape=shape, **SHAPES[shape].lengths))
+
+    box = panel.editor("inplane")
+    enabled = {box.itemData(k): box.model().item(k).isEnabled() for k in range(box.count())}
+    assert enabled == {"": True, "held": True, "diaphragm": True, "free": True, "hoop": possible}

@@ -24,7 +24,14 @@ from kappaskin import (
     basis_for,
 )
 from kappaskin.bases import curvature_at
-from kappaskin.scenes.effects import FiniteSlopeEffect, Fluid, Foam, GageLength, Tension
+from kappaskin.scenes.effects import (
+    FiniteSlopeEffect,
+    Fluid,
+    Foam,
+    GageLength,
+    StretchingEffect,
+    Tension,
+)
 from kappaskin.sources import sensor_from_json, sensor_to_json
 
 SQUARE = Patch(0.1, 0.1)
@@ -252,12 +259,13 @@ def test_on_a_bent_skin_finite_slopes_are_refused():
 
 def test_effects_on_the_skin_add_up_to_a_plate_and_come_off_it_one_by_one():
     bare = Plate(SQUARE, poisson=0.4)
-    effects = (Tension(60.0), Foam(3e5), Fluid())
+    effects = (Tension(60.0), Foam(3e5), Fluid(), StretchingEffect(3e-4))
     plate = bare
     for effect in effects:
         plate = effect.of(plate)
 
-    assert plate == Plate(SQUARE, tension=60.0, foundation=3e5, fluid=True, poisson=0.4)
+    held = {"tension": 60.0, "foundation": 3e5, "fluid": True}
+    assert plate == Plate(SQUARE, **held, poisson=0.4, thickness=3e-4)
     assert effects[0].off(plate) == replace(plate, tension=0.0)
     for effect in effects:
         plate = effect.off(plate)

@@ -28,7 +28,8 @@ survey = Survey(
     K.reshape(1, 3, -1), np.zeros(48), 1.0, np.zeros(48),
 )
 every = [
-    Tension(5.0), Foam(1e5), Fluid(), FiniteSlopeEffect(), GageLength(3e-3), DeadElements((1,)),
+    Tension(5.0), Foam(1e5), Fluid(), StretchingEffect(2e-4), FiniteSlopeEffect(),
+    GageLength(3e-3), DeadElements((1,)),
     StrainLimit(Transduction(), 0.1), SECOND_GENERATION_LOOPS, Creep(0.1, 1.0),
     Temperature(5.0, 1.0, 0.1), Tolerance(0.1, 0.1), IntermittentElements((1,)), MainsHum(0.1),
     Skew(), CrossTalk(0.1), FlickerNoise(0.1), GaussianNoise(0.1), UniformNoise(0.1),
@@ -38,7 +39,7 @@ every = [
 for effect in every:
     effect.size(survey), str(effect), effect.formula, parameters(type(effect))
 assert len(every) == len(EFFECTS)
-plate, layout = every[0].of(plate), every[4].of(layout)
+plate, layout = every[0].of(plate), every[5].of(layout)
 
 def at_work():
     room = "kappaskin.scenes.effects.at_work."
