@@ -198,8 +198,9 @@ def info(file: Path, *, json: Switch = False, limit: Limit = "") -> None:
 
 def _contents_text(file: Path, contents: dict[str, Any]) -> str:
     whole = "" if contents["whole"] else " (unfinished: see `kappaskin repair`)"
-    seconds, began, library = (contents[name] for name in ("seconds", "began", "library"))
-    lines = [f"{file}: {seconds:.1f} s from {began}, by {library}{whole}"]
+    seconds, began = contents["seconds"], contents["began"]
+    by = f"{contents['library']}, revision {contents['revision'] or 'unknown'}"
+    lines = [f"{file}: {seconds:.1f} s from {began}, by {by}{whole}"]
     for name in ("devices", "setups", "attachments", "events"):
         lines.append(f"{name}:" if contents[name] else f"{name}: none")
         lines += [f"  {line}" for line in contents[name]]
@@ -213,6 +214,7 @@ def _contents(recording: "Recording") -> dict[str, Any]:
         "began": datetime.fromtimestamp(recording.first * 1e-9, UTC).isoformat(),
         "seconds": recording.seconds(recording.last),
         "library": recording.library,
+        "revision": recording.revision,
         "whole": recording.whole,
         "devices": [_device(text) for text in devices],
         "setups": [text for _, text in recording.setups()],
@@ -233,7 +235,9 @@ def verify(file: Path, *, limit: Limit = "") -> int:
     """Recompute every recorded estimate from the recorded bytes and compare bit for bit.
 
     Exit code 0 if all are the same, 1 if one differs; the first that does is printed. Another
-    processor may round differently in the last digits.
+    processor may round differently in the last digits. A recording of another revision of the
+    estimates is recomputed by this one: the largest difference of each quantity is printed, and the
+    exit code is 0 unless results cannot be recomputed.
 
     Example: `kappaskin verify press.mcap`
 
@@ -249,8 +253,8 @@ def verify(file: Path, *, limit: Limit = "") -> int:
     allow(limit)
     with BackgroundProcess[float | Verification]("verify", Verification.steps, file) as work:
         verdict = result_of(work.wait(), Verification)
-    show(f"{file}: {verdict.words}")
-    return 0 if verdict.same else FAILED
+    show(f"{file}: {verdict.words}", *(f"  {line}" for line in verdict.changed))
+    return 0 if verdict.passed else FAILED
 
 
 _NOTHING = 3

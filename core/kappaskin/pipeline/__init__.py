@@ -1,5 +1,6 @@
 """Pipeline: frames to estimates, and files of readings to files of shapes."""
 
+from kappaskin.pipeline.pipeline import REVISION as REVISION
 from kappaskin.pipeline.pipeline import Pipeline as Pipeline
 from kappaskin.pipeline.quantities import ErrorBars as ErrorBars
 from kappaskin.pipeline.quantities import Quantities as Quantities

@@ -34,6 +34,7 @@ from mcap.records import (
 from kappaskin._files import Budget, open_file
 from kappaskin.errors import Damaged, Refusal
 from kappaskin.frames import Event
+from kappaskin.pipeline import REVISION
 from kappaskin.recording.cdr import decode
 from kappaskin.recording.messages import (
     DEVICE,
@@ -46,7 +47,7 @@ from kappaskin.recording.messages import (
     Topic,
     unpack_line,
 )
-from kappaskin.recording.writing import FORMAT
+from kappaskin.recording.writing import FORMAT, PROGRAM
 
 MAGIC = b"\x89MCAP0\r\n"
 LARGEST = 2**26  # bytes of a record, or of what is in a chunk
@@ -189,7 +190,7 @@ def summary_of(file: Bytes, size: int) -> Iterator[McapRecord]:
 MESSAGE_HEADER = struct.Struct("<HIQQ")
 """Begins a message's record in MCAP: channel, sequence, log time and publish time."""
 
-_DIGITS = 9  # of a version
+_DIGITS = 9  # of a version or revision
 _KINDS = {topic.name: topic.kind.name for topic in TOPICS}
 
 
@@ -215,7 +216,8 @@ class Recording:
 
     `whole` says whether it was ended as it should be; one that was not is read up to where it
     breaks off. `first` and `last` are the times it spans, in ns since 1970, `counts` how many
-    messages each topic has, and `chunks` where they are.
+    messages each topic has, and `chunks` where they are. It was recorded by the program `library`,
+    whose estimates have the `revision`; 0 if unknown, as of recordings before there were revisions.
     """
 
     def __init__(self, path: Path) -> None:
@@ -230,7 +232,8 @@ class Recording:
                 f"{path}: cannot be read ({error.strerror or error}); expected a recording"
             ) from error
         self.library = ""
-        self.format = FORMAT  # where that was lost with the beginning of the file
+        # Where they were lost with the beginning of the file:
+        self.format, self.revision = FORMAT, 0
         self.counts: dict[str, int] = {}
         self.chunks: list[ChunkAt] = []
         self._topics: dict[int, str] = {}
@@ -318,7 +321,8 @@ class Recording:
         elif record.code == Opcode.METADATA:
             found = parsed(Metadata, record.body)
             if found.name == "kappaskin":
-                self.format = _format(found.metadata)
+                self.format = _number(found.metadata, "format", FORMAT)
+                self.revision = _number(found.metadata, "revision", 0)
         elif record.code == Opcode.ATTACHMENT:
             self._attached[parsed(Attachment, record.body).name] = record.at
         elif record.code == Opcode.CHUNK:
@@ -362,6 +366,11 @@ class Recording:
             return
 
     # Contents.
+
+    @property
+    def made_by(self) -> str:
+        """The program that recorded it, and the revision of its estimates."""
+        return made_by(self.library, self.revision)
 
     @cached_property
     def first(self) -> int:
@@ -488,12 +497,17 @@ class Recording:
         self.close()
 
 
+def made_by(library: str = PROGRAM, revision: int = REVISION) -> str:
+    """A program and its `revision` of the estimates, as text; of this one if left out."""
+    return f"{library or 'unknown'!s:.60}, revision {revision or 'unknown'}"
+
+
 def event_of(message: RecordedMessage, time: float) -> Event:
     """The event that a message is, at a `time` in s."""
     fields = decode(LOG, message.data)
     return Event(time, fields["name"], fields["msg"])
 
 
-def _format(metadata: dict[str, str]) -> int:
-    text = metadata.get("format", "")
-    return int(text[:_DIGITS]) if text.isascii() and text.isdigit() else FORMAT
+def _number(metadata: dict[str, str], name: str, unknown: int) -> int:
+    text = metadata.get(name, "")
+    return int(text[:_DIGITS]) if text.isascii() and text.isdigit() else unknown

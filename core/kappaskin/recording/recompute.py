@@ -16,10 +16,19 @@ from kappaskin._state import StateArrays
 from kappaskin.bases import check_edge
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Estimate, Frame, Truth
-from kappaskin.pipeline import Getter, Pipeline, Reported, Setup, getters, setup_from_text
+from kappaskin.pipeline import (
+    REPORTED,
+    REVISION,
+    Getter,
+    Pipeline,
+    Reported,
+    Setup,
+    getters,
+    setup_from_text,
+)
 from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import decode
-from kappaskin.recording.reading import RecordedMessage, Recording
+from kappaskin.recording.reading import RecordedMessage, Recording, made_by
 from kappaskin.sensing import Sensor
 from kappaskin.sources import Accounting, ClockState, Decoder, Interpreter, RecordedClock, wire
 
@@ -298,6 +307,54 @@ _REPORTED = 1000  # messages between two reports of the share done
 
 
 _GETTERS: dict[str, Getter] = {**getters(), "shape": attrgetter("estimate.coefficients.shape")}
+_UNITS = {f"{each.name}{suffix}": each.unit for each in REPORTED for suffix, _, _ in each.forms}
+
+
+@dataclass(frozen=True)
+class QuantityDifference:
+    """How the quantity `name`, in a `unit`, differs in `different` results.
+
+    `largest` is the largest difference of two numbers, `scale` the largest recorded number in those
+    results. In `unlike` ones only one has a number there, or they are other values than numbers.
+    """
+
+    name: str
+    unit: str
+    different: int = 0
+    unlike: int = 0
+    largest: float = 0.0
+    scale: float = 0.0
+
+    def after(self, was: "NDArray[Any]", now: "NDArray[Any]") -> "QuantityDifference":
+        """With another result that differs: it `was` recorded, and is another one `now`."""
+        numbers = was.dtype.kind == now.dtype.kind == "f" and was.shape == now.shape
+        both = np.isfinite(was) & np.isfinite(now) if numbers else np.zeros(0, bool)
+        was, apart = (was[both], np.abs(was[both] - now[both])) if numbers else (both, both)
+        return replace(
+            self,
+            different=self.different + 1,
+            unlike=self.unlike + (not apart.any()),
+            largest=max(self.largest, float(np.max(apart, initial=0.0))),
+            scale=max(self.scale, float(np.max(np.abs(was), initial=0.0))),
+        )
+
+    @property
+    def words(self) -> str:
+        """The largest difference with its unit, and in how many results."""
+        parts = list[str]()
+        if self.largest:
+            share = self.largest / self.scale if self.scale else math.inf
+            number = f"{self.largest:.3g} {self.unit}".rstrip()
+            parts.append(f"{number} at most, {share:.2g} of the largest recorded number")
+        if self.unlike:
+            parts.append(f"another value, or a number in one only, in {self.unlike:,}")
+        return f"{self.name}: {'; '.join(parts)} ({self.different:,} differ)"
+
+
+def _same(was: "NDArray[Any]", now: "NDArray[Any]") -> bool:
+    """Whether they are the same, real numbers bit for bit."""
+    real = was.dtype.kind == now.dtype.kind == "f" and was.shape == now.shape
+    return was.tobytes() == now.tobytes() if real else np.array_equal(was, now)
 
 
 @dataclass(frozen=True)
@@ -305,7 +362,9 @@ class Verification:
     """Counts of contacts, curvatures and shapes `compared`, of `frames`, and `different`.
 
     `first` describes the first difference, `largest` is the largest as a share of the largest
-    number in the same array. `missing` counts recorded results whose frames are missing.
+    number in the same array. `missing` counts recorded results whose frames are missing. It was
+    recorded by the program and revision `made_by`, of `another` revision than this one, whose
+    `changes` are the quantities that differ.
     """
 
     frames: int
@@ -314,24 +373,45 @@ class Verification:
     different: int
     first: str
     largest: float
+    made_by: str
+    another: bool
+    changes: tuple[QuantityDifference, ...]
 
     @property
     def same(self) -> bool:
         return self.compared > 0 and not (self.different or self.missing)
 
     @property
+    def passed(self) -> bool:
+        """Whether all results are the same, as far as they are of the same revision."""
+        return self.same or (self.another and self.compared > 0 and not self.missing)
+
+    @property
     def words(self) -> str:
-        """The verdict as a sentence or two."""
+        """The verdict as a sentence or two; a line for each quantity that changed."""
         counts = f"{self.compared:,} recorded results of {self.frames:,} frames"
         if not self.compared:
             return f"{counts}: nothing to compare"
-        parts = [f"{counts}: {'the same bit for bit' if self.same else 'not the same'}"]
-        if self.different:
+        parts = [f"{counts}: {self._verdict}"]
+        if self.different and not self.another:
             parts.append(f"{self.different:,} differ, by {self.largest:.1g} of the largest number")
             parts.append(f"first difference: {self.first}")
         if self.missing:
             parts.append(f"the frames of {self.missing:,} further results are missing")
         return "; ".join(parts)
+
+    @property
+    def _verdict(self) -> str:
+        same = "the same bit for bit" if self.same else "not the same"
+        if not self.another:
+            return same
+        of = f"recomputed by another revision: recorded by {self.made_by}, recomputed by "
+        return f"{of}{made_by()}" + ("" if self.different else "; the same bit for bit")
+
+    @property
+    def changed(self) -> tuple[str, ...]:
+        """A line for each quantity that another revision changed."""
+        return tuple(change.words for change in self.changes) if self.another else ()
 
     @staticmethod
     def steps(path: Path) -> "Generator[float | Verification]":
@@ -355,9 +435,10 @@ class _Worker:
     """Processes messages in the order in which they were written."""
 
     def __init__(self, recording: Recording) -> None:
-        self._recomputation = Recomputation(recording)
+        self._recording, self._recomputation = recording, Recomputation(recording)
         self._frames = self._compared = self._missing = self._different = 0
         self._first, self._largest = "", 0.0
+        self._changes: dict[str, QuantityDifference] = {}
 
     def __call__(self, message: RecordedMessage) -> None:
         if kind := _COMPARED.get(message.topic):
@@ -384,9 +465,11 @@ class _Worker:
         """How a number, or list of numbers, differs from the recorded one; empty if it does not."""
         again = _GETTERS[name](Reported(estimate))
         was, now = np.asarray(value).ravel(), np.asarray(again).ravel()
-        real = was.dtype.kind == now.dtype.kind == "f" and was.shape == now.shape
-        if was.tobytes() == now.tobytes() if real else np.array_equal(was, now):
+        if _same(was, now):
             return ""
+        change = self._changes.get(name) or QuantityDifference(name, _UNITS.get(name, ""))
+        self._changes[name] = change.after(was, now)
+        real = was.dtype.kind == now.dtype.kind == "f" and was.shape == now.shape
         scale = float(np.max(np.abs(was), initial=0.0)) if real else math.nan
         share = float(np.max(np.abs(was - now))) / scale if scale > 0 else math.inf
         self._largest = max(self._largest, share if share == share else math.inf)
@@ -403,6 +486,9 @@ class _Worker:
             self._different,
             self._first,
             self._largest,
+            self._recording.made_by,
+            self._recording.revision != REVISION,
+            tuple(self._changes.values()),
         )
 
 

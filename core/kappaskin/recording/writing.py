@@ -13,11 +13,16 @@ from pathlib import Path
 from mcap.writer import CompressionType, Writer
 
 from kappaskin.errors import Refusal
+from kappaskin.pipeline import REVISION
 from kappaskin.recording.disk import ReservedFile, is_there
 from kappaskin.recording.messages import TOPICS, Topic
 
 FORMAT = 1
 """Version of the meaning of our own messages."""
+
+VERSION = metadata.version("kappaskin")
+PROGRAM = f"kappaskin {VERSION}"
+"""What recordings and exported files are made by."""
 
 _FLUSH = 0.1  # s between two times that all there is goes to the file: what a killed process loses
 _SYNC = 2.0  # s between two times that the file goes to the disk: what a loss of power takes
@@ -98,8 +103,7 @@ class RecordingFile:
             thread.start()
 
     def _begin(self) -> None:
-        version = metadata.version("kappaskin")
-        self._writer.start("ros2", f"kappaskin {version}")
+        self._writer.start("ros2", PROGRAM)
         schemas: dict[str, int] = {}
         for name, kind in TOPICS:
             if kind.name not in schemas:
@@ -109,7 +113,8 @@ class RecordingFile:
             self._channels[name] = self._writer.register_channel(
                 name, "cdr", schemas[kind.name], channel_metadata
             )
-        self._writer.add_metadata("kappaskin", {"format": str(FORMAT), "version": version})
+        made_by = {"format": str(FORMAT), "version": VERSION, "revision": str(REVISION)}
+        self._writer.add_metadata("kappaskin", made_by)
 
     def stamp(self, time: float) -> int:
         """Nanoseconds since 1970 at `time` in s on the monotonic clock."""

@@ -6,16 +6,16 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 from functools import cached_property
-from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from kappaskin.calibration import Calibration, Tare
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate, Frame
-from kappaskin.pipeline import Pipeline, Reported, Setup, setup_from_text
+from kappaskin.pipeline import REVISION, Pipeline, Reported, Setup, setup_from_text
 from kappaskin.recording.disk import is_there
 from kappaskin.recording.reading import Recording
+from kappaskin.recording.writing import PROGRAM
 from kappaskin.sensing import Sensor
 from kappaskin.sources import sensor_from_json
 
@@ -215,9 +215,11 @@ def _facts(
 ) -> dict[str, Any]:
     began = datetime.fromtimestamp(recording.first * 1e-9, UTC)
     return {
-        "program": f"kappaskin {metadata.version('kappaskin')}",
+        "program": PROGRAM,
+        "revision": REVISION,
         "recording": recording.path.name,
         "recorded_by": recording.library,
+        "recorded_revision": recording.revision,
         "began": began.isoformat(timespec="milliseconds"),
         "ended_properly": recording.whole,
         "device": json.loads(device),

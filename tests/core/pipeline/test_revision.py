@@ -1,0 +1,44 @@
+"""The revision of the estimates: raised whenever the same readings give others."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+import estimates
+
+from kappaskin.pipeline import REVISION
+
+
+def test_the_revision_is_raised_where_an_estimate_of_the_same_readings_changed() -> None:
+    revision, kept = estimates.kept()
+    found = revision, estimates.changed(estimates.computed(), kept)
+    assert found == (REVISION, []), "run `python tests/estimates.py`, which raises REVISION"
+
+
+@pytest.mark.parametrize(("factor", "notices"), [(1 + 1e-9, False), (1 + 1e-4, True)])
+def test_a_change_is_told_from_rounding(factor: float, notices: bool) -> None:
+    _, kept = estimates.kept()
+    method = next(iter(kept))
+    rows = [[factor * number for number in row] for row in kept[method]["force"]]
+    now = kept | {method: kept[method] | {"force": rows}}
+    assert estimates.changed(now, kept) == [f"{method}: force"] * notices
+
+
+def test_the_command_raises_the_revision_and_keeps_the_new_estimates(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, now = tmp_path / "pipeline.py", {"method": {"force": [[1.0]]}}
+    source.write_text(f"a = 1\nREVISION = {REVISION}\n")
+    monkeypatch.setattr(estimates, "_SOURCE", source)
+    monkeypatch.setattr(estimates, "ESTIMATES", tmp_path / "estimates.json")
+    monkeypatch.setattr(estimates, "computed", lambda: now)
+    estimates.renew()
+    assert estimates.kept() == (REVISION, now)
+    assert estimates.renew() == f"revision {REVISION}: the estimates are the same"
+    now["method"]["force"] = [[1.1]]
+    assert estimates.renew() == f"revision {REVISION + 1}: 1 rows changed: method: force"
+    assert estimates.kept() == (REVISION + 1, now)
+    assert source.read_text() == f"a = 1\nREVISION = {REVISION + 1}\n"
