@@ -10,6 +10,7 @@ from scipy.linalg import lapack
 
 from kappaskin.bases import Basis, SineBasis, basis_for
 from kappaskin.contact.influence import influence_of
+from kappaskin.contact.stretched import StretchedSkin
 from kappaskin.estimation import Fit, PatternCache
 from kappaskin.frames import Array, Contact, Mask
 from kappaskin.mechanics import Compliance, Plate
@@ -175,7 +176,9 @@ class PointContact:
         self._rows = np.zeros((5, len(self._M)))
         self._influence = influence_of(plate, layout, edge, _FUNCTIONS, self._rows[:4])
         self._unknowns = 4 if self._influence.sized else 3
+        self._stretched = StretchedSkin(plate, layout, edge) if plate.stretches else None
         self._live = layout.live.ravel()
+        self._readings = np.zeros(len(self._M))
         x, y = self.patch.grid(_SEARCHED + 2, 3 if strip else _SEARCHED + 2)
         self._x, self._y = x[1:-1], y[1:-1]
         self._map = self.basis.on_grid(self._x, self._y)
@@ -210,7 +213,7 @@ class PointContact:
             return NO_CONTACT
         x = _parabola_peak(self._x, explained[row], column)
         y = _parabola_peak(self._y, explained[:, column], row)
-        self._rows[4] = K
+        self._readings = K
         return self._refined(*self.patch.inward(x, y), tables, variance, fit)
 
     def _used(self, K: Array) -> tuple[Array, _Tables]:
@@ -221,18 +224,22 @@ class PointContact:
         return np.where(used, K, 0.0), self._cache(used, self._tables)
 
     def _refined(self, x: float, y: float, tables: _Tables, variance: float, fit: Fit) -> Contact:
-        a, b, s = _FURTHEST * self.patch.a, _FURTHEST * self.patch.b, self._start
-        force, here = 0.0, self._linearised(x, y, s, 0.0, tables, variance)
+        a, b, s, force = _FURTHEST * self.patch.a, _FURTHEST * self.patch.b, self._start, 0.0
+        if self._stretched is not None:
+            self._stretched.begin(x, y, float(fit.jet(x, y)[0][0]))
         for _ in range(_STEPS):
-            force, dx, dy, ds = here.steps
+            here = self._linearised(x, y, s, force, tables, variance)
+            before, (force, dx, dy, ds) = force, here.steps
             x, y = self.patch.inward(
                 x + _clamped(-a, dx / force, a), y + _clamped(-b, dy / force, b)
             )
             s = _clamped(self._least, s + ds / force, self._largest)
-            variance = here.left / tables.spare
-            if here.gain <= _WORTH * variance + _NO_GAIN * here.power:
+            variance, gain = here.left / tables.spare, here.gain
+            if self._stretched is not None:  # the readings are not linear in the force
+                self._stretched.move(force, dx, dy)
+                gain += (force - before) ** 2 / here.inverse.item(0, 0)
+            if gain <= _WORTH * variance + _NO_GAIN * here.power:
                 break
-            here = self._linearised(x, y, s, force, tables, variance)
         return self._contact(x, y, s, here, tables, fit)
 
     def _linearised(
@@ -240,6 +247,9 @@ class PointContact:
     ) -> _Linearised:
         """The best step from a load at (x, y) of size s and about this `force`."""
         self._influence.at(x, y, s)
+        self._rows[4] = self._readings
+        if self._stretched is not None:
+            self._stretched.stretch(x, y, s, self._influence.unit, self._rows)
         rows = self._weighted(s, force, tables, variance)
         products = rows.dot(self._rows.T)
         n = self._unknowns
@@ -277,13 +287,15 @@ class PointContact:
         spread, unit = math.sqrt(here.left / tables.spare), self._influence.unit
         strength, force = abs(here.steps[0]), here.steps[0] * unit
         sd = spread * np.sqrt(here.inverse.diagonal())
-        gives = self._influence.gives()
+        under = force * self._influence.gives()
+        if self._stretched is not None:
+            under += self._stretched.more(x, y, force)
         return Contact(
             np.array([x, y]),
             sd[1:3] / strength,
             force,
             float(sd[0]) * unit,
-            *self._displacement(fit, x, y, force * gives),
+            *self._displacement(fit, x, y, under),
             tables.spare,
             spread < _AS_WELL * float(fit.noise),
             self._near_rim(x, y, s, here, tables),
@@ -302,8 +314,9 @@ class PointContact:
         for x_rim, y_rim, share in self.patch.near_rim(x, y, _DOUBTFUL):
             if share < _RIM:
                 return True
+            K = self._rows[4]
             self._influence.at(x_rim, y_rim, s)
-            T, K = self._weighted(0.0, 0.0, tables, 0.0)[0], self._rows[4]
+            T = self._weighted(0.0, 0.0, tables, 0.0)[0]
             if float(T.dot(K)) ** 2 > least * float(T.dot(T)):
                 return True
         return False
