@@ -70,25 +70,16 @@ class HingedPlate:
     @property
     def stiffness(self):
         """Of each mode (modes, modes) in N/m."""
-        return self.a * self.b / 4 * self.rigidity * _squares(self) ** 2
+        return _stiffness(self)
 
     def surface(self, c, places):
         """Displacement (G,) of the modes `c` (modes, modes), both in m."""
         (k, l), (x, y) = self.waves(), places.T
-        return _summed(c, np.sin(np.outer(x, k)), np.sin(np.outer(y, l)))
+        return _sums(np.sin(np.outer(x, k)), np.sin(np.outer(y, l)))(c)
 
     def curvature(self, c, elements, gage_length=0.0):
         """Readings (3, P) of the modes `c` (modes, modes) in m."""
-        (k, l), (x, y) = self.waves(), elements.T
-        kx, ly = np.outer(x, k), np.outer(y, l)
-        by_xx, by_yy, by_xy = _gages(self, gage_length)
-        return np.stack(
-            [
-                _summed(c * by_xx, np.sin(kx), np.sin(ly)),
-                _summed(c * by_yy, np.sin(kx), np.sin(ly)),
-                _summed(c * by_xy, np.cos(kx), np.cos(ly)),
-            ]
-        )
+        return _gages(self, elements.tobytes(), gage_length)(c)
 
     def waves(self):
         """Wave numbers (modes,) along x and along y in 1/m."""
@@ -100,6 +91,11 @@ class HingedPlate:
 def _squares(plate):
     k, l = plate.waves()
     return np.add.outer(k**2, l**2)
+
+
+@cache
+def _stiffness(plate):
+    return plate.a * plate.b / 4 * plate.rigidity * _squares(plate) ** 2
 
 
 @cache
@@ -116,18 +112,23 @@ def _mean(plate, load):
 
 
 @cache
-def _gages(plate, L):
+def _gages(plate, elements, L):
+    """The map from modes to readings, for the bytes of `elements` (P, 2)."""
+    x, y = np.frombuffer(elements).reshape(-1, 2).T
     k, l = np.ix_(*plate.waves())
     h, both, difference = L / np.sqrt(8), k + l, k - l
-    xy = (both**2 * _sinc(both * h) - difference**2 * _sinc(difference * h)) / 4
-    return -(k**2) * _sinc(k * L / 2), -(l**2) * _sinc(l * L / 2), xy
+    by_xx, by_yy = -(k**2) * _sinc(k * L / 2), -(l**2) * _sinc(l * L / 2)
+    by_xy = (both**2 * _sinc(both * h) - difference**2 * _sinc(difference * h)) / 4
+    kx, ly = np.outer(x, k), np.outer(y, l)
+    sines, cosines = _sums(np.sin(kx), np.sin(ly)), _sums(np.cos(kx), np.cos(ly))
+    return lambda c: np.stack([sines(c * by_xx), sines(c * by_yy), cosines(c * by_xy)])
 
 
 def _sinc(t):
     return np.sinc(t / np.pi)
 
 
-def _summed(c, X, Y):
-    """Sum over i and j of c_ij X_i Y_j at each place; places of one column share a product."""
+def _sums(X, Y):
+    """The sum over i and j of c_ij X_i Y_j at each place; places of one column share a product."""
     columns, which = np.unique(X, axis=0, return_inverse=True)
-    return np.einsum("pj,pj->p", (columns @ c)[which.ravel()], Y)
+    return lambda c: np.vecdot((columns @ c)[which.ravel()], Y)

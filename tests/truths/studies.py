@@ -1,0 +1,172 @@
+"""Coverage studies: how often the error bars of a contact cover a truth of its own.
+
+`python tests/truths/studies.py` prints all figures as the guide's table.
+"""
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from math import pi, sqrt
+
+import numpy as np
+
+from kappaskin import LeastSquares, Patch, Plate, PointContact, SensorLayout, basis_for
+from navier import HingedPlate, Load
+from sanders import CylinderShell
+
+NOISE = 0.4  # 1/m, uniform to either side as Table 1's: 0.231 rms
+REACH = 1.96  # standard deviations to either side in a 95 % interval
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Shares of `frames` found, and covered by the intervals of x, y and force.
+
+    `bias` is the mean error of the force as a share of it, `place` the rms error of the position
+    over the Cramer-Rao bound, where that was computed.
+    """
+
+    frames: int
+    found: float
+    x: float
+    y: float
+    force: float
+    bias: float
+    place: float
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A skin, the truth of what its elements read of a load, and a maker of loads.
+
+    `load` gives the load of a random place (2,) in shares of the sides.
+    """
+
+    name: str
+    skin: Plate
+    truth: Callable[[SensorLayout], Callable[[Load], np.ndarray]]
+    load: Callable[[np.ndarray], Load]
+    gage_length: float = 0.0
+    low: float = 0.2
+    high: float = 0.8
+    noise: float = NOISE
+
+    @property
+    def layout(self):
+        return replace(SensorLayout.regular(self.skin.patch, 10, 10), gage_length=self.gage_length)
+
+
+def coverage(case, frames, seed=0, bound=True) -> Figures:
+    """The figures of `frames` presses at random places, each with its own noise."""
+    rng, layout = np.random.default_rng(seed), case.layout
+    read, contact = case.truth(layout), PointContact(case.skin, layout)
+    fit = LeastSquares(basis_for(case.skin.patch, "hinged", 8, 8), layout)
+    loads = [case.load(share) for share in rng.uniform(case.low, case.high, (frames, 2))]
+    rows, limits = [], []
+    for load in loads:
+        curvature = read(load) + rng.uniform(-case.noise, case.noise, (3, 100))
+        found = contact(curvature, fit(curvature))
+        error = *(found.position - (load.x, load.y)), found.force - load.force
+        rows.append([error, (*found.position_sd, found.force_sd)])
+        limits.append(cramer_rao(read, load, case.noise)[:2] if bound else (np.nan,) * 2)
+    error, sd = np.array(rows).swapaxes(0, 1)
+    covered = np.mean(np.abs(error) <= REACH * sd, axis=0)
+    there = np.isfinite(error[:, 2])
+    bias = np.mean(error[there, 2] / np.array([load.force for load in loads])[there])
+    place = sqrt(np.sum(error[there, :2] ** 2) / np.sum(np.array(limits)[there] ** 2))
+    return Figures(frames, there.mean(), *covered, bias, place)
+
+
+def cramer_rao(read, load, noise) -> np.ndarray:
+    """Least standard deviations of x, y, force and the load's mean square width, all unknown.
+
+    For Gaussian noise of the variance of a uniform one to `noise` in 1/m either side.
+    """
+    step = 2e-5
+    columns = [
+        (read(replace(load, x=load.x + step)) - read(replace(load, x=load.x - step))) / (2 * step),
+        (read(replace(load, y=load.y + step)) - read(replace(load, y=load.y - step))) / (2 * step),
+        read(load) / load.force,
+        _by_width(read, load),
+    ]
+    J = np.stack([column.ravel() for column in columns], -1)
+    scale = np.linalg.norm(J, axis=0)
+    covariance = np.linalg.inv((J / scale).T @ (J / scale))
+    return noise / sqrt(3) * np.sqrt(np.diag(covariance)) / scale
+
+
+def _by_width(read, load):
+    """The derivative by the square of the radius or of the standard deviation."""
+    if load.sd:
+        low, high = replace(load, sd=0.98 * load.sd), replace(load, sd=1.02 * load.sd)
+        return (read(high) - read(low)) / (high.sd**2 - low.sd**2)
+    low, high = replace(load, radius=0.98 * load.radius), replace(load, radius=1.02 * load.radius)
+    if not load.radius:
+        high = replace(load, radius=2e-4)
+    return (read(high) - read(low)) / (high.radius**2 - low.radius**2)
+
+
+# The flat skin of the paper: 0.1 x 0.1 m, 0.15 N, which press it in by 4.7 mm in the middle
+
+
+def _flat(gage_length):
+    return lambda layout: lambda load: HingedPlate().readings(load, layout.positions, gage_length)
+
+
+def _flat_case(name, gage_length=0.0, **width):
+    def load(share):
+        return Load(*(0.1 * share), 0.15, **width)
+
+    return Case(name, Plate(Patch(0.1, 0.1)), _flat(gage_length), load, gage_length)
+
+
+FLAT = [
+    _flat_case("flat, point"),
+    _flat_case("flat, disc of 3 mm", radius=3e-3),
+    _flat_case("flat, disc of 5 mm", radius=5e-3),
+    _flat_case("flat, Gaussian of 2 mm", sd=2e-3),
+    _flat_case("flat, Gaussian of 4 mm", sd=4e-3),
+    _flat_case("flat, disc of 3 mm, gages of 6 mm", 6e-3, radius=3e-3),
+]
+
+
+@cache
+def _shell(arc, length, radius, gage_length):
+    shell = CylinderShell(arc, length, radius, polynomials=96, waves=160)
+    return cache(lambda elements: shell.reader(np.frombuffer(elements).reshape(-1, 2), gage_length))
+
+
+def _bent_case(name, arc, length, radius, force):
+    skin = Plate(Patch(arc, length, radius))
+
+    def truth(layout):
+        return _shell(arc, length, radius, 0.0)(layout.positions.tobytes())
+
+    def load(share):
+        return Load(*(share * (arc, length)), force, radius=2e-3)
+
+    return Case(name, skin, truth, load)
+
+
+BENT = [
+    _bent_case("half round, disc of 2 mm", pi * 12.9e-3, 40e-3, 12.9e-3, 2.0),
+    _bent_case("bent to 30 mm, disc of 2 mm", 47e-3, 40e-3, 30e-3, 1.0),
+]
+
+CASES: Sequence[Case] = (*FLAT, *BENT)
+
+
+def table(frames=1000):
+    """The figures of every case as a table in Markdown."""
+    yield "| skin and load | frames | found | x | y | force | bias of force | place / bound |"
+    yield "|---|---|---|---|---|---|---|---|"
+    for case in CASES:
+        f = coverage(case, frames)
+        shares = " | ".join(f"{100 * share:.1f} %" for share in (f.found, f.x, f.y, f.force))
+        yield f"| {case.name} | {frames} | {shares} | {100 * f.bias:+.2f} % | {f.place:.2f} |"
+
+
+if __name__ == "__main__":
+    for row in table(*map(int, sys.argv[1:])):
+        print(row, flush=True)
