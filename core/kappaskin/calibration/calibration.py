@@ -22,6 +22,8 @@ from kappaskin.frames import Array
 from kappaskin.sensing import PrandtlIshlinskii, Sensor, SensorLayout, StandardLinearSolid
 
 _MOST_CHANNELS = 2**14  # whose numbers the engine can send with every status
+_STEEPEST = 1e9  # gain, 1 being nominal
+FARTHEST = 1e12  # 1/m, of an offset: a thousand times what any electronics read
 _STEPS = 200  # towards the reading of a straight skin; a quarter of the rest or more goes in each
 _REST = 1e-6  # 1/m, as near as it need be
 
@@ -89,8 +91,12 @@ class Calibration:
                 f"shapes {shapes}"
             )
         good = np.isfinite(self.gain)
-        if not (self.gain[good] > 0).all() or not np.isfinite(self.offset[good]).all():
-            raise Refusal("expected gains above zero, and finite offsets, where a channel passed")
+        gains, offsets = self.gain[good], np.abs(self.offset[good])
+        if not ((gains >= 1 / _STEEPEST) & (gains <= _STEEPEST) & (offsets <= FARTHEST)).all():
+            raise Refusal(
+                f"expected gains above zero, from {1 / _STEEPEST:g} to {_STEEPEST:g}, and finite "
+                f"offsets of at most {FARTHEST:g} 1/m, where a channel passed"
+            )
         failed = sorted(channel for channel, _ in self.failures)
         if failed != np.flatnonzero(~good).tolist():
             raise Refusal(f"expected a reason for every channel without a gain, got {failed}")

@@ -8,6 +8,7 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Mask
 from kappaskin.sensing import PrandtlIshlinskii, StandardLinearSolid
 
+_HUGE = 1e100  # 1/m: of more, or of less than its inverse, no squares can be added up
 _PLAYS = 10  # at most, up to half of the range
 _MOST_STEPS = 12  # of Gauss-Newton at most, in log a
 _LONGEST_STEP = 0.3  # step in log a
@@ -43,6 +44,13 @@ def fit_lines(x: Array, y: Array) -> LineFits:
     too small. What is left of an unseen reading is e_i / (1 - h_i), h_i its leverage.
     """
     n = len(x)
+    for values in (x, y):
+        size = np.max(np.abs(values), initial=0.0, where=~np.isnan(values))
+        if not (size == 0 or 1 / _HUGE <= size <= _HUGE):
+            raise Refusal(
+                f"expected curvatures and readings of 0, or {1 / _HUGE:g} to {_HUGE:g} 1/m, to fit "
+                f"lines to, got {size:g}; check their unit"
+            )
     d = x - x.mean()
     Sxx = float(d @ d) or np.nan  # never bent: no line
     gain = d @ y / Sxx

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from kappaskin.calibration.calibration import digest, fingerprint
+from kappaskin.calibration.calibration import FARTHEST, digest, fingerprint
 from kappaskin.contact import LoadDetector
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, OVERTAKEN, Array
@@ -75,8 +75,12 @@ class Tare:
                 f"shapes {shape} and {self.offset_sd.shape}"
             )
         known = np.isfinite(self.offset)
-        if np.isinf(self.offset).any() or not (self.offset_sd[known] >= 0).all() or not known.any():
-            raise Refusal("expected finite offsets in 1/m with errors of at least 0, or NaN")
+        far = (np.abs(self.offset) > FARTHEST).any()
+        if far or not (self.offset_sd[known] >= 0).all() or not known.any():
+            raise Refusal(
+                f"expected finite offsets of at most {FARTHEST:g} 1/m with errors of at least 0, "
+                "or NaN"
+            )
         if not (self.frames > 0 and 0 <= self.seconds < np.inf):
             raise Refusal(f"expected a tare of frames, got {self.frames} over {self.seconds} s")
         if self.temperature is not None and not np.isfinite(self.temperature):

@@ -8,7 +8,7 @@ import scipy
 from numpy.typing import NDArray
 
 from kappaskin.bases import basis_for
-from kappaskin.estimation import PatternCache
+from kappaskin.estimation import PatternCache, power_of_two
 from kappaskin.frames import Array, Mask
 from kappaskin.sensing import Sensor
 
@@ -86,7 +86,8 @@ class LoadDetector:
         """
         used: NDArray[np.bool_] = self._live & np.isfinite(readings)
         tables = self._cache(used, self._tables)
-        read = readings[used]
+        unit = float(power_of_two(readings[used])[0])
+        read, variance = readings[used] / unit, (math.sqrt(variance) / unit) ** 2
         K: Array = read - tables.Q @ (tables.Q.T @ read)
         power, h = float(K @ K), K @ tables.T
         explained = h**2 / tables.norm
@@ -94,7 +95,7 @@ class LoadDetector:
         least = max(_SIGNIFICANT * variance, max(share, tables.by_chance) * power)
         if not explained[best] > least:
             return None
-        force = float(h[best] / tables.norm[best])
+        force = unit * float(h[best] / tables.norm[best])
         return DetectedLoad(self._points[best], force, float(explained[best] / power))
 
 

@@ -1,7 +1,7 @@
 """Object recognition: the kind and curvature of the object that presses on the skin."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -30,6 +30,7 @@ _ENOUGH = 20  # readings at least
 _INEXACT = 0.02  # of a curvature: what a ring or arcs leave out of a real contact
 _QUIET = 1e-4  # of the largest reading: no skin is quieter
 _SEEN = 2.6  # standard deviations: a width below is only an upper bound, or noise passes for one
+_LEAST, _DEEPEST = 1e-12, 10.0  # of a side: displacements beyond show no shape of an object
 _SURE = 0.4  # probability below which no kind is named
 
 
@@ -37,13 +38,14 @@ _SURE = 0.4  # probability below which no kind is named
 class ContactObject:
     """The object that touches the skin, recognised from the readings of one frame.
 
-    `kind` is one of `KINDS`, or empty when undecided; `probability` has all of them, and is empty
-    without a contact. `position` (2,) in m and `force` in N have 95 % half widths. `radius` in m
-    has the 95 % interval `radius_95`: from 0 when only an upper bound is known, up to infinity when
-    it may be flat. `axis` is the angle in rad from x of a cylinder's axis or of an edge, `length`
-    its length in m, both with 95 % half widths. What does not apply is NaN. A flat face on a flat
-    skin touches at its rim alone and looks like the sphere or cylinder that touches there; two
-    points look like the edge that joins them.
+    `kind` is one of `KINDS`, or empty when undecided, as where the skin is moved by less than
+    1e-12 of its side or by more than ten times that, with nothing else known; `probability` has all
+    of them, and is empty without a contact. `position` (2,) in m and `force` in N have 95 % half
+    widths. `radius` in m has the 95 % interval `radius_95`: from 0 when only an upper bound is
+    known, up to infinity when it may be flat. `axis` is the angle in rad from x of a cylinder's
+    axis or of an edge, `length` its length in m, both with 95 % half widths. What does not apply is
+    NaN. A flat face on a flat skin touches at its rim alone and looks like the sphere or cylinder
+    that touches there; two points look like the edge that joins them.
     """
 
     kind: str
@@ -144,6 +146,8 @@ class ObjectFinder:
         used = self._live & np.isfinite(curvature).ravel()
         if not contact.present or used.sum() < _ENOUGH:
             return NO_OBJECT
+        if not _LEAST < abs(contact.displacement) / self._coarse.patch.a < _DEEPEST:
+            return replace(NO_OBJECT, probability=dict.fromkeys(KINDS, 1 / len(KINDS)))
         K = np.where(used, curvature.ravel(), 0.0)
         noise = max(noise, _QUIET * float(np.abs(K).max()))
         return _judged(

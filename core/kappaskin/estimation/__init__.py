@@ -12,6 +12,7 @@ from kappaskin.estimation.estimator import column_lengths as column_lengths
 from kappaskin.estimation.fast import Fast as Fast
 from kappaskin.estimation.fit import Fit as Fit
 from kappaskin.estimation.fit import Uncertainty as Uncertainty
+from kappaskin.estimation.fit import power_of_two as power_of_two
 from kappaskin.estimation.fit import propagated_covariance as propagated_covariance
 from kappaskin.estimation.least_squares import AsPrinted, Direct
 from kappaskin.estimation.least_squares import FiniteSlopeLeastSquares as FiniteSlopeLeastSquares

@@ -9,7 +9,7 @@ from scipy import linalg
 
 from kappaskin.bases import Basis, SineBasis
 from kappaskin.estimation.estimator import Estimator, PatternCache
-from kappaskin.estimation.fit import Fit
+from kappaskin.estimation.fit import Fit, power_of_two
 from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import Plate
 
@@ -103,6 +103,15 @@ class MarginalLikelihood:
 
     def __call__(self, K: Array) -> tuple[Array, Array, Array]:
         """y (T, k), gamma (T,) and sigma (T,) for readings K (T, R)."""
+        if self._sigma_known:
+            y, gamma = self._likeliest(K)[:2]
+            return y, gamma, np.ones(len(K))
+        unit = power_of_two(K)
+        y, gamma, sigma = self._likeliest(K / unit)
+        return y * unit, gamma, sigma * unit[:, 0]
+
+    def _likeliest(self, K: Array) -> tuple[Array, Array, Array]:
+        """The same for readings whose squares can be added up; sigma as if it were not known."""
         y = K @ self.U
         rest = K - y @ self.U.T
         power = np.vecdot(K, K)
@@ -114,8 +123,6 @@ class MarginalLikelihood:
         best = np.argmin(cost, axis=1)
         t = self._refined(_GRID[best], y2, left)
         gamma = np.exp(t - self._top)
-        if self._sigma_known:
-            return y, gamma, np.ones(len(K))
         fit = np.vecdot(y2, 1 / (1 + gamma[:, None] * self.s2[: self._k])) + left
         return y, gamma, np.sqrt(fit / self._readings)
 

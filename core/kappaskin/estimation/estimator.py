@@ -1,5 +1,6 @@
 """The interface of all estimators: curvature to coefficients with error bars."""
 
+import math
 from abc import ABC, abstractmethod
 from collections import OrderedDict
 from collections.abc import Callable
@@ -39,6 +40,7 @@ class PatternCache(Generic[_Made]):
 
 # Powers of the largest number: the squares of readings over sigmas, added up, stay below it.
 _SAFE, _SAFE_SIGMA = 0.25, 0.2
+_WIDEST = 1e60  # m: squares of what it makes of any derivative of the displacement are numbers
 _UNSEEN = 1e-15  # of the longest column: a function whose curvature cancels, as on half a circle
 
 
@@ -94,8 +96,10 @@ class Estimator(ABC):
         rim_sd: float = RIM_SD,
         dtype: DTypeLike = np.float64,
     ) -> None:
-        if not 0 <= rim_sd < np.inf:
-            raise Refusal(f"expected a rim_sd of at least zero in m, got {rim_sd}")
+        if not 0 <= rim_sd <= _WIDEST:
+            raise Refusal(
+                f"expected a rim_sd of at least zero and at most {_WIDEST:g} in m, got {rim_sd}"
+            )
         if np.dtype(dtype).name not in ("float64", "float32"):
             raise Refusal(f"expected float64 or float32 to compute in, got {np.dtype(dtype)}")
         self.basis, self.layout, self.rim_sd = basis, layout, rim_sd
@@ -106,7 +110,9 @@ class Estimator(ABC):
         )
         self.undecided = rim_sd * unobservable
         """Unobservable shapes (N, q) in m, each one standard deviation large."""
-        self._largest = float(np.finfo(self.dtype).max) ** _SAFE
+        numbers = np.finfo(self.dtype)
+        self._largest, self._faint = float(numbers.max) ** _SAFE, float(numbers.tiny)
+        self._faintest = float(numbers.tiny / numbers.eps)
         self.sigma = None if sigma is None else real_array(sigma, "sigma")
         """The given standard deviations in 1/m, one or (3, P); None if none were given."""
         self.weight = self._weights(1.0 if self.sigma is None else self.sigma)
@@ -163,17 +169,21 @@ class Estimator(ABC):
     def __call__(self, curvature: ArrayLike) -> Fit:
         """Fit `curvature` (3, P) or (T, 3, P) in 1/m; NaN and infinity mean a missing reading.
 
-        So do readings too large to compute with: 4e9 in float32, 1e77 in float64. Raises
-        `RankDeficient` when the readings do not determine the shape.
+        So do single readings too large to compute with: 4e9 in float32, 1e77 in float64; a frame
+        without any above 1e-31 in float32, 1e-292 in float64, is of zeros. Raises
+        `RankDeficient` when the readings do not determine the shape, or are so large throughout.
         """
         K = real_array(
             curvature, "curvature", self.dtype
         )  # a copy: residuals are computed from it later
         self._check_shape(K)
         flat = K.reshape(*K.shape[:-2], 3 * len(self.layout))
-        if self._all_readable and _squared(K.reshape(-1)) <= self._largest**2:
+        squares = _squares(flat)
+        if np.count_nonzero(~(squares >= self._faint)):  # NaN too
+            self._flush(flat)
+        if self._all_readable and not np.count_nonzero(~(squares <= self._largest**2)):
             return self._fit(flat, self.readable)
-        used = (np.abs(flat) <= self._largest) & self.readable
+        used = self._there(flat)
         flat[~used] = np.nan
         if np.all(used == self.readable):
             return self._fit(flat, self.readable)
@@ -192,6 +202,32 @@ class Estimator(ABC):
                 why = inner if isinstance(inner, RankDeficient) else error
                 raise RankDeficient(f"frame {first}: {why}") from why
         return Fit.merged(fits, np.argsort(np.argsort(which, kind="stable")))
+
+    def _there(self, flat: Array) -> Mask:
+        """Which readings (..., 3 P) are used; those missing or too large to compute with are not.
+
+        Raises `RankDeficient` where they are too large throughout: the small ones are no shape.
+        """
+        size = np.abs(flat)
+        small = size <= self._largest
+        beyond = np.isfinite(size) & ~small
+        if beyond.any():
+            kept = np.max(size, axis=-1, initial=0.0, where=small)
+            throughout = (kept > math.sqrt(self._largest)) | ~small.any(axis=-1)
+            if np.any(throughout & beyond.any(axis=-1)):
+                raise RankDeficient(
+                    f"expected readings of at most {self._largest:.1g} 1/m in {self.dtype}, and "
+                    f"NaN for missing ones; got {size[beyond].max():.3g} 1/m; check their unit"
+                )
+        return small & self.readable
+
+    def _flush(self, flat: Array) -> None:
+        """Set readings (..., 3 P) to zero where they are so small throughout that digits are lost.
+
+        Their coefficients, some thousand times smaller, would have next to none.
+        """
+        largest = np.max(np.abs(flat), axis=-1, initial=0.0, where=np.isfinite(flat), keepdims=True)
+        flat[(largest < self._faintest) & np.isfinite(flat)] = 0.0
 
     def follow(self, curvature: Array, times: Array, held: Array) -> Fit:
         """Fit the next frame: `curvature` (3, P) in 1/m read at `times` (3, P) in s.
@@ -273,7 +309,7 @@ class Estimator(ABC):
         )
 
 
-def _squared(a: Array) -> float:
-    """Sum of squares of `a`: the fastest test of whether it is finite and small."""
-    with np.errstate(over="ignore"):
-        return float(a.dot(a))
+@np.errstate(over="ignore")
+def _squares(flat: Array) -> Array:
+    """Sums of squares (...) of `flat` (..., R): the fastest test of whether it is finite."""
+    return np.vecdot(flat, flat)

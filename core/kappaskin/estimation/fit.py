@@ -14,6 +14,7 @@ from kappaskin.frames import Array
 if TYPE_CHECKING:
     from kappaskin.estimation.estimator import Estimator
 
+_FAINT = 2.0**120  # of the least normal number: below it squares, added up, lose digits
 _MOST = 10_000  # coefficients: their covariance takes 800 MB
 
 
@@ -62,6 +63,16 @@ def propagated_covariance(rows: Array, covariance: Array) -> Array:
     return rows @ covariance @ rows.mT
 
 
+def power_of_two(values: Array) -> Array:
+    """The largest power of two (..., 1) in the largest of `values` (..., R); 1 of zeros.
+
+    Divided by it, exactly but for what is 1e300 times smaller, values have squares to add up.
+    """
+    largest = np.max(np.abs(values), axis=-1, keepdims=True, initial=0.0)
+    one = np.ones((), values.dtype)
+    return np.ldexp(one, np.frexp(np.where(largest > 0, largest, one))[1] - 1)
+
+
 def _root(variance: Array) -> Array:
     """Standard deviations; NaN where rounding has left no variance."""
     return np.sqrt(np.where(variance >= 0, variance, np.nan))
@@ -107,9 +118,16 @@ class Fit:
         if np.count_nonzero(squares != squares):  # NaN, found in a tenth of the time of any()
             left = np.where(np.isnan(left), 0.0, left)
             squares = np.vecdot(left, left)
+        unit: Array | None = None
+        if np.count_nonzero(squares < _FAINT * np.finfo(squares.dtype).tiny):
+            unit = power_of_two(left)
+            left = left / unit
+            squares = np.vecdot(left, left)
         if isinstance(self.spare, int) and self.spare > 0:  # as in most frames: the fastest
-            return np.sqrt(squares / self.spare)
-        return np.sqrt(squares / np.where(np.greater(self.spare, 0), self.spare, np.nan))
+            noise = np.sqrt(squares / self.spare)
+        else:
+            noise = np.sqrt(squares / np.where(np.greater(self.spare, 0), self.spare, np.nan))
+        return noise if unit is None else noise * unit[..., 0]
 
     def _each(self, quantity: Callable[[Uncertainty], Array], shape: tuple[int, ...]) -> Array:
         """`quantity(uncertainty)` in this `shape`, for each frame when there are several."""

@@ -15,7 +15,7 @@ from kappaskin.bases import Basis
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation.bayes import MarginalLikelihood, prior_root
 from kappaskin.estimation.estimator import Estimator, PatternCache, real_array
-from kappaskin.estimation.fit import Fit
+from kappaskin.estimation.fit import Fit, power_of_two
 from kappaskin.estimation.least_squares import LeastSquares
 from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import Plate
@@ -177,14 +177,16 @@ class Robust(Estimator, Stateful):
 
     def _screened(self, flat: Array, used: Mask) -> _OutlierResult:
         test, P = self._tests(used, self._outlier_test), len(self.layout)
-        K = np.where(used, flat, 0.0) * self.weight
+        weighted = np.where(used, flat, 0.0).astype(float) * self.weight
+        unit = 1.0 if self.sigma is not None else float(power_of_two(weighted)[0])
+        K = weighted / unit
         there = cast("Mask", used.reshape(3, P).any(axis=0))
         suspects, loads, rounds = _gross_outliers(K, there), list[int](), 0
-        (gamma,) = test.likelihood(K[None, used])[1]
+        (gamma,) = test.likelihood(np.where(np.tile(suspects, 3), 0.0, K)[None, used])[1]
         while suspects.sum() <= _MOST * there.sum():
             free = np.hstack([_columns(suspects), *(self._load_readings[:, g] for g in loads)])
-            residuals = _Residuals(test, K, free, float(gamma))
-            _, (gamma,), (sigma,) = test.likelihood((K - residuals.explained)[None, used])
+            residuals = _Residuals(test, K, free, float(gamma), np.tile(suspects, 3))
+            _, (gamma,), (sigma,) = test.likelihood(residuals.unexplained[None, used])
             left = test.count - free.shape[1]
             given = self.sigma is not None
             variance = 1.0 if given else float(sigma) ** 2 * test.count / left
@@ -196,7 +198,7 @@ class Robust(Estimator, Stateful):
                 out = np.tile(suspects, 3)
                 off[out] = residuals.amounts[: 3 * suspects.sum()]
                 out &= test.used
-                off[out] /= self.weight[out]
+                off[out] *= unit / self.weight[out]
                 return _OutlierResult(suspects, off.reshape(3, P), rounds, hopeless=False)
             else:
                 suspects = found
@@ -237,10 +239,11 @@ def _columns(elements: Mask) -> Array:
 class _Residuals:
     """Residuals of the readings K (3 P,) against each other, in units of sigma.
 
-    `free` (3 P, f) are directions in which they are not constrained: whole elements, loads.
+    `free` (3 P, f) are directions in which they are not constrained: the readings `out` (3 P,) of
+    whole elements, then loads.
     """
 
-    def __init__(self, test: _OutlierTest, K: Array, free: Array, gamma: float) -> None:
+    def __init__(self, test: _OutlierTest, K: Array, free: Array, gamma: float, out: Mask) -> None:
         U = test.U
         s2 = test.likelihood.s2[: U.shape[1]]
         s2 = min(gamma, _CLEAREST / s2[0]) * s2
@@ -249,12 +252,17 @@ class _Residuals:
         self._U, self._free = U, free
         self._QF = free - self._Uw @ (U.T @ free)
         self._inverse = cast("Array", np.linalg.inv(free.T @ self._QF))
-        r = K - self._Uw @ (K @ U)
-        self.amounts = self._inverse @ (free.T @ r)
-        self.explained = free @ self.amounts
-        """The part of K (3 P,) along the free directions, with `amounts` (f,)."""
-        self.r = r - self._QF @ self.amounts
+        # What is along a free direction leaves no residual; kept in, it would leave its rounding.
+        rest = np.where(out, 0.0, K)
+        r = rest - self._Uw @ (rest @ U)
+        amounts = self._inverse @ (free.T @ r)
+        self.unexplained = rest - free @ amounts
+        """K (3 P,) without its part along the free directions."""
+        self.r = r - self._QF @ amounts
         """Q K (3 P,) without its free part."""
+        self.amounts = amounts
+        """Of the part of K along the free directions (f,)."""
+        self.amounts[: np.count_nonzero(out)] += K[out]
 
     def chi_squared(self, out: Mask) -> Array:
         """Chi-squared (P,) of each element against the rest; those `out` are free directions."""

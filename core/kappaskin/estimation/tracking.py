@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kappaskin._state import Stateful
 from kappaskin.bases import Basis
-from kappaskin.errors import Refusal
+from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation.bayes import prior_root
 from kappaskin.estimation.estimator import Estimator, real_array
 from kappaskin.estimation.fit import Fit
@@ -115,6 +115,8 @@ class Tracking(Estimator, Stateful):
     def _set_up(self) -> None:
         if not self.readable.any():
             raise self.refusal(0, 0)
+        # Of the first readings: the squares of what rounding leaves of them are no numbers below.
+        self._least_first = float(np.finfo(self.dtype).tiny) ** 0.4
         self._modes, self._wavenumbers, self._displacements = _principal(self.basis)
         A = self.weight[:, None] * (self.M @ self._modes)
         A[~self.readable] = 0.0
@@ -173,7 +175,7 @@ class Tracking(Estimator, Stateful):
                 f"and {when.shape}"
             )
         K, t = frame.ravel(), when.ravel()
-        used = np.flatnonzero((np.abs(K) <= self._largest) & self.readable)
+        used = np.flatnonzero(self._there(K))
         scanned = ~np.isnan(t)
         if not np.isfinite(t[scanned]).all() or not scanned[used].all():
             raise Refusal("expected a time in s with every reading, got NaN or infinity")
@@ -246,6 +248,11 @@ class Tracking(Estimator, Stateful):
 
     def _start(self, readings: Array, A: Array) -> None:
         """Start with the most likely amplitude for the first readings."""
+        if self.sigma is None and 0 < (largest := np.max(np.abs(readings))) < self._least_first:
+            raise RankDeficient(
+                f"expected first readings of 0, or of at least {self._least_first:.1g} 1/m in "
+                f"{self.dtype}, got {largest:.3g} 1/m; check their unit, or give sigma"
+            )
         noise = (0.0, 0.0) if self.sigma is None else (1.0, math.inf)
         self._level = SignalLevel(*noise, float(np.finfo(self.dtype).eps))
         self._filter.expect(self._level.renew(A, readings, self._signal), START_SPEED)
