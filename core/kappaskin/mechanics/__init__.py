@@ -24,3 +24,4 @@ from kappaskin.mechanics.rigid_objects import Wedge as Wedge
 from kappaskin.mechanics.stretching import Stretching as Stretching
 from kappaskin.mechanics.stretching import deflection_of as deflection_of
 from kappaskin.mechanics.stretching import shapes_under as shapes_under
+from kappaskin.mechanics.shell import Shell as Shell
