@@ -107,8 +107,8 @@ class Robust(Estimator, Stateful):
         points = np.stack(np.meshgrid(x[1:-1], y[1:-1]), -1).reshape(-1, 2)
         points = points[patch.moves(points)]
         plate, orders = Plate(patch), ((0, 0), (1, 0), (0, 1))
-        M = self.weight[:, None] * self.layout.curvature_operator(rich, plate)
-        M = plate.compliance(rich).after(M)
+        read = self.weight[:, None] * self.layout.curvature_operator(rich, plate)
+        M = plate.compliance(rich).after(read)
         jets = [rich.at(points, *order) for order in orders[: 2 if patch.strip else 3]]
         wider = rich.at(points, 2, 0) + (0.0 if patch.strip else rich.at(points, 0, 2))
         self._load_readings: Array = np.stack([M @ jet.T for jet in (*jets, wider)], axis=-1)
