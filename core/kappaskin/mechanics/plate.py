@@ -198,7 +198,7 @@ class Plate:
         return Compliance(values, None if isochoric else volume)
 
     @property
-    def _stretches(self) -> bool:
+    def _is_shell(self) -> bool:
         """Whether f alone does not tell how far it moves along itself.
 
         The planar arc and a bent drum head are inextensible: v_x = H f.
@@ -224,7 +224,7 @@ class Plate:
         if not H:
             return whole, whole
         negative = self.tension * H**2 * squares
-        if self._stretches:
+        if self._is_shell:
             whole += self.membrane_stiffness * H**2 * squares
             negative += Tangential(self, basis).relief
         elif self.patch.strip:
@@ -236,7 +236,7 @@ class Plate:
     def _by_ritz(self, basis: Basis) -> Array:
         """Inverse (N, N) of the stiffness, scaled so that it is well conditioned."""
         K, bare = self._stiffness(basis)
-        inextensible = self.patch.base_curvature and not self._stretches
+        inextensible = self.patch.base_curvature and not self._is_shell
         W = np.eye(basis.size) if basis.free is None or not inextensible else basis.free
         scale = np.sqrt(np.diag(W.T @ bare @ W))
         values, vectors = np.linalg.eigh(W.T @ K @ W / np.multiply.outer(scale, scale))
@@ -255,7 +255,7 @@ class Plate:
         That of the skin under loads along its normal: a bent one stretches under them, and its
         tangential displacements follow from its stiffness.
         """
-        if self._stretches:
+        if self._is_shell:
             return Tangential(self, basis).curvature_at
         return partial(curvature_at, basis)
 
