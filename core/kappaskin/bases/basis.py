@@ -57,7 +57,7 @@ class Basis(Protocol):
         """Derivatives (P, N) of order `dx`, `dy` of every function at `positions` (P, 2) in m.
 
         NaN off a disk or a polygon. `dx` = -1 is the integral along x whose values at the two ends
-        cancel; `dx` = -2 is the integral of that one along x with zero mean.
+        cancel.
         """
         ...
 
@@ -82,6 +82,9 @@ class Basis(Protocol):
 #     xx: f_xx + H^2 f,    yy: f_yy,    xy: f_xy + H v_y   with   v_x = H f.
 # These are Sanders' and Koiter's changes of curvature when neither the hoop nor the shear strain
 # changes: the tangential displacement v follows from f, and u_x = -v_y. Flat, they are Eqs. 3-5.
+# A fit of the shape knows no loads and no stiffness, and nothing better of v and u; where they are
+# known, mechanics has them (`Plate.curvature`). Of a skin 0.25 mm thick, half round (R 12.9 mm),
+# the readings differ by 2 % of the peak, and the shape so fitted by 5 % in RMS.
 _ORDERS = {"xx": ((2, 0), (0, 0)), "yy": ((0, 2), None), "xy": ((1, 1), (-1, 1))}
 
 
@@ -95,7 +98,10 @@ def curvature_terms(patch: Patch, component: str) -> list[tuple[float, Order]]:
 
 
 def curvature_at(basis: Basis, positions: Array) -> Array:
-    """Curvature change xx, yy, xy (3, P, N) in 1/m per m of each function (Eqs. 3-5, 11)."""
+    """Curvature change xx, yy, xy (3, P, N) in 1/m per m of each function (Eqs. 3-5, 11).
+
+    Of a bent skin as if it were inextensible.
+    """
     return np.stack(
         [
             sum(

@@ -50,8 +50,7 @@ class ProductBasis(FunctionBasis):
     def _along(self, x: Array, length: float, count: int, derivative: int) -> Array:
         """Derivatives (P, count) of `count` functions on [0, `length`] at `x` (P,).
 
-        Of order -1 it is the integral whose values at 0 and `length` cancel, of order -2 the
-        integral of that one whose mean is zero.
+        Of order -1 it is the integral whose values at 0 and `length` cancel.
         """
 
     @abstractmethod
@@ -59,8 +58,8 @@ class ProductBasis(FunctionBasis):
         """What every derivative at one point is a product of: in x (6, Ni), and in y (6, Nj)."""
 
     def _along_x(self, x: Array, derivative: int) -> Array:
-        if derivative not in (-2, -1, 0, 1, 2):
-            raise Refusal(f"expected a derivative of order -2 to 2, got {derivative}")
+        if derivative not in (-1, 0, 1, 2):
+            raise Refusal(f"expected a derivative of order -1 to 2, got {derivative}")
         return self._along(x, self.patch.a, self.Ni, derivative)
 
     def _along_y(self, y: Array, derivative: int) -> Array:
@@ -186,12 +185,8 @@ class SineBasis(ProductBasis):
         kx = np.multiply.outer(x, k)
         if derivative == 0:
             return np.sin(kx)
-        end = np.cos(k * length)
-        if derivative == -2:
-            tilt = np.multiply.outer(x - length / 2, (1 + end) / (2 * k))
-            return tilt - np.sin(kx) / k**2 + (1 - end) / (k**3 * length)
         if derivative == -1:
-            return ((1 + end) / 2 - np.cos(kx)) / k
+            return ((1 + np.cos(k * length)) / 2 - np.cos(kx)) / k
         return k * np.cos(kx) if derivative == 1 else -(k**2) * np.sin(kx)
 
     @cached_property
@@ -257,15 +252,9 @@ class ClampedBasis(JetProductBasis):
         return self._without_mean(ends[1] - ends[0])
 
     def _along(self, x: Array, length: float, count: int, derivative: int) -> Array:
-        s, ends = x / length - 0.5, np.array([-0.5, 0.5])
-        values = _beam(s, count, derivative)[0]
+        values = _beam(x / length - 0.5, count, derivative)[0]
         if derivative < 0:
-            middle = _beam(ends, count, -1)[0].mean(axis=0)
-            if derivative == -1:
-                values -= middle
-            else:
-                third = _beam(ends, count, -3)[0]
-                values -= np.multiply.outer(s, middle) + third[1] - third[0]
+            values -= _beam(np.array([-0.5, 0.5]), count, -1)[0].mean(axis=0)
         return values * length**-derivative
 
     def _jet(self, x: float, length: float, count: int) -> Array:

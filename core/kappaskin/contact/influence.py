@@ -65,7 +65,7 @@ class _OfFunctions:
     ) -> None:
         self._basis = basis_for(plate.patch, edge, functions, 1 if plate.patch.strip else functions)
         compliance = plate.compliance(self._basis)
-        self._readings = compliance.after(layout.curvature_operator(self._basis)).T.copy()
+        self._readings = compliance.after(layout.curvature_operator(self._basis, plate)).T.copy()
         self._C, self._out = compliance.after(np.eye(self._basis.size)), out
         self._jet = np.zeros((3, self._basis.size))
 
@@ -318,7 +318,7 @@ def _rest_of(
     parts = list[Array]()
     for part in np.array_split(positions, -(-len(positions) // _TOGETHER)):
         layout = replace(SensorLayout.scattered(patch, part), gage_length=gage_length)
-        M = compliance.after(layout.curvature_operator(basis)).reshape(-1, *basis.shape)
+        M = compliance.after(layout.curvature_operator(basis, plate)).reshape(-1, *basis.shape)
         rest = unit * (along_x @ (M @ along_y.T)).T.reshape(len(y), len(x), 3, len(part))
         d = part.T[:, None, None] - np.stack(np.meshgrid(x, y))[..., None]
         rest -= np.moveaxis(_under_gaussian(d, sd, gage_length), 0, 2)

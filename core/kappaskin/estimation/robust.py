@@ -106,8 +106,9 @@ class Robust(Estimator, Stateful):
         x, y = patch.grid(_PLACES + 2, 3 if patch.strip else _PLACES + 2)
         points = np.stack(np.meshgrid(x[1:-1], y[1:-1]), -1).reshape(-1, 2)
         points = points[patch.moves(points)]
-        of, orders = Plate(patch).compliance(rich), ((0, 0), (1, 0), (0, 1))
-        M = of.after(self.weight[:, None] * self.layout.curvature_operator(rich))
+        plate, orders = Plate(patch), ((0, 0), (1, 0), (0, 1))
+        read = self.weight[:, None] * self.layout.curvature_operator(rich, plate)
+        M = plate.compliance(rich).after(read)
         jets = [rich.at(points, *order) for order in orders[: 2 if patch.strip else 3]]
         wider = rich.at(points, 2, 0) + (0.0 if patch.strip else rich.at(points, 0, 2))
         self._load_readings: Array = np.stack([M @ jet.T for jet in (*jets, wider)], axis=-1)

@@ -21,6 +21,7 @@ from kappaskin.mechanics.rigid_objects import Punch as Punch
 from kappaskin.mechanics.rigid_objects import RigidObject as RigidObject
 from kappaskin.mechanics.rigid_objects import Sphere as Sphere
 from kappaskin.mechanics.rigid_objects import Wedge as Wedge
+from kappaskin.mechanics.shell import Shell as Shell
 from kappaskin.mechanics.stretching import Stretching as Stretching
 from kappaskin.mechanics.stretching import deflection_of as deflection_of
 from kappaskin.mechanics.stretching import shapes_under as shapes_under

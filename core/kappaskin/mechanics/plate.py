@@ -1,15 +1,16 @@
 """Plates: the deflection of an elastic skin under loads."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import partial
 
 import numpy as np
 
-from kappaskin.bases import Basis, ElasticBasis, SineBasis, curvature_terms, overlaps
+from kappaskin.bases import Basis, ElasticBasis, SineBasis, curvature_at, overlaps
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics.loads import Load, is_point
+from kappaskin.mechanics.shell import Tangential
 from kappaskin.skin import Patch
 
 
@@ -37,19 +38,6 @@ class Compliance:
         share = (M @ under_pressure) / (self.volume @ under_pressure)
         return free - np.multiply.outer(share, under_pressure)
 
-
-# A skin bent along x to 1/R = H. Its changes of curvature are Sanders' and Koiter's; of its three
-# membrane strains the hoop's and the shear are taken as nil, as in Vlasov's theory of long shells,
-# so that the tangential displacements v (hoop) and u (axial) follow from f (bases/basis.py):
-#     v_x = H f,    u_x = -v_y.
-# Kept: bending in all three components, and the axial strain u_y, which the skin cannot escape
-# where what presses it varies along its axis. Dropped: hoop strain and shear, which let it deflect
-# more: half round (R 12.9 mm) and 0.1 mm thick, 1.14 times as far under a touch 9 mm across when
-# as wide as its arc is long, 1.3 times when half as wide. Without the energy of u_y it would
-# deflect 16 and 29 times too far.
-# The edges along the axis are hinged, hold or guide v and let u go; the curved ones hold f and v.
-# Tension: a skin that the pressure T H blows up has the energy T area - p volume, of which the
-# second variation is T (|grad f|^2 - H^2 f^2): nil for a rigid translation.
 
 USUAL_THICKNESS = 0.25e-3
 """Thickness in m of a bent skin that was given none: substrate and gages."""
@@ -163,6 +151,12 @@ class Plate:
         return 12 * (1 - self.poisson**2) * self.rigidity / h**3
 
     @property
+    def membrane_stiffness(self) -> float:
+        """C = E h / (1 - nu^2) = 12 D / h^2 in N/m; zero for a flat skin without a thickness."""
+        h = self.sheet_thickness
+        return 12 * self.rigidity / h**2 if h else 0.0
+
+    @property
     def stretching(self) -> float:
         """Axial stiffness C in N/m; of a uniform sheet E h, as if 0.25 mm thick if unknown."""
         if self.axial_stiffness is None:
@@ -199,44 +193,52 @@ class Plate:
         points, weights = basis.quadrature()
         volume = weights @ basis.at(points)
         swelling = float(volume @ Compliance(values).after(volume[None])[0])
-        # A skin whose ends are pinned keeps the volume already: no pressure moves it.
+        # An arc whose ends are pinned keeps the volume already: no pressure moves it.
         isochoric = swelling <= 1e-12 * (volume @ volume) * np.abs(values).max()
         return Compliance(values, None if isochoric else volume)
+
+    @property
+    def _is_shell(self) -> bool:
+        """Whether f alone does not tell how far it moves along itself.
+
+        The planar arc and a bent drum head are inextensible: v_x = H f.
+        """
+        return bool(self.patch.base_curvature and self.rigidity) and not self.patch.strip
 
     def _stiffness(self, basis: Basis) -> tuple[Array, Array]:
         """Stiffness matrix (N, N) in N/m, and the same without its negative terms, for scaling."""
         nu, H, overlap = self.poisson, self.patch.base_curvature, overlaps(basis)
-
-        def product(left: str, right: str) -> Array:
-            first, second = curvature_terms(self.patch, left), curvature_terms(self.patch, right)
-            pairs = [(g * h, one, other) for g, one in first for h, other in second]
-            return reduce(np.add, (gh * overlap(one, other) for gh, one, other in pairs))
-
-        mixed = product("xx", "yy")
-        bending = product("xx", "xx") + product("yy", "yy") + nu * (mixed + mixed.T)
-        bending += 2 * (1 - nu) * product("xy", "xy")
-        whole = self.rigidity * bending
+        xx, yy, xy = (2, 0), (0, 2), (1, 1)
         # Of modes, half the time it takes is theirs.
         squares = overlap((0, 0), (0, 0)) if H or self.foundation else 0.0
+        mixed = overlap(xx, yy)
+        bending = overlap(xx, xx) + overlap(yy, yy) + nu * (mixed + mixed.T)
+        bending += 2 * (1 - nu) * overlap(xy, xy)
+        whole = self.rigidity * bending + self.foundation * squares
         if self.tension:
-            slopes = overlap((1, 0), (1, 0)) + overlap((0, 1), (0, 1))
-            whole += self.tension * (slopes - H**2 * squares)
-        whole += self.foundation * squares
+            whole += self.tension * (overlap((1, 0), (1, 0)) + overlap((0, 1), (0, 1)))
         if isinstance(basis, ElasticBasis):
             along, per_length = basis.rim()
             rim = basis.at(along)
             whole += self.rim_stiffness * (rim.T * per_length) @ rim
-        if H and self.stretching and not self.patch.strip:
-            whole += self.stretching * H**2 * overlap((-2, 2), (-2, 2))
-        return whole, whole + (self.rigidity * H**4 + self.tension * H**2) * squares
+        if not H:
+            return whole, whole
+        negative = self.tension * H**2 * squares
+        if self._is_shell:
+            whole += self.membrane_stiffness * H**2 * squares
+            negative += Tangential(self, basis).relief
+        elif self.patch.strip:
+            both = overlap(xx, (0, 0))
+            whole += self.rigidity * H**4 * squares
+            negative -= self.rigidity * H**2 * (both + both.T)
+        return whole - negative, whole
 
     def _by_ritz(self, basis: Basis) -> Array:
-        """Inverse (N, N) of the stiffness on the combinations that the edges leave free."""
+        """Inverse (N, N) of the stiffness, scaled so that it is well conditioned."""
         K, bare = self._stiffness(basis)
-        free = np.eye(basis.size) if basis.free is None else basis.free
-        W = free if basis.unobservable is None else np.hstack([free, basis.unobservable])
+        inextensible = self.patch.base_curvature and not self._is_shell
+        W = np.eye(basis.size) if basis.free is None or not inextensible else basis.free
         scale = np.sqrt(np.diag(W.T @ bare @ W))
-        scale[scale == 0] = np.inf
         values, vectors = np.linalg.eigh(W.T @ K @ W / np.multiply.outer(scale, scale))
         if not values[0] > 1e-13 * values[-1]:
             raise Refusal(
@@ -246,6 +248,16 @@ class Plate:
             )
         V = W @ (vectors / scale[:, None])
         return (V / values) @ V.T
+
+    def curvature(self, basis: Basis) -> Callable[[Array], Array]:
+        """The map from positions (P, 2) in m to the curvature (3, P, N) in 1/m per m of functions.
+
+        That of the skin under loads along its normal: a bent one stretches under them, and its
+        tangential displacements follow from its stiffness.
+        """
+        if self._is_shell:
+            return Tangential(self, basis).curvature_at
+        return partial(curvature_at, basis)
 
     def deflection(self, loads: Iterable[Load], basis: Basis) -> Array:
         """Coefficients (Ni, Nj) in m of the deflection under all `loads` at once."""

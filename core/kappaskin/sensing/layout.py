@@ -1,8 +1,9 @@
 """Sensor layout: where the elements are, and the curvature that their gages read."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike, DTypeLike
 from kappaskin.bases import Basis, SineBasis, curvature_at, gauss
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Mask
+from kappaskin.mechanics import Plate
 from kappaskin.skin import Patch
 
 _POINTS = 12  # exact to rounding for waves as short as the gage
@@ -37,18 +39,26 @@ def _sinc(t: Array) -> Array:
     return np.sinc(t / np.pi)
 
 
-def mean_curvature_at(basis: Basis, positions: Array, gage_length: float) -> Array:
+CurvatureAt = Callable[[Array], Array]
+"""From positions (P, 2) in m to curvature xx, yy, xy (3, P, N) in 1/m per m of each function."""
+
+
+def mean_curvature_at(
+    basis: Basis, positions: Array, gage_length: float, curvature: CurvatureAt | None = None
+) -> Array:
     """Mean curvature xx, yy, xy (3, P, N) in 1/m per m of each function along the gages.
 
     The middles of the gages, `gage_length` in m, are at `positions` (P, 2) in m. Without a length
-    it is `curvature_at`.
+    it is the `curvature` of the functions, unless given that of `curvature_at`.
     """
+    curvature = curvature or partial(curvature_at, basis)
     if not gage_length:
-        return curvature_at(basis, positions)
-    mean = _over_points if basis.patch.base_curvature else _between_ends
+        return curvature(positions)
 
     def along(x: float, y: float) -> Array:
-        return mean(basis, positions, gage_length, x, y)
+        if basis.patch.base_curvature:
+            return _over_points(curvature, positions, gage_length, x, y)
+        return _between_ends(basis, positions, gage_length, x, y)
 
     rising, falling = along(_DIAGONAL, _DIAGONAL), along(_DIAGONAL, -_DIAGONAL)
     return np.stack([along(1.0, 0.0), along(0.0, 1.0), (rising - falling) / 2])
@@ -67,11 +77,11 @@ def _between_ends(basis: Basis, positions: Array, L: float, x: float, y: float) 
     return (slope(positions + half) - slope(positions - half)) / L
 
 
-def _over_points(basis: Basis, positions: Array, L: float, x: float, y: float) -> Array:
+def _over_points(curvature: CurvatureAt, positions: Array, L: float, x: float, y: float) -> Array:
     """Mean curvature along (x, y) by quadrature: on a bent skin it is not only a derivative."""
     along, weights = gauss(L, _POINTS)
     steps = np.multiply.outer(along - L / 2, (x, y))
-    xx, yy, xy = curvature_at(basis, (positions + steps[:, None]).reshape(-1, 2))
+    xx, yy, xy = curvature((positions + steps[:, None]).reshape(-1, 2))
     normal = (x * x * xx + y * y * yy + 2 * x * y * xy).reshape(_POINTS, len(positions), -1)
     return np.einsum("q,qpn->pn", weights / L, normal)
 
@@ -180,11 +190,15 @@ class SensorLayout:
     def __str__(self) -> str:
         return "{} x {} elements".format(*self.shape) if self.shape else f"{len(self)} elements"
 
-    def curvature_operator(self, basis: Basis) -> Array:
-        """M (3 P, N): `M @ coefficients.ravel()` is curvature (3, P) flattened (Eqs. 2-5, 11)."""
+    def curvature_operator(self, basis: Basis, plate: Plate | None = None) -> Array:
+        """M (3 P, N): `M @ coefficients.ravel()` is curvature (3, P) flattened (Eqs. 2-5, 11).
+
+        With a `plate`, that of its deflection under loads: a bent skin stretches under them.
+        """
         if basis.patch != self.patch:
             raise Refusal(f"the layout is on {self.patch}, the basis on {basis.patch}; use one")
-        K = mean_curvature_at(basis, self.positions, self.gage_length)
+        curvature = plate.curvature(basis) if plate else None
+        K = mean_curvature_at(basis, self.positions, self.gage_length, curvature)
         return K.reshape(3 * len(self), basis.size)
 
 

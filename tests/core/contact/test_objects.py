@@ -381,13 +381,13 @@ def test_over_foam_too_the_radius_is_found(rigid):
 class Finger:
     """A bent skin, pressed through its own compliance: the contact alone is independent."""
 
-    def __init__(self, axial_stiffness=None):
+    def __init__(self, thickness=None):
         self.R, self.patch = 0.03, Patch(0.04, 0.04, 0.03)
-        plate = Plate(self.patch, axial_stiffness=axial_stiffness)
+        plate = Plate(self.patch, thickness=thickness)
         self.skin = Skin(self.patch, plate)
         self.basis = basis_for(self.patch, "hinged", 24, 24)
         self.compliance = plate.compliance(self.basis)
-        self.M = self.skin.layout.curvature_operator(self.basis)
+        self.M = self.skin.layout.curvature_operator(self.basis, plate)
 
     def curvature(self, rigid):
         u, v = rigid.grid(8e-3, 6e-4)
@@ -402,12 +402,12 @@ class Finger:
 
 @pytest.fixture(scope="module")
 def finger():
-    return Finger(axial_stiffness=0.0)
+    return Finger(thickness=2e-3)
 
 
 @pytest.fixture(scope="module")
 def sheet():
-    """The same, but it cannot stretch along its axis without cost: a dent is narrower."""
+    """The same rigidity, but thinner, so that it hardly stretches: a dent is narrower."""
     return Finger()
 
 
@@ -436,7 +436,7 @@ def test_a_rod_and_a_ball_dent_a_fingertip_further(finger, kind):
         assert one.radius_95[0] < 0.06 < one.radius_95[1]
 
 
-@pytest.mark.parametrize("force", [4.0, 12.0])
+@pytest.mark.parametrize("force", [4.0, 8.0])
 @pytest.mark.parametrize("kind", ["plane", "cylinder", "sphere"])
 def test_on_a_bent_sheet_too_objects_are_told_apart(sheet, kind, force):
     shape = {} if kind == "sphere" else ALONG

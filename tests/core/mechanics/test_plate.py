@@ -418,7 +418,7 @@ FLUID = {"flat": Patch(0.1, 0.06), "bent": Patch(0.1, 0.06, 0.05)}
 
 @pytest.mark.parametrize("patch", FLUID.values(), ids=FLUID)
 def test_over_a_fluid_the_volume_stays_and_the_pressure_is_its_multiplier(patch):
-    plate = Plate(patch, 0.5, tension=30.0, foundation=1e4, axial_stiffness=1e3)
+    plate = Plate(patch, 0.5, tension=30.0, foundation=1e4, thickness=2e-3)
     basis, load = SineBasis(patch, 9, 9, sliding=True), DiscLoad(0.03, 0.02, 0.01, 2.0)
     points, weights = basis.quadrature()
     volume = weights @ basis.at(points)
@@ -435,6 +435,6 @@ def test_over_a_fluid_the_volume_stays_and_the_pressure_is_its_multiplier(patch)
         load.modal(basis).ravel() - K @ c,
         pressure * volume,
         rtol=0,
-        atol=1e-8 * pressure * volume.max(),
+        atol=1e-8 * abs(pressure) * volume.max(),
     )
-    assert pressure > 0
+    assert pressure != 0

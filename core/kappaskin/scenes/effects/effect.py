@@ -59,7 +59,8 @@ class Survey:
     @cached_property
     def operator(self) -> Array:
         """Coefficients to readings of point-like elements, (3 P, N)."""
-        return replace(self.layout, gage_length=0.0).curvature_operator(self.basis)
+        layout = replace(self.layout, gage_length=0.0)
+        return layout.curvature_operator(self.basis, self.plate)
 
     @cached_property
     def wavenumber(self) -> float:

@@ -1,0 +1,302 @@
+"""Shells: what a bent skin that stretches reads, and how far it gives."""
+
+import math
+from collections.abc import Callable, Iterable
+from functools import cached_property, partial
+from itertools import pairwise, repeat
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.polynomial.legendre import legvander
+
+from kappaskin.bases import Basis, ProductBasis, SineBasis, gauss
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array
+
+if TYPE_CHECKING:
+    from kappaskin.mechanics.plate import Plate
+
+# Sanders' and Koiter's theory of a cylinder bent along x to H = 1/R, straight along y, with the
+# displacement f inward and the tangential ones v along x (hoop) and u along y (axial):
+#
+#     strain       e_x = v_x - H f        e_y = u_y      g = v_y + u_x
+#     curvature    k_x = f_xx + H v_x     k_y = f_yy     t = f_xy + H (3 v_y - u_x) / 4
+#
+# The energy is half the integral of
+#
+#     C (e_x^2 + e_y^2 + 2 nu e_x e_y + (1 - nu)/2 g^2)
+#     + D (k_x^2 + k_y^2 + 2 nu k_x k_y + 2 (1 - nu) t^2)
+#     + T (f_x^2 + f_y^2 - H^2 f^2) + k_f f^2
+#
+# with D = E h^3 / (12 (1 - nu^2)) and C = E h / (1 - nu^2). Gages read k_x, k_y and t. The curved
+# ends hold f and v and let u go: v goes as sin(q y), u as cos(q y) with q = j pi/b, and no wave j
+# mixes with another. The straight edges hold f and, as they are held in plane, v and u.
+# Tension: a skin that the pressure T H blows up has the energy T area - p volume, of which the
+# second variation is the third line: nil for a rigid translation.
+
+
+def _once(a: float, count: int, x: Array) -> Array:
+    """Integrals of the Legendre polynomials P_n on [0, a], n = 1 to `count`, and these (2, X, n).
+
+    The polynomials are orthonormal, the integrals vanish at both ends.
+    """
+    P, n = legvander(2 * x / a - 1, count + 1), np.arange(1, count + 1)
+    integrals = (P[:, 2:] - P[:, :-2]) / (2 * n + 1) * a / 2
+    scale: Array = np.sqrt((2 * n + 1) / a)
+    return np.stack([integrals, P[:, 1:-1]]) * scale
+
+
+def _twice(a: float, count: int, x: Array) -> Array:
+    """Integrals of integrals of P_n, n = 0 to `count` - 1, and two derivatives (3, X, n).
+
+    The second derivatives are orthonormal, the functions vanish at both ends.
+    """
+    P, n, nil = legvander(2 * x / a - 1, count + 1), np.arange(count), np.zeros((len(x), 2))
+    integrals = np.hstack([nil, (P[:, 2:] - P[:, :-2]) / (2 * np.arange(1, count + 1) + 1)])
+    slopes = (P[:, 1:-1] - np.hstack([nil, P[:, 1 : count - 1]])) / (2 * n + 1)
+    values = (integrals[:, 2:] - integrals[:, :-2]) / (2 * n + 1)
+    scale: Array = np.sqrt((2 * n + 1) / a)
+    return np.stack([values * a**2 / 4, slopes * a / 2, P[:, :-2]]) * scale
+
+
+def _lines(a: float, x: Array) -> Array:
+    """1 and 2x/a - 1, and their derivatives (2, X, 2)."""
+    one = np.ones_like(x)
+    values, slopes = (one, 2 * x / a - 1), (0 * one, 2 / a * one)
+    return np.stack([np.stack(values, axis=-1), np.stack(slopes, axis=-1)])
+
+
+class _Arc:
+    """Displacements along the arc by Ritz's method, which meet the straight edges.
+
+    `f` gives the functions of f and their first two derivatives (3, X, N) at x (X,); v and u are
+    integrals of `count` Legendre polynomials, and lines where they are not held. The n functions
+    are those of f, of v and of u.
+    """
+
+    def __init__(
+        self, plate: "Plate", f: Callable[[Array], Array], count: int, sliding: bool
+    ) -> None:
+        self._plate, self._f, self._count = plate, f, count
+        self._v_held = plate.inplane_edge in ("hoop", "held") and not sliding
+        self._u_held = plate.inplane_edge in ("diaphragm", "held")
+        self.x, self.weights = gauss(plate.patch.a, 2 * count + 16)
+        self._fields = self.fields(self.x)
+        ends = np.cumsum([0, *(field.shape[-1] for field in self._fields)]).tolist()
+        self.f, self.v, self.u = (slice(*pair) for pair in pairwise(ends))
+        self.size = ends[-1]
+
+    def fields(self, x: Array) -> tuple[Array, Array, Array]:
+        """The functions of f (3, X, N), v (2, X, Nv) and u (2, X, Nu) with derivatives at `x`."""
+        held = _once(self._plate.patch.a, self._count, x)
+        free = np.dstack([_lines(self._plate.patch.a, x), held])
+        return self._f(x), held if self._v_held else free, held if self._u_held else free
+
+    def rows(self, x: Array) -> Array:
+        """f, f_x, f_xx, v, v_x, u_x (6, ..., n) of all functions at `x` (...) in m."""
+        f, v, u = self.fields(x.ravel())
+        found = np.zeros((6, x.size, self.size))
+        found[:3, :, self.f], found[3:5, :, self.v], found[5, :, self.u] = f, v, u[1]
+        return found.reshape(6, *x.shape, self.size)
+
+    def stiffness(self, q: Array) -> Array:
+        """Stiffness (J, n, n) for `q` (J,) in 1/m, over the integral of sin(q y)^2 along y."""
+        strains, n = self._strains(), self.size
+        stress = np.einsum("ij,pjxn,x->pixn", self._law(), strains, self.weights)
+        left, right = strains.reshape(3, -1, n), stress.reshape(3, -1, n)
+        powers = np.zeros((5, n, n))
+        for one in range(3):
+            for other in range(3):
+                powers[one + other] += left[one].T @ right[other]
+        return np.tensordot(q[:, None] ** np.arange(5), powers, 1)
+
+    def _strains(self) -> Array:
+        """Strains (3, 9, X, n) by powers of q: e_x, e_y, g, k_x, k_y, t, f_x, f_y, f."""
+        H, F, V, U = self._plate.patch.base_curvature, self.f, self.v, self.u
+        f, v, u = self._fields
+        S = np.zeros((3, 9, len(self.x), self.size))
+        S[0, 0, :, F], S[0, 0, :, V] = -H * f[0], v[1]
+        S[1, 1, :, U] = -u[0]
+        S[1, 2, :, V], S[0, 2, :, U] = v[0], u[1]
+        S[0, 3, :, F], S[0, 3, :, V] = f[2], H * v[1]
+        S[2, 4, :, F] = -f[0]
+        S[1, 5, :, F], S[1, 5, :, V], S[0, 5, :, U] = f[1], 3 / 4 * H * v[0], -H / 4 * u[1]
+        S[0, 6, :, F], S[1, 7, :, F], S[0, 8, :, F] = f[1], f[0], f[0]
+        return S
+
+    def _law(self) -> Array:
+        plate, nu = self._plate, self._plate.poisson
+        C, D, T = plate.membrane_stiffness, plate.rigidity, plate.tension
+        squares = plate.foundation - T * plate.patch.base_curvature**2
+        law = np.diag([C, C, C * (1 - nu) / 2, D, D, 2 * D * (1 - nu), T, T, squares])
+        law[0, 1] = law[1, 0] = nu * C
+        law[3, 4] = law[4, 3] = nu * D
+        return law
+
+
+class Tangential:
+    """The tangential displacements of a bent skin that go with each function of a `basis`.
+
+    Nothing presses the skin along itself: v and u are those of the least energy for a given f.
+    `relief` (N, N) in N/m is by how much they lower the stiffness that f has without them.
+    """
+
+    def __init__(self, plate: "Plate", basis: Basis) -> None:
+        if not isinstance(basis, ProductBasis):
+            raise TypeError(f"a bent skin has products of functions, got {type(basis).__name__}")
+        Ni, Nj = basis.shape
+        sliding = isinstance(basis, SineBasis) and basis.sliding
+        a, b = plate.patch.a, plate.patch.b
+        self._basis, self._H = basis, plate.patch.base_curvature
+        self._arc = arc = _Arc(plate, self._along, 2 * Ni + 16, sliding)
+        waves = Nj if isinstance(basis, SineBasis) else 2 * Nj + 16
+        self._q = np.pi / b * np.arange(1.0, waves + 1)
+        square = b / 2  # the integral of a squared sine
+        y, weights = gauss(b, 2 * waves + 16)
+        of_y = basis.on_grid(np.array([a / 2]), y).Y
+        sines_there = np.sin(np.multiply.outer(self._q, y))
+        share = (sines_there * weights) @ of_y / square  # (J, Nj): of a function of y, of a wave
+        K, F, T = arc.stiffness(self._q), arc.f, slice(arc.v.start, arc.size)
+        least = -np.linalg.solve(K[:, T, T], K[:, T, F])
+        relief = np.einsum("jit,jtm->jim", -K[:, F, T], least)
+        self.relief: Array = square * np.einsum(
+            "jn,jl,jim->inml", share, share, relief, optimize=True
+        ).reshape(basis.size, basis.size)
+        self._share, self._least = share, np.zeros((len(self._q), arc.size, Ni))
+        self._least[:, T] = least
+
+    def _along(self, x: Array) -> Array:
+        maps = (self._basis.on_grid(x, np.zeros(1), order) for order in range(3))
+        return np.stack([each.X for each in maps])
+
+    def curvature_at(self, positions: Array) -> Array:
+        """Curvature xx, yy, xy (3, P, N) in 1/m per m of each function at `positions` (P, 2)."""
+        K = np.stack([self._basis.at(positions, *order) for order in ((2, 0), (0, 2), (1, 1))])
+        _, _, _, v, vx, ux = self._arc.rows(positions[:, 0])
+        turn = np.multiply.outer(positions[:, 1], self._q)
+        hoop = np.einsum("pn,jni->pij", vx, self._least, optimize=True)
+        turned = np.einsum("pn,j,jni->pij", 3 / 4 * v, self._q, self._least, optimize=True)
+        turned -= np.einsum("pn,jni->pij", ux / 4, self._least, optimize=True)
+        for channel, read, wave in ((0, hoop, np.sin(turn)), (2, turned, np.cos(turn))):
+            K[channel] += self._H * (read @ (wave[:, :, None] * self._share)).reshape(K[0].shape)
+        return K
+
+
+_MOST_FUNCTIONS, _MOST_WAVES = 96, 160
+_DIAGONAL = 1 / math.sqrt(2)
+_POINTS = 12  # along a gage: exact to rounding for waves as short as the gage
+
+
+class Gages(Protocol):
+    """P elements at `positions` (P, 2) in m whose gages are `gage_length` long in m."""
+
+    @property
+    def positions(self) -> Array: ...
+
+    @property
+    def gage_length(self) -> float: ...
+
+
+class Shell:
+    """A bent skin with hinged edges under small loads: its displacements to convergence.
+
+    `finest` in m is the least standard deviation of a load. `sliding` edges let the hoop
+    displacement go however they are held in plane.
+    """
+
+    def __init__(self, plate: "Plate", finest: float = 1e-3, sliding: bool = False) -> None:
+        patch = plate.patch
+        if not patch.base_curvature or patch.strip:
+            raise Refusal(f"expected a skin that is bent, with two sides, got a {patch.name}")
+        # A Gaussian has exp(-8) of its amplitude left at the wave number 4 / sd.
+        functions, waves = math.ceil(2 * patch.a / finest), math.ceil(4 * patch.b / finest / np.pi)
+        if functions > _MOST_FUNCTIONS or waves > _MOST_WAVES:
+            least = max(2 * patch.a / _MOST_FUNCTIONS, 4 * patch.b / np.pi / _MOST_WAVES)
+            raise Refusal(
+                f"expected a load of a standard deviation of at least {least:.3g} m on a "
+                f"{patch.name}, got {finest:g} m"
+            )
+        self._plate, self._finest, count = plate, finest, max(functions, 16)
+        self._arc = _Arc(plate, partial(_twice, patch.a, count), count, sliding)
+        self._q = np.pi / patch.b * np.arange(1.0, max(waves, 16) + 1)
+        self._felt = self._arc.rows(self._arc.x)[0][:, self._arc.f].T * self._arc.weights
+
+    @cached_property
+    def _answer(self) -> Array:
+        """The displacements (J, n, N) in m of each wave under unit forces on the functions of f."""
+        K, f = self._arc.stiffness(self._q), self._arc.f
+        scale: Array = 1 / np.sqrt(np.einsum("jnn->jn", K))
+        forces = np.zeros((*scale.shape, f.stop))
+        forces[:, f] = np.eye(f.stop) * scale[:, None, f]
+        scaled: Array = K * scale[:, :, None] * scale[:, None, :]
+        answer: Array = np.linalg.solve(scaled, forces) * scale[:, :, None]
+        return answer * (2 / self._plate.patch.b)  # the integral of a squared sine is b / 2
+
+    def _loads(self, x: Array, sd: float) -> Array:
+        """Forces (N, 2 X) on the functions of f under unit loads at `x`, and second derivatives.
+
+        Beyond the ends the load is reflected with the other sign, as sines do along y.
+        """
+        load, second = np.zeros((2, len(self._arc.x), len(x)))
+        for sign, centre in ((1, x), (-1, -x), (-1, 2 * self._plate.patch.a - x)):
+            r = (self._arc.x[:, None] - centre) / sd
+            bell = sign * np.exp(-(r**2) / 2) / (sd * math.sqrt(2 * np.pi))
+            load += bell
+            second += bell * (r**2 - 1) / sd**2
+        return self._felt @ np.hstack([load, second])
+
+    def readings_under(self, gages: Gages, x: Array, y: Array, sd: float) -> tuple[Array, Array]:
+        """Readings (2, ny, nx, 3 P) under 1 N at each node of `x` (nx,), `y` (ny,), and its give.
+
+        The load is a Gaussian of standard deviation `sd`; all in m. The first are the readings in
+        1/m per N, xx of all elements, then yy, then xy; the second their Laplacian by the load's
+        place in 1/m^3 per N. The give (ny, nx) in m per N is the displacement at the load's centre.
+        """
+        if sd < self._finest * (1 - 1e-9):
+            raise Refusal(
+                f"expected a load of a standard deviation of at least {self._finest:g} m, got "
+                f"{sd:g}"
+            )
+        q, nx, P = self._q, len(x), len(gages.positions)
+        along = np.exp(-((q * sd) ** 2) / 2) * np.sin(np.multiply.outer(y, q))  # (ny, J)
+        answer = self._answer @ self._loads(x, sd)  # (J, n, 2 nx)
+        answer[:, :, nx:] -= q[:, None, None] ** 2 * answer[:, :, :nx]
+        at, place = np.unique(gages.positions[:, 0], return_inverse=True)
+        T = np.empty((2, len(y), nx, 3, P))
+        for c, rows in enumerate(self._rows(at, gages.gage_length)):
+            read = np.stack([row @ of for row, of in zip(rows, answer, strict=False)])
+            read = read.reshape(len(q), len(at), 2, nx).transpose(2, 1, 0, 3)  # (2, U, J, nx)
+            turn = np.cos if c == 2 else np.sin
+            for p, (u, z) in enumerate(zip(place, gages.positions[:, 1], strict=True)):
+                T[:, :, :, c, p] = (along * turn(q * z)) @ read[:, u]
+        f = self._arc.rows(x)[0]
+        own = np.einsum("xn,jnx->jx", f, answer[:, :, :nx])
+        give = (along * np.sin(np.multiply.outer(y, q))) @ own
+        return T.reshape(2, len(y), nx, 3 * P), give
+
+    def _rows(self, x: Array, gage_length: float) -> tuple[Iterable[Array], ...]:
+        """For xx, yy and xy the readings (X, n) of the functions at `x` (X,), wave by wave.
+
+        They are the factors of sin(q y), sin(q y) and cos(q y). A gage along a diagonal reads the
+        mean of (k_x + k_y) / 2 + t or - t; the twist is half of what the two differ by.
+        """
+        H, q = self._plate.patch.base_curvature, self._q[:, None]
+        s, w = _along_gage(gage_length)
+        _, _, fxx, _, vx, _ = self._arc.rows(np.add.outer(s, x))
+        straight = self._arc.rows(x)[0]
+        xx: Array = np.einsum("s,sxn->xn", w, fxx + H * vx)
+        shorter = np.sinc(q * gage_length / (2 * np.pi)) * q**2
+        yy = (-k * straight for k in shorter)
+        f, fx, fxx, v, vx, ux = self._arc.rows(np.add.outer(s * _DIAGONAL, x))
+        shapes = np.stack([fx + 3 / 4 * H * v, ux, fxx + H * vx, f])
+        cos, sin = w * np.cos(q * s * _DIAGONAL), w * np.sin(q * s * _DIAGONAL) / 2
+        factors = np.stack([q * cos, -H / 4 * cos, sin, -(q**2) * sin], axis=1)
+        return repeat(xx), yy, np.tensordot(factors, shapes, 2)
+
+
+def _along_gage(length: float) -> tuple[Array, Array]:
+    """Places (S,) in m along a gage from its middle, and weights (S,) that sum to one."""
+    if not length:
+        return np.zeros(1), np.ones(1)
+    s, w = gauss(length, _POINTS)
+    return s - length / 2, w / length
