@@ -10,7 +10,7 @@ import scipy
 
 from kappaskin.bases import ProductBasis, SineBasis, basis_for
 from kappaskin.frames import Array
-from kappaskin.mechanics import Compliance, Plate
+from kappaskin.mechanics import Compliance, Plate, Shell
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
 
@@ -228,6 +228,7 @@ _VANISHED = 5.3  # k sd, beyond which a Gaussian load moves less than 1e-6 of wh
 _MOST_WAVES = 256  # along a side
 _MIXED = 24  # functions along a side where a load mixes them
 _MIXED_SD = 3.0  # over the largest wave number of those
+_SINES = "hinged", "sliding"
 _TOGETHER = 200  # elements: 100 MB
 
 
@@ -312,20 +313,44 @@ def _rest_of(
     load; and the standard deviation of the Gaussian in m.
     """
     patch, positions = plate.patch, np.frombuffer(places).reshape(-1, 2)
+    layout = replace(SensorLayout.scattered(patch, positions), gage_length=gage_length)
     x, y = patch.grid(*_nodes(patch, len(positions)))
-    basis, along_x, along_y, sd = _summed(patch, edge, x, y)
+    is_shell = patch.base_curvature and edge in _SINES and not plate.fluid
+    of_skin = _of_shell if is_shell else _of_functions
+    rest, gives, sd = of_skin(plate, layout, edge, x, y)
+    for i in range(0, len(positions), _TOGETHER):
+        part = slice(i, i + _TOGETHER)
+        d = positions[part].T[:, None, None] - np.stack(np.meshgrid(x, y))[..., None]
+        rest[..., part] -= np.moveaxis(_under_gaussian(d, sd, gage_length), 0, 2)
+    rest = rest.reshape(len(y), len(x), -1)
+    return np.stack([rest, _second(rest, y, 0) + _second(rest, x, 1)]), gives, sd
+
+
+def _of_functions(
+    plate: Plate, layout: SensorLayout, edge: str, x: Array, y: Array
+) -> tuple[Array, Array, float]:
+    """Readings (ny, nx, 3, P) under a Gaussian load at each node, and the rest of `_rest_of`."""
+    basis, along_x, along_y, sd = _summed(plate.patch, edge, x, y)
     compliance, unit = plate.compliance(basis), 8 * math.pi * plate.rigidity
-    parts = list[Array]()
-    for part in np.array_split(positions, -(-len(positions) // _TOGETHER)):
-        layout = replace(SensorLayout.scattered(patch, part), gage_length=gage_length)
-        M = compliance.after(layout.curvature_operator(basis, plate)).reshape(-1, *basis.shape)
-        rest = unit * (along_x @ (M @ along_y.T)).T.reshape(len(y), len(x), 3, len(part))
-        d = part.T[:, None, None] - np.stack(np.meshgrid(x, y))[..., None]
-        rest -= np.moveaxis(_under_gaussian(d, sd, gage_length), 0, 2)
-        parts.append(rest)
-    rest = np.concatenate(parts, axis=3).reshape(len(y), len(x), -1)
-    spread = _second(rest, y, 0) + _second(rest, x, 1)
-    return np.stack([rest, spread]), _displacement(basis, compliance, x, y), sd
+    T = np.empty((len(y), len(x), 3, len(layout)))
+    for i in range(0, len(layout), _TOGETHER):
+        here = slice(i, i + _TOGETHER)
+        part = replace(layout, positions=layout.positions[here], live=layout.live[:, here])
+        M = compliance.after(part.curvature_operator(basis, plate)).reshape(-1, *basis.shape)
+        read = unit * (along_x @ (M @ along_y.T)).T
+        T[..., here] = read.reshape(len(y), len(x), 3, len(part))
+    return T, _displacement(basis, compliance, x, y), sd
+
+
+def _of_shell(
+    plate: Plate, layout: SensorLayout, edge: str, x: Array, y: Array
+) -> tuple[Array, Array, float]:
+    """As `_of_functions`, as a shell."""
+    sd = max(_SD * min(plate.patch.a, plate.patch.b), Shell.finest_on(plate.patch))
+    shell = Shell(plate, sd, sliding=edge == "sliding")
+    T, gives = shell.readings_under(layout, x, y, sd)
+    unit = 8 * math.pi * plate.rigidity
+    return unit * T[0].reshape(len(y), len(x), 3, len(layout)), gives, sd
 
 
 def _nodes(patch: Patch, elements: int) -> tuple[int, int]:
@@ -342,7 +367,7 @@ def _summed(
 ) -> tuple[ProductBasis, Array, Array, float]:
     """Functions, their means (nx, Ni), (ny, Nj) under Gaussians at the nodes, and the sd in m."""
     sides = patch.a, patch.b
-    if edge in ("hinged", "sliding"):
+    if edge in _SINES and not patch.base_curvature:
         sd = max(_SD * min(sides), _VANISHED * max(sides) / (math.pi * _MOST_WAVES))
         Ni, Nj = (math.ceil(_VANISHED * side / (math.pi * sd)) for side in sides)
         sines = SineBasis(patch, Ni, Nj)

@@ -227,8 +227,8 @@ class PointContact:
         a, b, s, force = _FURTHEST * self.patch.a, _FURTHEST * self.patch.b, self._start, 0.0
         if self._stretched is not None:
             self._stretched.begin(x, y, float(fit.jet(x, y)[0][0]))
+        here = self._linearised(x, y, s, force, tables, variance)
         for _ in range(_STEPS):
-            here = self._linearised(x, y, s, force, tables, variance)
             before, (force, dx, dy, ds) = force, here.steps
             x, y = self.patch.inward(
                 x + _clamped(-a, dx / force, a), y + _clamped(-b, dy / force, b)
@@ -240,6 +240,7 @@ class PointContact:
                 gain += (force - before) ** 2 / here.inverse.item(0, 0)
             if gain <= _WORTH * variance + _NO_GAIN * here.power:
                 break
+            here = self._linearised(x, y, s, force, tables, variance)
         return self._contact(x, y, s, here, tables, fit)
 
     def _linearised(

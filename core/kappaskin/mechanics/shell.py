@@ -12,6 +12,7 @@ from numpy.polynomial.legendre import legvander
 from kappaskin.bases import Basis, ProductBasis, SineBasis, gauss
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
+from kappaskin.skin import Patch
 
 if TYPE_CHECKING:
     from kappaskin.mechanics.plate import Plate
@@ -208,18 +209,23 @@ class Shell:
         patch = plate.patch
         if not patch.base_curvature or patch.strip:
             raise Refusal(f"expected a skin that is bent, with two sides, got a {patch.name}")
-        # A Gaussian has exp(-8) of its amplitude left at the wave number 4 / sd.
-        functions, waves = math.ceil(2 * patch.a / finest), math.ceil(4 * patch.b / finest / np.pi)
-        if functions > _MOST_FUNCTIONS or waves > _MOST_WAVES:
-            least = max(2 * patch.a / _MOST_FUNCTIONS, 4 * patch.b / np.pi / _MOST_WAVES)
+        if finest < (least := self.finest_on(patch)) * (1 - 1e-9):
             raise Refusal(
                 f"expected a load of a standard deviation of at least {least:.3g} m on a "
                 f"{patch.name}, got {finest:g} m"
             )
+        # A Gaussian has exp(-8) of its amplitude left at the wave number 4 / sd.
+        functions = math.ceil(2 * patch.a / finest * (1 - 1e-9))
+        waves = math.ceil(4 * patch.b / finest / np.pi * (1 - 1e-9))
         self._plate, self._finest, count = plate, finest, max(functions, 16)
         self._arc = _Arc(plate, partial(_twice, patch.a, count), count, sliding)
         self._q = np.pi / patch.b * np.arange(1.0, max(waves, 16) + 1)
         self._felt = self._arc.rows(self._arc.x)[0][:, self._arc.f].T * self._arc.weights
+
+    @staticmethod
+    def finest_on(patch: Patch) -> float:
+        """The least standard deviation in m that can be asked for on `patch`."""
+        return max(2 * patch.a / _MOST_FUNCTIONS, 4 * patch.b / (math.pi * _MOST_WAVES))
 
     @cached_property
     def _answer(self) -> Array:
