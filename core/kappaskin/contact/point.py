@@ -117,7 +117,7 @@ _RIDGE = 1e-12  # keeps a load on the rim, which moves nothing, solvable
 _DOUBTFUL = 0.15  # of a side: within it, a contact may be one on the rim
 _RIM = 1 / 15  # of a side: within it, a load moves the skin too little to be told
 _START, _LEAST, _LARGEST = 0.03, 1e-3, 0.2  # of the shorter side: radius of a load
-_PROFILE = 0.2  # of P / (8 pi D): what readings under a load change with how it is spread
+_PROFILE = 0.27  # of P / (8 pi D): by so much a disc and a Gaussian differ in their middle
 
 _AS_WELL = 1.2  # times the residual of the fitted shape that a single load may leave
 _REACH = 1.96  # standard deviations to either side in a 95 % interval
@@ -233,7 +233,7 @@ class PointContact:
             x, y = self.patch.inward(
                 x + _clamped(-a, dx / force, a), y + _clamped(-b, dy / force, b)
             )
-            s = _clamped(self._least, s + ds / force, self._largest)
+            s = _clamped(self._least, _resized(s, ds / force), self._largest)
             variance, gain = here.left / tables.spare, here.gain
             if self._stretched is not None:  # the readings are not linear in the force
                 self._stretched.move(force, dx, dy)
@@ -339,6 +339,14 @@ def _inverse(H: Array) -> Array:
     H.flat[:: len(H) + 1] *= 1 + _RIDGE
     root, _ = lapack.dtrtri(lapack.dpotrf(H)[0])
     return root.dot(root.T)
+
+
+def _resized(s: float, step: float) -> float:
+    """The size after a step. One to a larger size is taken in the radius, sqrt(s).
+
+    What is read under a load goes with the logarithm of its radius, beside it with its square.
+    """
+    return s * (1 + step / (2 * s)) ** 2 if step > 0 else s + step
 
 
 def _clamped(low: float, value: float, high: float) -> float:
