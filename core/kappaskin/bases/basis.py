@@ -84,7 +84,7 @@ class Basis(Protocol):
 # changes: the tangential displacement v follows from f, and u_x = -v_y. Flat, they are Eqs. 3-5.
 # A fit of the shape knows no loads and no stiffness, and nothing better of v and u; where they are
 # known, mechanics has them (`Plate.curvature`). Of a skin 0.25 mm thick, half round (R 12.9 mm),
-# the readings differ by 2 % of the peak, and the shape so fitted by 5 % in RMS.
+# the twist differs by 2 % of its peak, and the shape so fitted by 5 % in RMS.
 _ORDERS = {"xx": ((2, 0), (0, 0)), "yy": ((0, 2), None), "xy": ((1, 1), (-1, 1))}
 
 

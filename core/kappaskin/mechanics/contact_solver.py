@@ -29,7 +29,7 @@ from scipy.linalg import lapack
 from kappaskin.bases import Basis, ProductBasis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Indices, Mask
-from kappaskin.mechanics.plate import Plate
+from kappaskin.mechanics.plate import USUAL_THICKNESS, Plate
 
 _MOST_PLACES, _MOST_STEPS = 1024, 500  # some seconds
 _ROUNDING = 1e-14  # of what sums to it: a gap is known to that
@@ -214,14 +214,14 @@ _STIFFEST = 1e-9  # of the skin's own give: a thinner layer is lost in rounding
 
 
 def layer_compliance(plate: Plate) -> float:
-    """h/E = h^2/C in m^3/N of a uniform sheet: D = E h^3 / (12 (1 - nu^2)), C = E h."""
-    D, C = plate.rigidity, plate.stretching
-    if not (D and C):
+    """h/E in m^3/N of a uniform sheet of the plate's thickness, 0.25 mm if unknown."""
+    if not plate.rigidity:
         raise Refusal(
-            "a skin without rigidity or without axial stiffness does not determine its thickness; "
-            "give the layer, its thickness over its Young's modulus, in m^3/N"
+            "a skin without rigidity does not determine its Young's modulus; give the layer, its "
+            "thickness over that, in m^3/N"
         )
-    return 12 * (1 - plate.poisson**2) * D / C**2
+    h = plate.sheet_thickness or USUAL_THICKNESS
+    return h / plate.modulus(h)
 
 
 class ContactNodes:

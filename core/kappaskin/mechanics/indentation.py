@@ -130,8 +130,8 @@ class IndentationSolver:
 
     `nodes` (nx, ny) divide the skin; forces act at the centres of the cells that lie on it and at
     the points of the object's keel. `layer` in m^3/N is the thickness of the skin over its Young's
-    modulus; None means that of a uniform sheet with the plate's rigidity and axial stiffness,
-    0.25 mm thick unless these say otherwise. The skin bends as a plate does, to first order; the
+    modulus; None means that of a uniform sheet with the plate's rigidity and thickness, 0.25 mm
+    unless told. The skin bends as a plate does, to first order; the
     part of an object that overhangs the rim meets nothing. There is no friction.
     """
 

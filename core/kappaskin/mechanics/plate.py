@@ -1,5 +1,6 @@
 """Plates: the deflection of an elastic skin under loads."""
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -46,8 +47,9 @@ INPLANE = ("held", "diaphragm", "free", "hoop")
 """Boundary conditions in the plane of the skin, along its edge.
 
 `held`: no displacement. `diaphragm`: no membrane force across the edge, no displacement along it.
-`free`: no membrane force across the edge, no shear. `hoop`, of a bent skin: the straight edges hold
-the hoop displacement and leave the axial one free, the curved ones hold the radial and the hoop.
+`free`: no membrane force across the edge, no shear. `hoop`, of a bent skin: the hoop displacement
+is held, the axial one free. Of a bent skin they are those of the straight edges; the curved ones
+hold the radial and the hoop displacement and leave the axial one free.
 """
 
 
@@ -57,14 +59,12 @@ class Plate:
 
     `tension` T in N/m: a drum head has it, and may have no rigidity. `foundation` modulus k_f in
     N/m^3 of a foam below. `fluid`: below is a fluid that keeps its volume. `poisson`: Poisson's
-    ratio, which matters where an edge is elastic or the skin is bent. `axial_stiffness` C in N/m
-    of a cylinder skin, which stretches along its axis as it bends: E h of a uniform sheet; None
-    means a sheet 0.25 mm thick, as the paper's skin, and zero one that stretches freely, which is
-    far too soft. `rim_stiffness` in N/m per m of an elastic rim: the default lets it give by
-    0.2 mm under a load that presses the default skin of 0.1 x 0.1 m in by 5 mm. `thickness` h in m
-    of a uniform sheet: a flat skin that was given none does not stretch, a bent one is 0.25 mm
-    thick. `inplane` is how its edge is held in its plane, one of `INPLANE`; empty means `held`, of
-    a bent skin `hoop`.
+    ratio, which matters where an edge is elastic or the skin is bent. `rim_stiffness` in N/m per m
+    of an elastic rim: the default lets it give by 0.2 mm under a load that presses the default skin
+    of 0.1 x 0.1 m in by 5 mm. `thickness` h in m of a uniform sheet: a flat skin that was given
+    none does not stretch, a bent one is 0.25 mm thick, or as its `axial_stiffness` E h in N/m has
+    it, unless that is zero. `inplane` is how its edge is held in its plane, one of `INPLANE`; empty
+    means `held`, of a bent skin `hoop`.
     """
 
     patch: Patch
@@ -131,9 +131,10 @@ class Plate:
     @property
     def sheet_thickness(self) -> float | None:
         """Thickness h in m by which it stretches; None for a flat skin that was given none."""
-        if self.thickness is None and self.patch.base_curvature:
-            return USUAL_THICKNESS
-        return self.thickness
+        if self.thickness is not None or not self.patch.base_curvature:
+            return self.thickness
+        D, C = self.rigidity, self.axial_stiffness
+        return math.sqrt(12 * (1 - self.poisson**2) * D / C) if D and C else USUAL_THICKNESS
 
     @property
     def inplane_edge(self) -> str:
@@ -155,14 +156,6 @@ class Plate:
         """C = E h / (1 - nu^2) = 12 D / h^2 in N/m; zero for a flat skin without a thickness."""
         h = self.sheet_thickness
         return 12 * self.rigidity / h**2 if h else 0.0
-
-    @property
-    def stretching(self) -> float:
-        """Axial stiffness C in N/m; of a uniform sheet E h, as if 0.25 mm thick if unknown."""
-        if self.axial_stiffness is None:
-            h = self.thickness or USUAL_THICKNESS
-            return self.modulus(h) * h
-        return self.axial_stiffness
 
     def check(self, load: Load) -> None:
         """Raise a `Refusal` for a load off the patch, or one that moves the skin without limit."""

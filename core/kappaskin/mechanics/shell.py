@@ -29,9 +29,14 @@ if TYPE_CHECKING:
 #     + D (k_x^2 + k_y^2 + 2 nu k_x k_y + 2 (1 - nu) t^2)
 #     + T (f_x^2 + f_y^2 - H^2 f^2) + k_f f^2
 #
-# with D = E h^3 / (12 (1 - nu^2)) and C = E h / (1 - nu^2). Gages read k_x, k_y and t. The curved
-# ends hold f and v and let u go: v goes as sin(q y), u as cos(q y) with q = j pi/b, and no wave j
-# mixes with another. The straight edges hold f and, as they are held in plane, v and u.
+# with D = E h^3 / (12 (1 - nu^2)) and C = E h / (1 - nu^2). A pair of gages back to back reads half
+# of what their strains differ by over half the thickness. On a line at z from the middle surface,
+# 1 + z H times as long, the strain is (e_x + z k_x) / (1 + z H), and likewise in shear, so that
+#
+#     xx = k_x - H e_x = f_xx + H^2 f    yy = k_y    xy = t - H g / 4 = f_xy + H (v_y - u_x) / 2
+#
+# The curved ends hold f and v and let u go: v goes as sin(q y), u as cos(q y) with q = j pi/b, and
+# no wave j mixes with another. The straight edges hold f and, as they are held in plane, v and u.
 # Tension: a skin that the pressure T H blows up has the energy T area - p volume, of which the
 # second variation is the third line: nil for a rigid translation.
 
@@ -94,11 +99,11 @@ class _Arc:
         return self._f(x), held if self._v_held else free, held if self._u_held else free
 
     def rows(self, x: Array) -> Array:
-        """f, f_x, f_xx, v, v_x, u_x (6, ..., n) of all functions at `x` (...) in m."""
+        """f, f_x, f_xx, v, u_x (5, ..., n) of all functions at `x` (...) in m."""
         f, v, u = self.fields(x.ravel())
-        found = np.zeros((6, x.size, self.size))
-        found[:3, :, self.f], found[3:5, :, self.v], found[5, :, self.u] = f, v, u[1]
-        return found.reshape(6, *x.shape, self.size)
+        found = np.zeros((5, x.size, self.size))
+        found[:3, :, self.f], found[3, :, self.v], found[4, :, self.u] = f, v[0], u[1]
+        return found.reshape(5, *x.shape, self.size)
 
     def stiffness(self, q: Array) -> Array:
         """Stiffness (J, n, n) for `q` (J,) in 1/m, over the integral of sin(q y)^2 along y."""
@@ -172,15 +177,15 @@ class Tangential:
 
     def curvature_at(self, positions: Array) -> Array:
         """Curvature xx, yy, xy (3, P, N) in 1/m per m of each function at `positions` (P, 2)."""
-        K = np.stack([self._basis.at(positions, *order) for order in ((2, 0), (0, 2), (1, 1))])
-        _, _, _, v, vx, ux = self._arc.rows(positions[:, 0])
-        turn = np.multiply.outer(positions[:, 1], self._q)
-        hoop = np.einsum("pn,jni->pij", vx, self._least, optimize=True)
-        turned = np.einsum("pn,j,jni->pij", 3 / 4 * v, self._q, self._least, optimize=True)
-        turned -= np.einsum("pn,jni->pij", ux / 4, self._least, optimize=True)
-        for channel, read, wave in ((0, hoop, np.sin(turn)), (2, turned, np.cos(turn))):
-            K[channel] += self._H * (read @ (wave[:, :, None] * self._share)).reshape(K[0].shape)
-        return K
+        f, xx, yy, xy = (
+            self._basis.at(positions, *order) for order in ((0, 0), (2, 0), (0, 2), (1, 1))
+        )
+        _, _, _, v, ux = self._arc.rows(positions[:, 0])
+        turned = np.einsum("pn,j,jni->pij", v, self._q, self._least, optimize=True)
+        turned -= np.einsum("pn,jni->pij", ux, self._least, optimize=True)
+        cos = np.cos(np.multiply.outer(positions[:, 1], self._q))
+        twist = (turned @ (cos[:, :, None] * self._share)).reshape(xy.shape)
+        return np.stack([xx + self._H**2 * f, yy, xy + self._H / 2 * twist])
 
 
 _MOST_FUNCTIONS, _MOST_WAVES = 96, 160
@@ -284,19 +289,19 @@ class Shell:
         """For xx, yy and xy the readings (X, n) of the functions at `x` (X,), wave by wave.
 
         They are the factors of sin(q y), sin(q y) and cos(q y). A gage along a diagonal reads the
-        mean of (k_x + k_y) / 2 + t or - t; the twist is half of what the two differ by.
+        mean of (xx + yy) / 2 + xy or - xy; the twist is half of what the two differ by.
         """
         H, q = self._plate.patch.base_curvature, self._q[:, None]
         s, w = _along_gage(gage_length)
-        _, _, fxx, _, vx, _ = self._arc.rows(np.add.outer(s, x))
+        f, _, fxx, _, _ = self._arc.rows(np.add.outer(s, x))
         straight = self._arc.rows(x)[0]
-        xx: Array = np.einsum("s,sxn->xn", w, fxx + H * vx)
+        xx: Array = np.einsum("s,sxn->xn", w, fxx + H**2 * f)
         shorter = np.sinc(q * gage_length / (2 * np.pi)) * q**2
         yy = (-k * straight for k in shorter)
-        f, fx, fxx, v, vx, ux = self._arc.rows(np.add.outer(s * _DIAGONAL, x))
-        shapes = np.stack([fx + 3 / 4 * H * v, ux, fxx + H * vx, f])
+        f, fx, fxx, v, ux = self._arc.rows(np.add.outer(s * _DIAGONAL, x))
+        shapes = np.stack([fx + H / 2 * v, ux, fxx + H**2 * f, f])
         cos, sin = w * np.cos(q * s * _DIAGONAL), w * np.sin(q * s * _DIAGONAL) / 2
-        factors = np.stack([q * cos, -H / 4 * cos, sin, -(q**2) * sin], axis=1)
+        factors = np.stack([q * cos, -H / 2 * cos, sin, -(q**2) * sin], axis=1)
         return repeat(xx), yy, np.tensordot(factors, shapes, 2)
 
 

@@ -155,7 +155,7 @@ SKIN = Part(
         ),
         "axial_stiffness": Key(
             "Axial stiffness",
-            "Stiffness against stretching along the axis of a bent skin.",
+            "Young's modulus times thickness, by which a bent skin without a thickness has one.",
             Unit.same("N/m"),
             limits=Within(1e-9, 1e12, "N/m", or_zero=True),
             example=1e4,
@@ -163,7 +163,7 @@ SKIN = Part(
         "thickness": Key(
             "Thickness",
             "Thickness of a uniform sheet, by which it resists stretching. A flat skin without one "
-            "does not stretch; a bent one is 0.25 mm thick.",
+            "does not stretch; a bent one is 0.25 mm thick, or as its axial stiffness has it.",
             _UM,
             limits=Within(1e-7, 0.1, "m"),
             example=2.5e-4,
@@ -172,8 +172,8 @@ SKIN = Part(
             "Held in its plane",
             "Boundary condition in the plane of the skin. Held: no displacement; diaphragm: no "
             "force across the edge, no displacement along it; free: neither force nor shear; hoop, "
-            "of a bent skin: the straight edges hold the hoop displacement and leave the axial one "
-            "free. Held unless given, hoop for a bent skin.",
+            "of a bent skin: the hoop displacement is held, the axial one free. Of a bent skin it "
+            "is that of the straight edges. Held unless given, hoop for a bent skin.",
             choices=tuple((one, one.capitalize()) for one in INPLANE),
             example="diaphragm",
         ),

@@ -82,9 +82,8 @@ def test_the_skin_stretches_as_the_panel_says() -> None:
 
 def test_a_bent_skin_is_an_even_sheet_as_thick_as_its_gages() -> None:
     plate = scene_of(on("cylinder")).plate
-    E = 12 * (1 - plate.poisson**2) * plate.rigidity / 250e-6**3
-    sheet = Plate.of_material(plate.patch, E, plate.poisson, 250e-6)
-    assert plate.stretching == pytest.approx(sheet.stretching)
+    sheet = Plate.of_material(plate.patch, plate.modulus(250e-6), plate.poisson, 250e-6)
+    assert plate.membrane_stiffness == pytest.approx(sheet.membrane_stiffness)
 
 
 def test_the_fingertip_is_half_a_circle_of_the_papers_radius() -> None:

@@ -136,7 +136,18 @@ def test_a_skin_of_known_thickness_has_the_modulus_of_its_rigidity():
 
     assert plate.thickness == plate.sheet_thickness == 1e-3
     assert plate.modulus(1e-3) == pytest.approx(2e9)
-    assert plate.stretching == pytest.approx(2e6)
+    assert plate.membrane_stiffness == pytest.approx(2e6 / (1 - 0.3**2))
+
+
+def test_axial_stiffness_tells_the_thickness_of_a_bent_sheet():
+    sheet = Plate.of_material(Patch(0.04, 0.03, 0.0129), E=2e9, nu=0.35, h=1e-4)
+
+    by_stiffness = replace(sheet, thickness=None, axial_stiffness=2e9 * 1e-4)
+
+    assert by_stiffness.sheet_thickness == pytest.approx(1e-4)
+    assert replace(by_stiffness, thickness=3e-4).sheet_thickness == 3e-4
+    assert replace(by_stiffness, axial_stiffness=0.0).sheet_thickness == 0.25e-3
+    assert replace(by_stiffness, patch=SQUARE).sheet_thickness is None
 
 
 def test_how_a_skin_is_held_in_its_plane_unless_told():
@@ -144,6 +155,7 @@ def test_how_a_skin_is_held_in_its_plane_unless_told():
 
     assert (flat.sheet_thickness, flat.inplane_edge) == (None, "held")
     assert (bent.sheet_thickness, bent.inplane_edge) == (0.25e-3, "hoop")
+    assert flat.membrane_stiffness == 0
     assert Plate(SQUARE, inplane="free").inplane_edge == "free"
 
 

@@ -37,9 +37,13 @@ def diaphragms(plate, positions, x0, y0, sd, waves=200):
     load = 4 / (a * b) * np.sin(k * x0) * np.sin(q * y0) * np.exp(-(k**2 + q**2) * sd**2 / 2)
     F, V, U = np.moveaxis(np.linalg.inv(K)[..., 0] * load[..., None], -1, 0)
     X, Y = np.outer(positions[:, 0], k[:, 0]), np.outer(positions[:, 1], q[0])
+    # Gages on either face: the strains over the length of their own line.
+    gages = [H**2 - k**2, nil, nil], yy, [k * q, H * q / 2, -H * k / 2]
     read = [
         np.einsum("pi,ij,pj->p", of_x(X), row[0] * F + row[1] * V + row[2] * U, of_y(Y))
-        for row, of_x, of_y in ((xx, np.sin, np.sin), (yy, np.sin, np.sin), (xy, np.cos, np.cos))
+        for row, of_x, of_y in zip(
+            gages, (np.sin, np.sin, np.cos), (np.sin, np.sin, np.cos), strict=True
+        )
     ]
     return np.concatenate(read), float(np.sum(F * np.sin(k * x0) * np.sin(q * y0)))
 

@@ -249,7 +249,7 @@ def test_an_object_that_a_drum_head_refuses_leaves_the_load_that_presses() -> No
     source = source_of("centre", clock, plate=drum, stimuli=disc)
     ball = Stimulus(Indenter(Sphere(0.01), 0.05, 0.05, force=0.1))
 
-    with pytest.raises(Refusal, match="does not determine its thickness"):
+    with pytest.raises(Refusal, match="does not determine its Young's modulus"):
         source.play(replace(source.scene, stimuli=(ball,)))
 
     (frame,) = source.read(0.0)
