@@ -757,6 +757,16 @@ _CONTACT = (
         ),
     ),
     ReportedQuantity(
+        "size",
+        "m^2",
+        "squared radius of the disc that the load is spread over",
+        "contact.size",
+        sd="contact.size_sd",
+        columns=(),
+        keys=(),
+        sd_keys=(),
+    ),
+    ReportedQuantity(
         "displacement",
         "m",
         _OF_SKIN,
