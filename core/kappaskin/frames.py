@@ -74,8 +74,9 @@ class Contact:
     load on a small area fits the readings as well as the shape. `near_rim` warns that the contact
     is too near a held edge, where no force moves the skin, for a reliable position and force.
     `size` and `size_sd` in m^2 are the squared radius of the disc that the load is spread over;
-    NaN where the skin does not tell it. Every number is NaN when the readings hold no contact that
-    stands out of the noise.
+    NaN where the skin does not tell it. `force_is_lower_bound` says that the skin may stretch, by
+    which the force would change by more than its error bar (`kappaskin.contact.LowerBound`). Every
+    number is NaN when the readings hold no contact that stands out of the noise.
     """
 
     position: Array
@@ -89,6 +90,7 @@ class Contact:
     near_rim: bool
     size: float = math.nan
     size_sd: float = math.nan
+    force_is_lower_bound: bool = False
 
     @property
     def present(self) -> bool:

@@ -13,7 +13,13 @@ from kappaskin._files import Budget, check_memory
 from kappaskin._state import StateArrays, Stateful
 from kappaskin.bases import Basis, ValueMap, basis_for
 from kappaskin.calibration import Calibration, Corrector, DriftMonitor, Rest, Tare
-from kappaskin.contact import NO_CONTACT, LoadDetector, PointContact, contact_geometry
+from kappaskin.contact import (
+    NO_CONTACT,
+    LoadDetector,
+    LowerBound,
+    PointContact,
+    contact_geometry,
+)
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation import METHODS, Fit, check_method, estimator_for
 from kappaskin.frames import OVERTAKEN, Array, Estimate, Frame, Mask, Truth
@@ -124,6 +130,7 @@ class Pipeline:
         self._skin = ... if on_skin.all() else on_skin
         self._surface = self.basis.on_grid(self._x, self._y)
         self._contact = PointContact(sensor.plate, sensor.layout, edge)
+        self._bounded = LowerBound(sensor.plate, edge)
         self.left_out = Exclusion.none(sensor, self._whole, self._ideal())
         self._no_shape = np.full(self.basis.shape, np.nan)
         self._unknown = np.full((setup.ny, setup.nx), np.nan)
@@ -228,7 +235,9 @@ class Pipeline:
         fit_time = time.perf_counter() - began
         surface = self._surface(fit.coefficients)
         noise = float(fit.noise)
-        contact = self._contact(fit.curvature, fit) if math.isfinite(noise) else NO_CONTACT
+        contact = NO_CONTACT
+        if math.isfinite(noise):
+            contact = self._bounded(self._contact(fit.curvature, fit))
         if self.drift is not None:
             self.drift.follow(frame.device_time, curvature, surface, noise)
         return Estimate(

@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 
 from kappaskin._files import Budget, check_memory, open_file
 from kappaskin.bases import Basis, basis_for
-from kappaskin.contact import KINDS, ContactObject, ObjectFinder, PointContact, contact_geometry
+from kappaskin.contact import (
+    KINDS,
+    ContactObject,
+    LowerBound,
+    ObjectFinder,
+    PointContact,
+    contact_geometry,
+)
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation import METHODS, Estimator, Fit, check_method, estimator_for
 from kappaskin.frames import Array, Contact
@@ -233,9 +240,9 @@ def reconstruct(
     if contact or objects:
         plate = _plate(patch, found, inplane)
         fitter = estimator_for(method, functions, layout)
-        contact_of = PointContact(plate, layout, edge)
+        contact_of, bounded = PointContact(plate, layout, edge), LowerBound(plate, edge)
         fits = [fitter(frame) for frame in curvature]
-        contacts = [contact_of(one.curvature, one) for one in fits]
+        contacts = [bounded(contact_of(one.curvature, one)) for one in fits]
         out |= _contacts(fits, contacts, forces="rigidity" in found)
         if objects:
             find = ObjectFinder(plate, layout, edge)
@@ -249,12 +256,12 @@ def _contacts(fits: list[Fit], contacts: list[Contact], forces: bool) -> dict[st
 
     `contact` and `contact_sd` (T, 2) in m, `displacement` and `displacement_sd` (T,) in m; `normal`
     (T, 3), `curvature_form` (T, 2, 2), `torsion_form` (T, 2) and `principal` (T, 2) in 1/m; with
-    `forces` also `force` and `force_sd` (T,) in N. `single` and `near_rim` (T,) say whether to
-    trust them (`Contact`). All readings weigh the same.
+    `forces` also `force` and `force_sd` (T,) in N. `single`, `near_rim` and, with `forces`,
+    `force_is_lower_bound` (T,) say whether to trust them (`Contact`). All readings weigh the same.
     """
     there = [contact_geometry(one, contact) for one, contact in zip(fits, contacts, strict=True)]
     names = ["displacement", "displacement_sd", "single", "near_rim"]
-    names += ["force", "force_sd"] if forces else []
+    names += ["force", "force_sd", "force_is_lower_bound"] if forces else []
     out = {
         "contact": np.stack([contact.position for contact in contacts]),
         "contact_sd": np.stack([contact.position_sd for contact in contacts]),

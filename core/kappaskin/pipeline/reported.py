@@ -704,6 +704,20 @@ _CONTACT = (
         ),
     ),
     ReportedQuantity(
+        "force_is_lower_bound",
+        "",
+        "whether the skin may stretch and need more force",
+        "contact.force_is_lower_bound",
+        kind="?",
+        keys=(
+            (
+                "force_is_lower_bound",
+                "whether the force leaves out a stretch that may change it by more than its error "
+                "bar: the skin's thickness is not given, and 0.25 mm is assumed for this",
+            ),
+        ),
+    ),
+    ReportedQuantity(
         "spare", "", "readings in excess of the unknowns", "contact.spare", kind="<i8", keys=()
     ),
     ReportedQuantity(
@@ -734,7 +748,23 @@ _CONTACT = (
         keys=(("force_N", "of the contact, above zero where it presses"),),
         labels_shown=("Force",),
         shown=("mN", 1e3, 1),
-        header=HeaderNumber("force", 14, "Force of that point load, with its error bar."),
+        header=HeaderNumber(
+            "force",
+            16,
+            "Force of that point load, with its error bar; \u2265: a lower bound, for the skin may "
+            "stretch. Its thickness is not given; 0.25 mm would change the force by more than the "
+            "error bar.",
+        ),
+    ),
+    ReportedQuantity(
+        "size",
+        "m^2",
+        "squared radius of the disc that the load is spread over",
+        "contact.size",
+        sd="contact.size_sd",
+        columns=(),
+        keys=(),
+        sd_keys=(),
     ),
     ReportedQuantity(
         "displacement",

@@ -242,9 +242,10 @@ def _words(message: JsonMessage) -> str:
 
     doubt = "" if message.get("single") else "  not a single point load"
     rim = "  near the rim" if message.get("near_rim") else ""
+    least = "  force is a lower bound" if message.get("force_is_lower_bound") else ""
     return (
         f"{head}  x {bar('x', 'm', 1e3, '.2f')} mm  y {bar('y', 'm', 1e3, '.2f')} mm  "
         f"force {bar('force', 'N', 1, '.4f')} N  moved {bar('displacement', 'm', 1e3, '.3f')} mm  "
         f"curvature {bar('curvature_1', 'per_m', 1, '.2f')}, "
-        f"{bar('curvature_2', 'per_m', 1, '.2f')} 1/m{doubt}{rim}  {tail}"
+        f"{bar('curvature_2', 'per_m', 1, '.2f')} 1/m{doubt}{rim}{least}  {tail}"
     )

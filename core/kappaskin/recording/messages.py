@@ -160,6 +160,7 @@ bool present               # whether there is a contact; every number is NaN wit
 bool single                # whether one point load explains the readings
 bool near_rim              # too near a held edge for place and force to be trusted
 bool converged
+bool force_is_lower_bound  # the skin may stretch and need more force
 int64 spare                # readings more than a point load needs
 float64 noise              # 1/m, standard deviation of a reading
 float64[2] position        # m, on the skin
@@ -222,7 +223,7 @@ FRAME = "skin"
 """The coordinate frame of all messages that have one."""
 
 _LINE = struct.Struct("<4sd?3xI")
-_CONTACT = struct.Struct("<4siII5s7xQ4d4?4xq40d")
+_CONTACT = struct.Struct("<4siII5s7xQ4d5?3xq40d")
 _HEAD = b"\0\1\0\0"
 
 
@@ -241,7 +242,7 @@ def pack_contact(
 ) -> bytes:
     """The message `CONTACT` of the frame `FRAME`: as `cdr.encode` makes it, at a third of the cost.
 
-    Its fields in their order: four `times`, four `flags`, and from the noise on 40 `numbers`.
+    Its fields in their order: four `times`, five `flags`, and from the noise on 40 `numbers`.
     """
     name = FRAME.encode() + b"\0"
     head = _HEAD, *divmod(stamp, 10**9), len(name), name

@@ -261,7 +261,10 @@ def _contact(estimate: Estimate, stamp: int) -> bytes:
         stamp,
         estimate.sequence,
         (estimate.device_time, estimate.host_time, estimate.taken, estimate.taken_sd),
-        (contact.present, contact.single, contact.near_rim, estimate.converged),
+        (
+            *(contact.present, contact.single, contact.near_rim, estimate.converged),
+            contact.force_is_lower_bound,
+        ),
         contact.spare,
         (
             estimate.noise,

@@ -42,6 +42,7 @@ COLUMNS = [
     "present",
     "single",
     "near_rim",
+    "force_is_lower_bound",
     "spare",
     "position",
     "position_sd",
@@ -126,7 +127,7 @@ KEYS = [
 ]
 """Keys of the numbers in a message by UDP or Foxglove, which others read."""
 
-FLAGS = ["present", "single", "near_rim", "shape_follows"]
+FLAGS = ["present", "single", "near_rim", "force_is_lower_bound", "shape_follows"]
 
 
 @pytest.fixture
@@ -151,6 +152,7 @@ def test_columns_have_the_types_that_they_always_had(made) -> None:
     assert kinds == {
         **dict.fromkeys(("sequence", "setup", "spare"), "<i8"),
         **dict.fromkeys(("fresh", "converged", "present", "single", "near_rim"), "?"),
+        "force_is_lower_bound": "?",
         "suspect": "|u1",
     }
 

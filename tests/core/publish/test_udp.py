@@ -304,6 +304,8 @@ def test_a_contact_is_told_with_its_error_bars_and_age(listener, message: Estima
     said, touch = send(listener, message.contact, message.shape), message.estimate.contact
     assert f"x {1e3 * touch.position[0]:.2f} +- {1e3 * touch.position_sd[0]:.2f} mm" in said
     assert f"force {touch.force:.4f} +- {touch.force_sd:.4f} N" in said
+    assert touch.force_is_lower_bound
+    assert "force is a lower bound" in said
     assert "age" in said
     assert listener.summary == "1 contacts received, 0 lost"
 

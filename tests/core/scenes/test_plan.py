@@ -49,6 +49,21 @@ def moments(scene, count=25):
 
 
 @READY
+def test_no_scene_presses_deeper_than_its_sheet_allows_without_saying_why(name):
+    scene = load_scene(name)
+    if scene.plate.patch.base_curvature or scene.laid:
+        return
+    x, y = scene.plate.patch.grid(31, 31)
+    moments = survey(scene).coefficients.reshape(-1, *scene.basis.shape)
+    deepest = np.abs(scene.basis.on_grid(x, y)(moments)).max()
+
+    if deepest > 2 * (scene.plate.thickness or 0.25e-3):
+        assert "skin has no thickness here and does not stretch" in scene.text
+    else:
+        assert scene.plate.thickness
+
+
+@READY
 def test_every_known_effect_is_in_the_plan_with_its_size_and_why(name):
     entries = plan(load_scene(name)).entries
 

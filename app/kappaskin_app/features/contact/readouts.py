@@ -182,7 +182,9 @@ class Readouts(QWidget):
         reported = Reported(estimate)
         for quantity, header in _NUMBERS:
             (found,) = readouts_of(quantity, reported)
-            self._write(header.key, _with_error(found, "+" if header.signed else ""))
+            least = header.key == "force" and estimate.contact.force_is_lower_bound
+            words = _with_error(found, "+" if header.signed else "")
+            self._write(header.key, f"\N{GREATER-THAN OR EQUAL TO} {words}" if least else words)
 
     def _write(self, key: str, text: str) -> None:
         self._numbers[key].show_text(text)

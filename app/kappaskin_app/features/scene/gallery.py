@@ -148,7 +148,7 @@ _DEMONSTRATIONS = (
     "slipping demo"
 )
 _PAPER = "centre off-centre line calibration"
-_EFFECTS = "failing-elements creep-hold steep saturation long-gages on-foam hot-room hum"
+_EFFECTS = "failing-elements creep-hold steep saturation long-gages on-foam stretching hot-room hum"
 ORDER = tuple(f"{_DEMONSTRATIONS} {_PAPER} {_EFFECTS}".split())
 
 _RESIZE_DELAY = 200  # ms after the last change of size until pictures are painted

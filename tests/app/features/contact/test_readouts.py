@@ -1,7 +1,10 @@
 """The numbers of the header have room, whatever the letters."""
 
+from dataclasses import replace
+
 import pytest
 
+from kappaskin import Pipeline, Setup, Simulator, load_scene
 from kappaskin_app.features.contact.readouts import FIELDS, Readouts
 
 
@@ -42,3 +45,15 @@ def test_larger_letters_stand_in_two_rows_and_are_read_whole(readouts: Readouts,
 
     assert rows(readouts) == 2
     assert all(number.whole for number, _ in readouts.parts.values())
+
+
+def test_a_force_that_leaves_out_a_stretch_is_shown_as_a_lower_bound(readouts: Readouts) -> None:
+    scene = load_scene("centre")
+    estimate = Pipeline(scene.sensor(), Setup())(Simulator(scene).frame(0, lambda: 0.0))
+    sure = replace(estimate, contact=replace(estimate.contact, force_is_lower_bound=False))
+
+    readouts.show_estimate(sure)
+    plain = readouts.text("force")
+    readouts.show_estimate(estimate)
+
+    assert readouts.text("force") == f"\N{GREATER-THAN OR EQUAL TO} {plain}"
