@@ -1,6 +1,7 @@
 """Coverage studies: how often the error bars of a contact cover a truth of its own.
 
-`python tests/truths/studies.py` prints all figures as the guide's table.
+`python tests/truths/studies.py` prints all figures as the guide's table; a number of frames and the
+beginning of a case's name, both optional, say of how many and which.
 """
 
 import sys
@@ -14,6 +15,7 @@ import numpy as np
 from kappaskin import LeastSquares, Patch, Plate, PointContact, SensorLayout, basis_for
 from navier import HingedPlate, Load
 from sanders import CylinderShell
+from von_karman import StretchingPlate
 
 NOISE = 0.4  # 1/m, uniform to either side as Table 1's: 0.231 rms
 REACH = 1.96  # standard deviations to either side in a 95 % interval
@@ -40,7 +42,8 @@ class Figures:
 class Case:
     """A skin, the truth of what its elements read of a load, and a maker of loads.
 
-    `load` gives the load of a random place (2,) in shares of the sides.
+    `load` gives the load of a random place (2,) in shares of the sides; `bound` is False where the
+    Cramer-Rao bound would take long.
     """
 
     name: str
@@ -51,13 +54,14 @@ class Case:
     low: float = 0.2
     high: float = 0.8
     noise: float = NOISE
+    bound: bool = True
 
     @property
     def layout(self):
         return replace(SensorLayout.regular(self.skin.patch, 10, 10), gage_length=self.gage_length)
 
 
-def coverage(case, frames, seed=0, bound=True) -> Figures:
+def coverage(case, frames, seed=0) -> Figures:
     """The figures of `frames` presses at random places, each with its own noise."""
     rng, layout = np.random.default_rng(seed), case.layout
     read, contact = case.truth(layout), PointContact(case.skin, layout)
@@ -69,7 +73,7 @@ def coverage(case, frames, seed=0, bound=True) -> Figures:
         found = contact(curvature, fit(curvature))
         error = *(found.position - (load.x, load.y)), found.force - load.force
         rows.append([error, (*found.position_sd, found.force_sd)])
-        limits.append(cramer_rao(read, load, case.noise)[:2] if bound else (np.nan,) * 2)
+        limits.append(cramer_rao(read, load, case.noise)[:2] if case.bound else (np.nan,) * 2)
     error, sd = np.array(rows).swapaxes(0, 1)
     covered = np.mean(np.abs(error) <= REACH * sd, axis=0)
     there = np.isfinite(error[:, 2])
@@ -154,19 +158,42 @@ BENT = [
     _bent_case("bent to 30 mm, disc of 2 mm", 47e-3, 40e-3, 30e-3, 1.0),
 ]
 
-CASES: Sequence[Case] = (*FLAT, *BENT)
+# A flat skin 0.25 mm thick, which goes in by 0.9 and 1.7 of that in the middle, where it is held
 
 
-def table(frames=1000):
-    """The figures of every case as a table in Markdown."""
+def _stretched_case(name, inplane, force):
+    plate = StretchingPlate(inplane=inplane, polynomials=30)
+    skin = Plate(Patch(0.1, 0.1), thickness=plate.thickness, inplane=inplane)
+
+    def load(share):
+        return Load(*(0.1 * share), force, radius=3e-3)
+
+    def truth(layout):
+        return lambda load: plate.readings(load, layout.positions)
+
+    return Case(name, skin, truth, load, bound=False)
+
+
+STRETCHED = [
+    _stretched_case("held, 0.9 thicknesses", "held", 0.012),
+    _stretched_case("held, 1.7 thicknesses", "held", 0.042),
+    _stretched_case("diaphragm, 2.1 thicknesses", "diaphragm", 0.042),
+    _stretched_case("free, 2.5 thicknesses", "free", 0.042),
+]
+
+CASES: Sequence[Case] = (*FLAT, *BENT, *STRETCHED)
+
+
+def table(frames=1000, name=""):
+    """The figures of the cases whose names begin as `name`, as a table in Markdown."""
     yield "| skin and load | frames | found | x | y | force | bias of force | place / bound |"
     yield "|---|---|---|---|---|---|---|---|"
-    for case in CASES:
+    for case in (case for case in CASES if case.name.startswith(name)):
         f = coverage(case, frames)
         shares = " | ".join(f"{100 * share:.1f} %" for share in (f.found, f.x, f.y, f.force))
         yield f"| {case.name} | {frames} | {shares} | {100 * f.bias:+.2f} % | {f.place:.2f} |"
 
 
 if __name__ == "__main__":
-    for row in table(*map(int, sys.argv[1:])):
+    for row in table(int(next(iter(sys.argv[1:]), 1000)), " ".join(sys.argv[2:])):
         print(row, flush=True)

@@ -5,7 +5,7 @@ from math import sqrt
 
 import pytest
 
-from studies import BENT, FLAT, coverage
+from studies import BENT, FLAT, STRETCHED, coverage
 
 pytestmark = pytest.mark.truth
 
@@ -63,5 +63,22 @@ def test_the_force_on_a_bent_skin_is_right(case, frames):
 @frames
 def test_intervals_on_a_bent_skin_cover_the_truth(case, frames):
     found, least = figures(case, frames), 0.90 - slack(frames)
+
+    assert min(found.x, found.y, found.force) >= least
+
+
+# A flat skin that stretches, of known thickness, pressed in by up to more than twice of it
+
+
+@each(STRETCHED)
+@frames
+def test_the_force_on_a_stretched_skin_is_right(case, frames):
+    assert abs(figures(case, frames).bias) < 0.05
+
+
+@each(STRETCHED)
+@frames
+def test_intervals_on_a_stretched_skin_cover_the_truth(case, frames):
+    found, least = figures(case, frames), 0.85 - slack(frames)
 
     assert min(found.x, found.y, found.force) >= least
