@@ -137,7 +137,7 @@ class Display(QObject):
         texts = [self._session.other_device()]
         if estimate is not None:
             crossed, _ = self.marks(estimate.curvature)
-            texts.append(warnings(estimate, int(crossed.sum())))
+            texts.append(warnings(estimate, int(crossed.sum()), self._session.status.slope))
         self.notice.show_warning("; ".join(filter(None, texts)))
 
     def estimate_shown(self) -> Estimate | None:

@@ -5,7 +5,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QHBoxLayout, QStatusBar, QToolButton, QWidget
 
-from kappaskin.estimation import FAULTS
+from kappaskin.estimation import FAULTS, slope_warning
 from kappaskin.frames import Estimate
 from kappaskin_app.theme import ALERT
 from kappaskin_app.widgets.layout import row
@@ -45,7 +45,8 @@ _TIP = (
     "Near the rim: a held edge does not move, so a small force inside and a large one at the rim "
     "give the same readings; select an elastic edge if the edge is elastic (Basis). "
     "Strain: beyond 1 % a metal gage is not elastic; these elements are crossed out in the "
-    "heatmaps. Excluded: elements, counted from 0, that are inconsistent with the others, or have "
+    "heatmaps. Slopes: most estimators take the skin for nearly flat; select Finite slope (Basis). "
+    "Excluded: elements, counted from 0, that are inconsistent with the others, or have "
     "faulty channels: Health (F3) lists these, and letters in the heatmaps give the reason."
 )
 
@@ -65,8 +66,11 @@ def _left_out(estimate: Estimate) -> str:
     return f"element{'s' if len(out) > 1 else ''} {named} excluded"
 
 
-def warnings(estimate: Estimate, strained: int) -> str:
-    """Warnings of an estimate; `strained` is the number of elements over their strain limit."""
+def warnings(estimate: Estimate, strained: int, slope: float = 0.0) -> str:
+    """Warnings of an estimate.
+
+    `strained` is the number of elements over their strain limit, `slope` what its method neglects.
+    """
     parts = [_left_out(estimate)] if estimate.suspect.any() else []
     if not estimate.converged:
         parts.append("no convergence; least squares shown")
@@ -74,6 +78,8 @@ def warnings(estimate: Estimate, strained: int) -> str:
         parts.append(f"{strained} element{'s' if strained > 1 else ''} over 1 % strain")
     if estimate.contact.near_rim:
         parts.append("contact near the rim: unreliable")
+    if slope:
+        parts.append(slope_warning(slope))
     words = "; ".join(parts)
     return words[:1].upper() + words[1:]
 

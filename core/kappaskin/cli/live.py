@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 _EVERY = 1.0  # s between two lines
 _POLL = 0.05  # s
+_STEEPER = 1.25  # times the slope of the last warning: warned again
 _PATIENCE = 10.0  # s that the engine may not respond
 
 Many = Annotated[list[str] | None, Parameter(negative="")]
@@ -88,7 +89,9 @@ def publish(
 
 def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
     """Print a line a second until the `end`; the last status."""
-    printed, line = time.monotonic(), ""
+    from kappaskin.estimation import slope_warning
+
+    printed, line, slope = time.monotonic(), "", 0.0
     noticed = set[str]()
     status = engine.status()
     while not stopped and time.monotonic() < end:
@@ -101,6 +104,9 @@ def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
             if target.refusal:
                 raise Refusal(target.refusal)
         _print_notices(status.publishing.targets, noticed)
+        if status.slope > _STEEPER * slope:
+            slope = status.slope
+            show(f"kappaskin: {slope_warning(slope)}", error=True)
         if time.monotonic() - printed >= _EVERY:
             printed, line = time.monotonic(), _line(status)
             show(line)

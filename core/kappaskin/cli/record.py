@@ -58,6 +58,7 @@ def record(source: str, out: Path, *, seconds: float = math.inf, trust: Switch =
     trust
         Let the scene name files outside its folder.
     """
+    from kappaskin.estimation import slope_warning
     from kappaskin.live import LOST, Engine
     from kappaskin.recording import ReplayedSource
 
@@ -71,7 +72,7 @@ def record(source: str, out: Path, *, seconds: float = math.inf, trust: Switch =
         engine.connect(source, trust)
         try:
             with ProgressLine() as show_progress:
-                status = _recorded(engine, seconds, stopped, show_progress)
+                slope = _recorded(engine, seconds, stopped, show_progress)
         except Refusal:
             if not _ended(engine).recording.trouble:
                 out.unlink(missing_ok=True)  # ours, with nothing in it
@@ -87,6 +88,8 @@ def record(source: str, out: Path, *, seconds: float = math.inf, trust: Switch =
     )
     if written.lost:
         show(f"{written.lost:,} messages were not recorded: the disk is too slow")
+    if slope:
+        _warn(slope_warning(slope))
     gone = status.message if status.state == LOST else ""
     for why in filter(None, (written.trouble, status.refusal, gone)):
         show(f"kappaskin: {why}", error=True)
@@ -94,20 +97,25 @@ def record(source: str, out: Path, *, seconds: float = math.inf, trust: Switch =
     return FAILED if failed or not status.accounting.accepted else 0
 
 
+def _warn(text: str) -> None:
+    show(f"kappaskin: {text}", error=True)
+
+
 def _recorded(
     engine: "Engine", seconds: float, stopped: list[int], show_progress: ProgressLine
-) -> "Status":
-    """Record until it is over; the last status."""
+) -> float:
+    """Record until it is over; the largest slope that was neglected though it matters."""
     from kappaskin.live import LOST, STREAMING
 
     began = recording = time.monotonic()
-    known = 0  # connections whose tare is in use
+    known, slope = 0, 0.0  # connections whose tare is in use
     while True:
         status, now = engine.status(), time.monotonic()
+        slope = max(slope, status.slope)
         written = status.recording
         recording = recording if written.active else now
         if not engine.alive or engine.silent > _BEGIN:
-            return status
+            return slope
         if written.trouble and not written.seconds:
             raise Refusal(written.trouble)
         if status.connections != known and status.sensor is not None:
@@ -115,7 +123,7 @@ def _recorded(
             _use_tare(engine, status.sensor)
         over = max(written.seconds, now - recording) >= seconds
         if stopped or written.trouble or over:
-            return status
+            return slope
         if status.state == LOST and not known:
             raise Refusal(status.message)
         if status.state != STREAMING and not known and now - began > _BEGIN:
@@ -383,6 +391,6 @@ def reconstruct(
     check_output(out, readings)
     points = pair(grid, "a grid") if grid else None
     functions = pair(basis, "a basis")
-    found = reconstructed(readings, functions, points, edge, method, contact, objects)
+    found = reconstructed(readings, functions, points, edge, method, contact, objects, _warn)
     save_arrays(out, found)
     show(f"{out}: {len(found['coefficients'])} shapes", error=True)

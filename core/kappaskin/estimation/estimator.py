@@ -10,7 +10,7 @@ from typing import ClassVar, Generic, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
-from kappaskin.bases import Basis, curvature_at
+from kappaskin.bases import Basis, ValueMap, curvature_at
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation.fit import Fit, Uncertainty
 from kappaskin.frames import Array, Mask
@@ -41,6 +41,7 @@ class PatternCache(Generic[_Made]):
 # Powers of the largest number: the squares of readings over sigmas, added up, stay below it.
 _SAFE, _SAFE_SIGMA = 0.25, 0.2
 _WIDEST = 1e60  # m: squares of what it makes of any derivative of the displacement are numbers
+_FINEST = 65  # points along a side at most where slopes are computed
 _UNSEEN = 1e-15  # of the longest column: a function whose curvature cancels, as on half a circle
 
 
@@ -81,6 +82,8 @@ class Estimator(ABC):
 
     RIM_SD: ClassVar = 0.2e-3
     """Default standard deviation in m of the movement of an elastic rim."""
+    linear: ClassVar = True
+    """Whether it takes the readings for those of slight slopes."""
     has_matrix: ClassVar = True
     """Whether it uses the curvature operator M as a matrix, 3 P x Ni Nj numbers."""
     has_prior: ClassVar = False
@@ -158,6 +161,26 @@ class Estimator(ABC):
         frames = coefficients.shape[:-2]
         flat = coefficients.reshape(*frames, self.basis.size)
         return np.dot(flat, self._M_T).reshape(*frames, 3, len(self.layout))
+
+    @cached_property
+    def _slopes(self) -> list[list[tuple[float, ValueMap]]]:
+        """The slopes along x and along y as sums of terms, on a grid that shows the finest."""
+        patch, (Ni, Nj) = self.basis.patch, self.basis.shape
+        at = patch.grid(*(min(4 * count + 1, _FINEST) for count in (Ni, Nj)))
+        terms = [[(1.0, (1, 0))], [(1.0, (0, 1))]]
+        if H := patch.base_curvature:
+            terms[0].append((H**2, (-1, 0)))
+        return [[(h, self.basis.on_grid(*at, *order)) for h, order in each] for each in terms]
+
+    def slope(self, coefficients: Array) -> float:
+        """The largest slope on the skin of the shape with `coefficients` (Ni, Nj); 0 of NaN.
+
+        On a bent skin p = f_x + H v along the arc, with v_x = H f, as the tangent turns.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):  # infinitely steep
+            x, y = (sum(h * values(coefficients) for h, values in each) for each in self._slopes)
+            squares = np.square(x) + np.square(y)
+            return math.sqrt(np.max(squares, initial=0.0, where=squares >= 0))
 
     def _check_shape(self, K: Array) -> None:
         if K.ndim not in (2, 3) or K.shape[-2:] != (3, len(self.layout)):

@@ -1,6 +1,7 @@
 """Fits: the coefficients of one frame or several, with residual, noise and error bars."""
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol, cast
@@ -54,6 +55,45 @@ class DenseUncertainty:
 
     def sd_of(self, rows: Array) -> Array:
         return _root(np.vecdot(rows @ self.covariance, rows))
+
+
+class RootUncertainty:
+    """Uncertainty by a `half` (R, N) of the covariance half' half, computed when first needed."""
+
+    def __init__(self, make: Callable[[], Array]) -> None:
+        self._make = make
+
+    @cached_property
+    def half(self) -> Array:
+        return self._make()
+
+    @property
+    def sd(self) -> Array:
+        return np.linalg.norm(self.half, axis=0)
+
+    def covariance_of(self, rows: Array) -> Array:
+        half = rows @ self.half.T
+        return half @ half.swapaxes(-1, -2)
+
+    def sd_of(self, rows: Array) -> Array:
+        return np.linalg.norm(rows @ self.half.T, axis=-1)
+
+
+STEEP = 0.3
+"""Slope from which on no linear method should neglect it."""
+
+
+# A gage along x reads p_x / (1 + p^2)^(3/2) of a slope p = tan(t) that varies along x alone: the
+# derivative of p / sqrt(1 + p^2) = sin(t). A linear method integrates that to the slope s = sin(t),
+# too flat by 1 - s/p = 1 - sqrt(1 - s^2): 8 % at s = 0.4. A dent loses 0.4 to 1 times that of its
+# height.
+def slope_warning(slope: float) -> str:
+    """What a linear method should say of the largest `slope` of its shape; nothing of 0."""
+    if not slope:
+        return ""
+    share = 100 * (1 - math.sqrt(max(1 - slope**2, 0.0)))
+    flat = f"{share:.0f}" if share >= 1 else f"{share:.1g}"
+    return f"slopes reach {slope:.2g}: up to {flat} % too flat; use finite-slope"
 
 
 def propagated_covariance(rows: Array, covariance: Array) -> Array:
@@ -194,6 +234,33 @@ class Fit:
             self._jets[x, y] = rows.dot(self.coefficients.ravel()), self.covariance_of(rows)
         return self._jets[x, y]
 
+    @cached_property
+    def neglected_slope(self) -> float:
+        """The largest slope in a frame whose method should not neglect it, 0 without one.
+
+        It should not from 0.3 on, nor where the square of the slope exceeds the relative error bar:
+        the standard deviation of the displacement over the displacement, by RMS over the skin.
+        """
+        if not self.estimator.linear:
+            return 0.0
+        c, axes = self.coefficients, (-2, -1)
+        slope = np.array([self.estimator.slope(one) for one in c.reshape(-1, *c.shape[-2:])])
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # of no shape
+            error = np.linalg.norm(self.sd, axis=axes) / np.linalg.norm(c, axis=axes)
+            matters = (slope >= STEEP) | (slope**2 > error.ravel())
+        return float(np.max(slope, initial=0.0, where=matters))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the answer neglects, in words."""
+        frames = np.size(self.converged)
+        lost = frames - np.count_nonzero(self.converged)
+        found = (slope_warning(self.neglected_slope),)
+        if lost:
+            where = f" in {lost} of {frames} frames" if frames > 1 else ""
+            found += (f"no convergence{where}; least squares shown",)
+        return tuple(filter(None, found))
+
     def sd_of(self, rows: Array) -> Array:
         """Standard deviations (..., R) of `rows` (R, N) times the flattened coefficients."""
         observed = self.noise[..., None] * self._each(lambda one: one.sd_of(rows), (len(rows),))
@@ -202,6 +269,18 @@ class Fit:
     def surface_sd(self, positions: Array) -> Array:
         """Standard deviations (..., P) of the displacement in m at `positions` (P, 2)."""
         return self.sd_of(self.estimator.basis.at(positions))
+
+    def alone(self) -> "Iterator[Fit]":
+        """Each of T frames as a fit of its own."""
+        each = cast("Sequence[Uncertainty]", self.uncertainty)
+        for t, uncertainty in enumerate(each):
+            yield replace(
+                self,
+                curvature=self.curvature[t],
+                coefficients=self.coefficients[t],
+                uncertainty=uncertainty,
+                known_noise=None if self.known_noise is None else self.known_noise[t],
+            )
 
     @staticmethod
     def merged(fits: "Sequence[Fit]", order: NDArray[np.intp]) -> "Fit":

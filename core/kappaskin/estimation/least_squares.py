@@ -1,16 +1,18 @@
 """Least-squares estimators, also for finite slopes."""
 
-from dataclasses import dataclass
-from typing import cast
+import math
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from scipy import linalg
+from scipy.linalg import get_lapack_funcs
 
 from kappaskin.errors import RankDeficient
 from kappaskin.estimation.estimator import Estimator, PatternCache, column_lengths
-from kappaskin.estimation.fit import DenseUncertainty, Fit
+from kappaskin.estimation.fit import DenseUncertainty, Fit, RootUncertainty
 from kappaskin.frames import Array, Mask
-from kappaskin.sensing import NormalCurvature
+from kappaskin.sensing import DeflectedSurface, NormalCurvature
 
 _MILD = 100.0  # a condition up to which a product of factors rounds no worse than they do
 _REFACTOR = 1e-6  # below this share of a direction left, updating loses digits: factor anew
@@ -176,26 +178,43 @@ class Direct(_PerFrame):
         return self._answer(flat, c, DenseUncertainty(covariance), len(A) - self.unknowns)
 
 
-_STEPS = 4  # at most; 2 or 3 do
-_EXACT = 1e-6  # of the readings' RMS: a step that changes them by less is the last one
+_STEPS = 6  # at most; slopes of 1.4 take 4 or 5
+_EXACT = 1e-6  # of the readings: a step that leaves less than this to go is the last one,
+_UNSEEN = 1e-3  # or less than this, of the standard deviation that noise gives the solution
 _ROUNDINGS = 100  # relative errors that a step may amount to by rounding alone, as in float32
-_CLOSE = 1e-2  # of the readings' RMS: so small must the fourth step be
-_CONTRACTS = 0.7  # a step longer than this share of the one before: it will not get there
+_DAMPING = 0.1  # of the information on a flat skin, after the first step that explains less
 
 
-class FiniteSlopeLeastSquares(Estimator):
+@dataclass(frozen=True, slots=True, eq=False)
+class _Trial:
+    """Coefficients (N,), their surface, and what it leaves (3, P) of the weighted readings."""
+
+    flat: Array
+    surface: DeflectedSurface
+    left: Array
+    squares: float
+
+
+class FiniteSlopeLeastSquares(LeastSquares):
     """Least squares for finite slopes: gages sense the curvature of the deflected surface.
 
-    c <- c + M^+ (K - h(c)), from the least-squares shape on, at most four times. h(c) is
-    `NormalCurvature`; M^+ is that of `LeastSquares`, factored once. Where the steps do not shrink,
-    as when slopes are near one and noise is large, the result is that of least squares and
-    `Fit.converged` is false.
+    The squares of K - h(c), with h of `NormalCurvature`, are minimised by Levenberg's and
+    Marquardt's method, in at most six steps from the shape of `LeastSquares` on. The covariance is
+    that of the problem linearised at the solution. Where six steps are not enough, as for slopes
+    above one with much noise, the result is that of least squares and `Fit.converged` is false.
     """
 
+    linear: ClassVar = False
+
     def _set_up(self) -> None:
-        basis, layout = self.basis, self.layout
-        self._sensed = NormalCurvature(basis, layout, self.dtype)
-        self._linear = LeastSquares(basis, layout, self.sigma, self.rim_sd, self.dtype)
+        super()._set_up()
+        self._sensed = NormalCurvature(self.basis, self.layout, self.dtype)
+        # The unknowns z of c = root z, in which the problem of a flat skin is orthonormal.
+        self._to_c = self._root.astype(self.dtype)
+        in_z = np.matmul(self._sensed.maps, self._to_c)
+        self._maps = np.ascontiguousarray(in_z.swapaxes(0, 1))
+        self._solve = cast("Any", get_lapack_funcs("posv", dtype=self.dtype))
+        self._rounding = _ROUNDINGS * float(np.finfo(self.dtype).eps)
 
     # Steps that run away may overflow: what is infinitely steep reads nothing, and what is no
     # number does not converge.
@@ -206,33 +225,59 @@ class FiniteSlopeLeastSquares(Estimator):
 
     @np.errstate(over="ignore", invalid="ignore")
     def _fit(self, flat: Array, used: Mask) -> Fit:
-        K = flat.reshape(*flat.shape[:-1], 3, len(self.layout))
-        first = self._linear(K)
-        c, size = first.coefficients, _rms(np.where(used.reshape(3, -1), K, 0.0))
-        exact = max(_EXACT, _ROUNDINGS * float(np.finfo(self.dtype).eps))
-        last, steps = size, np.zeros(size.shape, int)
-        going, diverged = size > 0, np.zeros(size.shape, bool)
-        while going.any() and steps.max() < _STEPS:
-            step = self._linear(K - self.predicted(c)).coefficients
-            change = _rms(self._linear.predicted(step))
-            diverged |= going & ~(change < _CONTRACTS * last)
-            going &= ~diverged
-            c = np.where(going[..., None, None], c + step, c)
-            steps, last = steps + going, change
-            going &= change > exact * size
-        diverged |= going & (last > _CLOSE * size)
-        return Fit(
-            self,
-            first.curvature,
-            np.where(diverged[..., None, None], first.coefficients, c),
-            first.uncertainty,
-            first.spare,
-            first.known_noise,
-            steps,
-            ~diverged,
+        linear = super()._fit(flat, used)
+        weight = (self.weight * used).astype(self.dtype).reshape(3, -1)
+        K = np.where(used, flat, 0.0).reshape(*flat.shape[:-1], *weight.shape) * weight
+        if flat.ndim == 1:
+            return self._refined(linear, K, weight)
+        frames = [self._refined(one, K[t], weight) for t, one in enumerate(linear.alone())]
+        return Fit.stacked(frames) if frames else linear
+
+    def _refined(self, linear: Fit, K: Array, weight: Array) -> Fit:
+        """The fit of one frame, from that of first order to the weighted readings K (3, P)."""
+        size = last = float(np.linalg.norm(K))
+        if not size:
+            return linear
+        here, damping = self._trial(linear.coefficients.ravel(), K, weight), 0.0
+        exact, no_more = max(_EXACT, self._rounding) * size, 1 + self._rounding
+        unseen = _UNSEEN * float(np.sqrt(self.unknowns / np.maximum(linear.spare, 1)))
+        for steps in range(1, _STEPS + 1):
+            J = self._jacobian(here.surface, weight)
+            step = self._step(J, here.left, damping)
+            there = self._trial(here.flat + self._to_c @ step, K, weight)
+            if not there.squares <= no_more * here.squares + exact**2:
+                damping = max(10 * damping, _DAMPING)
+                continue
+            here, length = there, float(np.linalg.norm(step))
+            last, left = length, length * min(length, last) / last if last else 0.0
+            if not damping and left <= max(exact, unseen * math.sqrt(here.squares)):
+                return self._solved(linear, here, weight, steps)
+            damping = damping / 10 if damping > _DAMPING else 0.0
+        return replace(linear, steps=_STEPS, converged=False)
+
+    def _trial(self, flat: Array, K: Array, weight: Array) -> _Trial:
+        surface = self._sensed.surface(flat)
+        left = K - weight * surface.readings
+        return _Trial(flat, surface, left, float(np.vdot(left, left)))
+
+    def _jacobian(self, surface: DeflectedSurface, weight: Array) -> Array:
+        """How the weighted readings, those of element after element, change with z, (3 P, F)."""
+        local = (surface.jacobian() * weight[:, None]).transpose(2, 0, 1)
+        return np.matmul(np.ascontiguousarray(local), self._maps).reshape(-1, self.unknowns)
+
+    def _step(self, J: Array, left: Array, damping: float) -> Array:
+        G = J.T @ J
+        G.flat[:: len(G) + 1] += damping
+        _, step, failed = self._solve(G, J.T @ left.T.ravel())
+        return np.full_like(step, np.nan) if failed else step
+
+    def _solved(self, linear: Fit, solution: _Trial, weight: Array, steps: int) -> Fit:
+        def half() -> Array:
+            J = self._jacobian(solution.surface, weight).astype(float)
+            root = linalg.cholesky(J.T @ J, lower=True)
+            return linalg.solve_triangular(root, self._root.T, lower=True)
+
+        c = solution.flat.reshape(self.basis.shape)
+        return replace(
+            linear, coefficients=c, uncertainty=RootUncertainty(half), steps=steps, converged=True
         )
-
-
-def _rms(K: Array) -> Array:
-    """Root mean square (...) of readings (..., 3, P)."""
-    return np.sqrt(np.mean(K**2, axis=(-2, -1)))

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 from copy import copy
-from functools import cached_property
 from typing import ClassVar, cast
 
 import numpy as np
@@ -14,7 +13,7 @@ from kappaskin.bases import Basis
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation.bayes import prior_root
 from kappaskin.estimation.estimator import Estimator, real_array
-from kappaskin.estimation.fit import Fit
+from kappaskin.estimation.fit import Fit, RootUncertainty
 from kappaskin.estimation.kalman import START_SPEED, ModalKalmanFilter, SignalLevel
 from kappaskin.frames import Array, Mask
 
@@ -71,28 +70,6 @@ _BACK = 0.05  # s by which a clock may go back within one run of a device
 _FORGOTTEN = 1e9  # s: of what is so long ago nothing is left, and squares are still numbers
 _COARSE = 8  # modes that make nearly all of the displacement
 _PLACE = 6.0  # of the contact's depth, times its distance in sides of the skin, as displacement
-
-
-class TrackedUncertainty:
-    """Uncertainty by a root S (R, F) of the covariance of `modes` (N, F): modes S' S modes'."""
-
-    def __init__(self, modes: Array, root: Array) -> None:
-        self._modes, self._root = modes, root
-
-    @cached_property
-    def _half(self) -> Array:
-        return self._root.astype(float) @ self._modes.T
-
-    @property
-    def sd(self) -> Array:
-        return np.linalg.norm(self._half, axis=0)
-
-    def covariance_of(self, rows: Array) -> Array:
-        half = rows @ self._half.T
-        return half @ half.swapaxes(-1, -2)
-
-    def sd_of(self, rows: Array) -> Array:
-        return np.linalg.norm(rows @ self._half.T, axis=-1)
 
 
 class Tracking(Estimator, Stateful):
@@ -290,6 +267,7 @@ class Tracking(Estimator, Stateful):
     def _fitted(self) -> Fit:
         level = cast("SignalLevel", self._level)
         c = (self._modes @ self._filter.mean[0]).reshape(self.basis.shape).astype(self.dtype)
+        root = self._filter.halves[0]
         there = self._read > self._now - _HELD
         K = np.where(there, self._left, np.nan) + self.predicted(c).ravel()
         if self.sigma is None:
@@ -300,7 +278,7 @@ class Tracking(Estimator, Stateful):
             self,
             K.reshape(3, -1).astype(self.dtype),
             c,
-            TrackedUncertainty(self._modes, self._filter.halves[0]),
+            RootUncertainty(lambda: root.astype(float) @ self._modes.T),
             spare,
             np.array(noise),
         )

@@ -333,7 +333,8 @@ class EngineLoop:
             self._add_event(Event(time.monotonic(), "recording", trouble))
         now, source, status = time.monotonic(), self._source, self._status
         if source is not None:
-            watch = self._main.pipeline.drift if self._main.pipeline else None
+            pipeline = self._main.pipeline
+            watch, fit = (pipeline.drift, pipeline.fitted) if pipeline else (None, None)
             status = replace(
                 status,
                 accounting=source.accounting(),
@@ -343,8 +344,9 @@ class EngineLoop:
                 reader_gap=self._arrivals.gap(now),
                 last_frame=self._arrivals.last,
                 playing=source.playing if isinstance(source, SimulatedSource) else Playback(),
-                health=self._health.health(self._main.pipeline, self._place),
+                health=self._health.health(pipeline, self._place),
                 replay=source.replay if isinstance(source, ReplayedSource) else None,
+                slope=fit.neglected_slope if fit else 0.0,
             )
         self._publishing.report(status.source_status(self._reported_events))
         self._reported_events = status.event_count

@@ -39,8 +39,9 @@ class Status:
     the state of tares, `drift` the drift since the tare of the `setup`, None without one. `health`
     lists faulty channels, `publishing` the state of each target, `recording` that of the file being
     written, `replay` the position in a recording (None for any other source), `compared` the state
-    of the second pipeline (None without one). `requested` is the number of the newest request that
-    the engine has received.
+    of the second pipeline (None without one). `slope` is the largest of the newest shape, if the
+    method neglects it though it matters (`Fit.neglected_slope`), else 0. `requested` is the number
+    of the newest request that the engine has received.
     """
 
     state: str = OFF
@@ -72,6 +73,7 @@ class Status:
     recording: RecordingStatus = field(default_factory=RecordingStatus)
     replay: Replay | None = None
     compared: PipelineStatus | None = None
+    slope: float = 0.0
     requested: int = 0
 
     def after(self, events: Sequence[Event]) -> "Status":
@@ -96,6 +98,7 @@ class Status:
             drift=None,
             health=Health(),
             replay=None,
+            slope=0.0,
         )
 
     @property

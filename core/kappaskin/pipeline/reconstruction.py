@@ -5,6 +5,7 @@ import math
 import os
 import zipfile
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -161,21 +162,17 @@ def _layout(path: Path, patch: Patch, positions: Array) -> SensorLayout:
 
 def _shapes(
     method: str, basis: Basis, layout: SensorLayout, curvature: Array, sigma: Array | None
-) -> dict[str, NDArray[Any]]:
-    """`coefficients`, `sd` and `residual` of all T frames; `sigma` may be of each of them."""
-
-    def arrays_of(fit: Fit) -> dict[str, NDArray[Any]]:
-        return {"coefficients": fit.coefficients, "sd": fit.sd, "residual": fit.residual}
-
+) -> Fit:
+    """The fit of all T frames; `sigma` may be of each of them."""
     if sigma is None or sigma.ndim < 3:
-        return arrays_of(estimator_for(method, basis, layout, sigma)(curvature))
-    frames: list[dict[str, NDArray[Any]]] = []
+        return estimator_for(method, basis, layout, sigma)(curvature)
+    frames: list[Fit] = []
     for number, own in enumerate(sigma):
         try:
-            frames.append(arrays_of(estimator_for(method, basis, layout, own)(curvature[number])))
+            frames.append(estimator_for(method, basis, layout, own)(curvature[number]))
         except Refusal as error:
             raise type(error)(f"frame {number}: {error}") from error
-    return {name: np.stack([frame[name] for frame in frames]) for name in frames[0]}
+    return Fit.stacked(frames)
 
 
 def _check_sizes(basis: Basis, readings: int, surface: int, method: type[Estimator]) -> None:
@@ -204,13 +201,14 @@ def reconstruct(
     method: str = next(iter(METHODS)),
     contact: bool = False,
     objects: bool = False,
+    warn: Callable[[str], object] = str,
 ) -> dict[str, NDArray[Any]]:
     """What `kappaskin reconstruct` writes: `coefficients`, `sd`, `residual` and the surface.
 
     `coefficients` and `sd` (T, Ni, Nj) in m, `residual` (T, 3, P) in 1/m; with a `grid` of nx x ny
     points also `grid_x` (nx,), `grid_y` (ny,) and `w` (T, ny, nx) in m. `edge` is one of `EDGES`,
     `method` one of `METHODS`. With `contact` also what `_contacts` gives, with `objects`
-    what `_objects` gives besides.
+    what `_objects` gives besides. What the shapes neglect goes to `warn`, in words.
     """
     found, inplane = _read(readings)
     curvature, sigma = found["curvature"], found.get("sigma")
@@ -233,7 +231,10 @@ def reconstruct(
     check_method(method)
     points = 0 if grid is None else len(curvature) * grid[0] * grid[1]
     _check_sizes(functions, int(layout.live.sum()), points, METHODS[method])
-    out = _shapes(method, functions, layout, curvature, sigma)
+    fit = _shapes(method, functions, layout, curvature, sigma)
+    for text in fit.warnings:
+        warn(text)
+    out = {"coefficients": fit.coefficients, "sd": fit.sd, "residual": fit.residual}
     if grid is not None:
         x, y = patch.grid(*grid)
         out |= {"grid_x": x, "grid_y": y, "w": functions.on_grid(x, y)(out["coefficients"])}

@@ -2,10 +2,10 @@
 
 from kappaskin.sensing.hysteresis import PrandtlIshlinskii as PrandtlIshlinskii
 from kappaskin.sensing.hysteresis import StandardLinearSolid as StandardLinearSolid
+from kappaskin.sensing.layout import DeflectedSurface as DeflectedSurface
 from kappaskin.sensing.layout import NormalCurvature as NormalCurvature
 from kappaskin.sensing.layout import SensorLayout as SensorLayout
 from kappaskin.sensing.layout import gage_multipliers as gage_multipliers
-from kappaskin.sensing.layout import slope_correction as slope_correction
 from kappaskin.sensing.sensor import Scan as Scan
 from kappaskin.sensing.sensor import Sensor as Sensor
 from kappaskin.sensing.transduction import FIRST_GENERATION as FIRST_GENERATION

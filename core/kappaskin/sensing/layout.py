@@ -202,41 +202,144 @@ class SensorLayout:
         return K.reshape(3 * len(self), basis.size)
 
 
-def slope_correction(slope_x: Array, slope_y: Array) -> Array:
-    """The factor (..., 3, P) by which Eqs. 3-5 are too large on slopes (..., P) along x and y.
+# The deflected skin is r = r0 - f n0 + v t. r0 is the skin at rest, of curvature H along x, t and e
+# are unit vectors along x and y, n0 the outward normal; f is the displacement inward, and v the one
+# along the arc that `curvature_at` assumes, v_x = H f: none on a flat skin. With the slopes
+# p = f_x + H v and q = f_y and with w = v_y, the derivatives of r along t, e and n0 are
+#     r_x = (1, 0, -p)     r_xx = (-H p, 0, -H - p_x)     r_xy = (0, 0, -p_y)
+#     r_y = (w, 1, -q)     r_yy = (w_y, 0, -q_y)          r_x x r_y = (p, q - p w, 1) = W n.
+# p_x, q_y and p_y are xx, yy and xy of first order. Gages along y have turned to r_y. So have gages
+# along x, as the skin is not sheared: they lie along d = r_x - w r_y. With the metric I, the scalar
+# products of d and r_y, and the second form II_ij = -n . r_ij of the same vectors the readings are
+#     xx: II_dd / I_dd - H      yy: II_yy / I_yy      xy: (II_dy - H I_dy / 2) / sqrt(I_dd I_yy).
+# Of first order they are those of `curvature_at`. On a flat skin W^2 = 1 + p^2 + q^2, and they are
+#     f_xx / (W (1 + p^2))      f_yy / (W (1 + q^2))      f_xy / (W sqrt((1 + p^2) (1 + q^2))).
+_XX, _YY, _XY = range(3)
+_EACH = [_XX, _YY, _XY]
+_IN_X, _IN_Y = np.array([[[1.0], [0.0], [0.5]], [[0.0], [1.0], [0.5]]])
+"""Powers of 1/I_dd and of 1/I_yy in the readings, (3, 1)."""
 
-    With W^2 = 1 + f_x^2 + f_y^2 it is xx: W (1 + f_x^2), yy: W (1 + f_y^2),
-    xy: W sqrt((1 + f_x^2) (1 + f_y^2)).
+
+class DeflectedSurface:
+    """The deflected surface at P elements, from its `jet` (Q, ..., P).
+
+    That is p_x, q_y, p_y, p and q as derived above; on a skin of `base_curvature` H in 1/m, also w
+    and w_y.
     """
-    along_x, along_y = 1 + slope_x**2, 1 + slope_y**2
-    W = np.sqrt(along_x + along_y - 1)
-    times = np.empty((*W.shape[:-1], 3, W.shape[-1]), W.dtype)
-    times[..., 0, :] = W * along_x
-    times[..., 1, :] = W * along_y
-    times[..., 2, :] = W * np.sqrt(along_x * along_y)
-    return times
+
+    def __init__(self, jet: Array, base_curvature: float) -> None:
+        self._jet, self._H = jet, base_curvature
+        first, p, q = jet[:3], jet[3], jet[4]
+        lengths = np.empty_like(first)  # I_dd, I_yy and the root of their product
+        lengths[_YY] = 1 + q * q
+        if base_curvature:
+            w = jet[5]
+            lengths[_XX] = 1 + (p - w * q) ** 2 + w * w * (w * w - 1)
+            lengths[_YY] += w * w
+            self._area: Array = np.sqrt(1 + p * p + (q - p * w) ** 2)  # W
+        else:
+            lengths[_XX] = 1 + p * p
+            self._area = np.sqrt(lengths[_XX] + q * q)
+        np.sqrt(lengths[_XX] * lengths[_YY], out=lengths[_XY])
+        self._lengths, self._scale = lengths, 1 / (self._area * lengths)
+        self._second = self._scale * (self._second_form() if base_curvature else first)
+
+    def _second_form(self) -> Array:
+        """W times II_dd, II_yy and II_dy, of a bent skin."""
+        px, qy, py, p, _, w, wy = self._jet
+        yy = qy - p * wy
+        return np.stack([self._H * (1 + p * p) + px - w * (2 * py - w * yy), yy, py - w * yy])
+
+    @property
+    def readings(self) -> Array:
+        """What the gages read, (3, ..., P) in 1/m."""
+        if not self._H:
+            return self._second
+        readings = self._ratios()
+        readings[_XX] -= self._H
+        return readings
+
+    def _ratios(self) -> Array:
+        """The readings plus, along x of a bent skin, H."""
+        if not self._H:
+            return self._second
+        p, q, w = self._jet[3:6]
+        ratios = self._second.copy()
+        ratios[_XY] -= self._H / 2 * (p * q - w * (w * w + q * q)) / self._lengths[_XY]
+        return ratios
+
+    @property
+    def slope(self) -> Array:
+        """The slope (..., P) along the steepest direction."""
+        return np.hypot(self._jet[3], self._jet[4])
+
+    def jacobian(self) -> Array:
+        """How the readings of one frame change with its jet, (3, Q, P)."""
+        jet, second, ratios = self._jet, self._second, self._ratios()
+        in_x, in_y = ratios * (_IN_X / self._lengths[_XX]), ratios * (_IN_Y / self._lengths[_YY])
+        if self._H:
+            found, rates = self._of_second_form() * self._scale[:, None], self._rates()
+            found[_XY, 3:6] -= self._of_shear()
+        else:
+            found, (p, q) = np.zeros((3, *jet.shape), jet.dtype), jet[3:]
+            found[_EACH, _EACH] = self._scale
+            rates = [(p, 2 * p, 0.0), (q, 0.0, 2 * q)]
+        second = second / self._area**2
+        for column, (area, along_x, along_y) in enumerate(rates, 3):
+            found[:, column] -= second * area + in_x * along_x + in_y * along_y
+        return found
+
+    def _rates(self) -> list[tuple[Array, Array, Array | float]]:
+        """How W^2 / 2, I_dd and I_yy change with p, with q and with w."""
+        p, q, w = self._jet[3:6]
+        m, e = q - p * w, p - w * q
+        return [
+            (p - w * m, 2 * e, 0.0),
+            (m, -2 * w * e, 2 * q),
+            (-p * m, 4 * w**3 - 2 * w - 2 * q * e, 2 * w),
+        ]
+
+    def _of_second_form(self) -> Array:
+        """How W times II_dd, II_yy and II_dy change with the jet, (3, Q, P)."""
+        _, qy, py, p, _, w, wy = self._jet
+        yy, found = qy - p * wy, np.zeros((3, *self._jet.shape), self._jet.dtype)
+        found[_EACH, _EACH], found[_YY, 3], found[_YY, 6] = 1.0, -wy, -p
+        found[_XY, 1], found[_XY, 3], found[_XY, 5], found[_XY, 6] = -w, w * wy, -yy, w * p
+        found[_XX, 1], found[_XX, 2], found[_XX, 3] = w * w, -2 * w, 2 * self._H * p - w * w * wy
+        found[_XX, 5], found[_XX, 6] = 2 * (w * yy - py), -w * w * p
+        return found
+
+    def _of_shear(self) -> Array:
+        """How H I_dy / 2, over the lengths, changes with p, q and w, (3, P)."""
+        p, q, w = self._jet[3:6]
+        rates = np.stack([q, p - 2 * w * q, -3 * w * w - q * q])
+        return self._H / 2 * rates / self._lengths[_XY]
 
 
 class NormalCurvature:
     """The map from coefficients to the true normal curvature of the surface along the gages.
 
-    It is the first-order curvature (Eqs. 3-5) over the `slope_correction`. A gage of some length
-    reads the mean of Eqs. 3-5 along it, at the slope in its middle.
+    A gage of some length reads the mean of the curvature of first order along it, at the slope in
+    its middle.
     """
 
     def __init__(self, basis: Basis, layout: SensorLayout, dtype: DTypeLike = np.float64) -> None:
-        if basis.patch.base_curvature:
-            raise Refusal(
-                f"expected a flat skin for finite slopes, got a {basis.patch.name}: on a bent one "
-                "the tangential displacement matters as much as the slope; use least-squares"
-            )
-        places = layout.positions
-        self._size = basis.size
-        self._second = layout.curvature_operator(basis).T.astype(dtype)
-        self._first = [basis.at(places, *order).T.astype(dtype) for order in ((1, 0), (0, 1))]
+        places, H = layout.positions, basis.patch.base_curvature
+        maps = [*layout.curvature_operator(basis).reshape(3, len(layout), basis.size)]
+        maps += [basis.at(places, 1, 0), basis.at(places, 0, 1)]
+        if H:
+            maps[3] = maps[3] + H**2 * basis.at(places, -1, 0)
+            maps += [H * basis.at(places, -1, 1), H * basis.at(places, -1, 2)]
+        self.maps = np.stack(maps).astype(dtype)
+        """From coefficients to the jet of a `DeflectedSurface`, (Q, P, N)."""
+        self._columns, self._H = self.maps.reshape(-1, basis.size).T, H
+
+    def surface(self, flat: Array) -> DeflectedSurface:
+        """The surface at the elements, for flattened coefficients (..., N)."""
+        jet = np.dot(flat, self._columns).reshape(*flat.shape[:-1], *self.maps.shape[:2])
+        return DeflectedSurface(np.moveaxis(jet, -2, 0), self._H)
 
     def __call__(self, coefficients: Array) -> Array:
         """Curvature (..., 3, P) in 1/m for `coefficients` (..., Ni, Nj)."""
-        flat = coefficients.reshape(*coefficients.shape[:-2], self._size)
-        times = slope_correction(*(np.dot(flat, slope) for slope in self._first))
-        return np.dot(flat, self._second).reshape(times.shape) / times
+        flat = coefficients.reshape(*coefficients.shape[:-2], self.maps.shape[2])
+        return np.moveaxis(self.surface(flat).readings, 0, -2)

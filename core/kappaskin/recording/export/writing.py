@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from kappaskin._processes import BackgroundProcess
 from kappaskin.errors import Refusal
+from kappaskin.estimation import slope_warning
 from kappaskin.frames import Frame
 from kappaskin.recording.export.request import (
     ExportedFrame,
@@ -44,13 +45,15 @@ class Exported(NamedTuple):
     """How many frames were `written`.
 
     `unsettled` frames were recorded before the first settings, and of `shapeless` ones the readings
-    determine no surface: neither are written. `whole` is whether the recording was ended properly.
+    determine no surface: neither are written. `whole` is whether the recording was ended properly,
+    `slope` the largest that was neglected though it matters (`Fit.neglected_slope`).
     """
 
     written: int
     unsettled: int
     shapeless: int
     whole: bool
+    slope: float
 
     @property
     def words(self) -> str:
@@ -62,6 +65,8 @@ class Exported(NamedTuple):
             parts.append(f"{self.shapeless:,} omitted: readings determine no shape")
         if not self.whole:
             parts.append("the recording is incomplete; this is all up to its end")
+        if self.slope:
+            parts.append(slope_warning(self.slope))
         return "; ".join(parts)
 
 
@@ -115,6 +120,7 @@ class _ExportWork:
         self._due = request.first  # s since the recording began
         self._last = math.nan  # s, when the last frame that was looked at came
         self._written = self._unsettled = self._shapeless = 0
+        self._slope = 0.0
 
     def take(self, message: RecordedMessage) -> bool:
         """Take one message; whether the next one is needed too."""
@@ -135,6 +141,8 @@ class _ExportWork:
             self._unsettled += 1
         elif self._writer.take(ExportedFrame(at, frame, estimate, pipeline)):
             self._written += 1
+            if pipeline.fitted is not None:
+                self._slope = max(self._slope, pipeline.fitted.neglected_slope)
             first, every = self._request.first, self._request.every
             if every:
                 self._due = first + every * (math.floor((at - first) / every) + 1)
@@ -176,7 +184,7 @@ class _ExportWork:
 
     def done(self) -> Exported:
         whole = self._recording.whole
-        return Exported(self._written, self._unsettled, self._shapeless, whole)
+        return Exported(self._written, self._unsettled, self._shapeless, whole, self._slope)
 
 
 class ExportTask:

@@ -84,13 +84,6 @@ class Survey:
         """Readings (S, 3 P) of point-like elements for the same forces on another `plate`."""
         return self.shapes_on(plate) @ self.operator.T
 
-    @cached_property
-    def slopes(self) -> Array:
-        """Slopes (S, 2, P) of the skin along x and y at its elements."""
-        places = self.layout.positions
-        along = [self.basis.at(places, *order) for order in ((1, 0), (0, 1))]
-        return np.stack([self.coefficients @ slope.T for slope in along], axis=1)
-
     def share(self, change: Array) -> float:
         """The largest `change` of a reading in 1/m as a share of the peak."""
         return float(np.abs(change).max(initial=0.0)) / self.peak

@@ -20,11 +20,11 @@ from kappaskin.scenes.effects.effect import (
     Survey,
 )
 from kappaskin.sensing import (
+    NormalCurvature,
     PrandtlIshlinskii,
     SensorLayout,
     StandardLinearSolid,
     Transduction,
-    slope_correction,
 )
 
 
@@ -32,8 +32,7 @@ from kappaskin.sensing import (
 class FiniteSlopeEffect(Effect):
     """Gages read the true normal curvature, of which the second derivative is the first order.
 
-    It replaces the operator from coefficients to curvature. For a bent skin there is no such
-    formula here: its readings are those of first order, and leaving that as it is costs nothing.
+    It replaces the operator from coefficients to curvature.
     """
 
     name: ClassVar = "finite-slope"
@@ -41,11 +40,10 @@ class FiniteSlopeEffect(Effect):
     formula: ClassVar = "largest slope squared"
 
     def size(self, survey: Survey) -> Size:
-        fx, fy = survey.slopes[:, 0], survey.slopes[:, 1]
-        number = float((fx**2 + fy**2).max(initial=0.0))
-        if survey.plate.patch.base_curvature:
-            return Size(number, 0.0)
-        return Size(number, survey.share(survey.curvature * (1 - 1 / slope_correction(fx, fy))))
+        sensed = NormalCurvature(survey.basis, replace(survey.layout, gage_length=0.0))
+        surface = sensed.surface(survey.coefficients)
+        number = float(surface.slope.max(initial=0.0)) ** 2
+        return Size(number, survey.share(survey.curvature - np.moveaxis(surface.readings, 0, -2)))
 
     def sensed(self, basis: Basis, layout: SensorLayout) -> Callable[[Array], Array]:
         """Coefficients (Ni, Nj) in m to the curvature (3 P,) in 1/m that the elements read."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from deflected import DeflectedSkin, sines
 from kappaskin import (
     Disk,
     Fast,
@@ -248,10 +249,19 @@ def test_on_a_slope_the_true_normal_curvature_is_sensed():
     np.testing.assert_allclose(xy, twist, rtol=1e-12, atol=1e-12)
 
 
-def test_on_a_bent_skin_finite_slopes_are_refused():
+def test_on_a_bent_skin_it_is_the_surface_in_space_that_is_sensed():
     patch = Patch(0.04, 0.03, 12.9e-3)
-    with pytest.raises(Refusal, match="flat skin for finite slopes"):
-        FiniteSlopeEffect().sensed(SineBasis(patch, 4, 4), SensorLayout.regular(patch, 8, 8))
+    basis, layout = SineBasis(patch, 4, 4), SensorLayout.regular(patch, 8, 8)
+    c = np.zeros((4, 4))
+    c[1], c[3, 0] = [3e-3, -1e-3, 0.0, 4e-4], -5e-4
+    skin = DeflectedSkin(patch.a, sines(patch.a, patch.b, c), patch.radius)
+
+    sensed = FiniteSlopeEffect().sensed(basis, layout)(c).reshape(3, -1)
+
+    expected = skin.readings(*layout.positions.T)
+    first_order = (layout.curvature_operator(basis) @ c.ravel()).reshape(3, -1)
+    np.testing.assert_allclose(sensed, expected, rtol=1e-10, atol=1e-10)
+    assert np.abs(expected - first_order).max() > 0.05 * np.abs(first_order).max()
 
 
 # What holds the skin
