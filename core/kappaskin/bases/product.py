@@ -98,6 +98,11 @@ class ProductBasis(FunctionBasis):
         points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
         return points, np.multiply.outer(wx, wy).ravel()
 
+    def volumes(self) -> Array:
+        """The integral (N,) in m^2 of each function."""
+        (x, wx), (y, wy) = self._rules
+        return np.kron(wx @ self._along_x(x, 0), wy @ self._along_y(y, 0))
+
     def overlap(self, one: Order, other: Order) -> Array:
         """The integrals (N, N) of one derivative of each function times another of each.
 

@@ -401,8 +401,13 @@ def _second(values: Array, nodes: Array, axis: int) -> Array:
 
 def _displacement(basis: ProductBasis, compliance: Compliance, x: Array, y: Array) -> Array:
     """Displacement (ny, nx) in m per N under a point load at each node."""
-    grid = basis.on_grid(x, y)
-    if compliance.values.ndim == 1 and compliance.volume is None:
-        return grid.Y**2 @ compliance.values.reshape(basis.shape).T @ (grid.X**2).T
+    grid, values, volume = basis.on_grid(x, y), compliance.values, compliance.volume
+    if values.ndim == 1:
+        gives: Array = grid.Y**2 @ values.reshape(basis.shape).T @ (grid.X**2).T
+        if volume is not None:  # less what the pressure below, which keeps the volume, moves back
+            swelling = values * volume
+            moved = grid.Y @ swelling.reshape(basis.shape).T @ grid.X.T
+            gives -= moved**2 / float(volume @ swelling)
+        return gives
     f = basis.at(np.stack(np.meshgrid(x, y), -1).reshape(-1, 2))
     return np.vecdot(compliance.after(f), f).reshape(len(y), len(x))

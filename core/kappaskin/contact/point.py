@@ -111,6 +111,8 @@ _SEARCHED = 33  # points searched along each side
 _FUNCTIONS = 15  # along each side, of the shape searched for
 _STEPS = 20  # of Gauss-Newton at most; 1 or 2 do but for the last millimetres at the rim
 _WORTH = 2.0  # variances of the noise: after a step that gains less, another one is not worth it
+_CAREFUL = 0.1  # of a side: within it a strong load may be taken for a weak one further in,
+_WORTH_AT_RIM = 0.1  # and small steps in this many variances lead to it
 _NO_GAIN = 1e-13  # of the readings' squares
 _FURTHEST = 0.05  # of a side, in one step
 _RIDGE = 1e-12  # keeps a load on the rim, which moves nothing, solvable
@@ -120,7 +122,7 @@ _START, _LEAST, _LARGEST = 0.03, 1e-3, 0.2  # of the shorter side: radius of a l
 _PROFILE = 0.27  # of P / (8 pi D): by so much a disc and a Gaussian differ in their middle
 
 _AS_WELL = 1.2  # times the residual of the fitted shape that a single load may leave
-_REACH = 1.96  # standard deviations to either side in a 95 % interval
+_REGION = 7.81  # variances: drop of chi-squared in the 95 % region of x, y and size
 
 NO_CONTACT = Contact(
     np.full(2, np.nan), np.full(2, np.nan), math.nan, math.nan, math.nan, math.nan, 0, False, False
@@ -144,7 +146,8 @@ class _Linearised(NamedTuple):
 
     `steps` are the force after the step, in units of the influence, and that force times the steps
     in x, y and s; `inverse` (4, 4) or (3, 3) their covariance for unit noise. `left` is the sum of
-    squares of the readings after the step, `gain` what the step takes off it.
+    squares of the readings after the step, `gain` what the step takes off it, `power` that of the
+    readings; `weights` (3 P,) are those of all these, None where all are 1.
     """
 
     steps: list[float]
@@ -152,6 +155,7 @@ class _Linearised(NamedTuple):
     left: float
     gain: float
     power: float
+    weights: Array | None
 
 
 class PointContact:
@@ -238,10 +242,14 @@ class PointContact:
             if self._stretched is not None:  # the readings are not linear in the force
                 self._stretched.move(force, dx, dy)
                 gain += (force - before) ** 2 / here.inverse.item(0, 0)
-            if gain <= _WORTH * variance + _NO_GAIN * here.power:
+            if gain <= self._worth(x, y) * variance + _NO_GAIN * here.power:
                 break
             here = self._linearised(x, y, s, force, tables, variance)
         return self._contact(x, y, s, here, tables, fit)
+
+    def _worth(self, x: float, y: float) -> float:
+        """Variances of the noise that a step must gain to be worth another one."""
+        return _WORTH_AT_RIM if self.patch.near_rim(x, y, _CAREFUL) else _WORTH
 
     def _linearised(
         self, x: float, y: float, s: float, force: float, tables: _Tables, variance: float
@@ -251,7 +259,8 @@ class PointContact:
         self._rows[4] = self._readings
         if self._stretched is not None:
             self._stretched.stretch(x, y, s, self._influence.unit, self._rows)
-        rows = self._weighted(s, force, tables, variance)
+        weights = self._weights(s, force, tables, variance)
+        rows = self._rows if weights is None else self._rows * weights
         products = rows.dot(self._rows.T)
         n = self._unknowns
         H, g = products[:n, :n], products[:n, 4]
@@ -268,18 +277,16 @@ class PointContact:
         if n == 3:
             steps.append(0.0)
         left = max(power - explained, 0.0)
-        return _Linearised(steps, inverse, left, explained - at_place, power)
+        return _Linearised(steps, inverse, left, explained - at_place, power, weights)
 
-    def _weighted(self, s: float, force: float, tables: _Tables, variance: float) -> Array:
-        """The rows (5, 3 P), each reading times its weight."""
-        rows = self._rows
-        if tables.weights is not None:
-            rows = rows * tables.weights
-        if force and variance:
-            trust = self._influence.trust(s, (_PROFILE * force) ** 2 / variance)
-            if trust is not None:
-                return (rows.reshape(5, 3, -1) * trust).reshape(5, -1)
-        return rows
+    def _weights(self, s: float, force: float, tables: _Tables, variance: float) -> Array | None:
+        """Weights (3 P,) of the readings; None where all are 1."""
+        share = (_PROFILE * force) ** 2 / variance if variance else 0.0
+        trust = self._influence.trust(s, share) if share else None
+        if trust is None:
+            return tables.weights
+        of_all = np.concatenate((trust, trust, trust))
+        return of_all if tables.weights is None else of_all * tables.weights
 
     def _contact(
         self, x: float, y: float, s: float, here: _Linearised, tables: _Tables, fit: Fit
@@ -311,14 +318,15 @@ class PointContact:
         """
         if self.basis.unobservable is not None:
             return False
-        least = here.power - here.left * (1 + _REACH**2 / tables.spare)
+        least = here.power - here.left * (1 + _REGION / tables.spare)
         for x_rim, y_rim, share in self.patch.near_rim(x, y, _DOUBTFUL):
             if share < _RIM:
                 return True
             K = self._rows[4]
             self._influence.at(x_rim, y_rim, s)
-            T = self._weighted(0.0, 0.0, tables, 0.0)[0]
-            if float(T.dot(K)) ** 2 > least * float(T.dot(T)):
+            T = self._rows[0]
+            read = T if here.weights is None else T * here.weights
+            if float(read.dot(K)) ** 2 > least * float(read.dot(T)):
                 return True
         return False
 

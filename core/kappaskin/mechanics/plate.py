@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from kappaskin.bases import Basis, ElasticBasis, SineBasis, curvature_at, overlaps
+from kappaskin.bases import Basis, ElasticBasis, ProductBasis, SineBasis, curvature_at, overlaps
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics.loads import Load, is_point
@@ -183,8 +183,11 @@ class Plate:
         return self._over_fluid(values, basis) if self.fluid else Compliance(values)
 
     def _over_fluid(self, values: Array, basis: Basis) -> Compliance:
-        points, weights = basis.quadrature()
-        volume = weights @ basis.at(points)
+        if isinstance(basis, ProductBasis):
+            volume = basis.volumes()
+        else:
+            points, weights = basis.quadrature()
+            volume = weights @ basis.at(points)
         swelling = float(volume @ Compliance(values).after(volume[None])[0])
         # An arc whose ends are pinned keeps the volume already: no pressure moves it.
         isochoric = swelling <= 1e-12 * (volume @ volume) * np.abs(values).max()

@@ -255,13 +255,15 @@ def reconstruct(
 def _contacts(fits: list[Fit], contacts: list[Contact], forces: bool) -> dict[str, NDArray[Any]]:
     """The contact of each frame and the skin's geometry there; NaN where there is none.
 
-    `contact` and `contact_sd` (T, 2) in m, `displacement` and `displacement_sd` (T,) in m; `normal`
+    `contact` and `contact_sd` (T, 2) in m, `displacement` and `displacement_sd` (T,) in m,
+    `load_radius` (T,) and the ends of its 95 % interval `load_radius_95` (T, 2) in m; `normal`
     (T, 3), `curvature_form` (T, 2, 2), `torsion_form` (T, 2) and `principal` (T, 2) in 1/m; with
     `forces` also `force` and `force_sd` (T,) in N. `single`, `near_rim` and, with `forces`,
     `force_is_lower_bound` (T,) say whether to trust them (`Contact`). All readings weigh the same.
     """
     there = [contact_geometry(one, contact) for one, contact in zip(fits, contacts, strict=True)]
     names = ["displacement", "displacement_sd", "single", "near_rim"]
+    names += ["load_radius", "load_radius_95"]
     names += ["force", "force_sd", "force_is_lower_bound"] if forces else []
     out = {
         "contact": np.stack([contact.position for contact in contacts]),

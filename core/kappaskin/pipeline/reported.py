@@ -31,6 +31,7 @@ ELEMENT, ALONG, ACROSS, ROW, COLUMN = "element", "along", "across", "row", "colu
 _SUFFIX = {
     "": "",
     "m": "_m",
+    "m^2": "_m2",
     "N": "_N",
     "s": "_s",
     "rad": "_rad",
@@ -342,6 +343,7 @@ def numbers_of(quantities: Iterable[ReportedQuantity]) -> Callable[[Reported], l
 
 
 _OF_SKIN = "of the skin at the contact"
+_OF_LOAD = "of the disc that the load is spread over"
 _MISSING = "NaN where missing"
 
 _FRAME = (
@@ -780,6 +782,36 @@ _CONTACT = (
         shown=("mm", 1e3, 3),
         header=HeaderNumber(
             "depth", 15, "Displacement at the contact, with its error bar; positive is inward."
+        ),
+    ),
+    ReportedQuantity(
+        "load_size",
+        "m^2",
+        "squared radius of the disc that the load is spread over",
+        "contact.size",
+        sd="contact.size_sd",
+        columns=(),
+        keys=(),
+    ),
+    ReportedQuantity(
+        "load_radius",
+        "m",
+        _OF_LOAD,
+        "contact.load_radius",
+        symbol="r",
+        keys=(("load_radius_m", f"{_OF_LOAD}; null where the skin does not tell it"),),
+        labels_shown=("Load radius",),
+        shown=("mm", 1e3, 2),
+    ),
+    ReportedQuantity(
+        "load_radius_95",
+        "m",
+        "95 % interval of the load's radius, from zero where only an upper bound is known",
+        "contact.load_radius_95",
+        parts=(("low", "high"),),
+        keys=(
+            ("load_radius_low_m", "lower end of the 95 % interval of load_radius_m, often 0"),
+            ("load_radius_high_m", "upper end of the 95 % interval of load_radius_m"),
         ),
     ),
 )

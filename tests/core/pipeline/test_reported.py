@@ -52,6 +52,8 @@ COLUMNS = [
     "force_95",
     "displacement",
     "displacement_sd",
+    "load_radius",
+    "load_radius_95",
     "point",
     "frame",
     "metric",
@@ -68,7 +70,7 @@ UNITS = {
     **dict.fromkeys(("time", "device_time", "host_time", "taken", "taken_sd"), "s"),
     **dict.fromkeys(("nominal", "curvature", "residual", "noise"), "1/m"),
     **dict.fromkeys(("coefficients", "position", "position_sd", "position_95", "point"), "m"),
-    **dict.fromkeys(("displacement", "displacement_sd"), "m"),
+    **dict.fromkeys(("displacement", "displacement_sd", "load_radius", "load_radius_95"), "m"),
     **dict.fromkeys(("force", "force_sd", "force_95"), "N"),
     **dict.fromkeys(("curvature_form", "torsion_form", "principal", "principal_sd"), "1/m"),
     **{"covariance": "1/m^2", "angle": "rad"},
@@ -78,6 +80,7 @@ HEADS = """
 position_x [m],position_y [m],position_sd_x [m],position_sd_y [m]
 position_95_x [m],position_95_y [m]
 force [N],force_sd [N],force_95 [N],displacement [m],displacement_sd [m]
+load_radius [m],load_radius_95_low [m],load_radius_95_high [m]
 point_x [m],point_y [m],point_z [m]
 frame_t_x,frame_t_y,frame_t_z,frame_s_x,frame_s_y,frame_s_z,frame_n_x,frame_n_y,frame_n_z
 metric_t_x,metric_t_y,metric_s_x,metric_s_y
@@ -103,6 +106,9 @@ KEYS = [
     "force_sd_N",
     "displacement_m",
     "displacement_sd_m",
+    "load_radius_m",
+    "load_radius_low_m",
+    "load_radius_high_m",
     "position_x_m",
     "position_y_m",
     "position_z_m",
