@@ -5,7 +5,7 @@ from math import sqrt
 
 import pytest
 
-from studies import BENT, FLAT, STRETCHED, coverage
+from studies import BENT, FLAT, SHAPES, STRETCHED, coverage, shape_coverage
 
 pytestmark = pytest.mark.truth
 
@@ -69,16 +69,32 @@ def test_intervals_on_a_bent_skin_cover_the_truth(case, frames):
 
 # A flat skin that stretches, of known thickness, pressed in by up to more than twice of it
 
+HELD, OTHERS = STRETCHED[:2], STRETCHED[2:]
+EACH_STRETCHED = [*HELD, *(pytest.param(case, marks=pytest.mark.full) for case in OTHERS)]
 
-@each(STRETCHED)
+
+@each(EACH_STRETCHED)
 @frames
 def test_the_force_on_a_stretched_skin_is_right(case, frames):
     assert abs(figures(case, frames).bias) < 0.05
 
 
-@each(STRETCHED)
+@each(EACH_STRETCHED)
 @frames
 def test_intervals_on_a_stretched_skin_cover_the_truth(case, frames):
     found, least = figures(case, frames), 0.85 - slack(frames)
 
     assert min(found.x, found.y, found.force) >= least
+
+
+# Shapes: the functions end where the truth does not, and nothing promises 95 %
+
+
+@pytest.mark.parametrize("case", FLAT[:3], ids=lambda case: case.name)
+@pytest.mark.parametrize(("method", "functions"), SHAPES)
+@frames
+def test_bands_of_the_surface_cover_nine_tenths_of_it(case, method, functions, frames):
+    covered, rms = shape_coverage(case, method, functions, frames)
+
+    assert 0.90 <= covered <= 0.98
+    assert rms < 30e-6
