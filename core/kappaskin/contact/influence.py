@@ -315,7 +315,7 @@ def _rest_of(
     patch, positions = plate.patch, np.frombuffer(places).reshape(-1, 2)
     layout = replace(SensorLayout.scattered(patch, positions), gage_length=gage_length)
     x, y = patch.grid(*_nodes(patch, len(positions)))
-    is_shell = patch.base_curvature and edge in _SINES and not plate.fluid
+    is_shell = patch.base_curvature and edge in _SINES
     of_skin = _of_shell if is_shell else _of_functions
     rest, gives, sd = of_skin(plate, layout, edge, x, y)
     for i in range(0, len(positions), _TOGETHER):
@@ -348,9 +348,9 @@ def _of_shell(
     """As `_of_functions`, as a shell."""
     sd = max(_SD * min(plate.patch.a, plate.patch.b), Shell.finest_on(plate.patch))
     shell = Shell(plate, sd, sliding=edge == "sliding")
-    T, gives = shell.readings_under(layout, x, y, sd)
+    T, gives = shell.readings_under(layout, x, y)
     unit = 8 * math.pi * plate.rigidity
-    return unit * T[0].reshape(len(y), len(x), 3, len(layout)), gives, sd
+    return unit * T.reshape(len(y), len(x), 3, len(layout)), gives, sd
 
 
 def _nodes(patch: Patch, elements: int) -> tuple[int, int]:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable
-from functools import cached_property, partial
+from functools import partial
 from itertools import pairwise, repeat
 from typing import TYPE_CHECKING, Protocol
 
@@ -204,36 +204,38 @@ class Gages(Protocol):
 
 
 class Shell:
-    """A bent skin with hinged edges under small loads: its displacements to convergence.
+    """A bent skin with hinged edges under Gaussian loads, resolved to convergence.
 
-    `finest` in m is the least standard deviation of a load. `sliding` edges let the hoop
-    displacement go however they are held in plane.
+    Their standard deviation is `sd` in m, at least that of `finest_on`. `sliding` edges let the
+    hoop displacement go however they are held in plane.
     """
 
-    def __init__(self, plate: "Plate", finest: float = 1e-3, sliding: bool = False) -> None:
+    def __init__(self, plate: "Plate", sd: float, sliding: bool = False) -> None:
         patch = plate.patch
-        if not patch.base_curvature or patch.strip:
-            raise Refusal(f"expected a skin that is bent, with two sides, got a {patch.name}")
-        if finest < (least := self.finest_on(patch)) * (1 - 1e-9):
+        if not patch.base_curvature or patch.strip or not plate.rigidity:
+            raise Refusal(
+                f"expected a bent skin with two sides and a rigidity above zero, got {plate}"
+            )
+        if sd < (least := self.finest_on(patch)) * (1 - 1e-9):
             raise Refusal(
                 f"expected a load of a standard deviation of at least {least:.3g} m on a "
-                f"{patch.name}, got {finest:g} m"
+                f"{patch.name}, got {sd:g} m"
             )
         # A Gaussian has exp(-8) of its amplitude left at the wave number 4 / sd.
-        functions = math.ceil(2 * patch.a / finest * (1 - 1e-9))
-        waves = math.ceil(4 * patch.b / finest / np.pi * (1 - 1e-9))
-        self._plate, self._finest, count = plate, finest, max(functions, 16)
+        functions = math.ceil(2 * patch.a / sd * (1 - 1e-9))
+        waves = math.ceil(4 * patch.b / sd / np.pi * (1 - 1e-9))
+        self._plate, self._sd, count = plate, sd, max(functions, 16)
         self._arc = _Arc(plate, partial(_twice, patch.a, count), count, sliding)
         self._q = np.pi / patch.b * np.arange(1.0, max(waves, 16) + 1)
         self._felt = self._arc.rows(self._arc.x)[0][:, self._arc.f].T * self._arc.weights
+        self._answer = self._solved()
 
     @staticmethod
     def finest_on(patch: Patch) -> float:
         """The least standard deviation in m that can be asked for on `patch`."""
         return max(2 * patch.a / _MOST_FUNCTIONS, 4 * patch.b / (math.pi * _MOST_WAVES))
 
-    @cached_property
-    def _answer(self) -> Array:
+    def _solved(self) -> Array:
         """The displacements (J, n, N) in m of each wave under unit forces on the functions of f."""
         K, f = self._arc.stiffness(self._q), self._arc.f
         scale: Array = 1 / np.sqrt(np.einsum("jnn->jn", K))
@@ -243,47 +245,51 @@ class Shell:
         answer: Array = np.linalg.solve(scaled, forces) * scale[:, :, None]
         return answer * (2 / self._plate.patch.b)  # the integral of a squared sine is b / 2
 
-    def _loads(self, x: Array, sd: float) -> Array:
-        """Forces (N, 2 X) on the functions of f under unit loads at `x`, and second derivatives.
+    def _loads(self, x: Array) -> Array:
+        """Forces (N, X) on the functions of f under unit loads at `x` (X,), over sin(q y).
 
         Beyond the ends the load is reflected with the other sign, as sines do along y.
         """
-        load, second = np.zeros((2, len(self._arc.x), len(x)))
+        load = np.zeros((len(self._arc.x), len(x)))
         for sign, centre in ((1, x), (-1, -x), (-1, 2 * self._plate.patch.a - x)):
-            r = (self._arc.x[:, None] - centre) / sd
-            bell = sign * np.exp(-(r**2) / 2) / (sd * math.sqrt(2 * np.pi))
-            load += bell
-            second += bell * (r**2 - 1) / sd**2
-        return self._felt @ np.hstack([load, second])
+            r = (self._arc.x[:, None] - centre) / self._sd
+            load += sign * np.exp(-(r**2) / 2) / (self._sd * math.sqrt(2 * np.pi))
+        return self._felt @ load
 
-    def readings_under(self, gages: Gages, x: Array, y: Array, sd: float) -> tuple[Array, Array]:
-        """Readings (2, ny, nx, 3 P) under 1 N at each node of `x` (nx,), `y` (ny,), and its give.
+    def readings_under(self, gages: Gages, x: Array, y: Array) -> tuple[Array, Array]:
+        """Readings (ny, nx, 3 P) under 1 N at each node of `x` (nx,), `y` (ny,), and its give.
 
-        The load is a Gaussian of standard deviation `sd`; all in m. The first are the readings in
-        1/m per N, xx of all elements, then yy, then xy; the second their Laplacian by the load's
-        place in 1/m^3 per N. The give (ny, nx) in m per N is the displacement at the load's centre.
+        Nodes are in m. The readings are in 1/m per N: xx of all elements, then yy, then xy; the
+        give (ny, nx) in m per N is the displacement at the load's centre.
         """
-        if sd < self._finest * (1 - 1e-9):
-            raise Refusal(
-                f"expected a load of a standard deviation of at least {self._finest:g} m, got "
-                f"{sd:g}"
-            )
-        q, nx, P = self._q, len(x), len(gages.positions)
-        along = np.exp(-((q * sd) ** 2) / 2) * np.sin(np.multiply.outer(y, q))  # (ny, J)
-        answer = self._answer @ self._loads(x, sd)  # (J, n, 2 nx)
-        answer[:, :, nx:] -= q[:, None, None] ** 2 * answer[:, :, :nx]
+        q, f = self._q, self._arc.rows(x)[0]
+        sines: Array = np.sin(np.multiply.outer(y, q))
+        along: Array = np.exp(-((q * self._sd) ** 2) / 2) * sines
+        moved: Array = self._answer @ self._loads(x)
+        read = self._read(gages, moved, along)
+        give: Array = (along * sines) @ np.einsum("xn,jnx->jx", f, moved)
+        if not self._plate.fluid:
+            return read, give
+        # The pressure that takes the volume back which the load displaces.
+        over: Array = np.multiply.outer(
+            (1 - np.cos(q * self._plate.patch.b)) / q, self._felt.sum(axis=1)
+        )
+        swollen = np.einsum("jnf,jf->jn", self._answer, over)
+        displaced: Array = along @ np.einsum("jf,jfx->jx", over, moved[:, self._arc.f])
+        pressure = displaced / np.sum(over * swollen[:, self._arc.f])
+        alike = self._read(gages, swollen[..., None], np.ones((1, len(q))))
+        return read - pressure[..., None] * alike, give - pressure * (sines @ swollen @ f.T)
+
+    def _read(self, gages: Gages, moved: Array, along: Array) -> Array:
+        """Readings (Y, X, 3 P) of displacements `moved` (J, n, X), by shares `along` (Y, J)."""
         at, place = np.unique(gages.positions[:, 0], return_inverse=True)
-        T = np.empty((2, len(y), nx, 3, P))
+        T = np.empty((len(along), moved.shape[2], 3, len(place)))
         for c, rows in enumerate(self._rows(at, gages.gage_length)):
-            read = np.stack([row @ of for row, of in zip(rows, answer, strict=False)])
-            read = read.reshape(len(q), len(at), 2, nx).transpose(2, 1, 0, 3)  # (2, U, J, nx)
+            read = np.stack([row @ of for row, of in zip(rows, moved, strict=False)], axis=1)
             turn = np.cos if c == 2 else np.sin
             for p, (u, z) in enumerate(zip(place, gages.positions[:, 1], strict=True)):
-                T[:, :, :, c, p] = (along * turn(q * z)) @ read[:, u]
-        f = self._arc.rows(x)[0]
-        own = np.einsum("xn,jnx->jx", f, answer[:, :, :nx])
-        give = (along * np.sin(np.multiply.outer(y, q))) @ own
-        return T.reshape(2, len(y), nx, 3 * P), give
+                T[:, :, c, p] = (along * turn(self._q * z)) @ read[u]
+        return T.reshape(*T.shape[:2], -1)
 
     def _rows(self, x: Array, gage_length: float) -> tuple[Iterable[Array], ...]:
         """For xx, yy and xy the readings (X, n) of the functions at `x` (X,), wave by wave.

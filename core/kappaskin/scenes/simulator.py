@@ -106,7 +106,7 @@ class Simulator:
         self._scan = scene.sensor().scan()
         sloped = [effect for effect in self._kept if isinstance(effect, FiniteSlopeEffect)]
         if sloped:
-            self._sensed = sloped[0].sensed(self._basis, layout)
+            self._sensed = sloped[0].sensed(self._basis, layout, plate)
         else:
             self._sensed = _linear(layout.curvature_operator(self._basis, plate))
 

@@ -320,12 +320,22 @@ class NormalCurvature:
     """The map from coefficients to the true normal curvature of the surface along the gages.
 
     A gage of some length reads the mean of the curvature of first order along it, at the slope in
-    its middle.
+    its middle. With a `plate`, the first order is that of its deflection under loads.
     """
 
-    def __init__(self, basis: Basis, layout: SensorLayout, dtype: DTypeLike = np.float64) -> None:
+    def __init__(
+        self,
+        basis: Basis,
+        layout: SensorLayout,
+        dtype: DTypeLike = np.float64,
+        plate: Plate | None = None,
+    ) -> None:
         places, H = layout.positions, basis.patch.base_curvature
-        maps = [*layout.curvature_operator(basis).reshape(3, len(layout), basis.size)]
+        M = layout.curvature_operator(basis)
+        self._stretch: Array | None = None
+        if H and plate:
+            self._stretch = (layout.curvature_operator(basis, plate) - M).T.astype(dtype)
+        maps = [*M.reshape(3, len(layout), basis.size)]
         maps += [basis.at(places, 1, 0), basis.at(places, 0, 1)]
         if H:
             maps[3] = maps[3] + H**2 * basis.at(places, -1, 0)
@@ -342,4 +352,7 @@ class NormalCurvature:
     def __call__(self, coefficients: Array) -> Array:
         """Curvature (..., 3, P) in 1/m for `coefficients` (..., Ni, Nj)."""
         flat = coefficients.reshape(*coefficients.shape[:-2], self.maps.shape[2])
-        return np.moveaxis(self.surface(flat).readings, 0, -2)
+        readings = np.moveaxis(self.surface(flat).readings, 0, -2)
+        if self._stretch is None:
+            return readings
+        return readings + np.dot(flat, self._stretch).reshape(readings.shape)

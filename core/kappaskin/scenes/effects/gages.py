@@ -11,6 +11,7 @@ from kappaskin._schema import Within
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
+from kappaskin.mechanics import Plate
 from kappaskin.scenes.effects.effect import (
     Effect,
     LayoutEffect,
@@ -40,16 +41,19 @@ class FiniteSlopeEffect(Effect):
     formula: ClassVar = "largest slope squared"
 
     def size(self, survey: Survey) -> Size:
-        sensed = NormalCurvature(survey.basis, replace(survey.layout, gage_length=0.0))
-        surface = sensed.surface(survey.coefficients)
-        number = float(surface.slope.max(initial=0.0)) ** 2
-        return Size(number, survey.share(survey.curvature - np.moveaxis(surface.readings, 0, -2)))
+        short = replace(survey.layout, gage_length=0.0)
+        sensed = NormalCurvature(survey.basis, short, plate=survey.plate)
+        number = float(sensed.surface(survey.coefficients).slope.max(initial=0.0)) ** 2
+        curvature = sensed(survey.coefficients.reshape(-1, *survey.basis.shape))
+        return Size(number, survey.share(survey.curvature - curvature))
 
-    def sensed(self, basis: Basis, layout: SensorLayout) -> Callable[[Array], Array]:
+    def sensed(
+        self, basis: Basis, layout: SensorLayout, plate: Plate | None = None
+    ) -> Callable[[Array], Array]:
         """Coefficients (Ni, Nj) in m to the curvature (3 P,) in 1/m that the elements read."""
         from kappaskin.scenes.effects.at_work.gages import finite_slope
 
-        return finite_slope(basis, layout)
+        return finite_slope(basis, layout, plate)
 
 
 @dataclass(frozen=True)

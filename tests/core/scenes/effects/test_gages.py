@@ -15,6 +15,7 @@ from kappaskin import (
     LeastSquares,
     Patch,
     Plate,
+    PointLoad,
     Polygon,
     Refusal,
     Sensor,
@@ -262,6 +263,19 @@ def test_on_a_bent_skin_it_is_the_surface_in_space_that_is_sensed():
     first_order = (layout.curvature_operator(basis) @ c.ravel()).reshape(3, -1)
     np.testing.assert_allclose(sensed, expected, rtol=1e-10, atol=1e-10)
     assert np.abs(expected - first_order).max() > 0.05 * np.abs(first_order).max()
+
+
+def test_on_slight_slopes_a_loaded_skin_is_sensed_as_the_shell_that_it_is():
+    plate = Plate(Patch(0.04, 0.03, 12.9e-3))
+    basis, layout = SineBasis(plate.patch, 12, 12), SensorLayout.regular(plate.patch, 8, 8)
+    c = plate.deflection([PointLoad(0.02, 0.012, 1e-4)], basis)
+
+    sensed = FiniteSlopeEffect().sensed(basis, layout, plate)(c)
+
+    shell, bent = (layout.curvature_operator(basis, of) @ c.ravel() for of in (plate, None))
+    peak = np.abs(shell).max()
+    np.testing.assert_allclose(sensed, shell, rtol=0, atol=1e-4 * peak)
+    assert np.abs(shell - bent).max() > 3e-3 * peak
 
 
 # What holds the skin

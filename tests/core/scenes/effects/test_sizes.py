@@ -114,7 +114,7 @@ class Scenery:
 
     def readings(self, layout=None, plate=None):
         """What the elements read (L, 3 P) of each load all alone."""
-        M = (layout or self.layout).curvature_operator(self.basis)
+        M = (layout or self.layout).curvature_operator(self.basis, self.plate)
         return self.shapes(plate or self.plate) @ M.T
 
     @property
@@ -179,7 +179,7 @@ def left_out(effect, seed):
     if isinstance(effect, LayoutEffect):
         return np.abs(share @ scene.readings(effect.of(scene.layout)) - K).max()
     if isinstance(effect, FiniteSlopeEffect):
-        sensed = effect.sensed(scene.basis, scene.layout)
+        sensed = effect.sensed(scene.basis, scene.layout, scene.plate)
         shapes = s.coefficients.reshape(FRAMES, *scene.basis.shape)
         return max(np.abs(sensed(c) - k).max() for c, k in zip(shapes, K, strict=True))
     if isinstance(effect, Skew):

@@ -6,12 +6,15 @@ import numpy as np
 
 from kappaskin.bases import Basis
 from kappaskin.frames import Array
+from kappaskin.mechanics import Plate
 from kappaskin.scenes.effects.at_work import RunningEffect
 from kappaskin.sensing import NormalCurvature, PrandtlIshlinskii, SensorLayout, StandardLinearSolid
 
 
-def finite_slope(basis: Basis, layout: SensorLayout) -> Callable[[Array], Array]:
-    sensed = NormalCurvature(basis, layout)
+def finite_slope(
+    basis: Basis, layout: SensorLayout, plate: Plate | None
+) -> Callable[[Array], Array]:
+    sensed = NormalCurvature(basis, layout, plate=plate)
     return lambda coefficients: sensed(coefficients).ravel()
 
 
