@@ -23,6 +23,7 @@ LONGEST = Feedback(
     *(-12.345, 0.123, 0.03456, 0.00123, (0.1234, 0.1234), 0.00012, "cylinder", 0.06),
     RadiusEstimate("cylinder", 0.1234, (0.1121, 0.1345)),
     near_rim=False,
+    force_is_lower_bound=True,
 )
 WHY = (
     "/dev/serial/by-id/usb-Kappaskin_SIM-0001: nothing has come for 2 s; is the cable plugged in, "
@@ -142,7 +143,7 @@ from kappaskin_app.features.presenter.feedback import Feedback, RadiusEstimate
 view = PresenterView(QWidget()); view.resize(1280, 720); view.present(True); view.show()
 assert view.devicePixelRatioF() == 1.5
 view.show_feedback(Feedback(-12.345, 0.123, 0.03456, 0.00123, (0.1234, 0.1234), 0.00012,
-                   "cylinder", 0.06, RadiusEstimate("cylinder", 0.1234, (0.1121, 0.1345)), False))
+                   "cylinder", 0.06, RadiusEstimate("cylinder", 0.1234, (0.1121, 0.1345)), False, True))
 view.strip.show_state("LIVE", "Second-generation fingertip, left hand", "1000 ms old")
 app.processEvents()
 print([w.text for b in view.indicators if b.isVisible() for w in b.words() if not w.fits])
@@ -175,6 +176,7 @@ def test_letters_stand_out_from_their_ground_without_any_colour(theme, qtbot) ->
 
     view, colours = view_of((1280, 720), qtbot, theme), THEMES[theme]
     view.show_feedback(LONGEST)
+    assert view.force.value.startswith("\N{GREATER-THAN OR EQUAL TO}")
     for indicator in indicators(view):
         for words in indicator.words():
             ground = colours.window
