@@ -218,7 +218,8 @@ def all_of(number: float) -> Estimate:
     estimate = estimate_of(pipeline_of(Setup(8, 8, 129, 129)))
     parts = {f.name: np.full(np.shape(getattr(estimate, f.name)), number) for f in fields(estimate)}
     pair, matrix = np.full(2, number), np.full((2, 2), number)
-    contact = Contact(pair, pair, number, number, number, number, int(number), True, False)
+    forces = number, number, number, number, int(number)
+    contact = Contact(pair, pair, *forces, True, False, size=number, size_sd=number)
     square = np.full((3, 3), number)
     geometry = LocalGeometry(square[0], square, matrix, matrix, pair, square)
     return Estimate(**parts | {"contact": contact, "geometry": geometry})

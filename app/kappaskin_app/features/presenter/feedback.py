@@ -48,6 +48,7 @@ class Feedback:
     length: float
     radius: RadiusEstimate | None
     near_rim: bool
+    force_is_lower_bound: bool = False
 
 
 def feedback_of(estimate: Estimate, recognised: Recognised | None = None) -> Feedback | None:
@@ -77,6 +78,7 @@ def feedback_of(estimate: Estimate, recognised: Recognised | None = None) -> Fee
     return Feedback(
         *(force, force_95, displacement, displacement_95, (x, y), place_95),
         *(kind, length, _radius_estimate(estimate, recognised), contact.near_rim),
+        contact.force_is_lower_bound,
     )
 
 

@@ -23,6 +23,7 @@ LONGEST = Feedback(
     *(-12.345, 0.123, 0.03456, 0.00123, (0.1234, 0.1234), 0.00012, "cylinder", 0.06),
     RadiusEstimate("cylinder", 0.1234, (0.1121, 0.1345)),
     near_rim=False,
+    force_is_lower_bound=True,
 )
 WHY = (
     "/dev/serial/by-id/usb-Kappaskin_SIM-0001: nothing has come for 2 s; is the cable plugged in, "
@@ -142,7 +143,8 @@ from kappaskin_app.features.presenter.feedback import Feedback, RadiusEstimate
 view = PresenterView(QWidget()); view.resize(1280, 720); view.present(True); view.show()
 assert view.devicePixelRatioF() == 1.5
 view.show_feedback(Feedback(-12.345, 0.123, 0.03456, 0.00123, (0.1234, 0.1234), 0.00012,
-                   "cylinder", 0.06, RadiusEstimate("cylinder", 0.1234, (0.1121, 0.1345)), False))
+                   "cylinder", 0.06, RadiusEstimate("cylinder", 0.1234, (0.1121, 0.1345)),
+                   False, True))
 view.strip.show_state("LIVE", "Second-generation fingertip, left hand", "1000 ms old")
 app.processEvents()
 print([w.text for b in view.indicators if b.isVisible() for w in b.words() if not w.fits])
@@ -167,6 +169,14 @@ def luminance(colour: str) -> float:
 def contrast(one: str, other: str) -> float:
     low, high = sorted((luminance(one), luminance(other)))
     return (high + 0.05) / (low + 0.05)
+
+
+def test_a_force_that_leaves_out_a_stretch_is_a_lower_bound(qtbot) -> None:
+    view = view_of((1280, 720), qtbot)
+
+    view.show_feedback(LONGEST)
+
+    assert view.force.value == "\N{GREATER-THAN OR EQUAL TO} \N{MINUS SIGN}12.345 N"
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
