@@ -188,7 +188,8 @@ class Engine:
             self._deaths = []
             self._requests.disconnect()
             self._requests.change(recording=None)
-        self._requests.change(source=source, trust=trust, scene=None, speed=1.0, looped=False)
+        played = {"speed": 1.0, "looped": False, "recomputes": False}
+        self._requests.change(source=source, trust=trust, scene=None, **played)
         if dead:
             self._start_again()
 
@@ -220,6 +221,10 @@ class Engine:
     def restart_effects(self) -> None:
         """Restart the simulated sensor's effects, as from rest."""
         self._requests.act(RestartEffects())
+
+    def recompute(self, on: bool) -> None:
+        """Show of a recording what is computed again of its readings, or what was recorded."""
+        self._requests.change(recomputes=on)
 
     def step(self, frames: int) -> None:
         """Pause a recording, so many `frames` further on, or back if negative."""

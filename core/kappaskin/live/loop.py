@@ -122,6 +122,8 @@ class EngineLoop:
                 self._go_to(requested.source)
             case "scene":
                 self._play(requested.scene)
+            case "recomputes":
+                self._recompute()
             case "recording":
                 self._recorder.begin(requested.recording, self._source, self._main)
             case Seek() | StepFrames():
@@ -151,12 +153,19 @@ class EngineLoop:
         try:
             self._source = open_source(name, self._requests.requested.trust)
             self._recorder.connect(self._source)
+            self._recompute()
             self._status = replace(self._status, state=WAITING, source=name, message="")
         except SourceError as error:
             self._again = time.monotonic() + _AGAIN
             self._status = replace(self._status, state=LOST, source=name, message=str(error))
         except Refusal as refusal:
             self._status = replace(self._status, state=LOST, source=name, message=str(refusal))
+
+    def _recompute(self) -> None:
+        """Let a recording show its recorded estimates, or such as are computed again."""
+        if isinstance(self._source, ReplayedSource):
+            self._source.recomputes = self._requests.requested.recomputes
+            self._source.again()
 
     def _move(self, request: Seek | StepFrames) -> None:
         """Move to another position in the source."""
@@ -267,6 +276,8 @@ class EngineLoop:
         for frame in frames[late:]:
             begun = time.monotonic()
             estimate = pipeline(frame)
+            if isinstance(source, ReplayedSource):
+                estimate = source.as_recorded(estimate, pipeline)
             self._publishing.send(estimate, pipeline, begun)
             self._main.ring.write(estimate)
             self._tare.take(estimate)

@@ -21,7 +21,9 @@ from kappaskin.scenes import Scene
 
 _RESEND = 0.5  # s after which an engine that reports, but not of what was sent, did not get it
 
-SETTINGS = ("setup", "compared", "region", "targets", "source", "scene", "recording")
+SETTINGS = (
+    *("setup", "compared", "region", "targets", "source", "scene", "recording", "recomputes"),
+)
 """The fields of `Requested` that the engine reacts to when they change."""
 
 
@@ -77,7 +79,8 @@ class Requested:
 
     Lasting settings come first: `targets` that are servers have `access`, with `trust` the scene
     that `source` names may name files outside its folder, a scene or recording plays at `speed`,
-    `looped` or not, and `window_state` is stored for a window that resumes the engine. `actions`
+    `looped` or not, a recording shows recorded estimates unless it `recomputes` them, and
+    `window_state` is stored for a window that resumes the engine. `actions`
     are the last ones, each with the `number` of the value that added it; `changed` has the number
     with which each setting was last requested. `over` ends the engine.
     """
@@ -93,6 +96,7 @@ class Requested:
     recording: Path | None = None
     speed: float = 1.0
     looped: bool = False
+    recomputes: bool = False
     window_state: bytes = b""
     actions: tuple[tuple[int, Action], ...] = ()
     over: bool = False

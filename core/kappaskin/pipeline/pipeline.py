@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,7 @@ from kappaskin.health import Exclusion, exclude
 from kappaskin.pipeline.setup import Setup
 from kappaskin.sensing import Sensor
 
-REVISION = 1
+REVISION = 2
 """Of the estimates: `python tests/estimates.py` raises it where the same readings give others."""
 
 _LOOSE = 100.0  # times the error bars with every reading: beyond it a shape is undetermined
@@ -262,6 +263,25 @@ class Pipeline:
             contact_geometry(fit, contact),
             *self._compared(surface, fit.coefficients, frame.truth),
         )
+
+    def shape_quantities(
+        self, curvature: Array, coefficients: Array, of: Estimate
+    ) -> dict[str, Any]:
+        """The fields of the estimate `of` that follow from other readings and another shape."""
+        surface = self._surface(coefficients)
+        at_load = rms = math.nan
+        if math.isfinite(of.error_rms):
+            off = (surface - of.true_surface)[self._skin].ravel()
+            rms = math.sqrt(float(off.dot(off)) / off.size)
+        if math.isfinite(of.error_at_load):
+            x, y = of.true_contact.tolist()
+            at_load = of.error_at_load + self.basis.value(x, y, coefficients - of.coefficients)
+        return {
+            "residual": curvature - self.fit.predicted(coefficients),
+            "surface": surface,
+            "error_at_load": at_load,
+            "error_rms": rms,
+        }
 
     def continue_from(self, before: "Pipeline") -> None:
         """Continue from the state of `before`, if its readings are of the same sensor and kind."""

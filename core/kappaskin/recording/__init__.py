@@ -6,6 +6,7 @@ from kappaskin.recording.export.request import ExportRequest as ExportRequest
 from kappaskin.recording.export.writing import Exported as Exported
 from kappaskin.recording.export.writing import ExportTask as ExportTask
 from kappaskin.recording.reading import Recording as Recording
+from kappaskin.recording.reading import made_by as made_by
 from kappaskin.recording.recompute import RecordingSummary as RecordingSummary
 from kappaskin.recording.recompute import Verification as Verification
 from kappaskin.recording.recompute import recorded_setups as recorded_setups

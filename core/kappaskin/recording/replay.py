@@ -4,14 +4,16 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import islice, pairwise
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from kappaskin.errors import Refusal
-from kappaskin.frames import Event, Frame
+from kappaskin.frames import Contact, Estimate, Event, Frame, LocalGeometry
+from kappaskin.pipeline import Pipeline, Setup, setup_from_text
 from kappaskin.recording import messages as m
+from kappaskin.recording.cdr import decode
 from kappaskin.recording.reading import RecordedMessage, Recording, event_of
 from kappaskin.recording.recompute import RecordedFrames
 from kappaskin.sensing import Sensor
@@ -36,6 +38,8 @@ class Replay:
     It restarts at its end if `looped`. `gaps` are the times in s, from and to, without
     messages; `events` the first events and their times in s. It was `begun` so many s
     after 1970; one that is not `whole` was never ended, and is played up to where it breaks off.
+    It was recorded by the program and revision `made_by`; `shows_recorded` says whether the last
+    estimate is the recorded one, not one computed again.
     """
 
     at: float
@@ -46,6 +50,53 @@ class Replay:
     events: tuple[Event, ...]
     begun: float
     whole: bool
+    made_by: str = ""
+    shows_recorded: bool = False
+
+
+_RESULTS = {topic.name: topic.kind for topic in (m.CONTACTS, m.CURVATURES, m.SHAPES)}
+_AHEAD = 10**9  # ns after a frame within which its results were recorded, if at all
+_REMEMBERED = 4096  # frames whose results are held for those that are read late
+
+
+class _RecordedResults:
+    """The results in a recording from the chunk number `first` on, each with the setup used."""
+
+    def __init__(self, recording: Recording, first: int, stamp: int) -> None:
+        self._recording, self._messages = recording, recording.messages(first)
+        self._next = next(self._messages, None)
+        self._setup: Setup | None = None
+        self._text = ""
+        self._found: dict[tuple[int, float], tuple[Setup | None, dict[str, Any]]] = {}
+        if message := recording.last_before(m.SETUP, stamp):
+            self._take(message)
+
+    def of(self, estimate: Estimate, stamp: int) -> tuple[Setup | None, dict[str, Any]]:
+        """The setup and the fields recorded of a frame that came at `stamp`, as far as there are.
+
+        Those of the shape are there only where the curvature was recorded too.
+        """
+        key = estimate.sequence, estimate.device_time
+        while self._next is not None and self._next.stamp <= stamp + _AHEAD:
+            if self._next.topic == m.LINES.name and key in self._found:
+                break  # all that belongs to the frames before was written before
+            self._take(self._next)
+            self._next = next(self._messages, None)
+        return self._found.get(key, (None, {}))
+
+    def _take(self, message: RecordedMessage) -> None:
+        if message.topic == m.SETUP.name:
+            text = decode(m.STRING, message.data)["data"]
+            if text != self._text:
+                self._setup = setup_from_text(text, self._recording.attachment)
+                self._text = text
+        elif kind := _RESULTS.get(message.topic):
+            values = decode(kind, message.data)
+            key = values["sequence"], values["device_time"]
+            known = self._found.setdefault(key, (self._setup, {}))[1]
+            known[message.topic.rpartition("/")[2]] = values
+            if len(self._found) > _REMEMBERED:
+                self._found.pop(next(iter(self._found)))
 
 
 class _Ready(NamedTuple):
@@ -95,6 +146,7 @@ class ReplayedSource:
         self._last: _Ready | None = None  # the frame given last
         self._steps, self._moves = 0, False  # frames to give at once, and go on from there
         self._back = 0  # frames before the last one given, from which these are
+        self.recomputes, self._shows_recorded = False, False
         self._go_to(0.0)
 
     def _landmarks(self) -> tuple[tuple[tuple[float, float], ...], tuple[Event, ...]]:
@@ -117,7 +169,22 @@ class ReplayedSource:
     def replay(self) -> Replay:
         where = min(max(self._at(), 0.0), self.length)
         rest = self._speed, self._looped, self._gaps, self._all_events
-        return Replay(where, self.length, *rest, self._first * 1e-9, self._recording.whole)
+        begun, whole, made_by = self._first * 1e-9, self._recording.whole, self._recording.made_by
+        return Replay(where, self.length, *rest, begun, whole, made_by, self._shows_recorded)
+
+    def as_recorded(self, estimate: Estimate, pipeline: Pipeline) -> Estimate:
+        """What was recorded of the frame of an `estimate`, as far as it was.
+
+        As it is where nothing was recorded of it, or with other settings than those of the
+        `pipeline`, or where this source `recomputes`. A shape that was not recorded, as those
+        between 50 a second, stays as it is.
+        """
+        setup, found = None, dict[str, Any]()
+        if not self.recomputes and self._last is not None:
+            with suppress(Refusal):  # damage is reported when it is played
+                setup, found = self._results.of(estimate, self._last.mark[0])
+        self._shows_recorded = "contact" in found and _same_estimator(setup, pipeline.setup)
+        return recorded_estimate(estimate, found, pipeline) if self._shows_recorded else estimate
 
     def _at(self) -> float:
         return self._from + (self._clock() - self._since) * self._speed
@@ -134,6 +201,7 @@ class ReplayedSource:
         for topic in (m.DEVICE, m.CLOCKS):
             if message := self._recording.last_before(topic, stamp):
                 self._frames.begin_with(message)
+        self._results = _RecordedResults(self._recording, max(later - 1, 0), stamp)
         self._messages: Iterator[RecordedMessage] = self._recording.messages(max(later - 1, 0))
         self._next: RecordedMessage | None = next(self._messages, None)
         while self._next is not None and self._next.stamp < stamp:
@@ -288,6 +356,44 @@ class ReplayedSource:
 
     def close(self) -> None:
         self._recording.close()
+
+
+def _same_estimator(setup: Setup | None, used: Setup) -> bool:
+    """Whether the settings are the same but for the points of the surface."""
+    return setup is not None and replace(setup, nx=used.nx, ny=used.ny) == used
+
+
+def recorded_estimate(estimate: Estimate, found: dict[str, Any], pipeline: Pipeline) -> Estimate:
+    """An `estimate` with the numbers `found` in the recording instead of those computed again."""
+    recorded = found["contact"]
+    contact = {each.name: recorded[each.name] for each in fields(Contact) if each.name in recorded}
+    geometry = LocalGeometry(
+        recorded["point"],
+        recorded["frame"].reshape(3, 3),
+        recorded["metric"].reshape(2, 2),
+        recorded["curvature_form"].reshape(2, 2),
+        recorded["torsion_form"],
+        recorded["covariance"].reshape(3, 3),
+    )
+    shown = replace(
+        estimate,
+        contact=Contact(**contact),
+        geometry=geometry,
+        noise=recorded["noise"],
+        converged=recorded["converged"],
+    )
+    shape, readings = found.get("coefficients"), found.get("curvature")
+    if shape is None or readings is None:
+        return shown
+    coefficients = shape["coefficients"].reshape(estimate.coefficients.shape)
+    curvature = readings["curvature"].reshape(estimate.curvature.shape)
+    return replace(
+        shown,
+        curvature=curvature,
+        coefficients=coefficients,
+        suspect=readings["suspect"],
+        **pipeline.shape_quantities(curvature, coefficients, estimate),
+    )
 
 
 def _brief(event: Event) -> Event:

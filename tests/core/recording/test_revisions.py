@@ -1,6 +1,7 @@
 """Recordings of another revision of the estimates: what `verify` and `info` report of them."""
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,9 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 
 from kappaskin.cli import main
-from kappaskin.pipeline import REVISION
-from kappaskin.recording import Recording, Repaired, Verification
+from kappaskin.live import Engine
+from kappaskin.pipeline import REVISION, Pipeline, Setup
+from kappaskin.recording import Recording, Repaired, ReplayedSource, Verification
 from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import MessageLayout, decode
 
@@ -117,6 +119,78 @@ def test_results_that_cannot_be_recomputed_are_a_failure_of_any_revision(recordi
     assert verdict.passed
     assert not replace(verdict, missing=1).passed
     assert not replace(verdict, compared=0).passed
+
+
+@pytest.fixture
+def played(recording: Path, tmp_path: Path) -> Iterator[ReplayedSource]:
+    """One whose forces another revision found twice as large, at rest at 0.3 s."""
+    clock, other = [0.0], rewritten(recording, tmp_path / "a.mcap", None, force=lambda f: 2 * f)
+    source = ReplayedSource(other, lambda: clock[0])
+    source.seek(0.3, 0.0)
+    yield source
+    source.close()
+
+
+def test_a_replay_shows_what_was_recorded_until_it_is_asked_to_recompute(
+    played: ReplayedSource,
+) -> None:
+    (frame,) = played.read(0.0)
+    pipeline = Pipeline(played.sensor, Setup())
+    again = pipeline(frame)
+
+    shown = played.as_recorded(again, pipeline)
+
+    assert played.replay.shows_recorded
+    assert played.replay.made_by == "kappaskin 9.8, revision unknown"
+    assert shown.contact.force == pytest.approx(2 * again.contact.force, rel=1e-12)
+    for name in ("coefficients", "curvature", "surface", "residual", "error_rms", "error_at_load"):
+        now, was = getattr(shown, name), getattr(again, name)
+        np.testing.assert_allclose(now, was, rtol=1e-9, atol=1e-12, err_msg=name)
+    np.testing.assert_allclose(shown.geometry.frame, again.geometry.frame, atol=1e-12)
+    played.recomputes = True
+    assert played.as_recorded(again, pipeline) is again
+    assert not played.replay.shows_recorded
+
+
+def test_with_other_settings_than_recorded_a_replay_is_recomputed(played: ReplayedSource) -> None:
+    (frame,) = played.read(0.0)
+    for setup, recorded in ((Setup(6, 7), False), (Setup(nx=33, ny=17), True)):
+        pipeline = Pipeline(played.sensor, setup)
+        played.as_recorded(pipeline(frame), pipeline)
+        assert played.replay.shows_recorded is recorded
+    played.seek(0.9, 0.0)
+    (frame,) = played.read(0.0)
+    for setup, recorded in ((Setup(), False), (Setup(6, 7), True)):
+        pipeline = Pipeline(played.sensor, setup)
+        played.as_recorded(pipeline(frame), pipeline)
+        assert played.replay.shows_recorded is recorded
+
+
+@pytest.mark.slow
+def test_the_engine_shows_what_was_recorded_until_it_is_asked_to_recompute(
+    recording: Path, tmp_path: Path
+) -> None:
+    other = rewritten(recording, tmp_path / "a.mcap", None, force=lambda f: 2 * f)
+
+    def force_once(recorded: bool) -> float:
+        end = time.monotonic() + 60
+        while time.monotonic() < end:
+            status = engine.status()
+            estimate = engine.latest(status)
+            same = status.replay is not None and status.replay.shows_recorded == recorded
+            if same and estimate is not None and estimate.contact.present:
+                return estimate.contact.force
+            time.sleep(0.02)
+        raise AssertionError("it never showed that")
+
+    with Engine(Setup()) as engine:
+        engine.connect(f"replay:{other}")
+        engine.seek(0.3, 0.0)
+        recorded = force_once(recorded=True)
+        engine.recompute(True)
+        assert force_once(recorded=False) == pytest.approx(recorded / 2, rel=1e-9)
+        engine.recompute(False)
+        assert force_once(recorded=True) == recorded
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QWidget
 
+from kappaskin._text import printable
 from kappaskin_app.features.recording.playback import PlaybackControl
 from kappaskin_app.features.recording.recorder import RecordingControl, duration_of, size_of
 from kappaskin_app.guard import guarded
@@ -31,7 +32,7 @@ class RecordingPanel(Panel):
         self.record = button(f"Record{ELLIPSIS}", "record-button", _RECORD)
         self.note = button(f"Note{ELLIPSIS}", "note-button", _NOTE)
         self.open = button(f"Open{ELLIPSIS}", "open-button", _OPEN)
-        self.what = Line()
+        self.what, self.estimates = Line(), Line()
         self.copy_button = button(
             "Copy the command", "copy-repair", "Copy the command in the message above."
         )
@@ -43,6 +44,7 @@ class RecordingPanel(Panel):
         self.offer.hide()
         self.body.addLayout(in_a_row(self.record, self.note, self.open))
         self.body.addWidget(self.what)
+        self.body.addWidget(self.estimates)
         self._around.addWidget(self.offer)
         self._recorder: RecordingControl | None = None
         self._playback: PlaybackControl | None = None
@@ -72,6 +74,9 @@ class RecordingPanel(Panel):
         self.what.show_text(f"{how}: {Path(written.path).name}" if written.messages else "")
         self.what.setToolTip(plain_tip(written.path))
         self.what.setVisible(bool(written.messages))
+        self.estimates.show_text(printable(playback.made_by))
+        self.estimates.setToolTip(plain_tip(playback.made_by))
+        self.estimates.setVisible(bool(playback.made_by))
         message = playback.message or recorder.message
         alarm = bool(playback.alarming if playback.message else recorder.alarming)
         self.show_message(sentence(message), hint=not alarm)

@@ -12,7 +12,7 @@ from kappaskin.errors import Damaged
 from kappaskin.frames import Event
 from kappaskin.live import Status
 from kappaskin.pipeline import Setup
-from kappaskin.recording import RecordingSummary, Replay, summary_of
+from kappaskin.recording import RecordingSummary, Replay, made_by, summary_of
 from kappaskin_app.features.recording.transport import SPEEDS, Transport, minutes
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions
@@ -36,7 +36,9 @@ _TIPS = {
     "slower": "Play the recording at the next lower speed",
     "loop": "Play the recording in a loop, or once",
     "settings": "Fit with the settings that were in use when this frame was recorded",
+    "recompute": "Compute the estimates again from the recorded readings, or show recorded ones",
 }
+_RECOMPUTE, _RECORDED = "&Recompute estimates", "Show &recorded estimates"
 _ARRIVES = 0.4  # s after which a request to the engine shows in its status
 _HERE = 1e-4  # s: an event so near is where the replay is
 
@@ -69,6 +71,8 @@ class PlaybackControl(QObject):
         self.message, self.alarming = "", False
         self.damaged: Path | None = None
         self.speed, self._looped, self._goes = 1.0, False, True
+        self._recomputes, self.made_by = False, ""
+        """Whether estimates are computed again on request, and whose are shown."""
         self._replay: Replay | None = None
         self._sought: float | None = None
         self._sought_at, self._steps = 0.0, 0
@@ -121,6 +125,7 @@ class PlaybackControl(QObject):
             ("slower", "Slo&wer", partial(self._faster, -1), "Ctrl+Shift+Down"),
             ("loop", "&Loop", self._turn_loop, "Ctrl+Shift+L"),
             ("settings", "Settings as recorded &here", self.use_recorded, ""),
+            ("recompute", _RECOMPUTE, self.recompute, ""),
         ):
             add(f"replay-{name}", text=text, act=act, shortcut=shortcut, tip=_TIPS[name])
         self._show_actions()
@@ -166,7 +171,7 @@ class PlaybackControl(QObject):
             self._session.connect_to(source)
         self.summary, self._changes = found, _changes(found)
         self._goes, self._begins, self._sought = True, True, None
-        self.speed, self._looped = 1.0, False
+        self.speed, self._looped, self._recomputes = 1.0, False, False
         self._folder = found.path.parent
         self._session.engine.seek(0.0, 0.0, False)  # until the settings are in use
         now = self._history.settings
@@ -193,6 +198,12 @@ class PlaybackControl(QObject):
         """Use the settings that were in use at this time of the recording."""
         if self.summary is not None:
             self._use(self.summary.setup_at(self.time))
+
+    def recompute(self) -> None:
+        """Compute the estimates again, or show the recorded ones again."""
+        self._recomputes = not self._recomputes
+        self._session.engine.recompute(self._recomputes)
+        self._show_actions()
 
     def _leave(self) -> None:
         """Restore calibration and tare before another source is opened."""
@@ -329,10 +340,21 @@ class PlaybackControl(QObject):
             if there or passed > _ARRIVES:
                 self._sought = None
         self._look_for_damage(status)
+        self._follow_estimates(replay)
         self._transport.show_recording(replay, self.events)
         self._show()
         self._show_actions()
         self._show_title(replay)
+
+    def _follow_estimates(self, replay: Replay | None) -> None:
+        """Take whose estimates are shown from the status."""
+        was, self.made_by = self.made_by, ""
+        if replay is not None and replay.shows_recorded:
+            self.made_by = f"Estimates as recorded by {replay.made_by}"
+        elif replay is not None:
+            self.made_by = f"Estimates recomputed by {made_by()}; recorded by {replay.made_by}"
+        if self.made_by != was:
+            self.changed.emit()
 
     def _look_for_damage(self, status: Status) -> None:
         """Report why the engine closed the recording."""
@@ -353,6 +375,7 @@ class PlaybackControl(QObject):
             for name in self._actions.entries:
                 if name.startswith("replay-"):
                     self._actions.allow(name, why_not)
+            self._actions["replay-recompute"].setText(_RECORDED if self._recomputes else _RECOMPUTE)
 
     def _show_title(self, replay: Replay | None) -> None:
         title = "Kappaskin"

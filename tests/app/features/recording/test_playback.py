@@ -346,3 +346,21 @@ def test_one_that_goes_while_it_is_played_leaves_the_session(
     assert not window.transport.isVisible()
     window.actions_by_name["simulate"].trigger()
     until(lambda: window.display.badge.state == "SIM")
+
+
+def test_estimates_are_those_recorded_until_they_are_to_be_recomputed(
+    standing: MainWindow, until
+) -> None:
+    panel, recompute = standing.recording, standing.actions_by_name["replay-recompute"]
+    until(lambda: standing.playback.made_by.startswith("Estimates as recorded by kappaskin "))
+    assert "revision" in standing.playback.made_by
+    assert panel.estimates.isVisibleTo(panel)
+    assert recompute.text() == "&Recompute estimates"
+    recompute.trigger()
+    until(lambda: standing.playback.made_by.startswith("Estimates recomputed by kappaskin "))
+    assert "; recorded by kappaskin " in standing.playback.made_by
+    assert recompute.text() == "Show &recorded estimates"
+    recompute.trigger()
+    until(lambda: standing.playback.made_by.startswith("Estimates as recorded"))
+    standing.history.change("Fewer", -1, functions_x=4)
+    until(lambda: standing.playback.made_by.startswith("Estimates recomputed"))
