@@ -347,7 +347,7 @@ def _of_shell(
 ) -> tuple[Array, Array, float]:
     """As `_of_functions`, as a shell."""
     sd = max(_SD * min(plate.patch.a, plate.patch.b), Shell.finest_on(plate.patch))
-    shell = Shell(plate, sd, sliding=edge == "sliding")
+    shell = Shell(plate.sheet(sliding=edge == "sliding"), sd)
     T, gives = shell.readings_under(layout, x, y)
     unit = 8 * math.pi * plate.rigidity
     return unit * T.reshape(len(y), len(x), 3, len(layout)), gives, sd

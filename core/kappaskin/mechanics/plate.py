@@ -11,7 +11,7 @@ from kappaskin.bases import Basis, ElasticBasis, ProductBasis, SineBasis, curvat
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics.loads import Load, is_point
-from kappaskin.mechanics.shell import Tangential
+from kappaskin.mechanics.shell import Sheet, Tangential
 from kappaskin.skin import Patch
 
 
@@ -201,6 +201,20 @@ class Plate:
         """
         return bool(self.patch.base_curvature and self.rigidity) and not self.patch.strip
 
+    def sheet(self, sliding: bool = False) -> Sheet:
+        """The bent sheet that it is; `sliding` edges let v go however they are held in plane."""
+        if not self._is_shell:
+            raise Refusal(
+                f"expected a bent skin with two sides and a rigidity above zero, got {self}"
+            )
+        of_sheet = self.rigidity, self.membrane_stiffness, self.poisson
+        below, held = (self.tension, self.foundation, self.fluid), self.inplane_edge
+        v_held = held in ("hoop", "held") and not sliding
+        return Sheet(self.patch, *of_sheet, *below, v_held, held in ("diaphragm", "held"))
+
+    def _tangential(self, basis: Basis) -> Tangential:
+        return Tangential(self.sheet(isinstance(basis, SineBasis) and basis.sliding), basis)
+
     def _stiffness(self, basis: Basis) -> tuple[Array, Array]:
         """Stiffness matrix (N, N) in N/m, and the same without its negative terms, for scaling."""
         nu, H, overlap = self.poisson, self.patch.base_curvature, overlaps(basis)
@@ -222,7 +236,7 @@ class Plate:
         negative = self.tension * H**2 * squares
         if self._is_shell:
             whole += self.membrane_stiffness * H**2 * squares
-            negative += Tangential(self, basis).relief
+            negative += self._tangential(basis).relief
         elif self.patch.strip:
             both = overlap(xx, (0, 0))
             whole += self.rigidity * H**4 * squares
@@ -252,7 +266,7 @@ class Plate:
         tangential displacements follow from its stiffness.
         """
         if self._is_shell:
-            return Tangential(self, basis).curvature_at
+            return self._tangential(basis).curvature_at
         return partial(curvature_at, basis)
 
     def deflection(self, loads: Iterable[Load], basis: Basis) -> Array:

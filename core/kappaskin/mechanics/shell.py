@@ -2,9 +2,10 @@
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise, repeat
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
@@ -13,9 +14,6 @@ from kappaskin.bases import Basis, ProductBasis, SineBasis, gauss
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.skin import Patch
-
-if TYPE_CHECKING:
-    from kappaskin.mechanics.plate import Plate
 
 # Sanders' and Koiter's theory of a cylinder bent along x to H = 1/R, straight along y, with the
 # displacement f inward and the tangential ones v along x (hoop) and u along y (axial):
@@ -72,6 +70,24 @@ def _lines(a: float, x: Array) -> Array:
     return np.stack([np.stack(values, axis=-1), np.stack(slopes, axis=-1)])
 
 
+@dataclass(frozen=True)
+class Sheet:
+    """A bent sheet: D in N m, C and T in N/m, nu, k_f in N/m^3, and which edges hold v and u.
+
+    Below may be a `fluid` that keeps its volume.
+    """
+
+    patch: Patch
+    D: float
+    C: float
+    nu: float
+    T: float
+    k_f: float
+    fluid: bool
+    v_held: bool
+    u_held: bool
+
+
 class _Arc:
     """Displacements along the arc by Ritz's method, which meet the straight edges.
 
@@ -80,13 +96,9 @@ class _Arc:
     are those of f, of v and of u.
     """
 
-    def __init__(
-        self, plate: "Plate", f: Callable[[Array], Array], count: int, sliding: bool
-    ) -> None:
-        self._plate, self._f, self._count = plate, f, count
-        self._v_held = plate.inplane_edge in ("hoop", "held") and not sliding
-        self._u_held = plate.inplane_edge in ("diaphragm", "held")
-        self.x, self.weights = gauss(plate.patch.a, 2 * count + 16)
+    def __init__(self, sheet: Sheet, f: Callable[[Array], Array], count: int) -> None:
+        self._sheet, self._f, self._count = sheet, f, count
+        self.x, self.weights = gauss(sheet.patch.a, 2 * count + 16)
         self._fields = self.fields(self.x)
         ends = np.cumsum([0, *(field.shape[-1] for field in self._fields)]).tolist()
         self.f, self.v, self.u = (slice(*pair) for pair in pairwise(ends))
@@ -94,9 +106,10 @@ class _Arc:
 
     def fields(self, x: Array) -> tuple[Array, Array, Array]:
         """The functions of f (3, X, N), v (2, X, Nv) and u (2, X, Nu) with derivatives at `x`."""
-        held = _once(self._plate.patch.a, self._count, x)
-        free = np.dstack([_lines(self._plate.patch.a, x), held])
-        return self._f(x), held if self._v_held else free, held if self._u_held else free
+        a, sheet = self._sheet.patch.a, self._sheet
+        held = _once(a, self._count, x)
+        free = np.dstack([_lines(a, x), held])
+        return self._f(x), held if sheet.v_held else free, held if sheet.u_held else free
 
     def rows(self, x: Array) -> Array:
         """f, f_x, f_xx, v, u_x (5, ..., n) of all functions at `x` (...) in m."""
@@ -118,7 +131,7 @@ class _Arc:
 
     def _strains(self) -> Array:
         """Strains (3, 9, X, n) by powers of q: e_x, e_y, g, k_x, k_y, t, f_x, f_y, f."""
-        H, F, V, U = self._plate.patch.base_curvature, self.f, self.v, self.u
+        H, F, V, U = self._sheet.patch.base_curvature, self.f, self.v, self.u
         f, v, u = self._fields
         S = np.zeros((3, 9, len(self.x), self.size))
         S[0, 0, :, F], S[0, 0, :, V] = -H * f[0], v[1]
@@ -131,9 +144,9 @@ class _Arc:
         return S
 
     def _law(self) -> Array:
-        plate, nu = self._plate, self._plate.poisson
-        C, D, T = plate.membrane_stiffness, plate.rigidity, plate.tension
-        squares = plate.foundation - T * plate.patch.base_curvature**2
+        sheet = self._sheet
+        C, D, nu, T = sheet.C, sheet.D, sheet.nu, sheet.T
+        squares = sheet.k_f - T * sheet.patch.base_curvature**2
         law = np.diag([C, C, C * (1 - nu) / 2, D, D, 2 * D * (1 - nu), T, T, squares])
         law[0, 1] = law[1, 0] = nu * C
         law[3, 4] = law[4, 3] = nu * D
@@ -147,14 +160,13 @@ class Tangential:
     `relief` (N, N) in N/m is by how much they lower the stiffness that f has without them.
     """
 
-    def __init__(self, plate: "Plate", basis: Basis) -> None:
+    def __init__(self, sheet: Sheet, basis: Basis) -> None:
         if not isinstance(basis, ProductBasis):
             raise TypeError(f"a bent skin has products of functions, got {type(basis).__name__}")
         Ni, Nj = basis.shape
-        sliding = isinstance(basis, SineBasis) and basis.sliding
-        a, b = plate.patch.a, plate.patch.b
-        self._basis, self._H = basis, plate.patch.base_curvature
-        self._arc = arc = _Arc(plate, self._along, 2 * Ni + 16, sliding)
+        a, b = sheet.patch.a, sheet.patch.b
+        self._basis, self._H = basis, sheet.patch.base_curvature
+        self._arc = arc = _Arc(sheet, self._along, 2 * Ni + 16)
         waves = Nj if isinstance(basis, SineBasis) else 2 * Nj + 16
         self._q = np.pi / b * np.arange(1.0, waves + 1)
         square = b / 2  # the integral of a squared sine
@@ -206,16 +218,11 @@ class Gages(Protocol):
 class Shell:
     """A bent skin with hinged edges under Gaussian loads, resolved to convergence.
 
-    Their standard deviation is `sd` in m, at least that of `finest_on`. `sliding` edges let the
-    hoop displacement go however they are held in plane.
+    Their standard deviation is `sd` in m, at least that of `finest_on`.
     """
 
-    def __init__(self, plate: "Plate", sd: float, sliding: bool = False) -> None:
-        patch = plate.patch
-        if not patch.base_curvature or patch.strip or not plate.rigidity:
-            raise Refusal(
-                f"expected a bent skin with two sides and a rigidity above zero, got {plate}"
-            )
+    def __init__(self, sheet: Sheet, sd: float) -> None:
+        patch = sheet.patch
         if sd < (least := self.finest_on(patch)) * (1 - 1e-9):
             raise Refusal(
                 f"expected a load of a standard deviation of at least {least:.3g} m on a "
@@ -224,8 +231,8 @@ class Shell:
         # A Gaussian has exp(-8) of its amplitude left at the wave number 4 / sd.
         functions = math.ceil(2 * patch.a / sd * (1 - 1e-9))
         waves = math.ceil(4 * patch.b / sd / np.pi * (1 - 1e-9))
-        self._plate, self._sd, count = plate, sd, max(functions, 16)
-        self._arc = _Arc(plate, partial(_twice, patch.a, count), count, sliding)
+        self._sheet, self._sd, count = sheet, sd, max(functions, 16)
+        self._arc = _Arc(sheet, partial(_twice, patch.a, count), count)
         self._q = np.pi / patch.b * np.arange(1.0, max(waves, 16) + 1)
         self._felt = self._arc.rows(self._arc.x)[0][:, self._arc.f].T * self._arc.weights
         self._answer = self._solved()
@@ -243,7 +250,7 @@ class Shell:
         forces[:, f] = np.eye(f.stop) * scale[:, None, f]
         scaled: Array = K * scale[:, :, None] * scale[:, None, :]
         answer: Array = np.linalg.solve(scaled, forces) * scale[:, :, None]
-        return answer * (2 / self._plate.patch.b)  # the integral of a squared sine is b / 2
+        return answer * (2 / self._sheet.patch.b)  # the integral of a squared sine is b / 2
 
     def _loads(self, x: Array) -> Array:
         """Forces (N, X) on the functions of f under unit loads at `x` (X,), over sin(q y).
@@ -251,7 +258,7 @@ class Shell:
         Beyond the ends the load is reflected with the other sign, as sines do along y.
         """
         load = np.zeros((len(self._arc.x), len(x)))
-        for sign, centre in ((1, x), (-1, -x), (-1, 2 * self._plate.patch.a - x)):
+        for sign, centre in ((1, x), (-1, -x), (-1, 2 * self._sheet.patch.a - x)):
             r = (self._arc.x[:, None] - centre) / self._sd
             load += sign * np.exp(-(r**2) / 2) / (self._sd * math.sqrt(2 * np.pi))
         return self._felt @ load
@@ -268,11 +275,11 @@ class Shell:
         moved: Array = self._answer @ self._loads(x)
         read = self._read(gages, moved, along)
         give: Array = (along * sines) @ np.einsum("xn,jnx->jx", f, moved)
-        if not self._plate.fluid:
+        if not self._sheet.fluid:
             return read, give
         # The pressure that takes the volume back which the load displaces.
         over: Array = np.multiply.outer(
-            (1 - np.cos(q * self._plate.patch.b)) / q, self._felt.sum(axis=1)
+            (1 - np.cos(q * self._sheet.patch.b)) / q, self._felt.sum(axis=1)
         )
         swollen = np.einsum("jnf,jf->jn", self._answer, over)
         displaced: Array = along @ np.einsum("jf,jfx->jx", over, moved[:, self._arc.f])
@@ -297,7 +304,7 @@ class Shell:
         They are the factors of sin(q y), sin(q y) and cos(q y). A gage along a diagonal reads the
         mean of (xx + yy) / 2 + xy or - xy; the twist is half of what the two differ by.
         """
-        H, q = self._plate.patch.base_curvature, self._q[:, None]
+        H, q = self._sheet.patch.base_curvature, self._q[:, None]
         s, w = _along_gage(gage_length)
         f, _, fxx, _, _ = self._arc.rows(np.add.outer(s, x))
         straight = self._arc.rows(x)[0]

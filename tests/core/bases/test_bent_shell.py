@@ -297,7 +297,9 @@ def test_its_readings_in_sines_converge_to_the_shells(functions, off):
     c = plate.deflection([load], basis).ravel()
     K = layout.curvature_operator(basis, plate) @ c
 
-    expected, _ = Shell(plate, 2e-3).readings_under(layout, np.array([load.x]), np.array([load.y]))
+    expected, _ = Shell(plate.sheet(), 2e-3).readings_under(
+        layout, np.array([load.x]), np.array([load.y])
+    )
     np.testing.assert_allclose(K, expected[0, 0], rtol=0, atol=off * np.abs(expected).max())
 
 

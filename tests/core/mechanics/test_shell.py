@@ -65,7 +65,7 @@ def test_readings_between_diaphragms_are_those_of_the_closed_form(sd, place, flu
     plate, layout = skin(inplane="diaphragm", fluid=fluid), SensorLayout.regular(SKIN, 10, 10)
     x0, y0 = place[0] * SKIN.a, place[1] * SKIN.b
 
-    T, G = Shell(plate, sd).readings_under(layout, np.array([x0]), np.array([y0]))
+    T, G = Shell(plate.sheet(), sd).readings_under(layout, np.array([x0]), np.array([y0]))
 
     expected, give = diaphragms(plate, layout.positions, x0, y0, sd)
     most = (2e-3 if sd == 2e-3 else 2e-4) if fluid else 2e-5
@@ -77,7 +77,9 @@ def test_readings_at_scattered_elements_are_those_of_the_closed_form():
     plate, places = skin(inplane="diaphragm"), np.random.default_rng(5).uniform(0.05, 0.95, (31, 2))
     layout = SensorLayout.scattered(SKIN, places * (SKIN.a, SKIN.b))
 
-    T, _ = Shell(plate, 2e-3).readings_under(layout, np.array([0.02]), np.array([0.017, 0.03]))
+    T, _ = Shell(plate.sheet(), 2e-3).readings_under(
+        layout, np.array([0.02]), np.array([0.017, 0.03])
+    )
 
     expected, _ = diaphragms(plate, layout.positions, 0.02, 0.03, 2e-3)
     np.testing.assert_allclose(T[1, 0], expected, rtol=0, atol=5e-5 * np.abs(expected).max())
@@ -87,7 +89,7 @@ def test_a_gage_reads_the_mean_along_it():
     """By quadrature of the readings of gages without length along x, along y and diagonals."""
     L, middle = 3e-3, np.array([[0.3 * ARC, 0.011], [0.6 * ARC, 0.02]])
     t, w = np.polynomial.legendre.leggauss(16)
-    shell, x, y = Shell(skin(), 2e-3), np.array([0.35 * ARC]), np.array([0.013])
+    shell, x, y = Shell(skin().sheet(), 2e-3), np.array([0.35 * ARC]), np.array([0.013])
 
     def mean(cos, sin):
         steps = L / 2 * np.multiply.outer(t, (cos, sin))
@@ -105,7 +107,7 @@ def test_a_gage_reads_the_mean_along_it():
 
 def test_the_give_is_the_displacement_where_the_load_is():
     """Two loads that swap places: work is reciprocal, the give alone no matter of the layout."""
-    shell = Shell(skin(), 2e-3)
+    shell = Shell(skin().sheet(), 2e-3)
     x, y = np.array([0.01, 0.02]), np.array([0.013, 0.02])
 
     one = shell.readings_under(SensorLayout.regular(SKIN, 3, 3), x, y)[1]
@@ -118,7 +120,7 @@ def test_less_held_is_softer():
     layout, x, y = SensorLayout.regular(SKIN, 3, 3), np.array([0.015]), np.array([0.013])
 
     gives = [
-        Shell(skin(inplane=held), 2e-3).readings_under(layout, x, y)[1][0, 0]
+        Shell(skin(inplane=held).sheet(), 2e-3).readings_under(layout, x, y)[1][0, 0]
         for held in ("held", "hoop", "free")
     ]
 
@@ -128,15 +130,15 @@ def test_less_held_is_softer():
 def test_sliding_edges_let_the_hoop_displacement_go():
     layout, x, y = SensorLayout.regular(SKIN, 3, 3), np.array([0.015]), np.array([0.013])
 
-    slid = Shell(skin(), 2e-3, sliding=True).readings_under(layout, x, y)
-    free = Shell(skin(inplane="free"), 2e-3).readings_under(layout, x, y)
+    slid = Shell(skin().sheet(sliding=True), 2e-3).readings_under(layout, x, y)
+    free = Shell(skin(inplane="free").sheet(), 2e-3).readings_under(layout, x, y)
 
     np.testing.assert_array_equal(slid[0], free[0])
 
 
 def test_a_load_too_small_to_resolve_is_refused():
     with pytest.raises(Refusal, match=r"at least 0\.000844 m on a patch"):
-        Shell(skin(), 1e-4)
+        Shell(skin().sheet(), 1e-4)
 
 
 @pytest.mark.parametrize(
@@ -150,4 +152,4 @@ def test_a_load_too_small_to_resolve_is_refused():
 )
 def test_a_skin_that_is_no_shell_is_refused(plate):
     with pytest.raises(Refusal, match="a bent skin with two sides and a rigidity above zero"):
-        Shell(plate, 1e-3)
+        plate.sheet()
