@@ -53,6 +53,17 @@ hold the radial and the hoop displacement and leave the axial one free.
 """
 
 
+_STIFFEST = 1e50  # in SI units; and its inverse: squares of what they make of loads are numbers
+
+
+def _check_size(expected: str, value: float) -> None:
+    if value and not 1 / _STIFFEST <= value <= _STIFFEST:
+        raise Refusal(
+            f"expected {expected}, if above zero from {1 / _STIFFEST:g} to {_STIFFEST:g}, "
+            f"got {value}"
+        )
+
+
 @dataclass(frozen=True)
 class Plate:
     """A thin skin on a patch: a plate of flexural `rigidity` D in N m, and what supports it.
@@ -87,11 +98,13 @@ class Plate:
         ):
             if not 0 <= value < np.inf:
                 raise Refusal(f"expected {expected}, got {value}")
+            _check_size(expected, value)
         if not (0 < self.rigidity < np.inf or (self.rigidity == 0 and self.tension)):
             raise Refusal(
                 f"expected a rigidity above zero in N m, got {self.rigidity}; with a "
                 "tension above zero, zero is allowed too"
             )
+        _check_size("a rigidity in N m", self.rigidity)
         if not -1 < self.poisson <= 0.5:
             raise Refusal(f"expected -1 < Poisson's ratio <= 0.5, got {self.poisson}")
         self._check_sheet()
