@@ -11,6 +11,7 @@ from numpy.polynomial.legendre import leggauss
 from scipy.optimize import brentq
 from scipy.special import j0
 
+from argyris import ArgyrisPlate
 from navier import HingedPlate, Load
 from rigid import Compliance, ball
 from sanders import CylinderShell
@@ -237,6 +238,28 @@ def test_a_pair_of_gages_reads_what_both_faces_stretch():
     K = shell.reader(place[None])(load)[:, 0]
 
     np.testing.assert_allclose(K, _of_two_faces(shell, load, place), rtol=2e-3)
+
+
+# Argyris' elements
+
+
+def test_elements_agree_with_navier():
+    plate, load = ArgyrisPlate(edge="hinged"), Load(0.043, 0.061, sd=2e-3)
+    places = np.random.default_rng(0).uniform(0.005, 0.095, (60, 2))
+
+    found, told = plate.readings(load, places), HingedPlate().readings(load, places)
+
+    np.testing.assert_allclose(found, told, atol=5e-4 * np.abs(told).max())
+    moved = HingedPlate().displacement(load, places)
+    np.testing.assert_allclose(plate.displacement(load, places), moved, atol=1e-4 * moved.max())
+
+
+def test_a_central_force_moves_a_clamped_square_as_in_table_37():
+    plate = ArgyrisPlate(1.0, 1.0, cells=24)
+
+    w = plate.displacement(Load(0.5, 0.5, sd=0.01), np.array([[0.5, 0.5]]))
+
+    assert w[0] == pytest.approx(0.00560, rel=5e-3)
 
 
 # Von Karman's plate

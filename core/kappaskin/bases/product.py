@@ -101,7 +101,8 @@ class ProductBasis(FunctionBasis):
     def volumes(self) -> Array:
         """The integral (N,) in m^2 of each function."""
         (x, wx), (y, wy) = self._rules
-        return np.kron(wx @ self._along_x(x, 0), wy @ self._along_y(y, 0))
+        volumes = np.kron(wx @ self._along_x(x, 0), wy @ self._along_y(y, 0))
+        return volumes.astype(float)
 
     def overlap(self, one: Order, other: Order) -> Array:
         """The integrals (N, N) of one derivative of each function times another of each.

@@ -226,7 +226,7 @@ _MOST_BYTES = 64e6  # of a table
 _SD = 0.02  # of the shorter side, of the Gaussian load that the table is summed for
 _VANISHED = 5.3  # k sd, beyond which a Gaussian load moves less than 1e-6 of what a point load does
 _MOST_WAVES = 256  # along a side
-_MIXED = 24  # functions along a side where a load mixes them
+_MIXED, _MOST_MIXED = 24, 1500  # functions where a load mixes them: along the shorter side, in all
 _MIXED_SD = 3.0  # over the largest wave number of those
 _SINES = "hinged", "sliding"
 _TOGETHER = 200  # elements: 100 MB
@@ -376,8 +376,12 @@ def _summed(
             for at, k in zip((x, y), sines.wavenumbers, strict=True)
         )
         return sines, along_x, along_y, sd
-    mixed = cast("ProductBasis", basis_for(patch, edge, _MIXED, _MIXED))
-    sd = _MIXED_SD * max(sides) / (math.pi * _MIXED)
+    # As fine along both sides, of as many functions as a matrix of them may have.
+    shorter = min(sides)
+    most = min(_MIXED, math.sqrt(_MOST_MIXED * shorter / max(sides)))
+    Ni, Nj = (math.ceil(most * side / shorter) for side in sides)
+    mixed = cast("ProductBasis", basis_for(patch, edge, Ni, Nj))
+    sd = _MIXED_SD * shorter / (math.pi * most)
     z, weights = np.polynomial.hermite_e.hermegauss(9)
     near_x, near_y = (
         np.clip(np.add.outer(at, sd * z), 0.0, side).ravel()

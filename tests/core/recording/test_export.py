@@ -152,6 +152,8 @@ OF_ESTIMATE: dict[str, Callable[[Estimate], object]] = {
     "force_95": lambda e: e.contact.force_95,
     "displacement": lambda e: e.contact.displacement,
     "displacement_sd": lambda e: e.contact.displacement_sd,
+    "load_radius": lambda e: e.contact.load_radius,
+    "load_radius_95": lambda e: e.contact.load_radius_95,
     "point": lambda e: e.geometry.position,
     "frame": lambda e: e.geometry.frame,
     "metric": lambda e: e.geometry.metric,

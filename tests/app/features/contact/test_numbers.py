@@ -15,12 +15,13 @@ def test_the_table_has_what_the_picture_shows_and_can_be_copied(window: MainWind
 
     def there() -> bool:
         counts = numbers.elements.rowCount(), numbers.facts.rowCount()
-        return counts == (100, 8) and bool(numbers.facts.item(2, 1).text())
+        return counts == (100, 9) and bool(numbers.facts.item(2, 1).text())
 
     until(there)
     numbers.copy.click()
     rows = list(csv.reader(QGuiApplication.clipboard().text().splitlines()))
     assert rows[0] == list(FACTS)
+    assert "Load radius" in [row[0] for row in rows if row]
     assert rows[len(rows) - 101] == list(ELEMENTS)
     read = np.array([row[3:6] for row in rows[-100:]], float)
     assert np.abs(read).max() > 1.0
