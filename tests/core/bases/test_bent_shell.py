@@ -19,6 +19,7 @@ from kappaskin import (
     SineBasis,
     basis_for,
 )
+from kappaskin.bases import hoop_at
 from kappaskin.mechanics import Shell
 
 R = 12.9e-3
@@ -342,3 +343,25 @@ def test_unless_said_otherwise_a_bent_skin_is_an_even_sheet():
     np.testing.assert_allclose(
         unsaid.deflection(load, basis), sheet.deflection(load, basis), rtol=0, atol=1e-12
     )
+
+
+@pytest.mark.parametrize("edge", ["hinged", "sliding", "clamped"])
+def test_the_hoop_displacement_is_the_one_that_the_readings_have(edge):
+    patch = Patch(0.04, 0.03, 12.9e-3)
+    plate, basis, step = Plate(patch), basis_for(patch, edge, 6, 5), 1e-6
+    places = np.array([[0.013, 0.011], [0.02, 0.02], [0.031, 0.004]])
+
+    def change(along, of):
+        one, other = (plate.hoop(basis, places + side * np.array(along)) for side in (step, -step))
+        return (one[of] - other[of]) / (2 * step)
+
+    v, by_y, twice_by_y = plate.hoop(basis, places)
+
+    xx = basis.at(places, 2, 0) + change([1, 0], 0) / patch.radius
+    for found, expected in (
+        (xx, plate.curvature(basis)(places)[0]),
+        (by_y, change([0, 1], 0)),
+        (twice_by_y, change([0, 1], 1)),
+    ):
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+    assert np.abs(v).max() < 0.9 * np.abs(hoop_at(basis, places)[0]).max()  # the arc stretches
