@@ -296,7 +296,7 @@ class Plate:
         At `positions` (P, 2) in m of a bent skin.
         """
         if self._is_shell:
-            return Tangential(self, basis).hoop_at(positions)
+            return self._tangential(basis).hoop_at(positions)
         return hoop_at(basis, positions)
 
     def deflection(self, loads: Iterable[Load], basis: Basis) -> Array:
