@@ -113,6 +113,12 @@ def curvature_at(basis: Basis, positions: Array) -> Array:
     )
 
 
+def hoop_at(basis: Basis, positions: Array) -> Array:
+    """v along an inextensible arc with v_y and v_yy, (3, P, N) per m of each function."""
+    v = np.stack([basis.at(positions, -1, order) for order in range(3)])
+    return basis.patch.base_curvature * v
+
+
 class CurvatureMap:
     """A map from coefficients to the change of one curvature component on a grid."""
 

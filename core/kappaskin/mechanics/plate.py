@@ -7,7 +7,15 @@ from functools import partial
 
 import numpy as np
 
-from kappaskin.bases import Basis, ElasticBasis, ProductBasis, SineBasis, curvature_at, overlaps
+from kappaskin.bases import (
+    Basis,
+    ElasticBasis,
+    ProductBasis,
+    SineBasis,
+    curvature_at,
+    hoop_at,
+    overlaps,
+)
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics.loads import Load, is_point
@@ -281,6 +289,15 @@ class Plate:
         if self._is_shell:
             return self._tangential(basis).curvature_at
         return partial(curvature_at, basis)
+
+    def hoop(self, basis: Basis, positions: Array) -> Array:
+        """Displacement v along the arc with v_y and v_yy, (3, P, N) per m of each function.
+
+        At `positions` (P, 2) in m of a bent skin.
+        """
+        if self._is_shell:
+            return self._tangential(basis).hoop_at(positions)
+        return hoop_at(basis, positions)
 
     def deflection(self, loads: Iterable[Load], basis: Basis) -> Array:
         """Coefficients (Ni, Nj) in m of the deflection under all `loads` at once."""

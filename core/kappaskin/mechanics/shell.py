@@ -187,6 +187,15 @@ class Tangential:
         maps = (self._basis.on_grid(x, np.zeros(1), order) for order in range(3))
         return np.stack([each.X for each in maps])
 
+    def hoop_at(self, positions: Array) -> Array:
+        """v and its first two derivatives along y, (3, P, N) per m of each function."""
+        along = self._arc.rows(positions[:, 0])[3]
+        turn = np.multiply.outer(positions[:, 1], self._q)
+        v = np.einsum("pn,jni->pij", along, self._least, optimize=True)
+        waves = np.sin(turn), self._q * np.cos(turn), -(self._q**2) * np.sin(turn)
+        found = [v @ (wave[:, :, None] * self._share) for wave in waves]
+        return np.stack(found).reshape(3, len(positions), -1)
+
     def curvature_at(self, positions: Array) -> Array:
         """Curvature xx, yy, xy (3, P, N) in 1/m per m of each function at `positions` (P, 2)."""
         f, xx, yy, xy = (

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
-from kappaskin.bases import Basis, SineBasis, curvature_at, gauss
+from kappaskin.bases import Basis, SineBasis, curvature_at, gauss, hoop_at
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import Plate
@@ -204,7 +204,7 @@ class SensorLayout:
 
 # The deflected skin is r = r0 - f n0 + v t. r0 is the skin at rest, of curvature H along x, t and e
 # are unit vectors along x and y, n0 the outward normal; f is the displacement inward, and v the one
-# along the arc that `curvature_at` assumes, v_x = H f: none on a flat skin. With the slopes
+# along the arc that the curvature of first order has: none on a flat skin. With the slopes
 # p = f_x + H v and q = f_y and with w = v_y, the derivatives of r along t, e and n0 are
 #     r_x = (1, 0, -p)     r_xx = (-H p, 0, -H - p_x)     r_xy = (0, 0, -p_y)
 #     r_y = (w, 1, -q)     r_yy = (w_y, 0, -q_y)          r_x x r_y = (p, q - p w, 1) = W n.
@@ -212,7 +212,8 @@ class SensorLayout:
 # along x, as the skin is not sheared: they lie along d = r_x - w r_y. With the metric I, the scalar
 # products of d and r_y, and the second form II_ij = -n . r_ij of the same vectors the readings are
 #     xx: II_dd / I_dd - H      yy: II_yy / I_yy      xy: (II_dy - H I_dy / 2) / sqrt(I_dd I_yy).
-# Of first order they are those of `curvature_at`. On a flat skin W^2 = 1 + p^2 + q^2, and they are
+# Of first order they are that one; that the arc is hardly stretched, v_x = H f, is taken for
+# granted. On a flat skin W^2 = 1 + p^2 + q^2, and they are
 #     f_xx / (W (1 + p^2))      f_yy / (W (1 + q^2))      f_xy / (W sqrt((1 + p^2) (1 + q^2))).
 _XX, _YY, _XY = range(3)
 _EACH = [_XX, _YY, _XY]
@@ -320,7 +321,7 @@ class NormalCurvature:
     """The map from coefficients to the true normal curvature of the surface along the gages.
 
     A gage of some length reads the mean of the curvature of first order along it, at the slope in
-    its middle. With a `plate`, the first order is that of its deflection under loads.
+    its middle. With a `plate` the shapes are those of its deflection under loads.
     """
 
     def __init__(
@@ -331,15 +332,12 @@ class NormalCurvature:
         plate: Plate | None = None,
     ) -> None:
         places, H = layout.positions, basis.patch.base_curvature
-        M = layout.curvature_operator(basis)
-        self._stretch: Array | None = None
-        if H and plate:
-            self._stretch = (layout.curvature_operator(basis, plate) - M).T.astype(dtype)
-        maps = [*M.reshape(3, len(layout), basis.size)]
+        maps = [*layout.curvature_operator(basis, plate).reshape(3, len(layout), basis.size)]
         maps += [basis.at(places, 1, 0), basis.at(places, 0, 1)]
         if H:
-            maps[3] = maps[3] + H**2 * basis.at(places, -1, 0)
-            maps += [H * basis.at(places, -1, 1), H * basis.at(places, -1, 2)]
+            v, *turns = plate.hoop(basis, places) if plate else hoop_at(basis, places)
+            maps[3] = maps[3] + H * v
+            maps += turns
         self.maps = np.stack(maps).astype(dtype)
         """From coefficients to the jet of a `DeflectedSurface`, (Q, P, N)."""
         self._columns, self._H = self.maps.reshape(-1, basis.size).T, H
@@ -352,7 +350,4 @@ class NormalCurvature:
     def __call__(self, coefficients: Array) -> Array:
         """Curvature (..., 3, P) in 1/m for `coefficients` (..., Ni, Nj)."""
         flat = coefficients.reshape(*coefficients.shape[:-2], self.maps.shape[2])
-        readings = np.moveaxis(self.surface(flat).readings, 0, -2)
-        if self._stretch is None:
-            return readings
-        return readings + np.dot(flat, self._stretch).reshape(readings.shape)
+        return np.moveaxis(self.surface(flat).readings, 0, -2)

@@ -53,6 +53,12 @@ def test_an_iteration_that_gave_up_is_told() -> None:
     assert warnings(replace(ESTIMATE, converged=False), 0) == words
 
 
+def test_slopes_that_a_method_neglects_are_told_after_the_rest() -> None:
+    words = "slopes reach 0.4: up to 8 % too flat; use finite-slope"
+    assert warnings(ESTIMATE, 0, 0.4) == words[0].upper() + words[1:]
+    assert warnings(ESTIMATE, 1, 0.4) == f"1 element over 1 % strain; {words}"
+
+
 def test_a_warning_takes_the_hints_place_in_the_colour_of_alarms_and_gives_it_back(qapp) -> None:
     notice = Notice("Drag the arrow")
     width = notice.minimumWidth()

@@ -19,6 +19,7 @@ from kappaskin import (
     SineBasis,
     basis_for,
 )
+from kappaskin.bases import hoop_at
 from kappaskin.mechanics import Shell
 
 R = 12.9e-3
@@ -342,3 +343,22 @@ def test_unless_said_otherwise_a_bent_skin_is_an_even_sheet():
     np.testing.assert_allclose(
         unsaid.deflection(load, basis), sheet.deflection(load, basis), rtol=0, atol=1e-12
     )
+
+
+@pytest.mark.parametrize("edge", ["hinged", "sliding", "clamped"])
+def test_the_hoop_displacement_has_its_derivatives_and_its_edges(edge):
+    patch = Patch(0.04, 0.03, R)
+    plate, basis, step = Plate(patch), basis_for(patch, edge, 6, 5), 1e-6
+    places = np.array([[0.013, 0.011], [0.02, 0.02], [0.031, 0.004]])
+
+    v, *rates = plate.hoop(basis, places)
+
+    above, below = (plate.hoop(basis, places + np.array([0.0, side])) for side in (step, -step))
+    for found, expected in zip(rates, (above - below)[:2] / (2 * step), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+    held = np.abs(plate.hoop(basis, np.array([[0.0, 0.01], [patch.a, 0.02]]))[0]).max()
+    assert (held < 1e-9 * np.abs(v).max()) == (edge != "sliding")
+    inextensible = hoop_at(basis, places)[0]
+    assert np.abs(v).max() < 0.9 * np.abs(inextensible).max()  # the arc stretches too
+    bend = np.arange(basis.size) == 5  # the first that one half of the arc gives to the other
+    assert np.sum(v[:, bend] * inextensible[:, bend]) > 0

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -54,12 +55,30 @@ def test_reconstruct_writes_what_the_readings_were_made_of(run, npz, tmp_path) -
     code, printed, told = run(
         "reconstruct", npz(), "--basis", "8x8", "--out", out, "--grid", "21x11"
     )
-    assert (code, printed, told) == (0, "", f"{out}: 1 shapes\n")
+    steep = "kappaskin: slopes reach 0.96: up to 74 % too flat; use finite-slope\n"
+    assert (code, printed, told) == (0, "", f"{steep}{out}: 1 shapes\n")
     with np.load(out, allow_pickle=False) as found:
         assert set(found) == {"coefficients", "sd", "residual", "grid_x", "grid_y", "w"}
         assert np.allclose(found["coefficients"], TRUTH[None], rtol=0, atol=1e-12)
         assert found["w"].shape == (1, 11, 21)
         assert np.abs(found["residual"]).max() < 1e-9
+
+
+def test_reconstruct_says_what_each_method_neglects(run, npz, tmp_path) -> None:
+    rng, out = np.random.default_rng(0), ("--out", tmp_path / "out.npz")
+    K = READINGS["curvature"] / 3 + rng.normal(0, 0.2, (4, 3, 100))
+    words = r"kappaskin: slopes reach 0\.[34]\d?: up to \d % too flat; use finite-slope\n"
+    words += ".*4 shapes\n"
+    assert re.fullmatch(words, run("reconstruct", npz(curvature=K), *out)[2])
+    sigma = np.full(K.shape, 0.2)
+    assert re.fullmatch(words, run("reconstruct", npz(curvature=K, sigma=sigma), *out)[2])
+
+    finite = (*out, "--method", "finite-slope")
+    assert run("reconstruct", npz(curvature=K), *finite)[2] == f"{out[1]}: 4 shapes\n"
+    lost = "kappaskin: no convergence in 4 of 4 frames; least squares shown\n"
+    assert run("reconstruct", npz(curvature=1e6 * K), *finite)[2] == f"{lost}{out[1]}: 4 shapes\n"
+    faint = run("reconstruct", npz(curvature=K / 100), *out)[2]
+    assert faint == f"{out[1]}: 4 shapes\n"
 
 
 def test_the_basis_is_8x8_and_the_surface_left_out_unless_asked(run, npz, tmp_path) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -31,6 +32,7 @@ def recorded(tmp_path_factory) -> Path:
     assert done.returncode == 0, done.stderr
     assert f"{path}: " in done.stdout
     assert "messages in" in done.stdout
+    assert re.search(r"^kappaskin: slopes reach 0.\d+: up to \d % too flat; use f", done.stderr)
     return path
 
 

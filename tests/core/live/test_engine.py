@@ -105,6 +105,14 @@ def test_a_simulated_scene_gives_estimates_with_the_truth_beside_them(engine) ->
     assert (status.source, status.message, status.refusal) == ("sim:centre", "", "")
 
 
+def test_a_steep_shape_is_warned_of_until_the_method_knows_slopes(engine) -> None:
+    engine.connect("sim:steep")
+    assert wait_for(lambda: engine.status().slope > 0.3)
+    engine.set_up(Setup(method="finite-slope"))
+    assert next_estimate(engine, engine.status().generation).converged
+    assert wait_for(lambda: engine.status().slope == 0)
+
+
 def test_failing_channels_are_told_with_what_leaving_them_out_costs(engine) -> None:
     engine.connect("sim:failing-elements")
     assert wait_for(lambda: {f.element for f in engine.status().health.findings} >= {44, 45, 63})

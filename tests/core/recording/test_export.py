@@ -422,6 +422,19 @@ def test_a_process_of_its_own_leaves_the_file_alone(taps, tmp_path) -> None:
     assert list(tmp_path.iterdir()) == [tmp_path / "out.npz"]
 
 
+def test_the_steepest_shape_is_warned_of(tmp_path) -> None:
+    steep = load_scene("steep")
+    recorded(tmp_path / "steep.mcap", steep, (SMALL, replace(SMALL, method="finite-slope")), 1.0)
+
+    done = export(tmp_path / "steep.mcap", tmp_path / "one" / "out.csv")
+    known = export(tmp_path / "steep.mcap", tmp_path / "two" / "out.csv", begin=1.05)
+
+    assert 0.2 < done.slope < 0.5
+    assert re.search(r"; slopes reach 0\.\d+: up to \d+ % too flat; use finite-slope$", done.words)
+    assert known.slope == 0
+    assert re.fullmatch(r"\d+ frames", known.words)
+
+
 def test_a_cancelled_export_leaves_nothing(taps, tmp_path) -> None:
     with ExportTask(ExportRequest(taps[0], tmp_path / "skin.pvd", every=0.001)) as exporting:
         next(exporting.wait())

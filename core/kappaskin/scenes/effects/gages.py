@@ -41,11 +41,11 @@ class FiniteSlopeEffect(Effect):
     formula: ClassVar = "largest slope squared"
 
     def size(self, survey: Survey) -> Size:
-        short = replace(survey.layout, gage_length=0.0)
-        sensed = NormalCurvature(survey.basis, short, plate=survey.plate)
-        number = float(sensed.surface(survey.coefficients).slope.max(initial=0.0)) ** 2
-        curvature = sensed(survey.coefficients.reshape(-1, *survey.basis.shape))
-        return Size(number, survey.share(survey.curvature - curvature))
+        layout = replace(survey.layout, gage_length=0.0)
+        sensed = NormalCurvature(survey.basis, layout, plate=survey.plate)
+        surface = sensed.surface(survey.coefficients)
+        number = float(surface.slope.max(initial=0.0)) ** 2
+        return Size(number, survey.share(survey.curvature - np.moveaxis(surface.readings, 0, -2)))
 
     def sensed(
         self, basis: Basis, layout: SensorLayout, plate: Plate | None = None
