@@ -77,7 +77,7 @@ def test_a_load_too_near_the_rim_is_warned_of_and_no_more_further_inside(
     window: MainWindow, until
 ) -> None:
     notice = window.display.notice
-    window.history.change("Load", -1, load_case="point", x=0.003, y=0.05)
+    window.history.change("Load", -1, load_case="point", x=0.003, y=0.05, force=0.03)
     until(lambda: "near the rim: unreliable" in notice.text())
     assert "near rim" in window.readouts.text("contact")
     assert notice.toolTip()

@@ -18,13 +18,20 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def port() -> Iterator[str]:
-    """A device at rest that is unplugged soon after its first readings, unless it has a second."""
+def port(tmp_path_factory) -> Iterator[str]:
+    """A device at rest that is unplugged soon after its first readings, unless it has a second.
+
+    A link of its own: the number of a terminal that is gone is soon that of another.
+    """
+    link = tmp_path_factory.mktemp("device") / "port"
     device = PseudoDevice(replace(load_scene("centre"), stimuli=(), rate=100.0))
     over, begun = threading.Event(), list[float]()
 
+    link.symlink_to(device.port)
+
     def serve() -> None:
         device.serve(lambda: over.is_set() or unplugged())
+        link.unlink()
         device.close()
 
     def unplugged() -> bool:
@@ -34,7 +41,7 @@ def port() -> Iterator[str]:
 
     thread = threading.Thread(target=serve)
     thread.start()
-    yield device.port
+    yield str(link)
     over.set()
     thread.join()
 

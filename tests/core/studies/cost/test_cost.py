@@ -609,6 +609,5 @@ def test_the_skin_of_a_scene_may_be_any() -> None:
     settings = settings_to_try(
         scene, ("least-squares", "finite-slope"), (5,), (), ("float64",), ("all",)
     )
-    known, refused = costs(scene, settings)
-    assert known.rms < known.shape_rms
-    assert "expected a flat skin" in refused.reason
+    for known in costs(scene, settings):
+        assert known.rms < known.shape_rms
