@@ -64,6 +64,7 @@ def no_window_and_no_failure_left(
     kinds = [type(each) for each in getAllValidWrappers()]
     assert kinds.count(QSurface) <= kinds.count(QtInteractor)
     assert not failures or request.node.get_closest_marker("fails_inside")
+    assert not qapp.mouseButtons().value, "a mouse button is still held"
 
 
 class TestedWindow(MainWindow):

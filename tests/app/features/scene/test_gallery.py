@@ -56,6 +56,7 @@ def test_a_card_a_key_and_the_button_choose(gallery, qtbot, until):
     qtbot.mouseClick(view, Qt.MouseButton.LeftButton, pos=place)
     assert gallery.names == ["tapping", "pencil"]
     qtbot.mouseDClick(view, Qt.MouseButton.LeftButton, pos=place)
+    qtbot.mouseRelease(view, Qt.MouseButton.LeftButton, pos=place)
     assert gallery.names == ["tapping", "pencil", "sphere"]
 
 

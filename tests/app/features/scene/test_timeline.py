@@ -134,6 +134,7 @@ def test_another_scene_ends_a_drag(row, qtbot):
     row.show_scene(load_scene("tapping"))
     row.show_time(0.3, True)
     assert row.clock.text == "0.30 s of 1.00 s"
+    qtbot.mouseRelease(row.track, LEFT)
 
 
 def test_the_words_keep_their_width(row):
