@@ -38,8 +38,8 @@ class Influence(Protocol):
         """
         ...
 
-    def gives(self) -> float:
-        """Displacement of the skin in m per N under a load at the last place."""
+    def gives(self, x: float, y: float) -> float:
+        """Displacement of the skin in m per N under a point load at (x, y) in m."""
         ...
 
 
@@ -67,17 +67,15 @@ class _OfFunctions:
         compliance = plate.compliance(self._basis)
         self._readings = compliance.after(layout.curvature_operator(self._basis, plate)).T.copy()
         self._C, self._out = compliance.after(np.eye(self._basis.size)), out
-        self._jet = np.zeros((3, self._basis.size))
 
     def at(self, x: float, y: float, s: float) -> None:
-        self._jet = self._basis.jet(x, y)[:3]
-        np.dot(self._jet, self._readings, self._out[:3])
+        np.dot(self._basis.jet(x, y)[:3], self._readings, self._out[:3])
 
     def trust(self, s: float, share: float) -> Array | None:
         return None
 
-    def gives(self) -> float:
-        f = self._jet[0]
+    def gives(self, x: float, y: float) -> float:
+        f = self._basis.jet(x, y)[0]
         return float(f.dot(self._C).dot(f))
 
 
@@ -257,18 +255,23 @@ class _OfPlate:
         self._last = nx - 4, ny - 4
         self._out, self._smooth = out, sd**2 / 2
         self._disc = _DiscOnGages(positions, length, out) if length else _Disc(positions, out)
-        self._weights, self._node = np.zeros((4, 2, 16)), (0, 0)
+        self._weights = np.zeros((4, 2, 16))
         self._both, self._cubics = self._weights.reshape(4, 32), np.empty((4, 4))
         self._block = lru_cache(16)(self._block_at)
+
+    def _among_nodes(self, x: float, y: float) -> tuple[int, int, float, float]:
+        """The first of the four nodes each way around (x, y), and the place from it, in steps."""
+        (hx, hy), (last_x, last_y) = self._steps, self._last
+        i, j = min(max(int(x / hx) - 1, 0), last_x), min(max(int(y / hy) - 1, 0), last_y)
+        return i, j, x / hx - i, y / hy - j
 
     def _block_at(self, i: int, j: int) -> Array:
         return self._table[:, j : j + 4, i : i + 4].reshape(32, -1)
 
     def at(self, x: float, y: float, s: float) -> None:
         self._disc(x, y, s)
-        (hx, hy), (last_x, last_y), weights = self._steps, self._last, self._weights
-        i, j = min(max(int(x / hx) - 1, 0), last_x), min(max(int(y / hy) - 1, 0), last_y)
-        u, v = x / hx - i, y / hy - j
+        (hx, hy), weights = self._steps, self._weights
+        i, j, u, v = self._among_nodes(x, y)
         uu, vv = u * u, v * v
         powers = (
             (1.0, u, uu, u * uu),
@@ -284,7 +287,6 @@ class _OfPlate:
         np.multiply(pairs, s / 8 - self._smooth, weights[:, 1])
         weights[3, 0] = 0.0
         np.multiply(pairs[0], 0.125, weights[3, 1])
-        self._node = i, j
         self._out += self._both.dot(self._block(i, j))
 
     def trust(self, s: float, share: float) -> Array | None:
@@ -297,9 +299,10 @@ class _OfPlate:
         under += 1
         return np.reciprocal(under, under)
 
-    def gives(self) -> float:
-        i, j = self._node
-        return float(self._weights[0, 0].dot(self._gives[j : j + 4, i : i + 4].ravel()))
+    def gives(self, x: float, y: float) -> float:
+        i, j, u, v = self._among_nodes(x, y)
+        of_x, of_y = np.dot(((1.0, u, u * u, u * u * u), (1.0, v, v * v, v * v * v)), _CUBICS)
+        return float(of_y.dot(self._gives[j : j + 4, i : i + 4]).dot(of_x))
 
 
 @lru_cache(4)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -108,6 +109,7 @@ def _products(factors: Array) -> list[tuple[int, Array, Array]]:
 
 _SIGNIFICANT = 30.0  # drop of chi-squared below which a contact may be noise found by searching
 _SEARCHED = 33  # points searched along each side
+_NODES = 64  # of them whose normal equations are kept
 _FUNCTIONS = 15  # along each side, of the shape searched for
 _STEPS = 20  # of Gauss-Newton at most; 1 or 2 do but for the last millimetres at the rim
 _WORTH = 2.0  # variances of the noise: after a step that gains less, another one is not worth it
@@ -192,6 +194,7 @@ class PointContact:
         self._start, self._least, self._largest = (
             (share * side) ** 2 for share in (_START, _LEAST, _LARGEST)
         )
+        self._at_node = lru_cache(_NODES)(self._node)
         self._cache = PatternCache[_Tables]()
         self._whole = self._cache(self._live, self._tables)
         self._all_live = bool(self._live.all())
@@ -215,10 +218,17 @@ class PointContact:
         variance = float(fit.noise) ** 2
         if not explained[row, column] > _threshold(float(cast("float", fit.spare))) * variance:
             return NO_CONTACT
-        x = _parabola_peak(self._x, explained[row], column)
-        y = _parabola_peak(self._y, explained[:, column], row)
-        self._readings = K
-        return self._refined(*self.patch.inward(x, y), tables, variance, fit)
+        self._rows[4] = self._readings = K
+        if tables.weights is None and self._stretched is None:
+            x, y, here = self._x.item(column), self._y.item(row), self._first(row, column)
+        else:
+            x = _parabola_peak(self._x, explained[row], column)
+            y = _parabola_peak(self._y, explained[:, column], row)
+            x, y = self.patch.inward(x, y)
+            if self._stretched is not None:
+                self._stretched.begin(x, y, float(fit.jet(x, y)[0][0]))
+            here = self._linearised(x, y, self._start, 0.0, tables, variance)
+        return self._refined(x, y, here, tables, variance, fit)
 
     def _used(self, K: Array) -> tuple[Array, _Tables]:
         """The readings with zeros for missing ones, and their tables."""
@@ -227,11 +237,22 @@ class PointContact:
         used = self._live & np.isfinite(K)
         return np.where(used, K, 0.0), self._cache(used, self._tables)
 
-    def _refined(self, x: float, y: float, tables: _Tables, variance: float, fit: Fit) -> Contact:
+    def _first(self, row: int, column: int) -> _Linearised:
+        """As `_linearised`, where all readings are used, at a point of the grid."""
+        rows, first, inverse = self._at_node(row, column)
+        K = self._readings
+        return self._step(self._start, first, inverse, rows.dot(K), float(K.dot(K)), None)
+
+    def _node(self, row: int, column: int) -> tuple[Array, float, Array]:
+        self._influence.at(self._x.item(column), self._y.item(row), self._start)
+        rows = self._rows[: self._unknowns].copy()
+        H = rows.dot(rows.T)
+        return rows, H.item(0, 0), _inverse(H)
+
+    def _refined(
+        self, x: float, y: float, here: _Linearised, tables: _Tables, variance: float, fit: Fit
+    ) -> Contact:
         a, b, s, force = _FURTHEST * self.patch.a, _FURTHEST * self.patch.b, self._start, 0.0
-        if self._stretched is not None:
-            self._stretched.begin(x, y, float(fit.jet(x, y)[0][0]))
-        here = self._linearised(x, y, s, force, tables, variance)
         for _ in range(_STEPS):
             before, (force, dx, dy, ds) = force, here.steps
             x, y = self.patch.inward(
@@ -256,25 +277,34 @@ class PointContact:
     ) -> _Linearised:
         """The best step from a load at (x, y) of size s and about this `force`."""
         self._influence.at(x, y, s)
-        self._rows[4] = self._readings
         if self._stretched is not None:
+            self._rows[4] = self._readings
             self._stretched.stretch(x, y, s, self._influence.unit, self._rows)
         weights = self._weights(s, force, tables, variance)
         rows = self._rows if weights is None else self._rows * weights
         products = rows.dot(self._rows.T)
         n = self._unknowns
         H, g = products[:n, :n], products[:n, 4]
-        if not H.item(2, 2):  # a strip is alike along y: no step, no error
-            H[2, 2] = math.inf
-        at_place = g.item(0) ** 2 / H.item(0, 0)
-        inverse = _inverse(H)
-        best = inverse.dot(g)
-        if n == 4 and s + best[3] / best[0] < self._least:
+        first = H.item(0, 0)
+        return self._step(s, first, _inverse(H), g, products.item(4, 4), weights)
+
+    def _step(
+        self,
+        s: float,
+        first: float,
+        inverse: Array,
+        g: Array,
+        power: float,
+        weights: Array | None,
+    ) -> _Linearised:
+        """The best step of a load of size `s`, from the normal equations and their `inverse`."""
+        at_place, best = g.item(0) ** 2 / first, inverse.dot(g)
+        if self._unknowns == 4 and s + best[3] / best[0] < self._least:
             # As small as can be: the best of those that are no smaller.
             shrinks = best[0] * (self._least - s)
             best -= inverse[3] * ((best[3] - shrinks) / inverse[3, 3])
-        steps, explained, power = best.tolist(), float(best.dot(g)), products.item(4, 4)
-        if n == 3:
+        steps, explained = best.tolist(), float(best.dot(g))
+        if self._unknowns == 3:
             steps.append(0.0)
         left = max(power - explained, 0.0)
         return _Linearised(steps, inverse, left, explained - at_place, power, weights)
@@ -295,7 +325,7 @@ class PointContact:
         spread, unit = math.sqrt(here.left / tables.spare), self._influence.unit
         strength, force = abs(here.steps[0]), here.steps[0] * unit
         sd = spread * np.sqrt(here.inverse.diagonal())
-        under = force * self._influence.gives()
+        under = force * self._influence.gives(x, y)
         if self._stretched is not None:
             under += self._stretched.more(x, y, force)
         return Contact(
@@ -344,6 +374,8 @@ class PointContact:
 
 def _inverse(H: Array) -> Array:
     """Inverse of a positive definite matrix; what it does not determine is vast."""
+    if not H.item(2, 2):  # a strip is alike along y: no step, no error
+        H[2, 2] = math.inf
     H.flat[:: len(H) + 1] *= 1 + _RIDGE
     root, _ = lapack.dtrtri(lapack.dpotrf(H)[0])
     return root.dot(root.T)

@@ -32,8 +32,7 @@ class Read:
         return (self.rows / self.influence.unit).reshape(4, 3, -1).copy()
 
     def displacement(self, x, y):
-        self.influence.at(x, y, 0.0)
-        return self.influence.gives()
+        return self.influence.gives(x, y)
 
 
 FLAT = {length: Read(Plate(SQUARE), gage_length=length) for length in (0.0, 4e-3)}
