@@ -22,7 +22,7 @@ from kappaskin_app.shell.centre import Centre
 from kappaskin_app.shell.colouring import SHADES, Colouring, Ranges
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.status_bar import Notice, StatusBar, warnings
+from kappaskin_app.shell.status_bar import Notice, StatusBar, SteadySlope, warnings
 from kappaskin_app.widgets.tint import Tint
 
 _OLD = (LOST, OFF, STALE, WAITING, GAP)  # the values shown are not the present ones
@@ -88,6 +88,7 @@ class Display(QObject):
         self.places: dict[str, list[QWidget]] = {}
         self.figures: dict[str, Callable[[], float]] = {}
         self._connection, self._next_numbers = 0, 0.0
+        self._slope = SteadySlope()
         session.estimated.connect(guarded(self.show_estimate))
         session.reported.connect(guarded(self._show_status))
 
@@ -137,7 +138,8 @@ class Display(QObject):
         texts = [self._session.other_device()]
         if estimate is not None:
             crossed, _ = self.marks(estimate.curvature)
-            texts.append(warnings(estimate, int(crossed.sum()), self._session.status.slope))
+            slope = self._slope(self._session.status.slope, time.monotonic())
+            texts.append(warnings(estimate, int(crossed.sum()), slope))
         self.notice.show_warning("; ".join(filter(None, texts)))
 
     def estimate_shown(self) -> Estimate | None:

@@ -84,6 +84,26 @@ def warnings(estimate: Estimate, strained: int, slope: float = 0.0) -> str:
     return words[:1].upper() + words[1:]
 
 
+_STEADY, _KEPT = 0.1, 2.0  # share by which a slope may change, and s it may be gone, unshown
+
+
+class SteadySlope:
+    """The neglected slope as it is shown: it changes if by much, and goes after a while."""
+
+    def __init__(self) -> None:
+        self._shown, self._until = 0.0, 0.0
+
+    def __call__(self, slope: float, now: float) -> float:
+        """What is shown of a `slope` at the time `now` in s."""
+        if slope:
+            self._until = now + _KEPT
+            steady = abs(slope - self._shown) < _STEADY * self._shown
+            self._shown = self._shown if steady else slope
+        elif now > self._until:
+            self._shown = 0.0
+        return self._shown
+
+
 class Notice(Label):
     """Shows a hint, or a warning in the colour of alarms."""
 
