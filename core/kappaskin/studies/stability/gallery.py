@@ -14,7 +14,7 @@ import numpy as np
 from kappaskin.bases import Basis, CurvatureMap, SineBasis
 from kappaskin.estimation import FiniteSlopeLeastSquares
 from kappaskin.frames import COMPONENTS, Array
-from kappaskin.mechanics import Plate, PointLoad
+from kappaskin.mechanics import DiscLoad, Plate, PointLoad, Stretching
 from kappaskin.scenes import TABLE_1_NOISE, scaled_to
 from kappaskin.sensing import SensorLayout, Transduction
 from kappaskin.skin import Patch
@@ -224,6 +224,32 @@ def _loads() -> Iterator[HardCase]:
             truth=1e-3 * w / peak,
             kind=CaseKind.LINEAR,
         )
+    plate, finest = Plate(_SQUARE), SineBasis(_SQUARE, 60, 60)
+    resolved = {
+        "point load, summed": (PointLoad(0.031, 0.052), "a point load, of 60 x 60 functions"),
+        "disc of 5 mm": (DiscLoad(0.031, 0.052, radius=5e-3), "a disc of 5 mm radius, of 60 x 60"),
+    }
+    for name, (load, what) in resolved.items():
+        yield case_of(
+            name,
+            f"{what}, of which those that are fitted follow 8 x 8",
+            _TENS,
+            (8, 8),
+            true_basis=finest,
+            truth=plate.deflection([scaled_to(plate, load, 1e-3, finest)], finest),
+            kind=CaseKind.LINEAR,
+        )
+    sheet = replace(plate, thickness=0.25e-3)
+    load = scaled_to(sheet, PointLoad(0.031, 0.052), 0.4e-3, fine)
+    yield case_of(
+        "skin that stretches",
+        "moved by 1.6 of its thickness and held in its plane: narrower than a plate that bends",
+        _TENS,
+        (8, 8),
+        true_basis=fine,
+        truth=Stretching(sheet, fine)(load.modal(fine).reshape(fine.shape)),
+        kind=CaseKind.LINEAR,
+    )
     yield case_of(
         "load on the edge",
         "the edge is held: a load there moves nothing, at any force",
@@ -292,6 +318,16 @@ def _scales() -> Iterator[HardCase]:
         yield case_of(f"{name} patch", f"the lengths of M's columns go with 1/{name}^2",
                     SensorLayout.regular(Patch(side, side), 10, 10), (8, 8),
                     kind=CaseKind.LINEAR)  # fmt: skip
+    for size in (1e-300, 1e290):
+        yield case_of(
+            f"readings of {size:g} 1/m",
+            "squares of such numbers are zero or infinite",
+            _TENS,
+            (8, 8),
+            truth=size * _dent(8),
+            noise=0,
+            kind=CaseKind.LINEAR,
+        )
     yield case_of("1:100", "functions in x have ten thousand times the curvature of those in y",
                   SensorLayout.regular(Patch(0.01, 1.0), 4, 20), (3, 15))  # fmt: skip
 
@@ -339,7 +375,7 @@ def _slopes() -> Iterator[HardCase]:
     basis = SineBasis(_SQUARE, 8, 8)
     c = Plate(_SQUARE).deflection([PointLoad(0.04, 0.06)], basis)
     slope = np.abs(basis.on_grid(*_SQUARE.grid(101, 101), dx=1)(c)).max()
-    for steepest in (0.5, 0.9):
+    for steepest in (0.5, 0.9, 1.4):
         truth = c * steepest / slope
         skin = FiniteSlopeLeastSquares(basis, _TENS)
         rng = np.random.default_rng(SEED)
