@@ -318,7 +318,11 @@ def _scales() -> Iterator[HardCase]:
         yield case_of(f"{name} patch", f"the lengths of M's columns go with 1/{name}^2",
                     SensorLayout.regular(Patch(side, side), 10, 10), (8, 8),
                     kind=CaseKind.LINEAR)  # fmt: skip
-    for size in (1e-300, 1e290):
+    extremes = {
+        1e-300: "a sequence cannot begin with readings of less than 1e-150 1/m",
+        1e290: "readings beyond 1e77 1/m are refused",
+    }
+    for size, announced in extremes.items():
         yield case_of(
             f"readings of {size:g} 1/m",
             "squares of such numbers are zero or infinite",
@@ -327,6 +331,7 @@ def _scales() -> Iterator[HardCase]:
             truth=size * _dent(8),
             noise=0,
             kind=CaseKind.LINEAR,
+            announced=announced,
         )
     yield case_of("1:100", "functions in x have ten thousand times the curvature of those in y",
                   SensorLayout.regular(Patch(0.01, 1.0), 4, 20), (3, 15))  # fmt: skip
