@@ -211,7 +211,7 @@ def shape_coverage(case, method, functions, frames, seed=0) -> tuple[float, floa
     return np.mean(covered), sqrt(np.mean(squares))
 
 
-SHAPES = [("least-squares", 8), ("bayes", 15)]
+SHAPES = [("least-squares", 8), ("robust", 8), ("tracking", 8), ("bayes", 15)]
 
 # So weak that not every press is found, and those that are found are told too hard.
 WEAK = _stretched_case("held, 0.9 thicknesses, hardly found", "held", 0.012)

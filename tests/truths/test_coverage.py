@@ -90,8 +90,14 @@ def test_intervals_on_a_stretched_skin_cover_the_truth(case, frames):
 # Shapes: the functions end where the truth does not, and nothing promises 95 %
 
 
+SLOW = ("robust", "tracking")
+
+
 @pytest.mark.parametrize("case", FLAT[:3], ids=lambda case: case.name)
-@pytest.mark.parametrize(("method", "functions"), SHAPES)
+@pytest.mark.parametrize(
+    ("method", "functions"),
+    [pytest.param(*one, marks=pytest.mark.full if one[0] in SLOW else ()) for one in SHAPES],
+)
 @frames
 def test_bands_of_the_surface_cover_nine_tenths_of_it(case, method, functions, frames):
     covered, rms = shape_coverage(case, method, functions, frames)

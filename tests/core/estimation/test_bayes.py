@@ -39,7 +39,7 @@ class Case:
 @pytest.mark.parametrize(
     ("name", "most"), [("centre", 0.001), ("off-centre", 0.0015), ("line", 0.0006)]
 )
-def test_15_by_15_functions_lift_the_truncation(name, most):
+def test_table_1s_shapes_of_15_by_15_functions_come_back_but_for_the_prior(name, most):
     case, fit = Case(name), Bayes(FIFTEEN, TENS)
 
     assert case.rms(fit(case.K)) <= most
@@ -57,7 +57,10 @@ def test_with_the_papers_noise_the_shape_is_known_to_21_um(name, sigma):
 
 
 def from_the_prior(frames, noise, seed=0, height=3e-3):
-    """Truths (frames, 15, 15) of `height` in m by RMS, and their readings with noise."""
+    """Draws (frames, 15, 15) of the prior, of `height` in m by RMS, and readings with noise.
+
+    The posterior is exact for these alone; a plate's shape is none: tests/truths has that.
+    """
     rng = np.random.default_rng(seed)
     c = height * rng.normal(size=(frames, 225)) @ prior_root(FIFTEEN).T
     K = (c @ TENS.curvature_operator(FIFTEEN).T).reshape(frames, 3, 100)
@@ -68,7 +71,7 @@ def from_the_prior(frames, noise, seed=0, height=3e-3):
 @pytest.mark.parametrize(
     ("noise", "told"), [(0.01, False), (0.231, False), (2.31, False), (0.231, True)]
 )
-def test_95_percent_bands_cover_95_percent_of_2000_truths_from_the_prior(noise, told):
+def test_95_percent_of_draws_of_the_prior_lie_in_the_posteriors_bands(noise, told):
     truth, K = from_the_prior(2000, noise)
     fit = Bayes(FIFTEEN, TENS, noise if told else None)
     x, y = SQUARE.grid(23, 23)
@@ -80,7 +83,7 @@ def test_95_percent_bands_cover_95_percent_of_2000_truths_from_the_prior(noise, 
     assert 0.93 <= np.mean(np.abs(off) < 1.96 * answer.surface_sd(points)) <= 0.97
 
 
-def test_curvature_has_its_bands_too():
+def test_so_do_95_percent_of_their_curvatures():
     truth, K = from_the_prior(500, 0.231)
     rows = TENS.curvature_operator(FIFTEEN)[::7]
 
@@ -142,7 +145,7 @@ def test_half_of_the_readings_gone_leave_a_shape_whose_bars_hold():
 
 
 @pytest.mark.parametrize("name", ["centre", "off-centre", "line"])
-def test_bands_hold_where_noise_hides_the_signal(name):
+def test_bands_hold_table_1s_shapes_where_noise_hides_them(name):
     case = Case(name)
     sd = 10 * np.sqrt(np.mean(case.K**2))
     K = case.K + np.random.default_rng(0).normal(0, sd, (300, *case.K.shape))

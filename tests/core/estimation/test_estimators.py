@@ -53,7 +53,7 @@ def surface(coefficients):
 
 
 @every_method
-def test_a_shape_without_noise_comes_back(method):
+def test_a_shape_of_the_functions_comes_back_without_noise(method):
     answer = made(method)(exact())
 
     # Finite slope knows that gages on a slope read less; tracking and Bayes have a prior.
@@ -107,7 +107,8 @@ def test_error_bars_and_covariance_tell_the_same(method):
 
 
 @every_frame_alone
-def test_the_bands_cover_the_surface(method):
+def test_the_bands_are_the_spread_of_answers_to_a_shape_of_the_functions(method):
+    """What the bands cover of a plate's shape, tests/truths tells."""
     fit, points = made(method), np.random.default_rng(1).uniform(0.01, 0.09, (40, 2))
 
     answer = fit(noisy(frames=200))

@@ -254,7 +254,7 @@ def test_the_covariance_is_that_of_the_problem_linearised_at_the_solution(name, 
 
 
 @pytest.mark.parametrize("name", ["flat", "half round"])
-def test_error_bars_hold_on_steep_skins(name):
+def test_error_bars_are_the_spread_of_answers_to_steep_shapes_of_the_functions(name):
     basis, layout = skin_of(name)
     c, rng = smooth_shape(basis, 1.2), np.random.default_rng(3)
     K = readings_of(basis, layout, c) + rng.normal(0, 0.231, (150, *layout.live.shape))

@@ -213,7 +213,7 @@ def test_a_still_load_is_averaged_to_the_shape_of_least_squares_with_the_right_e
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
-def test_error_bars_of_a_moving_shape_cover_it(dtype):
+def test_error_bars_of_a_moving_shape_of_the_functions_cover_it(dtype):
     rows, covered, noise = displacement_rows(), [], []
     for seed in range(6):
         shape, rng, fit = (
