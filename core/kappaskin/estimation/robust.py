@@ -38,6 +38,8 @@ _STEPS = 30  # towards the solution for a limit
 _STILL = 0.02  # of a limit: a step that changes less is the last
 _QUIET = 0.25  # of the elements are good, whatever others are: they tell the noise
 _NEARLY, _OTHERS = 40.0, 0.1  # -2 ln of evidence, and share of the elements, of another answer
+_HALF = 0.5  # of the variance of the noise, at least, has half of the good elements
+_ROUNDED = 1e-4  # of the largest reading: less noise is rounding
 _BAD = 1 / 30  # of one element is bad in a usual frame
 _FRAMES = 32  # from which the fault is identified
 _ENOUGH = 6  # of them: with fewer, any suspect may be a spike
@@ -72,7 +74,8 @@ class _OutlierTest:
 class _OutlierResult:
     """Suspected elements (P,), and how far `off` (3, P) their readings are, 0 for the others.
 
-    `cost` is -2 ln of its evidence, infinite where too many elements are suspects.
+    `cost` is -2 ln of its evidence, infinite where too many elements are suspects; `converged` is
+    False then, where other suspects are as likely, and where outliers are taken for noise.
     """
 
     suspects: Mask
@@ -97,8 +100,9 @@ class Robust(Estimator, Stateful):
     shape is that of `LeastSquares` with them dead. `Fit.suspect` has their faults, identified from
     the last frames. The rounds begin twice: with no suspects, and with those of `_FirstSuspects`,
     which a quarter of bad elements does not mislead. The end with more evidence holds.
-    `Fit.converged` is false where the other has nearly as much and quite other suspects, and where
-    more than a third of the elements contradict the rest: then none is excluded.
+    `Fit.converged` is false where the other has nearly as much and quite other suspects, where the
+    noise told is far more than most elements have, and where more than a third of the elements
+    contradict the rest: then none is excluded.
     """
 
     failure = (
@@ -198,9 +202,7 @@ class Robust(Estimator, Stateful):
             self._linear(np.where(out, np.nan, K)),
             estimator=self,
             steps=np.array([result.rounds for result in results], int).reshape(frames),
-            converged=np.array([math.isfinite(result.cost) for result in results], bool).reshape(
-                frames
-            ),
+            converged=np.array([result.converged for result in results], bool).reshape(frames),
             suspect=np.array(why, np.uint8).reshape(*frames, P),
         )
 
@@ -219,7 +221,8 @@ class Robust(Estimator, Stateful):
             return _OutlierResult(none, np.zeros((3, P)), rounds)
         off = best.off * unit
         np.divide(off, self.weight.reshape(3, P), where=off != 0, out=off)
-        return replace(best, off=off, rounds=rounds, converged=not _undecided(best, ends))
+        converged = best.converged and not _undecided(best, ends)
+        return replace(best, off=off, rounds=rounds, converged=converged)
 
     def _searched(self, K: Array, test: _OutlierTest, suspects: Mask) -> _OutlierResult:
         """Where rounds end that begin with some `suspects` (P,), in units of sigma."""
@@ -241,11 +244,23 @@ class Robust(Estimator, Stateful):
                 off = np.zeros(3 * P)
                 off[out & used] = residuals.amounts[: 3 * suspects.sum()][used[out]]
                 cost = residuals.cost(K, self.sigma is not None)
-                return _OutlierResult(suspects, off.reshape(3, P), rounds, cost)
+                good = (test.sensed > 0) & ~suspects
+                even = self._even(residuals.chi_squared(suspects)[good], variance, good, K)
+                return _OutlierResult(suspects, off.reshape(3, P), rounds, cost, even)
             else:
                 suspects = found
             rounds += 1
         return _OutlierResult(suspects, np.zeros((3, P)), rounds)
+
+    def _even(self, t: Array, variance: float, good: Mask, K: Array) -> bool:
+        """Whether half of the `good` (P,) elements, with t (g,), scatter as the noise of all says.
+
+        Outliers that are taken for noise make it too large for them.
+        """
+        if self.sigma is not None or variance <= (_ROUNDED * np.abs(K).max()) ** 2:
+            return True
+        usual = scipy.special.chdtri(self._sensing[good], 0.5)
+        return bool(np.median(t / usual) >= _HALF * variance)
 
     def _contradicted(
         self, residuals: "_Residuals", test: _OutlierTest, suspects: Mask, variance: float
@@ -402,8 +417,8 @@ class _Residuals:
         """
         tiny, P, f = np.finfo(float).tiny, len(K) // 3, len(self._inverse)
         squares = max(float(self.unexplained @ self.r), tiny)
-        variance = 1.0 if sigma_known else squares / self._left
-        width = math.log(max(float(np.abs(K).max()) ** 2, tiny) / variance)
+        variance = 1.0 if sigma_known else max(squares / self._left, tiny)
+        width = math.log(max(float(np.abs(K).max()) ** 2, tiny)) - math.log(variance)
         volume = -np.log1p(-self.w).sum() - np.linalg.slogdet(self._inverse)[1]
         count, outliers = self._left + f, self._out / 3
         cost = squares / variance + count * math.log(variance) + float(volume)
