@@ -111,7 +111,8 @@ def test_without_a_contact_its_numbers_are_null_and_it_is_json_all_the_same(mess
     assert told["force_N"] is told["normal_sd_rad"] is told["direction_2_z"] is None
     assert isinstance(told["noise_per_m"], float)
     assert [key for key in told if key not in ("kind", "version", "source", *SWITCHES)] == [
-        field.key for field in CONTACT
+        *(field.key for field in CONTACT),
+        "second",
     ]
 
 
@@ -119,6 +120,7 @@ def test_keys_are_one_of_a_kind_and_their_values_flat(messages_of) -> None:
     (made,) = messages_of(PRESSED)
     told = read(made.contact)
     assert len({field.key for field in CONTACT}) == len(CONTACT)
+    assert told.pop("second") is None
     assert all(isinstance(value, bool | int | float | str) for value in told.values())
     for key, value in read(made.shape).items():
         assert isinstance(value, int | float | str) or key.endswith("_m")
@@ -227,6 +229,7 @@ def test_the_state_of_the_source_is_json_with_every_number_promised() -> None:
 def test_the_guide_names_every_key_with_the_words_of_the_code() -> None:
     rows = dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", GUIDE, re.MULTILINE))
     assert rows.pop("source").startswith("`live`, `sim`")
+    assert rows.pop("second").startswith("null, or a weaker contact")
     assert rows == SWITCHES | {field.key: field.text for field in CONTACT}
     for key in (*message.STATUS_NUMBERS, "coefficients_sd_m", "functions_x", "edge", "state"):
         assert f"`{key}`" in GUIDE
