@@ -5,7 +5,18 @@ from math import sqrt
 
 import pytest
 
-from studies import BENT, FLAT, SHAPES, STRETCHED, coverage, shape_coverage
+from studies import (
+    BENT,
+    FLAT,
+    LINES,
+    SHAPES,
+    SINGLE,
+    STRETCHED,
+    TWO,
+    coverage,
+    shape_coverage,
+    told,
+)
 
 pytestmark = pytest.mark.truth
 
@@ -98,3 +109,42 @@ def test_bands_of_the_surface_cover_nine_tenths_of_it(case, method, functions, f
 
     assert 0.90 <= covered <= 0.98
     assert rms < 30e-6
+
+
+# One contact or two, and loads that are neither
+
+figures_told = cache(told)
+MANY = 10_000
+many = pytest.mark.parametrize("frames", [FEW, pytest.param(MANY, marks=pytest.mark.full)])
+LONG = [line for line in LINES if line.name in ("a line of 30 mm", "a line of 40 mm")]
+CLEAR = [
+    two for two in TWO if two.name.startswith(("two, 30", "two, 40")) and "0.1" not in two.name
+]
+
+
+@each(SINGLE)
+@many
+def test_no_second_contact_is_invented_beside_a_single_one(case, frames):
+    found = figures_told(case, frames)
+
+    assert found.two < 0.005
+    assert found.single > 0.99
+
+
+@each(LONG)
+@frames
+def test_a_line_is_neither_one_contact_nor_two(case, frames):
+    found = figures_told(case, frames)
+
+    assert found.two <= 0.02 + slack(frames)
+    assert found.single < 0.05
+
+
+@each(CLEAR)
+@frames
+def test_two_contacts_are_told_as_two(case, frames):
+    found, least = figures_told(case, frames), 0.90 - slack(frames)
+
+    assert found.two > 0.95
+    assert found.single < 0.05
+    assert min(found.covered) >= least

@@ -148,8 +148,7 @@ class _Tried:
         H, scale = self.normal()
         H.flat[:: len(H) + 1] += _RIDGE
         per = np.divide(1, scale, out=np.zeros_like(scale), where=scale > 0)
-        covariance: Array = np.linalg.inv(H) * np.multiply.outer(per, per)
-        return covariance
+        return np.multiply(np.linalg.inv(H), np.multiply.outer(per, per), dtype=np.float64)
 
 
 class _Loads:
