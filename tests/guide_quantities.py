@@ -23,7 +23,8 @@ def keys() -> str:
 
 def quantities() -> str:
     """A row for each quantity of an estimate."""
-    lines = [_HEAD, "|---" * 7 + "|", *map(_row, REPORTED)]
+    shown = (of for of in REPORTED if of.group != "second" or of.columns)
+    lines = [_HEAD, "|---" * 7 + "|", *map(_row, shown)]
     return "".join(f"{line}\n" for line in lines).replace("|  |", "| |").replace("|  |", "| |")
 
 

@@ -281,7 +281,9 @@ def told(press, frames, seed=0) -> Told:
         two += both[1].present
         if both[1].present and len(loads) == 2:
             covered.append(_covered(both, loads))
-    return Told(two / frames, single / frames, np.concatenate(covered).mean(axis=0))
+    of_both = np.concatenate(covered)
+    shares = of_both.mean(axis=0) if len(of_both) else np.full(3, np.nan)
+    return Told(two / frames, single / frames, shares)
 
 
 def _covered(contacts, loads):

@@ -25,12 +25,12 @@ _SPREAD = 25.0  # by which two loads must be better than one, for the load to be
 _DISTINCT = 32.0  # and to be told as two
 _NO_LINE = 12.0  # and by which they must be better than a line
 
-_TURNS = 4  # of the search: each of two loads in turn, the other one where it is
-_SEARCHED = 21  # points searched along each side
+_SEARCHED = 17  # points searched along each side
 _FUNCTIONS = 15  # along each side, of the loads searched for
 _COVERED = 1e-3  # of the squares of a load's readings: what another one leaves of them is none
 _STEPS = 25  # of Levenberg and Marquardt at most
 _WORTH = 0.05  # a step that makes -2 ln of the likelihood no smaller than by this is the last one
+_NEARER = 0.1  # of the way to a cost that is enough: steps that gain less lead nowhere
 _DAMPING, _EASED, _RAISED, _MOST = 1e-3, 0.2, 10.0, 1e6
 _FURTHEST = 0.05  # of a side, in one step
 _START, _LEAST, _LARGEST = 0.03, 1e-3, 0.2  # of the shorter side: radius of a load
@@ -245,7 +245,7 @@ class _Pairs:
         self._felt = self._basis.at(self._places)
         M = self._compliance.after(layout.curvature_operator(self._basis, plate))
         self._M = M * self._loads.influence.unit
-        self._norms = PatternCache[Array]()
+        self._pairs = PatternCache[tuple[Array, Array]]()
 
     def __call__(self, K: Array, fit: Fit, contact: Contact) -> tuple[Contact, Contact]:
         """The contacts for readings `K` (C,) over their noise, by the single one that fits best."""
@@ -255,7 +255,7 @@ class _Pairs:
         s = contact.size if self._loads.influence.sized else self._loads.start
         alone = np.array([[*contact.position, s, contact.force / unit]])
         one = self._climbed(several, alone, readings)
-        two = self._climbed(several, self._found(readings, contact.position), readings)
+        two = self._climbed(several, self._found(readings), readings)
         better = one.cost - two.cost
         contact = replace(contact, single=contact.single and better < _SPREAD)
         spare = int(used.sum()) - two.p.size
@@ -283,27 +283,30 @@ class _Pairs:
         line = np.array([[*ends.mean(axis=0), *(ends[1] - ends[0]) / 2, two.p[:, 3].sum()]])
         return self._climbed(self._loads.line, line, readings, least).cost < least
 
-    def _found(self, readings: _Readings, first: Array) -> Array:
-        """Two loads (2, 4) on a grid that explain most, each searched for in turn."""
+    def _found(self, readings: _Readings) -> Array:
+        """The two loads (2, 4) on a grid that explain most, and push to the same side."""
         K, used = readings
-        M = self._M * used[:, None]
-        norm = self._norms(used, lambda _: np.vecdot(self._felt @ (M.T @ M), self._felt))
-        norm = np.where(norm > 0, norm, math.inf)
-        read = self._felt @ (K @ M)
-        here = int(np.hypot(*(self._places - first).T).argmin())
-        pair, forces = [here, here], np.zeros(2)
-        for _ in range(_TURNS):
-            # What a load explains besides one: by the part of its readings across that one's.
-            shared = self._felt @ ((M @ self._felt[here]) @ M)
-            across = norm - shared**2 / norm[here]
-            rest = read - shared * (read[here] / norm[here])
-            gain = np.where(across > _COVERED * norm, rest**2, 0.0) / np.maximum(across, 1e-300)
-            there = int(gain.argmax())
-            own = rest[there] / across[there]
-            forces[:] = (read[here] - shared[there] * own) / norm[here], own
-            pair, here = [here, there], there
-        places = self._places[pair]
-        return np.column_stack([places, [self._loads.start] * 2, forces])
+        shared, across = self._pairs(used, self._products)
+        norm, read = shared.diagonal(), self._felt @ (K @ self._M)
+        # Forces of all pairs, times `across`: what the first explains besides the second.
+        forces = np.multiply.outer(read, norm) - shared * read
+        gain = np.where(forces * forces.T > 0, (forces * read[:, None] + forces.T * read), 0.0)
+        gain /= across
+        first, second = divmod(int(gain.argmax()), len(read))
+        pair = [first, second]
+        found = forces[pair, pair[::-1]] / across[first, second]
+        return np.column_stack([self._places[pair], [self._loads.start] * 2, found])
+
+    def _products(self, used: Mask) -> tuple[Array, Array]:
+        """Products (G, G) of what the readings `used` (C,) are of a load at each place and another.
+
+        And the determinants of those of each pair, infinite where one hides the other.
+        """
+        M = self._M[used]
+        shared = self._felt @ (M.T @ M) @ self._felt.T
+        squares = np.multiply.outer(shared.diagonal(), shared.diagonal())
+        across = squares - shared**2
+        return shared, np.where(across > _COVERED * squares, across, math.inf)
 
     def _climbed(
         self,
@@ -312,9 +315,9 @@ class _Pairs:
         readings: _Readings,
         enough: float = -math.inf,
     ) -> _Tried:
-        """The most likely loads near `p`, or any of a cost below `enough`.
+        """The most likely loads near `p`, by the steps of Levenberg and Marquardt.
 
-        By the steps of Levenberg and Marquardt.
+        Or any of a cost below `enough`, or that come no nearer to it.
         """
         best, damping = _tried(model, p, readings), _DAMPING
         for _ in range(_STEPS):
@@ -332,7 +335,8 @@ class _Pairs:
             gain = best.cost - other.cost
             damping *= _EASED if gain > 0 else _RAISED
             best = other if gain > 0 else best
-            if 0 < gain < _WORTH or damping > _MOST or best.cost < enough:
+            worth = max(_WORTH, _NEARER * (best.cost - enough) if math.isfinite(enough) else 0.0)
+            if 0 < gain < worth or damping > _MOST or best.cost < enough:
                 break
         return best
 

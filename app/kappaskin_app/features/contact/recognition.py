@@ -71,4 +71,6 @@ def _recognise(
         whole = as_one(estimate.contact, estimate.second)
         found = finder(estimate.curvature, estimate.noise, whole)
         what = found.describe()
+        if estimate.second.present:
+            what = f"if one object makes both contacts: {what}"
     return "; ".join(filter(None, [what, curvature_text(estimate)])), found, estimate
