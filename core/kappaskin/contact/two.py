@@ -136,6 +136,11 @@ class _Tried:
         """Weighted sum of squares that the loads leave of the readings."""
         return float((self.weights * self.rest).dot(self.rest))
 
+    def worse(self, than: "_Tried", variance: float) -> float:
+        """-2 ln of the likelihood ratio to other loads, which leave a `variance` of readings."""
+        logarithms = (self.cost - self.left) - (than.cost - than.left)
+        return (self.left - than.left) / variance + logarithms
+
     def normal(self) -> tuple[Array, Array]:
         """The normal matrix (U, U) scaled to a diagonal of 1, and the scale (U,), 0 if not felt."""
         H = (self.J * self.weights).dot(self.J.T)
@@ -256,12 +261,12 @@ class _Pairs:
         alone = np.array([[*contact.position, s, contact.force / unit]])
         one = self._climbed(several, alone, readings)
         two = self._climbed(several, self._found(readings), readings)
-        better = one.cost - two.cost
-        contact = replace(contact, single=contact.single and better < _SPREAD)
         spare = int(used.sum()) - two.p.size
+        better = one.worse(two, two.left / spare)
+        contact = replace(contact, single=contact.single and better < _SPREAD)
         if better < _DISTINCT or not self._explains(two, spare, fit):
             return contact, NO_CONTACT
-        if self._is_line(two, readings):
+        if self._is_line(two, two.left / spare, readings):
             return contact, NO_CONTACT
         return self._told(two, spare, fit)
 
@@ -277,11 +282,13 @@ class _Pairs:
             and two.left <= spare * _quantile(_LEFT, spare, fit)
         )
 
-    def _is_line(self, two: _Tried, readings: _Readings) -> bool:
-        """Whether a line fits about as well as two loads."""
-        ends, least = two.p[:, :2], two.cost + _NO_LINE
+    def _is_line(self, two: _Tried, variance: float, readings: _Readings) -> bool:
+        """Whether a line fits about as well as two loads, which leave this `variance`."""
+        ends, least = two.p[:, :2], two.cost + _NO_LINE * variance
         line = np.array([[*ends.mean(axis=0), *(ends[1] - ends[0]) / 2, two.p[:, 3].sum()]])
-        return self._climbed(self._loads.line, line, readings, least).cost < least
+        return (
+            self._climbed(self._loads.line, line, readings, least).worse(two, variance) < _NO_LINE
+        )
 
     def _found(self, readings: _Readings) -> Array:
         """The two loads (2, 4) on a grid that explain most, and push to the same side."""
