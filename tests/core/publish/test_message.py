@@ -22,7 +22,7 @@ from kappaskin.publish import foxglove as client
 from kappaskin.publish import foxglove_channels as channels
 from kappaskin.publish import foxglove_channels as cloud
 from kappaskin.publish import publishing as target
-from kappaskin.publish.message import CONTACT, LARGEST, MOST_FUNCTIONS, SWITCHES, text_of
+from kappaskin.publish.message import CONTACT, LARGEST, MOST_FUNCTIONS, SECOND, SWITCHES, text_of
 from kappaskin.scenes.effects import GaussianNoise
 
 GUIDE = (files("kappaskin_resources") / "publishing" / "messages.md").read_text("utf-8")
@@ -114,6 +114,22 @@ def test_without_a_contact_its_numbers_are_null_and_it_is_json_all_the_same(mess
         *(field.key for field in CONTACT),
         "second",
     ]
+
+
+def test_a_second_contact_is_told_beside_the_first(messages_of) -> None:
+    (made,) = messages_of(load_scene("two-contacts"))
+    second, estimate = read(made.contact)["second"], made.estimate
+    assert [one.force for one in estimate.contacts] == [
+        estimate.contact.force,
+        estimate.second.force,
+    ]
+    assert isinstance(second, dict)
+    assert list(second) == [number.key for number in SECOND]
+    assert second["force_N"] == pytest.approx(estimate.second.force, rel=1e-5)
+    assert (second["x_m"], second["y_m"]) == pytest.approx(
+        tuple(estimate.second.position), rel=1e-6
+    )
+    assert len(made.contact) <= 2000
 
 
 def test_keys_are_one_of_a_kind_and_their_values_flat(messages_of) -> None:
