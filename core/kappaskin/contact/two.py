@@ -381,9 +381,8 @@ class _Pairs:
 
         The other load moves the skin there by `beside` in m.
         """
-        x, y, s, _ = load.tolist()
-        self._loads.at(x, y, s)
-        under = force * self._loads.influence.gives() + beside
+        x, y = load[:2].tolist()
+        under = force * self._loads.influence.gives(x, y) + beside
         shape, covariance = fit.jet(x, y)
         fitted, observed = float(shape[0]), float(covariance[0, 0])
         observed = math.sqrt(observed) if observed >= 0 else math.nan
