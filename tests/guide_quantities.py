@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from kappaskin.pipeline import REPORTED, ReportedQuantity
-from kappaskin.publish.message import CONTACT, SWITCHES
+from kappaskin.publish.message import CONTACT, SECOND, SWITCHES
 
 _RESOURCES = Path(__file__).parents[1] / "resources" / "kappaskin_resources"
 _HEAD = "| quantity | symbol | unit | what it is | in files | in messages | on the screen |"
@@ -16,19 +16,23 @@ _HEAD = "| quantity | symbol | unit | what it is | in files | in messages | on t
 def keys() -> str:
     """A row for each key of a message about a contact."""
     rows = SWITCHES | {number.key: number.text for number in CONTACT}
+    keys = ", ".join(f"`{number.key}`" for number in SECOND)
+    rows |= {"second": f"null, or a weaker contact that is told beside the first: {keys}"}
     return "".join(f"| `{key}` | {text} |\n" for key, text in rows.items())
 
 
 def quantities() -> str:
     """A row for each quantity of an estimate."""
-    lines = [_HEAD, "|---" * 7 + "|", *map(_row, REPORTED)]
+    shown = (of for of in REPORTED if of.group != "second" or of.columns)
+    lines = [_HEAD, "|---" * 7 + "|", *map(_row, shown)]
     return "".join(f"{line}\n" for line in lines).replace("|  |", "| |").replace("|  |", "| |")
 
 
 def _row(of: ReportedQuantity) -> str:
-    tables = of.group in ("frame", "fit", "contact")
+    tables = of.group in ("frame", "fit", "contact", "second")
     files = [f"{of.name}{suffix}" for suffix, _, _ in of.forms if tables and suffix in of.columns]
-    sent = [number.key for number in of.published if tables]
+    inside = "second." if of.group == "second" else ""
+    sent = [f"{inside}{number.key}" for number in of.published if tables]
     shown = [*of.labels_shown, *([f"{of.traced} over time"] if of.traced else [])]
     shown += [f"colour {colour.label}" for colour in of.colours]
     cells = (f"`{of.name}`", of.symbol, of.unit, of.text, _coded(files), _coded(sent))

@@ -70,9 +70,10 @@ class Contact:
     """A contact: `position` (2,) in m with `position_sd` (2,) in m, and how hard it is.
 
     `force` and `force_sd` in N, `displacement` and `displacement_sd` in m, of the skin at the
-    contact; `spare` readings more than a load needs tell the noise. `single` says whether one
-    load on a small area fits the readings as well as the shape. `near_rim` warns that the contact
-    is too near a held edge, where no force moves the skin, for a reliable position and force.
+    contact; `spare` readings more than the loads need tell the noise. `single` says whether one
+    load on a small area explains the readings: no line, no large area, no two contacts.
+    `near_rim` warns that the contact is too near a held edge, where no force moves the skin, for a
+    reliable position and force.
     `size` and `size_sd` in m^2 are the squared radius of the disc that the load is spread over;
     NaN where the skin does not tell it. `force_is_lower_bound` says that the skin may stretch, by
     which the force would change by more than its error bar (`kappaskin.contact.LowerBound`). Every
@@ -237,7 +238,9 @@ class Estimate:
     (Ni, Nj) in m; `surface` (ny, nx) in m, NaN off the skin; `noise` is the standard deviation of
     a reading in 1/m as the residual tells it; `suspect` (P,) numbers in `FAULTS` why an element was
     left out, 0 if it was not; `converged` is False where an iteration gave up for least squares;
-    `fit_time` in s is what the fit took. `geometry` is that of the skin at the contact.
+    `fit_time` in s is what the fit took. `second` is a weaker contact beside `contact`, which are
+    told as two; none is there where its numbers are NaN. `geometry` is that of the skin at the
+    first contact.
     `true_surface`, `true_contact`, `error_at_load` and `error_rms` (all in m) are NaN unless a
     simulation made the frame. `ready_time` is when the estimate was done, on the clock of
     `host_time`; `taken` +- `taken_sd`, in s on it too, when the scan began, as the frame says.
@@ -261,8 +264,14 @@ class Estimate:
     converged: bool
     fit_time: float
     contact: Contact
+    second: Contact
     geometry: LocalGeometry
     true_surface: Array
     true_contact: Array
     error_at_load: float
     error_rms: float
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """The contacts that are there, the strongest first: none, one or two."""
+        return tuple(one for one in (self.contact, self.second) if one.present)

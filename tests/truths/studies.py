@@ -1,7 +1,8 @@
 """Coverage studies: how often the error bars of a contact cover a truth of its own.
 
 `python tests/truths/studies.py` prints all figures as the guide's table; a number of frames and the
-beginning of a case's name, both optional, say of how many and which.
+beginning of a case's name, both optional, say of how many and which; the name `told` prints what
+is told of one load and of two.
 """
 
 import sys
@@ -24,6 +25,7 @@ from kappaskin import (
     estimator_for,
     load_scene,
 )
+from kappaskin.contact import Contacts
 from kappaskin.health import HealthMonitor
 from navier import HingedPlate, Load
 from sanders import CylinderShell
@@ -353,7 +355,125 @@ def robust_table(frames=72):
             yield row + " | ".join(map(str, lost)) + " |"
 
 
+# What is told of one load, of two, and of lines, on the flat skin, of 0.15 N in all
+
+
+@dataclass(frozen=True)
+class Told:
+    """Shares of frames in which two contacts were told, and one was called single.
+
+    `covered` (3,) are those of the intervals of x, y and force of both, where two were told of two.
+    """
+
+    two: float
+    single: float
+    covered: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Press:
+    """Loads that `made` draws at random, by their name."""
+
+    name: str
+    made: Callable[[np.random.Generator], Sequence[Load]]
+
+
+def told(press, frames, seed=0) -> Told:
+    """What is told of `frames` presses at random places, each with its own noise."""
+    case = FLAT[0]
+    rng, layout = np.random.default_rng(seed), case.layout
+    read, contacts = case.truth(layout), Contacts(case.skin, layout)
+    fit = LeastSquares(basis_for(case.skin.patch, "hinged", 8, 8), layout)
+    two, single, covered = 0, 0, [np.empty((0, 3), bool)]
+    for _ in range(frames):
+        loads = press.made(rng)
+        curvature = sum(map(read, loads)) + rng.uniform(-case.noise, case.noise, (3, 100))
+        both = contacts(curvature, fit(curvature))
+        single += both[0].single
+        two += both[1].present
+        if both[1].present and len(loads) == 2:
+            covered.append(_covered(both, loads))
+    of_both = np.concatenate(covered)
+    shares = of_both.mean(axis=0) if len(of_both) else np.full(3, np.nan)
+    return Told(two / frames, single / frames, shares)
+
+
+def _covered(contacts, loads):
+    """Whether the intervals (2, 3) of x, y and force cover those of the nearer order of loads."""
+    found = np.array([(*one.position, one.force) for one in contacts])
+    sd = np.array([(*one.position_sd, one.force_sd) for one in contacts])
+    true = np.array([(load.x, load.y, load.force) for load in loads])
+    off = min(found - true, found - true[::-1], key=lambda off: np.hypot(*off[:, :2].T).sum())
+    return np.abs(off) <= REACH * sd
+
+
+def _single(**widths):
+    def made(rng):
+        wide = {name: rng.uniform(*within) for name, within in widths.items()}
+        return [Load(*rng.uniform(0.02, 0.08, 2), 0.15, **wide)]
+
+    return made
+
+
+def _along(length, points=40):
+    """Points along a line, which press as one."""
+
+    def made(rng):
+        middle, turn = rng.uniform(0.03, 0.07, 2), rng.uniform(0, pi)
+        half = length / 2 * np.array([np.cos(turn), np.sin(turn)])
+        shares = (np.arange(points) + 0.5) / points * 2 - 1
+        return [Load(*(middle + share * half), 0.15 / points) for share in shares]
+
+    return made
+
+
+def _apart(distance, ratio):
+    """Two discs of up to 4 mm radius, the weaker of `ratio` times the force of the other."""
+
+    def made(rng):
+        while True:
+            first, turn = rng.uniform(0.02, 0.08, 2), rng.uniform(0, 2 * pi)
+            second = first + distance * np.array([np.cos(turn), np.sin(turn)])
+            if ((second > 0.02) & (second < 0.08)).all():
+                break
+        force, widths = 0.15 / (1 + ratio), rng.uniform(0, 4e-3, 2)
+        return [
+            Load(*first, force, radius=widths[0]),
+            Load(*second, ratio * force, radius=widths[1]),
+        ]
+
+    return made
+
+
+SINGLE = [
+    Press("one point", _single()),
+    Press("one disc of 1 to 10 mm", _single(radius=(1e-3, 10e-3))),
+    Press("one Gaussian of 1 to 5 mm", _single(sd=(1e-3, 5e-3))),
+]
+LINES = [Press(f"a line of {1e3 * n:.0f} mm", _along(n)) for n in (0.01, 0.02, 0.03, 0.04)]
+TWO = [
+    Press(f"two, {1e3 * d:.0f} mm apart, forces as 1 to {q:g}", _apart(d, q))
+    for d in (0.01, 0.015, 0.02, 0.03, 0.04)
+    for q in (1, 0.3, 0.1)
+]
+
+
+def told_table(frames=1000):
+    """What is told of one load, of lines and of two, as a table in Markdown."""
+    yield "| load | frames | told as two | single | x | y | force |"
+    yield "|---|---|---|---|---|---|---|"
+    for press in (*SINGLE, *LINES, *TWO):
+        of = told(press, frames)
+        shares = [of.two, of.single, *of.covered]
+        words = " | ".join(f"{100 * share:.1f} %" if share == share else "" for share in shares)
+        yield f"| {press.name} | {frames} | {words} |"
+
+
 def main(frames="1000", *name):
+    if name == ("told",):
+        for row in told_table(int(frames)):
+            print(row, flush=True)
+        return
     for row in table(int(frames), " ".join(name)):
         print(row, flush=True)
     if not name:

@@ -10,13 +10,17 @@ from studies import (
     BENT,
     FLAT,
     GRIDS,
+    LINES,
     SHAPES,
     SHARES,
+    SINGLE,
     STRETCHED,
+    TWO,
     accused,
     coverage,
     robustness,
     shape_coverage,
+    told,
 )
 
 pytestmark = pytest.mark.truth
@@ -120,9 +124,9 @@ def test_bands_of_the_surface_cover_nine_tenths_of_it(case, method, functions, f
 
 # Bad elements, up to a quarter of them, off by 20 to 40 noises
 
-SOME, MANY = 12, 72  # frames of no load, one and two in turn
+SOME, MORE = 12, 72  # frames of no load, one and two in turn
 by_grid = pytest.mark.parametrize("grid", GRIDS, ids=lambda grid: "{} elements, {}".format(*grid))
-draws = pytest.mark.parametrize("draws", [SOME, pytest.param(MANY, marks=pytest.mark.full)])
+draws = pytest.mark.parametrize("draws", [SOME, pytest.param(MORE, marks=pytest.mark.full)])
 
 
 @by_grid
@@ -149,3 +153,42 @@ def test_robust_with_too_many_bad_elements_mostly_says_so(share):
 @pytest.mark.parametrize("frames", [1000, pytest.param(10000, marks=pytest.mark.full)])
 def test_the_health_monitor_accuses_no_healthy_element_under_a_small_contact(frames):
     assert accused(frames) < 0.01 * frames
+
+
+# One contact or two, and loads that are neither
+
+figures_told = cache(told)
+MANY = 10_000
+many = pytest.mark.parametrize("frames", [FEW, pytest.param(MANY, marks=pytest.mark.full)])
+LONG = [line for line in LINES if line.name in ("a line of 30 mm", "a line of 40 mm")]
+CLEAR = [
+    two for two in TWO if two.name.startswith(("two, 30", "two, 40")) and "0.1" not in two.name
+]
+
+
+@each(SINGLE)
+@many
+def test_no_second_contact_is_invented_beside_a_single_one(case, frames):
+    found = figures_told(case, frames)
+
+    assert found.two < 0.005
+    assert found.single > 0.99
+
+
+@each(LONG)
+@frames
+def test_a_line_is_neither_one_contact_nor_two(case, frames):
+    found = figures_told(case, frames)
+
+    assert found.two <= 0.02 + slack(frames)
+    assert found.single < 0.05
+
+
+@each(CLEAR)
+@frames
+def test_two_contacts_are_told_as_two(case, frames):
+    found, least = figures_told(case, frames), 0.90 - slack(frames)
+
+    assert found.two > 0.95
+    assert found.single < 0.05
+    assert min(found.covered) >= least

@@ -16,3 +16,5 @@ from kappaskin.contact.objects import ObjectFinder as ObjectFinder
 from kappaskin.contact.objects import placed_object as placed_object
 from kappaskin.contact.point import NO_CONTACT as NO_CONTACT
 from kappaskin.contact.point import PointContact as PointContact
+from kappaskin.contact.two import Contacts as Contacts
+from kappaskin.contact.two import as_one as as_one

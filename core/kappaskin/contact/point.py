@@ -198,6 +198,8 @@ class PointContact:
         self._cache = PatternCache[_Tables]()
         self._whole = self._cache(self._live, self._tables)
         self._all_live = bool(self._live.all())
+        self.misfit = math.nan
+        """Variance that the last contact leaves of the readings, over that of the fit."""
 
     def _tables(self, used: Mask) -> _Tables:
         """The tables for the readings `used` (3 P,)."""
@@ -325,6 +327,7 @@ class PointContact:
         spread, unit = math.sqrt(here.left / tables.spare), self._influence.unit
         strength, force = abs(here.steps[0]), here.steps[0] * unit
         sd = spread * np.sqrt(here.inverse.diagonal())
+        self.misfit = (spread / float(fit.noise)) ** 2 if fit.noise else math.inf
         under = force * self._influence.gives(x, y)
         if self._stretched is not None:
             under += self._stretched.more(x, y, force)

@@ -16,9 +16,9 @@ from kappaskin.bases import Basis, ValueMap, basis_for
 from kappaskin.calibration import Calibration, Corrector, DriftMonitor, Rest, Tare
 from kappaskin.contact import (
     NO_CONTACT,
+    Contacts,
     LoadDetector,
     LowerBound,
-    PointContact,
     contact_geometry,
 )
 from kappaskin.errors import RankDeficient, Refusal
@@ -130,7 +130,7 @@ class Pipeline:
         on_skin = sensor.layout.patch.contains(points).reshape(setup.ny, setup.nx)
         self._skin = ... if on_skin.all() else on_skin
         self._surface = self.basis.on_grid(self._x, self._y)
-        self._contact = PointContact(sensor.plate, sensor.layout, edge)
+        self._contacts = Contacts(sensor.plate, sensor.layout, edge)
         self._bounded = LowerBound(sensor.plate, edge)
         self.left_out = Exclusion.none(sensor, self._whole, self._ideal())
         self._no_shape = np.full(self.basis.shape, np.nan)
@@ -236,9 +236,9 @@ class Pipeline:
         fit_time = time.perf_counter() - began
         surface = self._surface(fit.coefficients)
         noise = float(fit.noise)
-        contact = NO_CONTACT
+        contact, second = NO_CONTACT, NO_CONTACT
         if math.isfinite(noise):
-            contact = self._bounded(self._contact(fit.curvature, fit))
+            contact, second = map(self._bounded, self._contacts(fit.curvature, fit))
         if self.drift is not None:
             self.drift.follow(frame.device_time, curvature, surface, noise)
         return Estimate(
@@ -260,6 +260,7 @@ class Pipeline:
             bool(fit.converged),
             fit_time,
             contact,
+            second,
             contact_geometry(fit, contact),
             *self._compared(surface, fit.coefficients, frame.truth),
         )

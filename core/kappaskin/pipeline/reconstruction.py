@@ -17,9 +17,10 @@ from kappaskin.bases import Basis, basis_for
 from kappaskin.contact import (
     KINDS,
     ContactObject,
+    Contacts,
     LowerBound,
     ObjectFinder,
-    PointContact,
+    as_one,
     contact_geometry,
 )
 from kappaskin.errors import RankDeficient, Refusal
@@ -207,8 +208,8 @@ def reconstruct(
 
     `coefficients` and `sd` (T, Ni, Nj) in m, `residual` (T, 3, P) in 1/m; with a `grid` of nx x ny
     points also `grid_x` (nx,), `grid_y` (ny,) and `w` (T, ny, nx) in m. `edge` is one of `EDGES`,
-    `method` one of `METHODS`. With `contact` also what `_contacts` gives, with `objects`
-    what `_objects` gives besides. What the shapes neglect goes to `warn`, in words.
+    `method` one of `METHODS`. With `contact` also what `_contacts` and `_pairs` give, with
+    `objects` what `_objects` gives besides. What the shapes neglect goes to `warn`, in words.
     """
     found, inplane = _read(readings)
     curvature, sigma = found["curvature"], found.get("sigma")
@@ -241,14 +242,17 @@ def reconstruct(
     if contact or objects:
         plate = _plate(patch, found, inplane)
         fitter = estimator_for(method, functions, layout)
-        contact_of, bounded = PointContact(plate, layout, edge), LowerBound(plate, edge)
+        contacts_of, bounded = Contacts(plate, layout, edge), LowerBound(plate, edge)
         fits = [fitter(frame) for frame in curvature]
-        contacts = [bounded(contact_of(one.curvature, one)) for one in fits]
+        pairs = [contacts_of(one.curvature, one) for one in fits]
+        contacts = [bounded(first) for first, _ in pairs]
         out |= _contacts(fits, contacts, forces="rigidity" in found)
+        out |= _pairs(pairs, forces="rigidity" in found)
         if objects:
             find = ObjectFinder(plate, layout, edge)
             noises = [float(one.noise) for one in fits]
-            out |= _objects([find(*each) for each in zip(curvature, noises, contacts, strict=True)])
+            whole = [as_one(*pair) for pair in pairs]
+            out |= _objects([find(*each) for each in zip(curvature, noises, whole, strict=True)])
     return out
 
 
@@ -273,6 +277,20 @@ def _contacts(fits: list[Fit], contacts: list[Contact], forces: bool) -> dict[st
     for name in ("normal", "curvature_form", "torsion_form", "principal"):
         out[name] = np.stack([getattr(geometry, name) for geometry in there])
     return out
+
+
+def _pairs(pairs: list[tuple[Contact, Contact]], forces: bool) -> dict[str, NDArray[Any]]:
+    """Both contacts of each frame, the stronger one first; NaN where there is none.
+
+    `contacts` and `contacts_sd` (T, 2, 2) in m; with `forces` also `forces` and `forces_sd` (T, 2)
+    in N.
+    """
+    names = {"contacts": "position", "contacts_sd": "position_sd"}
+    names |= {"forces": "force", "forces_sd": "force_sd"} if forces else {}
+    return {
+        name: np.array([[getattr(one, of) for one in pair] for pair in pairs])
+        for name, of in names.items()
+    }
 
 
 def _objects(found: list[ContactObject]) -> dict[str, NDArray[Any]]:

@@ -48,13 +48,23 @@ class Reported:
     the surface the `skin`.
     """
 
-    __slots__ = ("_in_space", "_principal", "contact", "estimate", "fit", "geometry", "skin")
+    __slots__ = (
+        "_in_space",
+        "_principal",
+        "contact",
+        "estimate",
+        "fit",
+        "geometry",
+        "second",
+        "skin",
+    )
 
     def __init__(
         self, estimate: Estimate, fit: Fit | None = None, skin: "Quantities | None" = None
     ) -> None:
         self.estimate, self.fit, self.skin = estimate, fit, skin
-        self.contact, self.geometry = estimate.contact, estimate.geometry
+        self.contact, self.second = estimate.contact, estimate.second
+        self.geometry = estimate.geometry
         self._in_space: tuple[list[float], list[float]] | None = None
         self._principal: tuple[list[float], list[float]] | None = None
 
@@ -193,8 +203,8 @@ class ReportedQuantity:
     `value` gets it, `sd` its standard deviation and `half_width` that of its 95 % interval, each a
     function, or the path of a field of the estimate, as "contact.force". Each is a column of
     tables if its suffix is among `columns`, of the NumPy type `kind`, described by `text` and
-    `sd_text`. A quantity of the `group` contact is NaN without one; those of the groups skin and
-    truth are in no table.
+    `sd_text`. A quantity of the `group` contact is NaN without one, as one of the group second is
+    without a second one; those of the groups skin and truth are in no table.
 
     Published it is one number for each of `keys`, key and meaning, written in a `form`; its error
     bars follow it, or each its number if they are `interleaved`. Without `keys` these are made of
@@ -687,10 +697,16 @@ _CONTACT = (
     ReportedQuantity(
         "single",
         "",
-        "whether one point load explains the readings",
+        "whether one load on a small area explains the readings",
         "contact.single",
         kind="?",
-        keys=(("single", "whether one point load fits the readings as well as the shape"),),
+        keys=(
+            (
+                "single",
+                "whether one load on a small area explains the readings; else the load is "
+                "distributed, or there are two: see second",
+            ),
+        ),
     ),
     ReportedQuantity(
         "near_rim",
@@ -990,7 +1006,33 @@ _TRUTH = (
     ),
 )
 
-REPORTED = (*_FRAME, *_FIT, *_CONTACT, *_GEOMETRY, *_TRUTH)
+
+def _of_second(quantity: ReportedQuantity) -> ReportedQuantity:
+    """A quantity of the contact, of the second one; it has no place on the screen of its own."""
+    told = quantity.name in ("present", "position", "force")
+    value, sd, half_width = (
+        of.replace("contact.", "second.") if isinstance(of, str) else of
+        for of in (quantity.value, quantity.sd, quantity.half_width)
+    )
+    return replace(
+        quantity,
+        name=f"second_{quantity.name}",
+        text=f"{quantity.text}; of a second contact",
+        value=value or "",
+        sd=sd,
+        half_width=half_width,
+        group="second",
+        columns=quantity.columns if told else (),
+        keys=quantity.keys if told and quantity.kind != "?" else (),
+        sd_keys=None if told else (),
+        labels_shown=(),
+        header=None,
+    )
+
+
+_SECOND = tuple(_of_second(quantity) for quantity in _CONTACT)
+
+REPORTED = (*_FRAME, *_FIT, *_CONTACT, *_GEOMETRY, *_SECOND, *_TRUTH)
 """Every quantity of an estimate, in the order in which tables have them."""
 
 

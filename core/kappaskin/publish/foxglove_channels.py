@@ -13,7 +13,7 @@ from kappaskin.bases import CurvatureMap
 from kappaskin.frames import COMPONENTS, Array, Event
 from kappaskin.pipeline import Pipeline
 from kappaskin.publish.message import CONTACT as CONTACT_NUMBERS
-from kappaskin.publish.message import STATUS_NUMBERS, SWITCHES, EstimateMessage
+from kappaskin.publish.message import SECOND, STATUS_NUMBERS, SWITCHES, EstimateMessage
 
 FRAME = "skin"
 """The frame of reference: that of `Patch`, x along the skin, z outward at its middle."""
@@ -68,6 +68,7 @@ _CONTACT = _object(
     source=_TEXT,
     **{key: {"type": "boolean", "description": words} for key, words in SWITCHES.items()},
     **{f.key: {"type": "number", "description": f.text} for f in CONTACT_NUMBERS},
+    second=_object(**{f.key: {"type": "number", "description": f.text} for f in SECOND}),
 )
 _SHAPE = _object(
     **_KIND,

@@ -50,11 +50,14 @@ def _of(quantities: Iterable[ReportedQuantity]) -> tuple[Number, ...]:
     return tuple(number for quantity in quantities for number in quantity.published)
 
 
-_FRAME, _FIT, _AT_CONTACT = map(_published, ("frame", "fit", "contact"))
+_FRAME, _FIT, _AT_CONTACT, _AT_SECOND = map(_published, ("frame", "fit", "contact", "second"))
 _FLAGS = tuple(q for q in REPORTED if q.kind == "?" and q.published)
 
 CONTACT = (*_HEAD, *_of(_FRAME), _AGE, *_of(_FIT), *_of(_AT_CONTACT))
 """The numbers of a message about the contact, in order."""
+
+SECOND = _of(_AT_SECOND)
+"""The numbers of its object `second`, which is null where there is no second contact."""
 
 SWITCHES = {number.key: number.text for number in _of(_FLAGS)} | {
     "shape_follows": "whether a message of kind shape follows in a datagram of its own",
@@ -62,8 +65,8 @@ SWITCHES = {number.key: number.text for number in _of(_FLAGS)} | {
 """What a message about the contact says with true or false."""
 
 # Made once of the table, since they are called for every frame.
-_frame_numbers, _fit_numbers, _contact_numbers, _flags = map(
-    numbers_of, (_FRAME, _FIT, _AT_CONTACT, _FLAGS)
+_frame_numbers, _fit_numbers, _contact_numbers, _second_numbers, _flags = map(
+    numbers_of, (_FRAME, _FIT, _AT_CONTACT, _AT_SECOND, _FLAGS)
 )
 _NOTHING = [math.nan] * len(_of(_AT_CONTACT))
 _FLAGS_TEXT = ",".join(f'"{key}":%s' for key in SWITCHES)
@@ -100,7 +103,7 @@ def _template(fields: Iterable[Number]) -> str:
     return ",".join(f'"{field.key}":{field.form}' for field in fields)
 
 
-_WHOLE, _HEAD_WHOLE = _template(CONTACT), _template(_HEAD)
+_WHOLE, _HEAD_WHOLE, _SECOND = _template(CONTACT), _template(_HEAD), _template(SECOND)
 
 
 def _numbers(values: list[float]) -> str:
@@ -176,9 +179,17 @@ class EstimateMessage:
         flags = [_yes(flag) for flag in _flags(self._reported)]
         text = (
             f'{{"kind":"contact","version":{VERSION},"source":"{self.mark.source}",'
-            f"{_FLAGS_TEXT % (*flags, _yes(self.shape_follows))},{_numbers(self.values)}}}"
+            f"{_FLAGS_TEXT % (*flags, _yes(self.shape_follows))},{_numbers(self.values)},"
+            f'"second":{self._second}}}'
         )
         return text.encode()
+
+    @property
+    def _second(self) -> str:
+        """The second contact as JSON."""
+        if not self.estimate.second.present:
+            return "null"
+        return f"{{{_SECOND % tuple(_second_numbers(self._reported))}}}"
 
     @cached_property
     def shape(self) -> bytes:

@@ -240,7 +240,12 @@ def _words(message: JsonMessage) -> str:
         value, sd = (_figure(message, k, scale, how) for k in (f"{key}_{unit}", sd_key))
         return f"{value} +- {sd}"
 
-    doubt = "" if message.get("single") else "  not a single point load"
+    doubt = "" if message.get("single") else "  not a single load"
+    second = message.get("second")
+    if isinstance(second, dict):
+        also = cast("JsonMessage", second)
+        x, y = (_figure(also, key, 1e3, ".2f") for key in ("x_m", "y_m"))
+        doubt = f"  second x {x} mm  y {y} mm  force {_figure(also, 'force_N', 1, '.4f')} N"
     rim = "  near the rim" if message.get("near_rim") else ""
     least = "  force is a lower bound" if message.get("force_is_lower_bound") else ""
     return (

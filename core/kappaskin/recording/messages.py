@@ -178,6 +178,26 @@ float64[9] covariance      # 1/m^2, of xx, yy, xy of the curvature form
 """,
     HEADER,
 )
+SECOND_CONTACT = MessageType(
+    "kappaskin_msgs/msg/SecondContact",
+    """
+std_msgs/Header header
+uint64 sequence
+float64 device_time               # s, on the device's clock, when the scan began
+bool second_near_rim              # too near a held edge for place and force to be trusted
+bool second_force_is_lower_bound  # the skin may stretch and need more force
+int64 second_spare                # readings more than two loads need
+float64[2] second_position        # m, on the skin
+float64[2] second_position_sd     # m
+float64 second_force              # N
+float64 second_force_sd           # N
+float64 second_displacement       # m
+float64 second_displacement_sd    # m
+float64 second_size               # m^2, squared radius of the disc that the load is spread over
+float64 second_size_sd            # m^2
+""",
+    HEADER,
+)
 
 
 class Topic(NamedTuple):
@@ -196,6 +216,7 @@ LEFT_OUTS = Topic("/kappaskin/left_out", LEFT_OUT)
 MEMORIES = Topic("/kappaskin/memory", MEMORY)
 TRUTHS = Topic("/kappaskin/truth", TRUTH)
 CONTACTS = Topic("/kappaskin/contact", CONTACT)
+SECONDS = Topic("/kappaskin/second_contact", SECOND_CONTACT)
 COUNT = Topic("/kappaskin/counts", COUNTS)
 CURVATURES = Topic("/kappaskin/curvature", CURVATURE)
 SHAPES = Topic("/kappaskin/coefficients", COEFFICIENTS)
@@ -211,6 +232,7 @@ TOPICS = (
     MEMORIES,
     TRUTHS,
     CONTACTS,
+    SECONDS,
     COUNT,
     CURVATURES,
     SHAPES,

@@ -300,6 +300,7 @@ def summary_of(path: Path) -> RecordingSummary:
 
 _COMPARED = {
     m.CONTACTS.name: m.CONTACT,
+    m.SECONDS.name: m.SECOND_CONTACT,
     m.CURVATURES.name: m.CURVATURE,
     m.SHAPES.name: m.COEFFICIENTS,
 }

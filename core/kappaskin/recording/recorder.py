@@ -161,6 +161,8 @@ class Recorder:
         if views is None or not (self._contacts(time) or views.every):
             return
         self._file.put(m.CONTACTS, time, _contact(estimate, self._file.stamp(time)))
+        if estimate.second.present:
+            self._file.put(m.SECONDS, time, _second(estimate, self._file.stamp(time)))
         if views.affordable(time):
             for topic, data in views.heavy(frame, estimate, self._file.stamp(time)):
                 self._file.put(topic, time, data)
@@ -282,6 +284,20 @@ def _contact(estimate: Estimate, stamp: int) -> bytes:
             *here.covariance.ravel().tolist(),
         ),
     )
+
+
+_OF_SECOND = [field.name for field in m.SECOND_CONTACT.fields if "second_" in field.name]
+
+
+def _second(estimate: Estimate, stamp: int) -> bytes:
+    fields = {
+        **_stamped(stamp),
+        "header.frame_id": m.FRAME,
+        "sequence": estimate.sequence,
+        "device_time": estimate.device_time,
+    }
+    told = {name: getattr(estimate.second, name.removeprefix("second_")) for name in _OF_SECOND}
+    return encode(m.SECOND_CONTACT, fields | told)
 
 
 def _stamped(stamp: int) -> dict[str, int]:

@@ -9,6 +9,7 @@ from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from kappaskin.contact import NO_CONTACT
 from kappaskin.errors import Refusal
 from kappaskin.frames import Contact, Estimate, Event, Frame, LocalGeometry
 from kappaskin.pipeline import Pipeline, Setup, setup_from_text
@@ -54,7 +55,7 @@ class Replay:
     shows_recorded: bool = False
 
 
-_RESULTS = {topic.name: topic.kind for topic in (m.CONTACTS, m.CURVATURES, m.SHAPES)}
+_RESULTS = {topic.name: topic.kind for topic in (m.CONTACTS, m.SECONDS, m.CURVATURES, m.SHAPES)}
 _AHEAD = 10**9  # ns after a frame within which its results were recorded, if at all
 _REMEMBERED = 4096  # frames whose results are held for those that are read late
 
@@ -367,6 +368,11 @@ def recorded_estimate(estimate: Estimate, found: dict[str, Any], pipeline: Pipel
     """An `estimate` with the numbers `found` in the recording instead of those computed again."""
     recorded = found["contact"]
     contact = {each.name: recorded[each.name] for each in fields(Contact) if each.name in recorded}
+    second = {
+        name.removeprefix("second_"): value
+        for name, value in found.get("second_contact", {}).items()
+        if name.startswith("second_")
+    }
     geometry = LocalGeometry(
         recorded["point"],
         recorded["frame"].reshape(3, 3),
@@ -378,6 +384,7 @@ def recorded_estimate(estimate: Estimate, found: dict[str, Any], pipeline: Pipel
     shown = replace(
         estimate,
         contact=Contact(**contact),
+        second=Contact(**second, single=False) if second else NO_CONTACT,
         geometry=geometry,
         noise=recorded["noise"],
         converged=recorded["converged"],

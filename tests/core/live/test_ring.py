@@ -222,7 +222,7 @@ def all_of(number: float) -> Estimate:
     contact = Contact(pair, pair, *forces, True, False, size=number, size_sd=number)
     square = np.full((3, 3), number)
     geometry = LocalGeometry(square[0], square, matrix, matrix, pair, square)
-    return Estimate(**parts | {"contact": contact, "geometry": geometry})
+    return Estimate(**parts | {"contact": contact, "second": contact, "geometry": geometry})
 
 
 @pytest.mark.slow

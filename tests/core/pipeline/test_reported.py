@@ -15,7 +15,7 @@ from kappaskin import load_scene
 from kappaskin.frames import COMPONENTS, Estimate
 from kappaskin.pipeline import REPORTED, getters, readouts, stored
 from kappaskin.publish.foxglove_channels import CHANNELS
-from kappaskin.publish.message import CONTACT, SWITCHES
+from kappaskin.publish.message import CONTACT, SECOND, SWITCHES
 from kappaskin.recording import messages as m
 from kappaskin.recording.export.tables import columns
 
@@ -63,6 +63,13 @@ COLUMNS = [
     "principal",
     "principal_sd",
     "angle",
+    "second_present",
+    "second_position",
+    "second_position_sd",
+    "second_position_95",
+    "second_force",
+    "second_force_sd",
+    "second_force_95",
 ]
 """Names of columns of CSV and HDF5 files and of arrays of NPZ files, which others read."""
 
@@ -74,6 +81,8 @@ UNITS = {
     **dict.fromkeys(("force", "force_sd", "force_95"), "N"),
     **dict.fromkeys(("curvature_form", "torsion_form", "principal", "principal_sd"), "1/m"),
     **{"covariance": "1/m^2", "angle": "rad"},
+    **dict.fromkeys(("second_position", "second_position_sd", "second_position_95"), "m"),
+    **dict.fromkeys(("second_force", "second_force_sd", "second_force_95"), "N"),
 }
 
 HEADS = """
@@ -158,6 +167,7 @@ def test_columns_have_the_types_that_they_always_had(made) -> None:
     assert kinds == {
         **dict.fromkeys(("sequence", "setup", "spare"), "<i8"),
         **dict.fromkeys(("fresh", "converged", "present", "single", "near_rim"), "?"),
+        "second_present": "?",
         "force_is_lower_bound": "?",
         "suspect": "|u1",
     }
@@ -167,7 +177,9 @@ def test_messages_have_the_keys_that_they_always_had() -> None:
     assert [number.key for number in CONTACT] == KEYS
     assert list(SWITCHES) == FLAGS
     schema = json.loads(CHANNELS[0].schema)["properties"]
-    assert list(schema) == ["kind", "version", "source", *FLAGS, *KEYS]
+    assert list(schema) == ["kind", "version", "source", *FLAGS, *KEYS, "second"]
+    second = ["x_m", "y_m", "x_sd_m", "y_sd_m", "force_N", "force_sd_N"]
+    assert [number.key for number in SECOND] == list(schema["second"]["properties"]) == second
 
 
 def test_names_are_one_of_a_kind_and_every_unit_has_a_suffix() -> None:
@@ -177,7 +189,8 @@ def test_names_are_one_of_a_kind_and_every_unit_has_a_suffix() -> None:
 
 
 def test_everything_recorded_of_a_contact_can_be_verified() -> None:
-    recorded = {field.name for field in m.CONTACT.fields} - {"header"}
+    fields = (*m.CONTACT.fields, *m.SECOND_CONTACT.fields)
+    recorded = {field.name for field in fields} - {"header"}
     assert recorded <= set(getters())
 
 
@@ -188,7 +201,7 @@ def test_the_tables_of_the_guide_are_made_from_the_table(page: Path) -> None:
 
 def test_every_field_of_an_estimate_has_its_type_from_the_table() -> None:
     fields = {field.name: field.type for field in dataclasses.fields(Estimate)}
-    parts = {n: dataclasses.fields(fields[n]) for n in ("contact", "geometry")}
+    parts = {n: dataclasses.fields(fields[n]) for n in ("contact", "second", "geometry")}
     paths = {f"{name}.{field.name}" for name in parts for field in parts[name]}
     assert {*stored()} >= paths | (fields.keys() - parts.keys())
 
@@ -226,7 +239,7 @@ with np.load(folder / "out.npz") as npz, h5py.File(folder / "out.h5") as h5:
         found[name] &= doubled(file, "twice_read", "curvature")
     found["units"] = (h5["twice"].attrs["unit"], h5["twice_read"].attrs["unit"]) == ("N", "1/m")
 heads = [line for line in (folder / "out.csv").read_text().splitlines() if line[0] != "#"][0]
-found["csv"] = heads.endswith(",twice [N],twice_sd [N]") and "twice_read_xy_3 [1/m]" in heads
+found["csv"] = ",twice [N],twice_sd [N]" in heads and "twice_read_xy_3 [1/m]" in heads
 
 scene = load_scene("off-centre")
 made = Pipeline(scene.sensor(), Setup(), 1)

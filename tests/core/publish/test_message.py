@@ -22,7 +22,7 @@ from kappaskin.publish import foxglove as client
 from kappaskin.publish import foxglove_channels as channels
 from kappaskin.publish import foxglove_channels as cloud
 from kappaskin.publish import publishing as target
-from kappaskin.publish.message import CONTACT, LARGEST, MOST_FUNCTIONS, SWITCHES, text_of
+from kappaskin.publish.message import CONTACT, LARGEST, MOST_FUNCTIONS, SECOND, SWITCHES, text_of
 from kappaskin.scenes.effects import GaussianNoise
 
 GUIDE = (files("kappaskin_resources") / "publishing" / "messages.md").read_text("utf-8")
@@ -111,14 +111,32 @@ def test_without_a_contact_its_numbers_are_null_and_it_is_json_all_the_same(mess
     assert told["force_N"] is told["normal_sd_rad"] is told["direction_2_z"] is None
     assert isinstance(told["noise_per_m"], float)
     assert [key for key in told if key not in ("kind", "version", "source", *SWITCHES)] == [
-        field.key for field in CONTACT
+        *(field.key for field in CONTACT),
+        "second",
     ]
+
+
+def test_a_second_contact_is_told_beside_the_first(messages_of) -> None:
+    (made,) = messages_of(load_scene("two-contacts"))
+    second, estimate = read(made.contact)["second"], made.estimate
+    assert [one.force for one in estimate.contacts] == [
+        estimate.contact.force,
+        estimate.second.force,
+    ]
+    assert isinstance(second, dict)
+    assert list(second) == [number.key for number in SECOND]
+    assert second["force_N"] == pytest.approx(estimate.second.force, rel=1e-5)
+    assert (second["x_m"], second["y_m"]) == pytest.approx(
+        tuple(estimate.second.position), rel=1e-6
+    )
+    assert len(made.contact) <= 2000
 
 
 def test_keys_are_one_of_a_kind_and_their_values_flat(messages_of) -> None:
     (made,) = messages_of(PRESSED)
     told = read(made.contact)
     assert len({field.key for field in CONTACT}) == len(CONTACT)
+    assert told.pop("second") is None
     assert all(isinstance(value, bool | int | float | str) for value in told.values())
     for key, value in read(made.shape).items():
         assert isinstance(value, int | float | str) or key.endswith("_m")
@@ -227,6 +245,7 @@ def test_the_state_of_the_source_is_json_with_every_number_promised() -> None:
 def test_the_guide_names_every_key_with_the_words_of_the_code() -> None:
     rows = dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", GUIDE, re.MULTILINE))
     assert rows.pop("source").startswith("`live`, `sim`")
+    assert rows.pop("second").startswith("null, or a weaker contact")
     assert rows == SWITCHES | {field.key: field.text for field in CONTACT}
     for key in (*message.STATUS_NUMBERS, "coefficients_sd_m", "functions_x", "edge", "state"):
         assert f"`{key}`" in GUIDE

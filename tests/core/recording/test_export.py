@@ -43,9 +43,10 @@ from kappaskin.recording import (
     Recording,
     Verification,
 )
+from kappaskin.recording.cdr import decode
 from kappaskin.recording.export.surfaces import SkinMesh, SkinSurface
 from kappaskin.recording.export.writing import export_steps
-from kappaskin.recording.messages import TOPICS
+from kappaskin.recording.messages import SECOND_CONTACT, SECONDS, TOPICS
 from kappaskin.sources import SimulatedSource, VirtualClock
 
 pytestmark = pytest.mark.slow
@@ -163,6 +164,13 @@ OF_ESTIMATE: dict[str, Callable[[Estimate], object]] = {
     "principal": lambda e: e.geometry.principal,
     "principal_sd": lambda e: e.geometry.principal_sd,
     "angle": lambda e: e.geometry.angle,
+    "second_present": lambda e: e.second.present,
+    "second_position": lambda e: e.second.position,
+    "second_position_sd": lambda e: e.second.position_sd,
+    "second_position_95": lambda e: e.second.position_95,
+    "second_force": lambda e: e.second.force,
+    "second_force_sd": lambda e: e.second.force_sd,
+    "second_force_95": lambda e: e.second.force_95,
     "device_time": lambda e: e.device_time,
     "host_time": lambda e: e.host_time,
     "taken": lambda e: e.taken,
@@ -209,6 +217,18 @@ def test_a_verdict_finds_the_recording_the_same(taps) -> None:
     assert isinstance(verdict, Verification)
     assert verdict.same
     assert verdict.compared > len(taps[1])
+
+
+def test_two_contacts_are_recorded_and_verified(tmp_path) -> None:
+    path = tmp_path / "two.mcap"
+    told = recorded(path, load_scene("two-contacts"), (Setup(nx=9, ny=7),), 0.1)
+    assert all(one.estimate.second.present for one in told)
+    with Recording(path) as recording:
+        seconds = [decode(SECOND_CONTACT, got.data) for got in recording.messages_on(SECONDS)]
+    assert [got["second_force"] for got in seconds] == [one.estimate.second.force for one in told]
+    *_, verdict = Verification.steps(path)
+    assert isinstance(verdict, Verification)
+    assert verdict.same
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".npz", ".h5"])

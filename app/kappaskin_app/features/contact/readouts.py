@@ -31,8 +31,9 @@ FIELDS = {
     ),
     "contact": (
         "Contact",
-        "Position of the point load that fits the readings best; distributed: over an area or "
-        "several places, no point load fits; near rim: too close to a held edge to be reliable.",
+        "Position of the load that fits the readings best, or of two that are told apart; "
+        "distributed: over a line, a large area or several places, neither fits; near rim: too "
+        "close to a held edge to be reliable.",
     ),
 }
 _WIDTHS = {"contact": 26, "rate": 15, "lost": 19, "age": 10}
@@ -62,10 +63,13 @@ def _short(count: int) -> str:
     return f"{count / 1e3:.0f} k" if count < 999_500 else f"{count / 1e6:.1f} M"
 
 
-def _contact(contact: Contact) -> str:
+def _contact(contact: Contact, second: Contact) -> str:
     if not contact.present:
         return "none"
     x, y = contact.position * 1e3
+    if second.present:
+        other_x, other_y = second.position * 1e3
+        return f"({x:.1f}, {y:.1f}), ({other_x:.1f}, {other_y:.1f}) mm"
     if contact.near_rim:
         return f"\N{ALMOST EQUAL TO} ({x:.0f}, {y:.0f}) mm, near rim"
     if not contact.single:
@@ -178,7 +182,7 @@ class Readouts(QWidget):
             for key in ("contact", *(header.key for _, header in _NUMBERS)):
                 self._write(key, NONE)
             return
-        self._write("contact", _contact(estimate.contact))
+        self._write("contact", _contact(estimate.contact, estimate.second))
         reported = Reported(estimate)
         for quantity, header in _NUMBERS:
             (found,) = readouts_of(quantity, reported)

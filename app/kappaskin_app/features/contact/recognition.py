@@ -2,7 +2,7 @@
 
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin.contact import NO_OBJECT, ContactObject, ObjectFinder
+from kappaskin.contact import NO_OBJECT, ContactObject, ObjectFinder, as_one
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
 from kappaskin_app.shell.background import BackgroundTask, Tasks
@@ -68,6 +68,9 @@ def _recognise(
     if isinstance(finder, str):
         found, what = NO_OBJECT, finder
     else:
-        found = finder(estimate.curvature, estimate.noise, estimate.contact)
+        whole = as_one(estimate.contact, estimate.second)
+        found = finder(estimate.curvature, estimate.noise, whole)
         what = found.describe()
+        if estimate.second.present:
+            what = f"if one object makes both contacts: {what}"
     return "; ".join(filter(None, [what, curvature_text(estimate)])), found, estimate

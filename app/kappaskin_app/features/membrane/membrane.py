@@ -97,9 +97,12 @@ class MembraneView(QWidget):
         # Visible on every colour.
         self.pointed = Marks(plotter, 17, DARK_INK), Marks(plotter, 12, LIGHT_INK)
         self._loads = DrawnLoads(plotter)
-        self._contact = plotter.add_mesh(
-            pv.Sphere(radius=0.018), color="#1fd17a", reset_camera=False, render=False
-        )
+        self._contacts = [
+            plotter.add_mesh(
+                pv.Sphere(radius=0.018), color="#1fd17a", reset_camera=False, render=False
+            )
+            for _ in range(2)
+        ]
         self.sides = Sides(plotter)
         self._caption = Caption(plotter, _LETTERS, 0.98, "top")
         self.caption: Any = self._caption.text
@@ -136,7 +139,8 @@ class MembraneView(QWidget):
         self.show_marked(np.empty(0, np.intp), -1)
         self.point(-1)
         self._place_elements(sensor.layout.positions[sensor.layout.live.any(axis=0)])
-        self._contact.scale = skin.size
+        for ball in self._contacts:
+            ball.scale = skin.size
         self._arrays = self._changing()
         self.sides.show_skin(skin)
         self.show_box(self._box.shares)
@@ -233,7 +237,8 @@ class MembraneView(QWidget):
         for marks in (self.excluded, self.target):
             marks.follow(skin, self.lift)
         self._follow_pointed()
-        put_upright(self._contact, skin, estimate.contact.position)
+        for ball, contact in zip(self._contacts, (estimate.contact, estimate.second), strict=True):
+            put_upright(ball, skin, contact.position)
         if self._box.shares != WHOLE:
             self._box.cut(self.plotter.actors.values())  # some may be new
         known = math.isfinite(estimate.taken)
@@ -298,8 +303,9 @@ class MembraneView(QWidget):
             return
         if lost:
             self.show_loads(())
+            for ball in self._contacts:
+                ball.visibility = False
         self.surface.show_lost(lost)
-        self._contact.visibility = not lost
         self.plotter.update()
 
     def _apply_theme(self) -> None:

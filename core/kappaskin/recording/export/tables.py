@@ -61,7 +61,7 @@ def columns(info: RecordingInfo) -> tuple[Column, ...]:
         return found.reshape(3, P)
 
     nominal = next(quantity for quantity in REPORTED if quantity.name == "nominal")
-    made = {group: _columns(group, lengths) for group in ("frame", "fit", "contact")}
+    made = {group: _columns(group, lengths) for group in ("frame", "fit", "contact", "second")}
     return (
         Column(
             "time", "s", "<f8", (), (), "arrival time since the recording began", attrgetter("at")
@@ -78,6 +78,7 @@ def columns(info: RecordingInfo) -> tuple[Column, ...]:
         ),
         *made["fit"],
         *made["contact"],
+        *made["second"],
     )
 
 
