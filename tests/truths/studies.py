@@ -17,10 +17,14 @@ from kappaskin import (
     Patch,
     Plate,
     PointContact,
+    Robust,
     SensorLayout,
+    Simulator,
     basis_for,
     estimator_for,
+    load_scene,
 )
+from kappaskin.health import HealthMonitor
 from navier import HingedPlate, Load
 from sanders import CylinderShell
 from von_karman import StretchingPlate
@@ -216,6 +220,97 @@ SHAPES = [("least-squares", 8), ("robust", 8), ("tracking", 8), ("bayes", 15)]
 # So weak that not every press is found, and those that are found are told too hard.
 WEAK = _stretched_case("held, 0.9 thicknesses, hardly found", "held", 0.012)
 
+# Bad elements: the error of a shape by `robust`, and of least squares that knows which are bad
+
+GRIDS = [(6, 4), (6, 5), (8, 4), (8, 6), (10, 6), (10, 8), (12, 8)]  # elements and functions a side
+SHARES = [0.1, 0.15, 0.2, 0.25]
+
+
+@dataclass(frozen=True)
+class Robustness:
+    """Of `frames` the rms errors (T,) in m by `robust`, and by least squares that `knew`.
+
+    `converged` (T,) as the fit has it.
+    """
+
+    error: np.ndarray
+    knew: np.ndarray
+    converged: np.ndarray
+
+    @property
+    def broken(self):
+        """Frames (T,) that are four times worse than the worst of those that knew."""
+        return self.error > 4 * self.knew.max()
+
+
+def robustness(elements, functions, share, frames, seed=0, equal=True) -> Robustness:
+    """Frames of none, one and two loads in turn, with a `share` of bad elements.
+
+    Each is off by 20 to 40 noises, by the same in its three channels where `equal`, and every
+    fourth frame all of them the same way then.
+    """
+    patch, plate, rows = Patch(0.1, 0.1), HingedPlate(), []
+    layout = SensorLayout.regular(patch, elements, elements)
+    basis = basis_for(patch, "hinged", functions, functions)
+    places = np.stack(np.meshgrid(*patch.grid(21, 21)), -1)[1:-1, 1:-1].reshape(-1, 2)
+    at, known, robust = basis.at(places), LeastSquares(basis, layout), Robust(basis, layout)
+    for frame in range(frames):
+        rng = np.random.default_rng([seed, frame, elements, functions, round(100 * share), equal])
+        c = sum(plate.coefficients(_anywhere(rng)) for _ in range(frame % 3)) + np.zeros((240, 240))
+        K = plate.curvature(c, layout.positions)
+        K = K + rng.normal(0, NOISE / sqrt(3), K.shape)
+        bad = rng.permutation(elements**2)[: round(share * elements**2)]
+        off = rng.uniform(20, 40, (3, len(bad))) * rng.choice([-1, 1], (3, len(bad)))
+        if equal:
+            off[:] = np.abs(off[0]) if frame % 4 == 3 else off[0]
+        without = K.copy()
+        without[:, bad] = np.nan
+        K[:, bad] += NOISE / sqrt(3) * off
+        found, true = robust(K), plate.surface(c, places)
+        error, knew = (
+            sqrt(np.mean((at @ fit.coefficients.ravel() - true) ** 2))
+            for fit in (found, known(without))
+        )
+        rows.append((error, knew, found.converged))
+    error, knew, converged = np.array(rows).T
+    return Robustness(error, knew, converged > 0)
+
+
+def _anywhere(rng):
+    return Load(*rng.uniform(0.01, 0.09, 2), rng.uniform(0.03, 0.3), rng.choice([0.0, 3e-3]))
+
+
+# Healthy elements under small contacts, which the health monitor is not to accuse
+
+MONITORED = 64.0  # frames/s
+
+
+def accused(frames, seed=0) -> int:
+    """In how many of so many `frames` the health monitor accuses any channel of a healthy sensor.
+
+    Discs of 1 to 10 mm are pressed for 3 s each, anywhere farther than 5 mm from the edge.
+    """
+    scene, plate = load_scene("centre"), HingedPlate()
+    sensor = scene.sensor()
+    chain, monitor, rng = sensor.transduction, HealthMonitor(sensor), np.random.default_rng(seed)
+    scan, rest = sensor.scan(), float(chain.curvature(np.zeros(1, np.int32))[0])
+    blank = Simulator(replace(scene, stimuli=())).scanned(scan, 0, 0.0, lambda: 0.0)
+    count, per = 0, round(3 * MONITORED)
+    for n in range(frames):
+        if n % per == 0:
+            load = Load(*rng.uniform(5e-3, 95e-3, 2), rng.uniform(0.02, 0.3))
+            load = replace(load, radius=rng.uniform(0.5e-3, 5e-3))
+            pressed = plate.readings(load, sensor.layout.positions)
+        share = np.clip(min(n % per, per - 20 - n % per) / 20, 0, 1)
+        K = share * pressed + rng.normal(0, NOISE / sqrt(3), pressed.shape)
+        counts = np.clip(np.rint((K.ravel() - rest) / chain.resolution), *chain.limits)
+        counts = counts.astype(blank.counts.dtype)
+        time = n / MONITORED
+        monitor(replace(blank, sequence=n, counts=counts, device_time=time, host_time=time))
+        count += bool(monitor.kinds.any())
+    return count
+
+
 CASES: Sequence[Case] = (*FLAT, *BENT, *STRETCHED, WEAK)
 
 
@@ -241,6 +336,23 @@ def shape_table(frames=200):
             yield f"| {name} | {100 * covered:.1f} % | {1e3 * rms:.4f} mm |"
 
 
+def robust_table(frames=72):
+    """Errors by `robust` over those that knew the bad elements, as a table in Markdown."""
+    yield "| bad elements | frames | median | worst | broken down | of these converged | flagged |"
+    yield "|---|---|---|---|---|---|---|"
+    for share in SHARES:
+        for equal in (True, False):
+            found = [robustness(*grid, share, frames, equal=equal) for grid in GRIDS]
+            broken = np.concatenate([of.broken for of in found])
+            converged = np.concatenate([of.converged for of in found])
+            median = max(np.median(of.error) / np.median(of.knew) for of in found)
+            worst = max(of.error.max() / of.knew.max() for of in found)
+            kind = "equal in the channels" if equal else "independent"
+            row = f"| {100 * share:.0f} %, {kind} | {broken.size} | {median:.2f} | {worst:.2f} | "
+            lost = broken.sum(), (broken & converged).sum(), (~converged).sum()
+            yield row + " | ".join(map(str, lost)) + " |"
+
+
 def main(frames="1000", *name):
     for row in table(int(frames), " ".join(name)):
         print(row, flush=True)
@@ -248,6 +360,10 @@ def main(frames="1000", *name):
         print()
         for row in shape_table(int(frames)):
             print(row, flush=True)
+        print()
+        for row in robust_table(int(frames) * 72 // 1000):
+            print(row, flush=True)
+        print(f"accused under a small contact: {accused(10 * int(frames))} of {10 * int(frames)}")
 
 
 if __name__ == "__main__":

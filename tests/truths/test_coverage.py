@@ -3,9 +3,21 @@
 from functools import cache
 from math import sqrt
 
+import numpy as np
 import pytest
 
-from studies import BENT, FLAT, SHAPES, STRETCHED, coverage, shape_coverage
+from studies import (
+    BENT,
+    FLAT,
+    GRIDS,
+    SHAPES,
+    SHARES,
+    STRETCHED,
+    accused,
+    coverage,
+    robustness,
+    shape_coverage,
+)
 
 pytestmark = pytest.mark.truth
 
@@ -104,3 +116,36 @@ def test_bands_of_the_surface_cover_nine_tenths_of_it(case, method, functions, f
 
     assert 0.90 <= covered <= 0.98
     assert rms < 30e-6
+
+
+# Bad elements, up to a quarter of them, off by 20 to 40 noises
+
+SOME, MANY = 12, 72  # frames of no load, one and two in turn
+by_grid = pytest.mark.parametrize("grid", GRIDS, ids=lambda grid: "{} elements, {}".format(*grid))
+draws = pytest.mark.parametrize("draws", [SOME, pytest.param(MANY, marks=pytest.mark.full)])
+
+
+@by_grid
+@pytest.mark.parametrize("share", SHARES)
+@pytest.mark.parametrize("equal", [True, False])
+@draws
+def test_bad_elements_cost_robust_little_more_than_to_know_them(grid, share, equal, draws):
+    found = robustness(*grid, share, draws, equal=equal)
+
+    assert np.median(found.error) <= 1.6 * np.median(found.knew)
+    assert found.error.max() <= 4 * found.knew.max()
+    assert not (found.converged & found.broken).any()
+    assert found.converged.mean() >= 0.75
+
+
+@pytest.mark.parametrize("share", [0.35, 0.4])
+def test_robust_with_too_many_bad_elements_mostly_says_so(share):
+    found = robustness(10, 8, share, 3 * SOME)
+
+    assert found.broken.any()
+    assert (found.converged & found.broken).mean() <= 0.05
+
+
+@pytest.mark.parametrize("frames", [1000, pytest.param(10000, marks=pytest.mark.full)])
+def test_the_health_monitor_accuses_no_healthy_element_under_a_small_contact(frames):
+    assert accused(frames) < 0.01 * frames

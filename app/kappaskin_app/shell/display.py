@@ -139,7 +139,8 @@ class Display(QObject):
         if estimate is not None:
             crossed, _ = self.marks(estimate.curvature)
             slope = self._slope(self._session.status.slope, time.monotonic())
-            texts.append(warnings(estimate, int(crossed.sum()), slope))
+            method = self._session.engine.requested.setup.method
+            texts.append(warnings(estimate, int(crossed.sum()), method, slope))
         self.notice.show_warning("; ".join(filter(None, texts)))
 
     def estimate_shown(self) -> Estimate | None:

@@ -5,7 +5,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QHBoxLayout, QStatusBar, QToolButton, QWidget
 
-from kappaskin.estimation import FAULTS, slope_warning
+from kappaskin.estimation import FAULTS, METHODS, slope_warning
 from kappaskin.frames import Estimate
 from kappaskin_app.theme import ALERT
 from kappaskin_app.widgets.layout import row
@@ -66,14 +66,14 @@ def _left_out(estimate: Estimate) -> str:
     return f"element{'s' if len(out) > 1 else ''} {named} excluded"
 
 
-def warnings(estimate: Estimate, strained: int, slope: float = 0.0) -> str:
-    """Warnings of an estimate.
+def warnings(estimate: Estimate, strained: int, method: str, slope: float = 0.0) -> str:
+    """Warnings of an estimate by a `method`.
 
-    `strained` is the number of elements over their strain limit, `slope` what its method neglects.
+    `strained` is the number of elements over their strain limit, `slope` what the method neglects.
     """
     parts = [_left_out(estimate)] if estimate.suspect.any() else []
     if not estimate.converged:
-        parts.append("no convergence; least squares shown")
+        parts.append(METHODS[method].failure.format(""))
     if strained:
         parts.append(f"{strained} element{'s' if strained > 1 else ''} over 1 % strain")
     if estimate.contact.near_rim:

@@ -91,6 +91,9 @@ class Estimator(ABC):
     has_memory: ClassVar = False
     """Whether a fit depends on earlier frames: `follow` each frame once, in order."""
 
+    failure: ClassVar = "no convergence{}; least squares shown"
+    """Why a fit has not converged, and what to do, in words; {} is for the frames."""
+
     def __init__(
         self,
         basis: Basis,

@@ -258,7 +258,7 @@ class Fit:
         found = (slope_warning(self.neglected_slope),)
         if lost:
             where = f" in {lost} of {frames} frames" if frames > 1 else ""
-            found += (f"no convergence{where}; least squares shown",)
+            found += (self.estimator.failure.format(where),)
         return tuple(filter(None, found))
 
     def sd_of(self, rows: Array) -> Array:

@@ -1,7 +1,8 @@
 """Robust estimator: least squares without outliers, and the likely fault of each."""
 
+import math
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any, cast
@@ -24,13 +25,22 @@ _FUNCTIONS = 15  # along each side at least, of the shapes that elements are tes
 _ALARM = 1e-3  # chance that a frame of good readings has any of them suspected
 _PLACES = 25  # along each side, where a load is tried
 _LOADS = 3  # that are tried at most
-_OUTRAGEOUS = 50.0  # times what three quarters of the elements read at most
 _UNSEEN = 1e-12  # of a load's readings: so much is left of one that the elements do not read
 _CLEAREST = 1e10  # signal over noise in power: beyond it rounding decides
+_FEWEST, _MOST_DECIDED = 0.15, 0.85  # of the readings that suspects and loads leave, by the prior
 _BACK = 0.5  # of what makes a suspect: below it, one is trusted again
 _ROUNDS = 12  # of suspecting and trusting again
 _AT_ONCE = 4.0  # a suspect is left out together with those at least a fourth as far off
-_MOST = 0.25  # of the elements: if more contradict the rest, no outlier can be identified
+_MOST = 1 / 3  # of the elements: if more contradict the rest, no outlier can be identified
+_DECIDED = 1 / 3  # of the readings, by a shape that none of many outliers bends after itself
+_LOWER = 0.6  # times the last: the next limit of what an element may be off by
+_STEPS = 30  # towards the solution for a limit
+_STILL = 0.02  # of a limit: a step that changes less is the last
+_QUIET = 0.25  # of the elements are good, whatever others are: they tell the noise
+_NEARLY, _OTHERS = 40.0, 0.1  # -2 ln of evidence, and share of the elements, of another answer
+_HALF = 0.5  # of the variance of the noise, at least, has half of the good elements
+_ROUNDED = 1e-4  # of the largest reading: less noise is rounding
+_BAD = 1 / 30  # of one element is bad in a usual frame
 _FRAMES = 32  # from which the fault is identified
 _ENOUGH = 6  # of them: with fewer, any suspect may be a spike
 _OFTEN = 0.3  # of the frames: a suspect of fewer has spikes
@@ -46,7 +56,7 @@ class _OutlierTest:
 
     `U` (3 P, k) are the directions of the likelihood, zero where there is no reading. For a load at
     each of G places, `by_load` (G, k) are the squared components along them, `beyond` (G,) those
-    along none.
+    along none. `sensed` (P,) is the number of readings of each element.
     """
 
     likelihood: MarginalLikelihood
@@ -55,16 +65,24 @@ class _OutlierTest:
     beyond: Array
     used: Mask
     count: int
+    sensed: NDArray[np.intp]
+    prior: "_PriorStrength"
+    first: "_FirstSuspects"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _OutlierResult:
-    """Suspected elements (P,), and how far `off` (3, P) their readings are, 0 for the others."""
+    """Suspected elements (P,), and how far `off` (3, P) their readings are, 0 for the others.
+
+    `cost` is -2 ln of its evidence, infinite where too many elements are suspects; `converged` is
+    False then, where other suspects are as likely, and where outliers are taken for noise.
+    """
 
     suspects: Mask
     off: Array
     rounds: int
-    hopeless: bool
+    cost: float = math.inf
+    converged: bool = False
 
 
 # Under the prior the readings have the covariance sigma^2 S, S^-1 = Q = 1 - U diag(w) U^T with
@@ -80,10 +98,17 @@ class Robust(Estimator, Stateful):
     under a white load (`Bayes`), so that the fine structure under a load is not taken for a fault.
     Suspects are excluded round by round, and included again where the rest agrees with them; the
     shape is that of `LeastSquares` with them dead. `Fit.suspect` has their faults, identified from
-    the last frames. Where more than a quarter of the elements contradict the rest, none is
-    excluded and `Fit.converged` is false; without a `sigma` such faults may be estimated as noise.
+    the last frames. The rounds begin twice: with no suspects, and with those of `_FirstSuspects`,
+    which a quarter of bad elements does not mislead. The end with more evidence holds.
+    `Fit.converged` is false where the other has nearly as much and quite other suspects, where the
+    noise told is far more than most elements have, and where more than a third of the elements
+    contradict the rest: then none is excluded.
     """
 
+    failure = (
+        "too many elements contradict each other{}: the shape may be wrong; "
+        "tare, or repair what Health lists"
+    )
     STATE = ("_history",)
 
     def _set_up(self) -> None:
@@ -96,6 +121,7 @@ class Robust(Estimator, Stateful):
         self._tests = PatternCache[_OutlierTest]()
         P = len(layout)
         sensing = np.maximum(layout.live.sum(axis=0), 1)
+        self._sensing: Array = sensing.astype(float)
         self._limit: Array = scipy.special.chdtri(sensing, _ALARM / P)
         self._history = _SuspectHistory(P)
         self._tests(self.readable, self._outlier_test)
@@ -131,7 +157,11 @@ class Robust(Estimator, Stateful):
         U[used] = likelihood.U
         by_load = (self._forces.T @ U) ** 2
         beyond = np.sum(self._forces[used] ** 2, axis=0) - by_load.sum(axis=1)
-        return _OutlierTest(likelihood, U, by_load, np.maximum(beyond, 0.0), used, int(used.sum()))
+        sensed = cast("NDArray[np.intp]", used.reshape(3, -1).sum(axis=0))
+        prior = _PriorStrength(likelihood.s2[: U.shape[1]])
+        first = _FirstSuspects(U, prior.shares(_DECIDED * sensed.sum()), sensed)
+        beyond, count = np.maximum(beyond, 0.0), int(used.sum())
+        return _OutlierTest(likelihood, U, by_load, beyond, used, count, sensed, prior, first)
 
     def __call__(self, curvature: ArrayLike) -> Fit:
         """Fit `curvature` (3, P), or (T, 3, P) in the order of time, in 1/m."""
@@ -172,7 +202,7 @@ class Robust(Estimator, Stateful):
             self._linear(np.where(out, np.nan, K)),
             estimator=self,
             steps=np.array([result.rounds for result in results], int).reshape(frames),
-            converged=np.array([not result.hopeless for result in results], bool).reshape(frames),
+            converged=np.array([result.converged for result in results], bool).reshape(frames),
             suspect=np.array(why, np.uint8).reshape(*frames, P),
         )
 
@@ -181,30 +211,56 @@ class Robust(Estimator, Stateful):
         weighted = np.where(used, flat, 0.0).astype(float) * self.weight
         unit = 1.0 if self.sigma is not None else float(power_of_two(weighted)[0])
         K = weighted / unit
-        there = cast("Mask", used.reshape(3, P).any(axis=0))
-        suspects, loads, rounds = _gross_outliers(K, there), list[int](), 0
+        none = np.zeros(P, bool)
+        first = test.first(K, 0.0 if self.sigma is None else 1.0)
+        ends = [self._searched(K, test, none)]
+        if first.any():
+            ends.append(self._searched(K, test, first))
+        best, rounds = min(ends, key=lambda end: end.cost), sum(end.rounds for end in ends)
+        if not math.isfinite(best.cost):
+            return _OutlierResult(none, np.zeros((3, P)), rounds)
+        off = best.off * unit
+        np.divide(off, self.weight.reshape(3, P), where=off != 0, out=off)
+        converged = best.converged and not _undecided(best, ends)
+        return replace(best, off=off, rounds=rounds, converged=converged)
+
+    def _searched(self, K: Array, test: _OutlierTest, suspects: Mask) -> _OutlierResult:
+        """Where rounds end that begin with some `suspects` (P,), in units of sigma."""
+        loads, rounds, P, used = list[int](), 0, len(suspects), test.used
+        most = _MOST * np.count_nonzero(test.sensed)
         (gamma,) = test.likelihood(np.where(np.tile(suspects, 3), 0.0, K)[None, used])[1]
-        while suspects.sum() <= _MOST * there.sum():
+        while suspects.sum() <= most:
             free = np.hstack([_columns(suspects), *(self._load_readings[:, g] for g in loads)])
-            residuals = _Residuals(test, K, free, float(gamma), np.tile(suspects, 3))
+            left, out = test.count - free.shape[1], np.tile(suspects, 3)
+            residuals = _Residuals(test, K, free, float(gamma), out)
             _, (gamma,), (sigma,) = test.likelihood(residuals.unexplained[None, used])
-            left = test.count - free.shape[1]
-            given = self.sigma is not None
-            variance = 1.0 if given else float(sigma) ** 2 * test.count / left
+            gamma = np.clip(gamma, *test.prior.between(_FEWEST * left, _MOST_DECIDED * left))
+            residuals = _Residuals(test, K, free, float(gamma), out)
+            variance = 1.0 if self.sigma is not None else float(sigma) ** 2 * test.count / left
             found, place = self._contradicted(residuals, test, suspects, variance)
             if place is not None and len(loads) < _LOADS:
                 loads.append(place)
             elif (found == suspects).all() or rounds == _ROUNDS:
                 off = np.zeros(3 * P)
-                out = np.tile(suspects, 3)
-                off[out] = residuals.amounts[: 3 * suspects.sum()]
-                out &= test.used
-                off[out] *= unit / self.weight[out]
-                return _OutlierResult(suspects, off.reshape(3, P), rounds, hopeless=False)
+                off[out & used] = residuals.amounts[: 3 * suspects.sum()][used[out]]
+                cost = residuals.cost(K, self.sigma is not None)
+                good = (test.sensed > 0) & ~suspects
+                even = self._even(residuals.chi_squared(suspects)[good], variance, good, K)
+                return _OutlierResult(suspects, off.reshape(3, P), rounds, cost, even)
             else:
                 suspects = found
             rounds += 1
-        return _OutlierResult(np.zeros(P, bool), np.zeros((3, P)), rounds, hopeless=True)
+        return _OutlierResult(suspects, np.zeros((3, P)), rounds)
+
+    def _even(self, t: Array, variance: float, good: Mask, K: Array) -> bool:
+        """Whether half of the `good` (P,) elements, with t (g,), scatter as the noise of all says.
+
+        Outliers that are taken for noise make it too large for them.
+        """
+        if self.sigma is not None or variance <= (_ROUNDED * np.abs(K).max()) ** 2:
+            return True
+        usual = scipy.special.chdtri(self._sensing[good], 0.5)
+        return bool(np.median(t / usual) >= _HALF * variance)
 
     def _contradicted(
         self, residuals: "_Residuals", test: _OutlierTest, suspects: Mask, variance: float
@@ -217,16 +273,98 @@ class Robust(Estimator, Stateful):
             self._load_gain(residuals, test) / variance,
         )
         most, place = t[~suspects].max(initial=0.0), int(gain.argmax())
-        least = np.maximum(self._limit, most / _AT_ONCE)
-        found = t > np.where(suspects, _BACK * self._limit, least)
+        limit = self._limit
+        if self.sigma is None:  # the noise is estimated from what the shape leaves of the readings
+            chance = 1 - _ALARM / len(t)
+            limit = self._sensing * scipy.special.fdtri(self._sensing, residuals.spare, chance)
+        least = np.maximum(limit, most / _AT_ONCE)
+        found = t > np.where(suspects, _BACK * limit, least)
         return found, place if gain[place] > max(most, self._load_limit) else None
 
 
-def _gross_outliers(K: Array, there: Mask) -> Mask:
-    """The elements (P,) that read far more than most of those `there`: suspected at once."""
-    size = np.abs(K.reshape(3, -1)).max(axis=0)
-    found = size > _OUTRAGEOUS * np.quantile(size[there], 1 - _MOST)
-    return found & (found.sum() <= _MOST * there.sum())
+def _undecided(best: _OutlierResult, ends: Sequence[_OutlierResult]) -> bool:
+    """Whether nearly as much speaks for another end, with quite other suspects."""
+    few = _OTHERS * len(best.suspects)
+    return any(
+        end.cost < best.cost + _NEARLY and np.count_nonzero(end.suspects != best.suspects) > few
+        for end in ends
+    )
+
+
+class _FirstSuspects:
+    """Which elements are far from a smooth shape of the others, even if a quarter of them is.
+
+    With Q as above, for a prior that decides a third of the readings by its `shares` w (k,),
+    (K - o)^T Q (K - o) / 2 + sum_p limit_p |o_p| is minimised over what the elements are off by, o
+    (3, P): none pulls at the shape harder than its limit. That is convex, and solved by accelerated
+    proximal steps (doi:10.1137/080716542) for lower and lower limits, until more than a third of
+    the elements would be off.
+    """
+
+    def __init__(self, U: Array, shares: Array, sensed: NDArray[np.intp]) -> None:
+        self._root = U * np.sqrt(shares)
+        self._there = sensed > 0
+        n = np.maximum(sensed, 1)
+        left = 1 - np.square(self._root).sum(axis=1).reshape(3, -1).sum(axis=0) / n
+        self._limit: Array = np.sqrt(scipy.special.chdtri(n, _ALARM))
+        lowest = scipy.special.chdtri(n, 1 - _QUIET)
+        self._usual: Array = np.sqrt(np.maximum(left, 1e-3) * lowest)
+
+    def __call__(self, K: Array, least: float) -> Mask:
+        """Suspected elements (P,) from weighted readings K (3 P,) of noise `least` or more."""
+        o, sigma = np.zeros_like(K), self._noise(K)
+        most = _MOST * np.count_nonzero(self._there)
+        while sigma:
+            found = self._solved(K, o, sigma * self._limit)
+            if np.count_nonzero(found.reshape(3, -1).any(axis=0)) > most:
+                break
+            o, sigma = found, _LOWER * sigma
+        limit = max(self._noise(K - o), least) * self._limit
+        return self._there & (np.linalg.norm(o.reshape(3, -1), axis=0) > limit)
+
+    def _rest(self, K: Array) -> Array:
+        """Q K (3 P,)."""
+        return K - self._root @ (K @ self._root)
+
+    def _noise(self, K: Array) -> float:
+        size = np.linalg.norm(self._rest(K).reshape(3, -1), axis=0)
+        return float(np.quantile((size / self._usual)[self._there], _QUIET))
+
+    def _solved(self, K: Array, o: Array, limit: Array) -> Array:
+        """What the elements are off by (3 P,) for a `limit` (P,) each, from o on."""
+        ahead, pace, still = o, 1.0, _STILL * limit.min()
+        for _ in range(_STEPS):
+            pulled = (ahead + self._rest(K - ahead)).reshape(3, -1)
+            size = np.linalg.norm(pulled, axis=0)
+            new = (pulled * (1 - limit / np.maximum(size, limit))).ravel()
+            moved, faster = new - o, (1 + math.sqrt(1 + 4 * pace**2)) / 2
+            ahead, o = new + (pace - 1) / faster * moved, new
+            pace = faster
+            if np.abs(moved).max() <= still:
+                break
+        return o
+
+
+class _PriorStrength:
+    """How many of the readings a prior decides, sum w of w = gamma s2 / (1 + gamma s2), by gamma.
+
+    Of directions with the squares `s2` (k,) of their singular values.
+    """
+
+    def __init__(self, s2: Array) -> None:
+        self._s2 = s2
+        self._ln = np.linspace(-12.0, 60.0, 289) - math.log(s2[0] or 1.0)
+        gs2 = np.exp(self._ln)[:, None] * s2
+        self._decided: Array = np.sum(gs2 / (1 + gs2), axis=1)
+
+    def between(self, *counts: float) -> Array:
+        """The gammas with which it decides so many readings."""
+        return np.exp(np.interp(counts, self._decided, self._ln))
+
+    def shares(self, count: float) -> Array:
+        """w (k,) where it decides `count` readings."""
+        gs2 = self.between(count) * self._s2
+        return gs2 / (1 + gs2)
 
 
 def _columns(elements: Mask) -> Array:
@@ -250,12 +388,13 @@ class _Residuals:
         s2 = min(gamma, _CLEAREST / s2[0]) * s2
         self.w = s2 / (1 + s2)
         self._Uw = U * self.w
-        self._U, self._free = U, free
+        self._U = U
         self._QF = free - self._Uw @ (U.T @ free)
         self._inverse = cast("Array", np.linalg.inv(free.T @ self._QF))
         # What is along a free direction leaves no residual; kept in, it would leave its rounding.
         rest = np.where(out, 0.0, K)
         r = rest - self._Uw @ (rest @ U)
+        self._left, self._out = test.count - free.shape[1], int(np.count_nonzero(out))
         amounts = self._inverse @ (free.T @ r)
         self.unexplained = rest - free @ amounts
         """K (3 P,) without its part along the free directions."""
@@ -264,6 +403,27 @@ class _Residuals:
         self.amounts = amounts
         """Of the part of K along the free directions (f,)."""
         self.amounts[: np.count_nonzero(out)] += K[out]
+
+    @property
+    def spare(self) -> float:
+        """How many readings neither the free directions nor the prior decide, 1 at least."""
+        return max(self._left - float(self.w.sum()), 1.0)
+
+    def cost(self, K: Array, sigma_known: bool) -> float:
+        """-2 ln of the evidence for the free directions.
+
+        The amount of an outlier may be anything up to the largest of the readings K (3 P,); a
+        direction of a load costs 1.5 times what Schwarz's criterion says.
+        """
+        tiny, P, f = np.finfo(float).tiny, len(K) // 3, len(self._inverse)
+        squares = max(float(self.unexplained @ self.r), tiny)
+        variance = 1.0 if sigma_known else max(squares / self._left, tiny)
+        width = math.log(max(float(np.abs(K).max()) ** 2, tiny)) - math.log(variance)
+        volume = -np.log1p(-self.w).sum() - np.linalg.slogdet(self._inverse)[1]
+        count, outliers = self._left + f, self._out / 3
+        cost = squares / variance + count * math.log(variance) + float(volume)
+        cost += outliers * (3 * width + 2 * math.log(P / _BAD))
+        return cost + 1.5 * (f - self._out) * math.log(count)
 
     def chi_squared(self, out: Mask) -> Array:
         """Chi-squared (P,) of each element against the rest; those `out` are free directions."""

@@ -13,7 +13,7 @@ from kappaskin_app.theme import DARK, LIGHT, apply_look
 
 INSIDE = Contact(np.full(2, 0.05), np.full(2, 1e-4), 0.1, 1e-3, 4e-3, 1e-5, 297, True, False)
 NEAR = replace(INSIDE, near_rim=True)
-SCENE = load_scene("centre")
+SCENE, METHOD = load_scene("centre"), "least-squares"
 ESTIMATE = Pipeline(SCENE.sensor(), Setup())(Simulator(SCENE).frame(0, lambda: 0.0))
 
 
@@ -33,7 +33,7 @@ def suspecting(**why: int) -> np.ndarray:
     ],
 )
 def test_what_is_doubtful_is_told_in_words(contact: Contact, strained: int, words: str) -> None:
-    assert warnings(replace(ESTIMATE, contact=contact), strained) == words
+    assert warnings(replace(ESTIMATE, contact=contact), strained, METHOD) == words
 
 
 @pytest.mark.parametrize(
@@ -45,18 +45,28 @@ def test_what_is_doubtful_is_told_in_words(contact: Contact, strained: int, word
     ],
 )
 def test_elements_that_are_left_out_are_named(suspect: np.ndarray, words: str) -> None:
-    assert warnings(replace(ESTIMATE, suspect=suspect), 0) == words
+    assert warnings(replace(ESTIMATE, suspect=suspect), 0, METHOD) == words
 
 
-def test_an_iteration_that_gave_up_is_told() -> None:
-    words = "No convergence; least squares shown"
-    assert warnings(replace(ESTIMATE, converged=False), 0) == words
+@pytest.mark.parametrize(
+    ("method", "words"),
+    [
+        ("finite-slope", "No convergence; least squares shown"),
+        (
+            "robust",
+            "Too many elements contradict each other: the shape may be wrong; "
+            "tare, or repair what Health lists",
+        ),
+    ],
+)
+def test_a_method_that_gave_up_says_why(method: str, words: str) -> None:
+    assert warnings(replace(ESTIMATE, converged=False), 0, method) == words
 
 
 def test_slopes_that_a_method_neglects_are_told_after_the_rest() -> None:
     words = "slopes reach 0.4: up to 8 % too flat; use finite-slope"
-    assert warnings(ESTIMATE, 0, 0.4) == words[0].upper() + words[1:]
-    assert warnings(ESTIMATE, 1, 0.4) == f"1 element over 1 % strain; {words}"
+    assert warnings(ESTIMATE, 0, METHOD, 0.4) == words[0].upper() + words[1:]
+    assert warnings(ESTIMATE, 1, METHOD, 0.4) == f"1 element over 1 % strain; {words}"
 
 
 def test_a_warning_takes_the_hints_place_in_the_colour_of_alarms_and_gives_it_back(qapp) -> None:

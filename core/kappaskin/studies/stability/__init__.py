@@ -177,7 +177,7 @@ _CLAIMS: Mapping[str, frozenset[CaseKind]] = {
     "least-squares": _USUAL | {CaseKind.SEQUENCE},
     "fast": _USUAL | {CaseKind.SEQUENCE, CaseKind.LARGE},
     "finite-slope": frozenset({CaseKind.ANY, CaseKind.SLOPES}),
-    "robust": _USUAL - {CaseKind.DENSE},
+    "robust": _USUAL - {CaseKind.DENSE} | {CaseKind.OUTLIERS},
     "tracking": _USUAL - {CaseKind.DENSE} | {CaseKind.SEQUENCE},
 }
 """Which cases a method claims; any other claims the usual ones."""

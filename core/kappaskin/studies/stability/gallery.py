@@ -36,6 +36,7 @@ class CaseKind(Enum):
     SLOPES = "readings of a skin with slopes near one"
     SEQUENCE = "more frames than a method that solves each anew is asked for"
     DENSE = "as many functions as dense algebra does quickly, but nothing slower"
+    OUTLIERS = "so many bad readings that only a method which excludes them is asked for a shape"
     LARGE = "more functions than a dense matrix is made for"
 
 
@@ -360,11 +361,29 @@ def _readings() -> Iterator[HardCase]:
                   spoilt=lambda K: chain.curvature(chain.counts(K)))  # fmt: skip
     yield case_of("spikes", "one reading of each frame is off by 1e6 1/m", _TENS, (8, 8),
                   spoilt=spiked, announced="a spike is no noise: bars widen with it")  # fmt: skip
+    for share in (0.1, 0.25):
+        yield case_of(f"{100 * share:.0f} % of the elements bad",
+                      "so many elements are off by 20 to 40 times the noise, by the same in each"
+                      " channel, others in the next frame", _TENS, (8, 8),
+                      spoilt=_with_offsets(share),
+                      announced="an offset is no noise: too many may be told as such",
+                      kind=CaseKind.OUTLIERS)  # fmt: skip
     dent = _dent(8)
     signal = _TENS.curvature_operator(SineBasis(_SQUARE, 8, 8)) @ dent.ravel()
     noise = 10 * root_mean_square(signal)
     yield case_of("noise 10 times the signal", "readings hold more noise than shape",
                   _TENS, (8, 8), truth=dent, noise=noise)  # fmt: skip
+
+
+def _with_offsets(share: float) -> Callable[[Array], Array]:
+    def spoilt(K: Array) -> Array:
+        rng = np.random.default_rng(SEED + 1)
+        for frame in K:
+            bad = rng.permutation(frame.shape[1])[: round(share * frame.shape[1])]
+            frame[:, bad] += TABLE_1_NOISE * rng.uniform(20, 40, len(bad)) * rng.choice([-1, 1])
+        return K
+
+    return spoilt
 
 
 def _strong(chain: Transduction) -> Array:
