@@ -19,8 +19,9 @@ ROOMS = (
 LIMITS = {
     # mechanics: shell and stretching; contact: influence, stretched, lower_bound.
     "modules": 330,
-    # Shells and plates that stretch, a load's size, slopes on shells, revisions of estimates.
-    "statements": 36_822,
+    # Shells and plates that stretch, a load's size, slopes on shells, revisions of estimates,
+    # a robust start that a quarter of bad elements does not mislead.
+    "statements": 36_937,
     # _files: one way to read and write files; _text: text from outside. For all rooms and the app.
     "loose modules of core": 10,
     "loose modules of the app": 8,
