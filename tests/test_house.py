@@ -21,7 +21,7 @@ LIMITS = {
     "modules": 330,
     # Shells and plates that stretch, a load's size, slopes on shells, revisions of estimates,
     # a robust start that a quarter of bad elements does not mislead.
-    "statements": 36_937,
+    "statements": 36_941,
     # _files: one way to read and write files; _text: text from outside. For all rooms and the app.
     "loose modules of core": 10,
     "loose modules of the app": 8,
