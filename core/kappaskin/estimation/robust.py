@@ -232,13 +232,16 @@ class Robust(Estimator, Stateful):
         while suspects.sum() <= most:
             free = np.hstack([_columns(suspects), *(self._load_readings[:, g] for g in loads)])
             left, out = test.count - free.shape[1], np.tile(suspects, 3)
+            if left < 1:  # as many free directions as readings: nothing is left to contradict
+                break
             residuals = _Residuals(test, K, free, float(gamma), out)
             _, (gamma,), (sigma,) = test.likelihood(residuals.unexplained[None, used])
             gamma = np.clip(gamma, *test.prior.between(_FEWEST * left, _MOST_DECIDED * left))
             residuals = _Residuals(test, K, free, float(gamma), out)
             variance = 1.0 if self.sigma is not None else float(sigma) ** 2 * test.count / left
             found, place = self._contradicted(residuals, test, suspects, variance)
-            if place is not None and len(loads) < _LOADS:
+            a_load = self._load_readings.shape[-1]
+            if place is not None and len(loads) < _LOADS and left > a_load:
                 loads.append(place)
             elif (found == suspects).all() or rounds == _ROUNDS:
                 off = np.zeros(3 * P)
