@@ -21,6 +21,7 @@ _LOOKED_AT = 0.25  # beyond it, two loads are tried
 _MISFIT = 1e-3  # beyond it, whatever presses is no load on a small area
 _LEFT = 0.01  # of pairs: beyond it, two loads do not explain the readings either
 # -2 ln of likelihood ratios.
+_HINT = 12.0  # that a second load promises in first order: below it, none is tried
 _SPREAD = 25.0  # by which two loads must be better than one, for the load to be distributed
 _DISTINCT = 32.0  # and to be told as two
 _NO_LINE = 12.0  # and by which they must be better than a line
@@ -30,7 +31,7 @@ _FUNCTIONS = 15  # along each side, of the loads searched for
 _COVERED = 1e-3  # of the squares of a load's readings: what another one leaves of them is none
 _STEPS = 25  # of Levenberg and Marquardt at most
 _WORTH = 0.05  # a step that makes -2 ln of the likelihood no smaller than by this is the last one
-_NEARER = 0.1  # of the way to a cost that is enough: steps that gain less lead nowhere
+_HOPE = 3.0  # times what a step promises: more is not to be gained by all that follow
 _DAMPING, _EASED, _RAISED, _MOST = 1e-3, 0.2, 10.0, 1e6
 _FURTHEST = 0.05  # of a side, in one step
 _START, _LEAST, _LARGEST = 0.03, 1e-3, 0.2  # of the shorter side: radius of a load
@@ -250,7 +251,7 @@ class _Pairs:
         self._felt = self._basis.at(self._places)
         M = self._compliance.after(layout.curvature_operator(self._basis, plate))
         self._M = M * self._loads.influence.unit
-        self._pairs = PatternCache[tuple[Array, Array]]()
+        self._pairs = PatternCache[tuple[Array, Array, Array]]()
 
     def __call__(self, K: Array, fit: Fit, contact: Contact) -> tuple[Contact, Contact]:
         """The contacts for readings `K` (C,) over their noise, by the single one that fits best."""
@@ -259,14 +260,17 @@ class _Pairs:
         several, unit = self._loads.several, float(fit.noise) * self._loads.influence.unit
         s = contact.size if self._loads.influence.sized else self._loads.start
         alone = np.array([[*contact.position, s, contact.force / unit]])
-        one = self._climbed(several, alone, readings)
+        if self._beside(_tried(several, alone, readings), readings) < _HINT:
+            return contact, NO_CONTACT
         two = self._climbed(several, self._found(readings), readings)
         spare = int(used.sum()) - two.p.size
-        better = one.worse(two, two.left / spare)
+        variance = two.left / spare
+        one = self._climbed(several, alone, readings, two.cost + _DISTINCT * variance)
+        better = one.worse(two, variance)
         contact = replace(contact, single=contact.single and better < _SPREAD)
         if better < _DISTINCT or not self._explains(two, spare, fit):
             return contact, NO_CONTACT
-        if self._is_line(two, two.left / spare, readings):
+        if self._is_line(two, variance, readings):
             return contact, NO_CONTACT
         return self._told(two, spare, fit)
 
@@ -287,13 +291,14 @@ class _Pairs:
         ends, least = two.p[:, :2], two.cost + _NO_LINE * variance
         line = np.array([[*ends.mean(axis=0), *(ends[1] - ends[0]) / 2, two.p[:, 3].sum()]])
         return (
-            self._climbed(self._loads.line, line, readings, least).worse(two, variance) < _NO_LINE
+            self._climbed(self._loads.line, line, readings, least, least).worse(two, variance)
+            < _NO_LINE
         )
 
     def _found(self, readings: _Readings) -> Array:
         """The two loads (2, 4) on a grid that explain most, and push to the same side."""
         K, used = readings
-        shared, across = self._pairs(used, self._products)
+        _, shared, across = self._pairs(used, self._products)
         norm, read = shared.diagonal(), self._felt @ (K @ self._M)
         # Forces of all pairs, times `across`: what the first explains besides the second.
         forces = np.multiply.outer(read, norm) - shared * read
@@ -304,46 +309,61 @@ class _Pairs:
         found = forces[pair, pair[::-1]] / across[first, second]
         return np.column_stack([self._places[pair], [self._loads.start] * 2, found])
 
-    def _products(self, used: Mask) -> tuple[Array, Array]:
-        """Products (G, G) of what the readings `used` (C,) are of a load at each place and another.
+    def _beside(self, one: _Tried, readings: _Readings) -> float:
+        """What a second load on the grid takes off -2 ln of the likelihood, in first order.
+
+        The first one gives way to it.
+        """
+        read = self._pairs(readings.used, self._products)[0]
+        Q = np.linalg.qr((one.J * np.sqrt(one.weights)).T)[0]
+        own = read @ Q
+        norm = np.vecdot(read, read)
+        across = norm - np.vecdot(own, own)
+        rest = one.rest * np.sqrt(one.weights)
+        gain = (read @ (rest - Q @ (rest @ Q))) ** 2
+        return float(np.max(gain / np.where(across > _COVERED * norm, across, math.inf)))
+
+    def _products(self, used: Mask) -> tuple[Array, Array, Array]:
+        """What the readings `used` (C,) are of a load at each place (G, C); their products (G, G).
 
         And the determinants of those of each pair, infinite where one hides the other.
         """
-        M = self._M[used]
-        shared = self._felt @ (M.T @ M) @ self._felt.T
+        read = np.where(used, self._felt @ self._M.T, 0.0)
+        shared = read @ read.T
         squares = np.multiply.outer(shared.diagonal(), shared.diagonal())
         across = squares - shared**2
-        return shared, np.where(across > _COVERED * squares, across, math.inf)
+        return read, shared, np.where(across > _COVERED * squares, across, math.inf)
 
     def _climbed(
         self,
         model: Callable[[Array], _Model],
         p: Array,
         readings: _Readings,
+        wanted: float = math.inf,
         enough: float = -math.inf,
     ) -> _Tried:
         """The most likely loads near `p`, by the steps of Levenberg and Marquardt.
 
-        Or any of a cost below `enough`, or that come no nearer to it.
+        Or any of a cost below `enough`, or from which no steps promise to come near the one that is
+        `wanted`.
         """
         best, damping = _tried(model, p, readings), _DAMPING
         for _ in range(_STEPS):
             H, scale = best.normal()
             slopes = best.J.dot(best.weights * best.rest)
             free = np.flatnonzero((scale > 0) & self._loads.free(best.p, slopes))
+            H, g = H[np.ix_(free, free)], slopes[free] / scale[free]
+            H.flat[:: len(H) + 1] += damping
+            step = np.linalg.solve(H, g)
+            if best.cost - _HOPE * float(step.dot(g)) > wanted:
+                break
             steps = np.zeros(len(slopes))
-            steps[free] = (
-                np.linalg.solve(
-                    H[np.ix_(free, free)] + damping * np.eye(len(free)), slopes[free] / scale[free]
-                )
-                / scale[free]
-            )
+            steps[free] = step / scale[free]
             other = _tried(model, self._loads.moved(best.p, steps), readings)
             gain = best.cost - other.cost
             damping *= _EASED if gain > 0 else _RAISED
             best = other if gain > 0 else best
-            worth = max(_WORTH, _NEARER * (best.cost - enough) if math.isfinite(enough) else 0.0)
-            if 0 < gain < worth or damping > _MOST or best.cost < enough:
+            if 0 < gain < _WORTH or damping > _MOST or best.cost < enough:
                 break
         return best
 
