@@ -349,12 +349,12 @@ class _Pairs:
         """
         best, damping = _tried(model, p, readings), _DAMPING
         for _ in range(_STEPS):
-            H, scale = best.normal()
+            normal, scale = best.normal()
             slopes = best.J.dot(best.weights * best.rest)
             free = np.flatnonzero((scale > 0) & self._loads.free(best.p, slopes))
-            H, g = H[np.ix_(free, free)], slopes[free] / scale[free]
+            H, g = cast("Array", normal[np.ix_(free, free)]), slopes[free] / scale[free]
             H.flat[:: len(H) + 1] += damping
-            step = np.linalg.solve(H, g)
+            step: Array = np.linalg.solve(H, g)
             if best.cost - _HOPE * float(step.dot(g)) > wanted:
                 break
             steps = np.zeros(len(slopes))

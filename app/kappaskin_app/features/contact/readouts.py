@@ -78,6 +78,14 @@ def _contact(contact: Contact, second: Contact) -> str:
     return f"({x:.1f}, {y:.1f}) \N{PLUS-MINUS SIGN} {sd:.2f} mm"
 
 
+def _forces(contact: Contact, second: Contact) -> str:
+    """The forces of two contacts, without error bars, for which there is no room."""
+    forces = 1e3 * contact.force, 1e3 * second.force
+    if abs(forces[0]) >= 1e3:
+        return "{:.2f}, {:.2f} N".format(*(1e-3 * force for force in forces))
+    return "{:.0f}, {:.0f} mN".format(*forces)
+
+
 def _age(age: float, sd: float) -> str:
     """An age in ms with its error bar, unless that is negligible."""
     if not math.isfinite(age):
@@ -188,6 +196,8 @@ class Readouts(QWidget):
             (found,) = readouts_of(quantity, reported)
             least = header.key == "force" and estimate.contact.force_is_lower_bound
             words = _with_error(found, "+" if header.signed else "")
+            if header.key == "force" and estimate.second.present:
+                words = _forces(estimate.contact, estimate.second)
             self._write(header.key, f"\N{GREATER-THAN OR EQUAL TO} {words}" if least else words)
 
     def _write(self, key: str, text: str) -> None:

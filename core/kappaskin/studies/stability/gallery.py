@@ -227,17 +227,23 @@ def _loads() -> Iterator[HardCase]:
         )
     plate, finest = Plate(_SQUARE), SineBasis(_SQUARE, 60, 60)
     resolved = {
-        "point load, summed": (PointLoad(0.031, 0.052), "a point load, of 60 x 60 functions"),
-        "disc of 5 mm": (DiscLoad(0.031, 0.052, radius=5e-3), "a disc of 5 mm radius, of 60 x 60"),
+        "point load, summed": ([PointLoad(0.031, 0.052)], "a point load, of 60 x 60 functions"),
+        "disc of 5 mm": ([DiscLoad(0.031, 0.052, radius=5e-3)], "a disc of 5 mm radius, 60 x 60"),
+        "two loads": (
+            [PointLoad(0.031, 0.052), PointLoad(0.051, 0.052)],
+            "two point loads, 20 mm apart, of 60 x 60 functions",
+        ),
     }
-    for name, (load, what) in resolved.items():
+    for name, (loads, what) in resolved.items():
         yield case_of(
             name,
             f"{what}, of which those that are fitted follow 8 x 8",
             _TENS,
             (8, 8),
             true_basis=finest,
-            truth=plate.deflection([scaled_to(plate, load, 1e-3, finest)], finest),
+            truth=plate.deflection(
+                [scaled_to(plate, each, 1e-3, finest) for each in loads], finest
+            ),
             kind=CaseKind.LINEAR,
         )
     sheet = replace(plate, thickness=0.25e-3)

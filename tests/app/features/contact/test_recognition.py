@@ -32,7 +32,9 @@ def test_the_window_describes_the_object_in_contact(window, until):
     window.history.change("Blade", -1, load_case="two-points", force=0.2, **ends)
     assert len(window.session.scene.loads) == 2
 
-    until(lambda: window.display.status_bar.object.text().startswith("edge, 20 mm long, axis "))
+    # Its ends are two contacts, which the blade makes if it is one object.
+    said = "if one object makes both contacts: edge, 20 mm long, axis "
+    until(lambda: window.display.status_bar.object.text().startswith(said))
     assert "principal curvatures" in window.display.status_bar.object.text()
 
     window.session.disconnect_from()
