@@ -352,9 +352,9 @@ class _Pairs:
             normal, scale = best.normal()
             slopes = best.J.dot(best.weights * best.rest)
             free = np.flatnonzero((scale > 0) & self._loads.free(best.p, slopes))
-            H, g = cast("Array", normal[np.ix_(free, free)]), slopes[free] / scale[free]
+            H, g = normal[np.ix_(free, free)], slopes[free] / scale[free]
             H.flat[:: len(H) + 1] += damping
-            step: Array = np.linalg.solve(H, g)
+            step = cast("Array", np.linalg.solve(H, g))
             if best.cost - _HOPE * float(step.dot(g)) > wanted:
                 break
             steps = np.zeros(len(slopes))
