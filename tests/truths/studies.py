@@ -2,7 +2,7 @@
 
 `python tests/truths/studies.py` prints all figures as the guide's table; a number of frames and the
 beginning of a case's name, both optional, say of how many and which; the name `told` prints what
-is told of one load and of two.
+is told of one load and of two, `drift` what of drifts.
 """
 
 import sys
@@ -469,9 +469,69 @@ def told_table(frames=1000):
         yield f"| {press.name} | {frames} | {words} |"
 
 
+# Drifts of all readings, beside a load of 0.06 N and alone
+
+
+@dataclass(frozen=True)
+class Drifted:
+    """Shares of frames in which a drift was told, and a contact: of no load, and of one.
+
+    `size` is the mean size told over the true one; `covered` (3,) the shares of intervals of x, y
+    and force that hold the truth, in frames with a load.
+    """
+
+    told: tuple[float, float]
+    present: tuple[float, float]
+    size: float
+    covered: np.ndarray
+
+
+def drifted(noises, frames, seed=0) -> Drifted:
+    """Drifts of so many noises by RMS, level and slopes drawn for each frame, on the flat skin."""
+    case = FLAT[0]
+    rng, layout = np.random.default_rng(seed), case.layout
+    read, contacts = case.truth(layout), Contacts(case.skin, layout)
+    fit = LeastSquares(basis_for(case.skin.patch, "hinged", 8, 8), layout)
+    x, y = (layout.positions - 0.05).T / 0.05
+    size = noises * case.noise / sqrt(3)
+    told, present, sizes, covered = [0, 0], [0, 0], [], []
+    for frame in range(2 * frames):
+        level, along, across = rng.normal(size=(3, 3, 1))
+        field = level + along * x + across * y
+        curvature = size * field / np.sqrt(np.mean(field**2))
+        curvature = curvature + rng.uniform(-case.noise, case.noise, (3, 100))
+        load = Load(*rng.uniform(0.02, 0.08, 2), 0.06, radius=rng.uniform(0, 5e-3))
+        loaded = frame % 2
+        curvature = curvature + loaded * read(load)
+        contact = contacts(curvature, fit(curvature))[0]
+        told[loaded] += contacts.drift > 0
+        present[loaded] += contact.present
+        sizes.append(contacts.drift / size if size else 0.0)
+        if loaded and contact.present:
+            off = np.array([*(contact.position - (load.x, load.y)), contact.force - load.force])
+            covered.append(np.abs(off) <= (*contact.position_95, contact.force_95))
+    shares = (tuple(count / frames for count in counts) for counts in (told, present))
+    return Drifted(*shares, float(np.mean(sizes)), np.mean(covered, axis=0))
+
+
+DRIFTS = (0, 1, 2, 3, 4, 6)
+
+
+def drift_table(frames=1000):
+    """What is told of drifts, as a table in Markdown."""
+    heads = "told as drift, no load | false contacts | told as drift, 0.06 N | contact found"
+    yield f"| drift, in noises | {heads} | size told | x | y | force |"
+    yield "|---|---|---|---|---|---|---|---|---|"
+    for noises in DRIFTS:
+        of = drifted(noises, frames)
+        shares = (of.told[0], of.present[0], of.told[1], of.present[1], of.size, *of.covered)
+        yield f"| {noises} | " + " | ".join(f"{100 * share:.1f} %" for share in shares) + " |"
+
+
 def main(frames="1000", *name):
-    if name == ("told",):
-        for row in told_table(int(frames)):
+    tables = {("told",): told_table, ("drift",): drift_table}
+    if name in tables:
+        for row in tables[name](int(frames)):
             print(row, flush=True)
         return
     for row in table(int(frames), " ".join(name)):

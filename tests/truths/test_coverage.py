@@ -18,6 +18,7 @@ from studies import (
     TWO,
     accused,
     coverage,
+    drifted,
     robustness,
     shape_coverage,
     told,
@@ -192,3 +193,26 @@ def test_two_contacts_are_told_as_two(case, frames):
     assert found.two > 0.95
     assert found.single < 0.05
     assert min(found.covered) >= least
+
+
+# Drifts of all readings
+
+
+@pytest.mark.parametrize("noises", [2, 3, 4, 6])
+@frames
+def test_a_drift_is_told_as_one_and_contacts_are_found_beside_it(noises, frames):
+    found = drifted(noises, frames)
+
+    assert found.present[0] <= 0.02
+    assert found.present[1] >= 0.95
+    assert min(found.told) >= 0.95
+    assert min(found.covered) >= 0.90
+    assert abs(found.size - 1) < 0.05
+
+
+@frames
+def test_no_drift_is_told_where_there_is_none(frames):
+    found = drifted(0, frames)
+
+    assert max(found.told) <= 0.005
+    assert found.present == (0.0, 1.0)

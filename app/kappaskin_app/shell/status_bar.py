@@ -45,7 +45,9 @@ _TIP = (
     "Near the rim: a held edge does not move, so a small force inside and a large one at the rim "
     "give the same readings; select an elastic edge if the edge is elastic (Basis). "
     "Strain: beyond 1 % a metal gage is not elastic; these elements are crossed out in the "
-    "heatmaps. Slopes: most estimators take the skin for nearly flat; select Finite slope (Basis). "
+    "heatmaps. Drift: all readings have shifted smoothly over the skin, which no load does; "
+    "contacts are found beside it, but the surface still shows it. "
+    "Slopes: most estimators take the skin for nearly flat; select Finite slope (Basis). "
     "Excluded: elements, counted from 0, that are inconsistent with the others, or have "
     "faulty channels: Health (F3) lists these, and letters in the heatmaps give the reason."
 )
@@ -76,6 +78,10 @@ def warnings(estimate: Estimate, strained: int, method: str, slope: float = 0.0)
         parts.append(METHODS[method].failure.format(""))
     if strained:
         parts.append(f"{strained} element{'s' if strained > 1 else ''} over 1 % strain")
+    if estimate.drift:
+        parts.append(
+            f"readings drifted by {estimate.drift:.2g} 1/m, by warmth or a bent mount: tare at rest"
+        )
     if estimate.contact.near_rim:
         parts.append("contact near the rim: unreliable")
     if slope:

@@ -8,6 +8,7 @@ import scipy
 from numpy.typing import NDArray
 
 from kappaskin.bases import basis_for
+from kappaskin.contact.drift import level_and_slopes
 from kappaskin.estimation import PatternCache, power_of_two
 from kappaskin.frames import Array, Mask
 from kappaskin.sensing import Sensor
@@ -62,9 +63,7 @@ class LoadDetector:
         self._points = points[patch.moves(points)]
         M = plate.compliance(basis).after(layout.curvature_operator(basis, plate))
         self._T = M @ basis.at(self._points).T
-        centred = (layout.positions - [patch.a / 2, patch.b / 2]) / [patch.a, patch.b]
-        level_and_slopes = np.column_stack([np.ones(len(layout)), centred])
-        self._plain = np.kron(np.eye(3), level_and_slopes)
+        self._plain = level_and_slopes(layout).T
         self._live = layout.live.ravel()
         self._cache = PatternCache[_LoadTables]()
 

@@ -7,6 +7,8 @@ from functools import lru_cache
 from typing import NamedTuple, cast
 
 import numpy as np
+import scipy
+from numpy.typing import ArrayLike
 from scipy.linalg import lapack
 
 from kappaskin.bases import Basis, SineBasis, basis_for
@@ -118,6 +120,7 @@ _WORTH_AT_RIM = 0.1  # and small steps in this many variances lead to it
 _NO_GAIN = 1e-13  # of the readings' squares
 _FURTHEST = 0.05  # of a side, in one step
 _RIDGE = 1e-12  # keeps a load on the rim, which moves nothing, solvable
+_HARDLY = 1e-9  # of the largest: a direction with no more left is none
 _DOUBTFUL = 0.15  # of a side: within it, a contact may be one on the rim
 _RIM = 1 / 15  # of a side: within it, a load moves the skin too little to be told
 _START, _LEAST, _LARGEST = 0.03, 1e-3, 0.2  # of the shorter side: radius of a load
@@ -135,12 +138,14 @@ NO_CONTACT = Contact(
 class _Tables:
     """What depends on which readings are used: T'T (ny, nx), their weights, and `spare` ones.
 
-    The weights (3 P,) are 1 where used, else 0; None where all are used.
+    The weights (3 P,) are 1 where used, else 0; None where all are used. `free` (d, 3 P) are
+    orthonormal directions of them that may be anything.
     """
 
     norm: Array
     weights: Array | None
     spare: int
+    free: Array
 
 
 class _Linearised(NamedTuple):
@@ -169,17 +174,26 @@ class PointContact:
     contact is missed: T = M t there, with t = compliance times what each function of `basis` feels
     (Eqs. 2, 9), and T'K is one map from M'K. Gauss-Newton steps in x, y, s and P refine it with
     the `Influence`, which no number of functions cuts short. What readings right under the load
-    depend on how it is spread is added to their variance.
+    depend on how it is spread is added to their variance. Along the `free` directions (d, 3 P), as
+    those of a drift, the readings may be anything: they are fitted beside the load.
     """
 
-    def __init__(self, plate: Plate, layout: SensorLayout, edge: str = "hinged") -> None:
+    def __init__(
+        self,
+        plate: Plate,
+        layout: SensorLayout,
+        edge: str = "hinged",
+        free: Array | None = None,
+    ) -> None:
         self.patch, strip = plate.patch, plate.patch.strip
         self.basis = basis_for(self.patch, edge, _FUNCTIONS, 1 if strip else _FUNCTIONS)
         compliance = plate.compliance(self.basis)
         self._M = compliance.after(layout.curvature_operator(self.basis, plate))
         self._modal = modal_projection(layout, self.basis, compliance, self._M)
-        # The readings of a load, their derivatives by x, y and s, and what the elements read.
-        self._rows = np.zeros((5, len(self._M)))
+        self._free = np.empty((0, len(self._M))) if free is None else free
+        # The readings of a load, their derivatives by x, y and s, what the elements read, and the
+        # directions along which that may be anything.
+        self._rows = np.zeros((5 + len(self._free), len(self._M)))
         self._influence = influence_of(plate, layout, edge, _FUNCTIONS, self._rows[:4])
         self._unknowns = 4 if self._influence.sized else 3
         self._stretched = StretchedSkin(plate, layout, edge) if plate.stretches else None
@@ -200,14 +214,18 @@ class PointContact:
         self._all_live = bool(self._live.all())
         self.misfit = math.nan
         """Variance that the last contact leaves of the readings, over that of the fit."""
+        self.rest = self._readings
+        """What the last contact leaves (3 P,) of the readings in 1/m; 0 where one is missing."""
+        self._linear = self._rows[:0]  # readings and derivatives that the last steps are from
 
     def _tables(self, used: Mask) -> _Tables:
         """The tables for the readings `used` (3 P,)."""
-        M = self._M[used]
-        norm = _squares_on_grid(self.basis, M.T @ M, self._x, self._y)
+        M, free = self._M[used], orthonormal(np.where(used, self._free, 0.0))
+        hidden = free[:, used] @ M
+        norm = _squares_on_grid(self.basis, M.T @ M - hidden.T @ hidden, self._x, self._y)
         norm[norm <= 0] = math.inf  # a load that these readings do not see explains nothing
         weights = None if used.all() else used.astype(float)
-        return _Tables(norm, weights, max(len(M) - self._unknowns, 1))
+        return _Tables(norm, weights, max(len(M) - len(free) - self._unknowns, 1), free)
 
     def __call__(self, curvature: Array, fit: Fit) -> Contact:
         """The contact for `curvature` (3, P) in 1/m, NaN where missing, and the `fit` to it."""
@@ -217,11 +235,11 @@ class PointContact:
         explained /= tables.norm
         explained.put(self._still, 0.0)
         row, column = divmod(int(explained.argmax()), len(self._x))
-        variance = float(fit.noise) ** 2
+        variance, self.rest = float(fit.noise) ** 2, K
         if not explained[row, column] > _threshold(float(cast("float", fit.spare))) * variance:
             return NO_CONTACT
         self._rows[4] = self._readings = K
-        if tables.weights is None and self._stretched is None:
+        if tables.weights is None and self._stretched is None and not len(self._free):
             x, y, here = self._x.item(column), self._y.item(row), self._first(row, column)
         else:
             x = _parabola_peak(self._x, explained[row], column)
@@ -233,16 +251,22 @@ class PointContact:
         return self._refined(x, y, here, tables, variance, fit)
 
     def _used(self, K: Array) -> tuple[Array, _Tables]:
-        """The readings with zeros for missing ones, and their tables."""
+        """The readings, 0 where missing, less their part along `free`, and the tables."""
         if self._all_live and math.isfinite(float(K.dot(K))):
-            return K, self._whole
-        used = self._live & np.isfinite(K)
-        return np.where(used, K, 0.0), self._cache(used, self._tables)
+            known, tables = K, self._whole
+        else:
+            used = self._live & np.isfinite(K)
+            known, tables = np.where(used, K, 0.0), self._cache(used, self._tables)
+        if len(tables.free):
+            known = known - (tables.free @ known) @ tables.free
+            self._rows[5:] = 0.0
+            self._rows[5 : 5 + len(tables.free)] = tables.free
+        return known, tables
 
     def _first(self, row: int, column: int) -> _Linearised:
         """As `_linearised`, where all readings are used, at a point of the grid."""
         rows, first, inverse = self._at_node(row, column)
-        K = self._readings
+        K, self._linear = self._readings, rows
         return self._step(self._start, first, inverse, rows.dot(K), float(K.dot(K)), None)
 
     def _node(self, row: int, column: int) -> tuple[Array, float, Array]:
@@ -268,6 +292,9 @@ class PointContact:
             if gain <= self._worth(x, y) * variance + _NO_GAIN * here.power:
                 break
             here = self._linearised(x, y, s, force, tables, variance)
+        self.rest = self._rows[4] - np.dot(here.steps[: self._unknowns], self._linear)
+        if tables.weights is not None:
+            self.rest *= tables.weights
         return self._contact(x, y, s, here, tables, fit)
 
     def _worth(self, x: float, y: float) -> float:
@@ -284,8 +311,9 @@ class PointContact:
             self._stretched.stretch(x, y, s, self._influence.unit, self._rows)
         weights = self._weights(s, force, tables, variance)
         rows = self._rows if weights is None else self._rows * weights
-        products = rows.dot(self._rows.T)
+        products = _without_free(rows.dot(self._rows.T))
         n = self._unknowns
+        self._linear = self._rows[:n]
         H, g = products[:n, :n], products[:n, 4]
         first = H.item(0, 0)
         return self._step(s, first, _inverse(H), g, products.item(4, 4), weights)
@@ -357,7 +385,7 @@ class PointContact:
                 return True
             K = self._rows[4]
             self._influence.at(x_rim, y_rim, s)
-            T = self._rows[0]
+            T = self._rows[0] - (tables.free @ self._rows[0]) @ tables.free
             read = T if here.weights is None else T * here.weights
             if float(read.dot(K)) ** 2 > least * float(read.dot(T)):
                 return True
@@ -373,6 +401,32 @@ class PointContact:
         fitted, observed = float(shape[0]), float(covariance[0, 0])
         observed = math.sqrt(observed) if observed >= 0 else math.nan
         return fitted, math.hypot(observed, fitted - under)
+
+
+def left_by_chance(share: float, spare: int, of_fit: ArrayLike) -> float:
+    """Variance left by a load, over that of a fit, which this share of single loads exceeds.
+
+    They leave `spare` readings, and the fit `of_fit`.
+    """
+    fewer = max(float(cast("float", of_fit)), 1.0)
+    more = max(spare - fewer, 1.0)
+    F = float(scipy.special.fdtri(more, fewer, 1 - share))
+    return (fewer + more * F) / (fewer + more)
+
+
+def orthonormal(rows: Array) -> Array:
+    """Orthonormal rows (k, C) that span `rows` (d, C): those of which nothing is left are none."""
+    _, s, Vt = np.linalg.svd(rows, full_matrices=False)
+    return Vt[s > _HARDLY * s.max(initial=0.0)]
+
+
+def _without_free(products: Array) -> Array:
+    """The first 5 of `products` (5 + d, 5 + d) of rows, without their parts along the others."""
+    if len(products) == 5:
+        return products
+    own, beside, free = products[:5, :5], products[:5, 5:], products[5:, 5:]
+    free.flat[:: len(free) + 1] += _HARDLY  # a direction that these readings lack is a zero row
+    return own - beside.dot(np.linalg.solve(free, beside.T))
 
 
 def _inverse(H: Array) -> Array:

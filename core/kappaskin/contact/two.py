@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple, cast
 
 import numpy as np
-import scipy
 
 from kappaskin.bases import basis_for
+from kappaskin.contact.drift import SmoothDrift
 from kappaskin.contact.influence import influence_of
-from kappaskin.contact.point import NO_CONTACT, PointContact
+from kappaskin.contact.point import NO_CONTACT, PointContact, left_by_chance
 from kappaskin.estimation import Fit, PatternCache
 from kappaskin.frames import Array, Contact, Mask
 from kappaskin.mechanics import Plate
@@ -50,12 +50,16 @@ class Contacts:
     told as two if they are better than one by a likelihood ratio that hardly any single load
     reaches, better than a line, clear of one another and of the rim, push to the same side, and
     leave no more than noise does. Otherwise, what one load does not explain is distributed: not
-    `single`. No two are told on a flat skin of known thickness, whose readings are no sums of those
-    of its loads.
+    `single`. Where one is told or none, a `drift` of all readings may be told beside it
+    (`SmoothDrift`). No two are told on a flat skin of known thickness, whose readings are no sums
+    of those of its loads.
     """
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str = "hinged") -> None:
         self._one = PointContact(plate, layout, edge)
+        self._drift = SmoothDrift(plate, layout, edge)
+        self.drift = 0.0
+        """Size in 1/m of the drift beside the last contacts, by RMS; 0 where none is told."""
         self._pairs = None if plate.stretches else _Pairs(plate, layout, edge)
 
     def __call__(self, curvature: Array, fit: Fit) -> tuple[Contact, Contact]:
@@ -63,10 +67,20 @@ class Contacts:
 
         For `curvature` (3, P) in 1/m, NaN where missing, and the `fit` to it.
         """
+        found = self._pressed(curvature, fit)
+        rest = self._one.rest
+        left = float(rest.dot(rest))
+        if found[1].present and self._pairs is not None:
+            left = self._pairs.left * float(fit.noise) ** 2
+        beside, self.drift = self._drift(curvature, fit, found, rest, left)
+        return beside if self.drift else found
+
+    def _pressed(self, curvature: Array, fit: Fit) -> tuple[Contact, Contact]:
+        """The contacts where nothing drifts."""
         contact, misfit = self._one(curvature, fit), self._one.misfit
-        if not contact.present or misfit <= _quantile(_LOOKED_AT, contact.spare, fit):
+        if not contact.present or misfit <= left_by_chance(_LOOKED_AT, contact.spare, fit.spare):
             return contact, NO_CONTACT
-        single = misfit <= _quantile(_MISFIT, contact.spare, fit)
+        single = misfit <= left_by_chance(_MISFIT, contact.spare, fit.spare)
         contact = replace(contact, single=single)
         with np.errstate(all="ignore"):
             readings = curvature.ravel() / float(fit.noise)
@@ -91,14 +105,6 @@ def as_one(first: Contact, second: Contact) -> Contact:
         force=force,
         force_sd=math.hypot(first.force_sd, second.force_sd),
     )
-
-
-def _quantile(share: float, spare: int, fit: Fit) -> float:
-    """Variance left by a load, over that of the fit, which this share of single ones exceeds."""
-    of_fit = max(float(cast("float", fit.spare)), 1.0)
-    more = max(spare - of_fit, 1.0)
-    F = float(scipy.special.fdtri(more, of_fit, 1 - share))
-    return (of_fit + more * F) / (of_fit + more)
 
 
 class _Readings(NamedTuple):
@@ -252,6 +258,8 @@ class _Pairs:
         M = self._compliance.after(layout.curvature_operator(self._basis, plate))
         self._M = M * self._loads.influence.unit
         self._pairs = PatternCache[tuple[Array, Array, Array]]()
+        self.left = math.nan
+        """Weighted sum of squares that the last two loads leave of readings over their noise."""
 
     def __call__(self, K: Array, fit: Fit, contact: Contact) -> tuple[Contact, Contact]:
         """The contacts for readings `K` (C,) over their noise, by the single one that fits best."""
@@ -272,6 +280,7 @@ class _Pairs:
             return contact, NO_CONTACT
         if self._is_line(two, variance, readings):
             return contact, NO_CONTACT
+        self.left = two.left
         return self._told(two, spare, fit)
 
     def _explains(self, two: _Tried, spare: int, fit: Fit) -> bool:
@@ -283,7 +292,7 @@ class _Pairs:
             and math.hypot(X - x, Y - y) > wide
             and not self.patch.near_rim(x, y, _RIM)
             and not self.patch.near_rim(X, Y, _RIM)
-            and two.left <= spare * _quantile(_LEFT, spare, fit)
+            and two.left <= spare * left_by_chance(_LEFT, spare, fit.spare)
         )
 
     def _is_line(self, two: _Tried, variance: float, readings: _Readings) -> bool:

@@ -236,9 +236,10 @@ class Pipeline:
         fit_time = time.perf_counter() - began
         surface = self._surface(fit.coefficients)
         noise = float(fit.noise)
-        contact, second = NO_CONTACT, NO_CONTACT
+        contact, second, drift = NO_CONTACT, NO_CONTACT, 0.0
         if math.isfinite(noise):
             contact, second = map(self._bounded, self._contacts(fit.curvature, fit))
+            drift = self._contacts.drift
         if self.drift is not None:
             self.drift.follow(frame.device_time, curvature, surface, noise)
         return Estimate(
@@ -259,6 +260,7 @@ class Pipeline:
             out.words(fit.suspect),
             bool(fit.converged),
             fit_time,
+            drift,
             contact,
             second,
             contact_geometry(fit, contact),

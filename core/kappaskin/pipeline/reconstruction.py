@@ -244,7 +244,11 @@ def reconstruct(
         fitter = estimator_for(method, functions, layout)
         contacts_of, bounded = Contacts(plate, layout, edge), LowerBound(plate, edge)
         fits = [fitter(frame) for frame in curvature]
-        pairs = [contacts_of(one.curvature, one) for one in fits]
+        pairs, drifts = list[tuple[Contact, Contact]](), list[float]()
+        for one in fits:
+            pairs.append(contacts_of(one.curvature, one))
+            drifts.append(contacts_of.drift)
+        out["drift"] = np.array(drifts)
         contacts = [bounded(first) for first, _ in pairs]
         out |= _contacts(fits, contacts, forces="rigidity" in found)
         out |= _pairs(pairs, forces="rigidity" in found)

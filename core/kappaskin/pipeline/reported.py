@@ -684,6 +684,17 @@ _FIT = (
     ReportedQuantity(
         "fit_time", "s", "computing time of the fit", "fit_time", group="fit", columns=(), keys=()
     ),
+    ReportedQuantity(
+        "drift",
+        "1/m",
+        "smooth shift of all readings by RMS, 0 where none is told",
+        "drift",
+        group="fit",
+        keys=(("drift_per_m", "smooth shift of all readings by RMS, 0 where none is told"),),
+        form="%.3g",
+        labels_shown=("Drift of all readings",),
+        shown=("1/m", 1.0, 3),
+    ),
 )
 _CONTACT = (
     ReportedQuantity(

@@ -20,6 +20,7 @@ from kappaskin.scenes.effects import (
     Size,
     Skew,
     StretchingEffect,
+    Temperature,
     Tension,
 )
 from kappaskin.scenes.scene import EffectSelection, Scene, survey
@@ -85,7 +86,10 @@ def effects_of(scene: Scene) -> dict[str, Effect]:
         there.append(FiniteSlopeEffect())
     if scene.moves:
         there.append(Skew())
-    there += [*scene.effects, Saturation(scene.transduction), Quantisation(scene.transduction)]
+    there += [
+        effect.on(layout) if isinstance(effect, Temperature) else effect for effect in scene.effects
+    ]
+    there += [Saturation(scene.transduction), Quantisation(scene.transduction)]
     return {effect.name: effect for effect in there}
 
 

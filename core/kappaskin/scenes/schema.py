@@ -605,6 +605,8 @@ EFFECT = Part(
         "share": Key("Share", "Share of all frames."),
         "rise": Key("Rise", "Rise of the skin's temperature."),
         "offset": Key("Offset", "Error of a reading for each kelvin."),
+        "gradient_x": Key("Gradient in x", "Share by which each metre along x warms more."),
+        "gradient_y": Key("Gradient in y", "Share by which each metre along y warms more."),
         "spread": Key(
             "Offset spread",
             "Standard deviation of the offsets, as a share of their mean.",

@@ -39,6 +39,7 @@ COLUMNS = [
     "coefficients",
     "noise",
     "converged",
+    "drift",
     "present",
     "single",
     "near_rim",
@@ -75,7 +76,7 @@ COLUMNS = [
 
 UNITS = {
     **dict.fromkeys(("time", "device_time", "host_time", "taken", "taken_sd"), "s"),
-    **dict.fromkeys(("nominal", "curvature", "residual", "noise"), "1/m"),
+    **dict.fromkeys(("nominal", "curvature", "residual", "noise", "drift"), "1/m"),
     **dict.fromkeys(("coefficients", "position", "position_sd", "position_95", "point"), "m"),
     **dict.fromkeys(("displacement", "displacement_sd", "load_radius", "load_radius_95"), "m"),
     **dict.fromkeys(("force", "force_sd", "force_95"), "N"),
@@ -107,6 +108,7 @@ KEYS = [
     "taken_sd_s",
     "age_s",
     "noise_per_m",
+    "drift_per_m",
     "x_m",
     "y_m",
     "x_sd_m",

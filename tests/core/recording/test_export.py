@@ -143,6 +143,7 @@ OF_ESTIMATE: dict[str, Callable[[Estimate], object]] = {
     "coefficients": lambda e: e.coefficients,
     "noise": lambda e: e.noise,
     "converged": lambda e: e.converged,
+    "drift": lambda e: e.drift,
     "present": lambda e: e.contact.present,
     "spare": lambda e: e.contact.spare,
     "position": lambda e: e.contact.position,

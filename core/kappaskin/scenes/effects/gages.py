@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -210,7 +210,8 @@ class Temperature(ReadingEffect):
     `rise` in K and tau, the `time_constant` in s: short for a step, long for a drift. The half
     bridge leaves over the apparent curvature o, `offset` in 1/m/K, which differs from channel to
     channel with the standard deviation `spread`, a share of it; the `seed` is the skin's own. The
-    gage factor changes by g, `gain` per K.
+    gage factor changes by g, `gain` per K. Each metre along x and y from the middle of the elements
+    it warms by the shares `gradient_x` and `gradient_y` more.
     """
 
     name: ClassVar = "temperature"
@@ -223,27 +224,52 @@ class Temperature(ReadingEffect):
     spread: Annotated[float, Within(0, 1)] = 0.0
     gain: Annotated[float, Within(-1e-2, 1e-2, "1/K")] = 0.0
     seed: Annotated[int, Within(0, 2**63 - 1, whole=True)] = 0
+    gradient_x: Annotated[float, Within(-1e3, 1e3, "1/m")] = 0.0
+    gradient_y: Annotated[float, Within(-1e3, 1e3, "1/m")] = 0.0
+
+    def on(self, layout: SensorLayout) -> "Temperature":
+        """The effect on the elements of a layout."""
+        if not (self.gradient_x or self.gradient_y):
+            return self
+        own = {field.name: getattr(self, field.name) for field in fields(self)}
+        centred = layout.positions - layout.positions.mean(axis=0)
+        warmth = 1 + centred @ (self.gradient_x, self.gradient_y)
+        return _TemperatureOf(**own, warmth=tuple(warmth.tolist()))
+
+    def shares(self, shape: tuple[int, ...]) -> Array:
+        """How much every channel of a skin of `shape` warms, over what the middle does."""
+        return np.ones(shape)
 
     def warmer(self, time: float) -> float:
         """By how many K the skin is warmer at `time` in s than it was at rest."""
         return -self.rise * math.expm1(-max(time, 0.0) / self.time_constant)
 
     def offsets(self, shape: tuple[int, ...]) -> Array:
-        """The apparent curvature in 1/m per K of every channel of a skin of `shape`."""
+        """Apparent curvature of every channel of a skin of `shape`, in 1/m per K in its middle."""
         rng = np.random.default_rng(self.seed)
-        return self.offset * rng.normal(1.0, self.spread, shape)
+        return self.offset * rng.normal(1.0, self.spread, shape) * self.shares(shape)
 
     def size(self, survey: Survey) -> Size:
         T = abs(self.warmer(survey.duration))
         K = survey.curvature.reshape(len(survey.times), -1)
-        change = T * (self.gain * K + self.offsets(K.shape[1:]))
+        change = T * (self.gain * self.shares(K.shape[1:]) * K + self.offsets(K.shape[1:]))
         number = T * (abs(self.offset) / survey.peak + abs(self.gain))
         return Size(number, survey.share(change))
 
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
         from kappaskin.scenes.effects.at_work.gages import temperature
 
-        return temperature(self.warmer, self.gain, self.offsets(shape))
+        return temperature(self.warmer, self.gain * self.shares(shape), self.offsets(shape))
+
+
+@dataclass(frozen=True)
+class _TemperatureOf(Temperature):
+    """The same on elements that warm differently: `warmth` (P,), over that in the middle."""
+
+    warmth: tuple[float, ...] = ()
+
+    def shares(self, shape: tuple[int, ...]) -> Array:
+        return np.tile(self.warmth, math.prod(shape) // len(self.warmth)).reshape(shape)
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ def creep(solid: StandardLinearSolid, shape: tuple[int, ...]) -> RunningEffect:
     return lambda curvature, time: relaxing(curvature.ravel(), time).reshape(shape)
 
 
-def temperature(warmer: Callable[[float], float], gain: float, offsets: Array) -> RunningEffect:
+def temperature(warmer: Callable[[float], float], gain: Array, offsets: Array) -> RunningEffect:
     def read(curvature: Array, time: float) -> Array:
         T = warmer(time)
         return (1 + gain * T) * curvature + T * offsets

@@ -1,0 +1,119 @@
+"""Drift: a smooth change of all readings, which is no load, told beside a contact."""
+
+import math
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+
+from kappaskin.contact.point import NO_CONTACT, PointContact, left_by_chance, orthonormal
+from kappaskin.errors import RankDeficient
+from kappaskin.estimation import Direct, Estimator, Fast, Fit, LeastSquares, PatternCache
+from kappaskin.frames import Array, Contact, Mask
+from kappaskin.mechanics import Plate
+from kappaskin.sensing import SensorLayout
+
+_HINT = 21.7  # chi-squared of nine numbers that one frame in 100 without a drift exceeds
+_EVIDENT = 36.0  # -2 ln of the likelihood ratio: one in 25,000
+_OF_LOAD = 4  # unknowns of a load
+_LEFT = 1e-3  # of frames of a drift and a load leave more than noise explains
+
+
+def level_and_slopes(layout: SensorLayout) -> Array:
+    """A level, and slopes along x and along y, of the readings of each component, (9, 3 P)."""
+    patch = layout.patch
+    centred = (layout.positions - [patch.a / 2, patch.b / 2]) / [patch.a, patch.b]
+    each = np.column_stack([np.ones(len(layout)), centred])
+    return np.kron(np.eye(3), each).T.astype(np.float64)
+
+
+class SmoothDrift:
+    """Tells a drift from a load: what warmth or a bent mount adds to all readings alike.
+
+    It is a level and two slopes in each component, nine numbers. Where they explain much of what a
+    contact leaves of the readings, a contact is searched for beside them. A drift is told if it
+    makes the readings more likely by more than chance, and if with it they are explained to the
+    noise: what a load on a large area leaves is no drift.
+    """
+
+    def __init__(self, plate: Plate, layout: SensorLayout, edge: str = "hinged") -> None:
+        self._columns, self._live = level_and_slopes(layout), layout.live.ravel()
+        self._beside = PointContact(plate, layout, edge, self._columns)
+        self._directions = PatternCache[Array]()
+        self._reference: tuple[Estimator, Estimator] | None = None
+        self._of_fit = PatternCache[Array]()
+
+    def __call__(
+        self,
+        curvature: Array,
+        fit: Fit,
+        contacts: tuple[Contact, Contact],
+        rest: Array,
+        left: float,
+    ) -> tuple[tuple[Contact, Contact], float]:
+        """The contacts beside a drift, and the drift's size in 1/m by RMS; 0 where there is none.
+
+        For `curvature` (3, P) in 1/m, NaN where missing, the `fit` to it, the `rest` (3 P,) that
+        one load leaves of it, 0 where missing, and the squares `left` by the `contacts` found.
+        """
+        used = self._live & np.isfinite(curvature.ravel())
+        Q = self._directions(used, self._orthonormal)
+        spare = max(int(used.sum()) - len(Q), 1)
+        score = float(np.square(Q @ rest).sum())
+        if not score > _HINT * max(float(rest.dot(rest)) - score, 0.0) / spare:
+            return contacts, 0.0
+        told = self._noise(curvature, fit, used)
+        if told is None:
+            return contacts, 0.0
+        noise, of_noise = told
+        found = self._beside(curvature, replace(fit, known_noise=np.array(noise), spare=of_noise))
+        after = self._beside.rest
+        along = Q @ after
+        squares = float(after.dot(after) - along.dot(along)) / noise**2
+        better = left / noise**2 - squares
+        if found.present and not contacts[0].present:  # more unknowns, as Schwarz counts them
+            better -= _OF_LOAD * math.log(used.sum())
+        spare -= _OF_LOAD * found.present
+        usual = spare * left_by_chance(_LEFT, spare, of_noise)
+        if better < _EVIDENT or squares > usual:
+            return contacts, 0.0
+        drifted = along + Q @ np.where(used, curvature.ravel(), 0.0)
+        return (found, NO_CONTACT), math.sqrt(float(drifted.dot(drifted)) / used.sum())
+
+    def _orthonormal(self, used: Mask) -> Array:
+        return orthonormal(np.where(used, self._columns, 0.0))
+
+    def _noise(self, curvature: Array, fit: Fit, used: Mask) -> tuple[float, int] | None:
+        """Noise in 1/m that a shape and a drift leave together, and from how many spare readings.
+
+        None where no shape is determined without a prior.
+        """
+        estimator = self._linear(fit.estimator)
+        if estimator is None:
+            return None
+        try:
+            own = fit if estimator is fit.estimator else estimator(curvature)
+        except RankDeficient:
+            return None
+        residual = np.nan_to_num(own.residual.ravel())
+        G = self._of_fit(used, lambda used: self._left_of_columns(estimator, used))
+        left = residual - (G @ residual) @ G
+        spare = int(cast("int", own.spare)) - len(G)
+        return (math.sqrt(float(left.dot(left)) / spare), spare) if spare > 0 else None
+
+    def _linear(self, estimator: Estimator) -> Estimator | None:
+        """The estimator, if linear, or least squares of its functions; None where it is refused."""
+        if type(estimator) in (LeastSquares, Fast, Direct):
+            return estimator
+        if self._reference is None or self._reference[0] is not estimator:
+            try:
+                linear = LeastSquares(estimator.basis, estimator.layout, estimator.sigma)
+            except RankDeficient:
+                return None
+            self._reference, self._of_fit = (estimator, linear), PatternCache[Array]()
+        return self._reference[1]
+
+    def _left_of_columns(self, estimator: Estimator, used: Mask) -> Array:
+        """Directions (r, C) of what a fit leaves of the drift's columns."""
+        columns = np.where(used, self._columns, np.nan).reshape(-1, 3, len(used) // 3)
+        return orthonormal(np.nan_to_num(estimator(columns).residual.reshape(len(columns), -1)))
