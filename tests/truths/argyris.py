@@ -8,26 +8,41 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from skfem import Basis, BilinearForm, ElementTriArgyris, LinearForm, MeshTri, condense, solve
-from skfem.helpers import dd, ddot
+from skfem import (
+    Basis,
+    BilinearForm,
+    ElementTriArgyris,
+    FacetBasis,
+    LinearForm,
+    MeshTri,
+    condense,
+    solve,
+)
+from skfem.helpers import dd, ddot, trace
 
 # What an edge along y holds of a function and its derivatives; along x the same with x and y
 # exchanged. Where the slope is free so is the moment, which needs no constraint.
 _HELD = {
     "clamped": ("u", "u_x", "u_y", "u_xy", "u_yy", "u_n"),
     "hinged": ("u", "u_y", "u_yy"),
+    "springs": (),
 }
 _EXCHANGED = {"u_x": "u_y", "u_y": "u_x", "u_yy": "u_xx"}
 
 
 @dataclass(frozen=True)
 class ArgyrisPlate:
-    """A square plate of `side` in m and flexural `rigidity` D in N m, its `edge` one of `_HELD`."""
+    """A square plate of `side` in m and flexural `rigidity` D in N m, its `edge` one of `_HELD`.
+
+    On `springs` of a stiffness in N/m^2 along the rim it is free to turn there.
+    """
 
     side: float = 0.1
     rigidity: float = 3.7e-3
     edge: str = "clamped"
     cells: int = 32
+    poisson: float = 0.3
+    springs: float = 0.0
 
     def displacement(self, load, places):
         """Displacement (G,) in m at `places` (G, 2) in m under a load with an sd."""
@@ -50,8 +65,16 @@ class ArgyrisPlate:
     @cached_property
     def _energy(self):
         # Held edges leave nothing of what Poisson's ratio adds to the energy.
-        D = self.rigidity
-        return BilinearForm(lambda u, v, _: D * ddot(dd(u), dd(v))).assemble(self._basis)
+        D, nu, k = self.rigidity, self.poisson, self.springs
+
+        def bending(u, v, _):
+            return D * ((1 - nu) * ddot(dd(u), dd(v)) + nu * trace(dd(u)) * trace(dd(v)))
+
+        energy = BilinearForm(bending).assemble(self._basis)
+        if not k:
+            return energy
+        rim = FacetBasis(self._basis.mesh, ElementTriArgyris(), intorder=10)
+        return energy + BilinearForm(lambda u, v, _: k * u * v).assemble(rim)
 
     def _solved(self, load):
         def work(v, w):
@@ -65,6 +88,8 @@ class ArgyrisPlate:
             basis.get_dofs("along x").all(exchanged),
         ]
         pressed = LinearForm(work).assemble(basis)
+        if not names:
+            return solve(self._energy, pressed)
         return solve(*condense(self._energy, pressed, D=np.unique(np.concatenate(held))))
 
     def _at(self, c, places, what):

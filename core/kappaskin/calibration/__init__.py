@@ -2,6 +2,7 @@
 
 from kappaskin.calibration.calibration import Calibration as Calibration
 from kappaskin.calibration.calibration import Corrector as Corrector
+from kappaskin.calibration.calibration import KnownWeights as KnownWeights
 from kappaskin.calibration.calibration import load_calibration as load_calibration
 from kappaskin.calibration.channel_map import MapVerdict as MapVerdict
 from kappaskin.calibration.press_test import PressPhase as PressPhase
@@ -18,3 +19,7 @@ from kappaskin.calibration.tare import Rest as Rest
 from kappaskin.calibration.tare import Tare as Tare
 from kappaskin.calibration.tare import TareMeasurement as TareMeasurement
 from kappaskin.calibration.tare_store import TareStore as TareStore
+from kappaskin.calibration.weights import WEIGHT_ADVICE as WEIGHT_ADVICE
+from kappaskin.calibration.weights import Weighing as Weighing
+from kappaskin.calibration.weights import WeightFit as WeightFit
+from kappaskin.calibration.weights import take_weights as take_weights

@@ -6,7 +6,7 @@ import json
 import math
 import os
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from functools import cached_property
 from pathlib import Path
@@ -19,6 +19,7 @@ from kappaskin._state import Stateful
 from kappaskin._toml import table
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
+from kappaskin.mechanics import Plate
 from kappaskin.sensing import PrandtlIshlinskii, Sensor, SensorLayout, StandardLinearSolid
 
 _MOST_CHANNELS = 2**14  # whose numbers the engine can send with every status
@@ -26,6 +27,14 @@ _STEEPEST = 1e9  # gain, 1 being nominal
 FARTHEST = 1e12  # 1/m, of an offset: a thousand times what any electronics read
 _STEPS = 200  # towards the reading of a straight skin; a quarter of the rest or more goes in each
 _REST = 1e-6  # 1/m, as near as it need be
+
+GRAVITY = 9.80665
+"""Newtons per kilogram (standard gravity)."""
+
+LIMIT = 0.05
+"""Share of a weight by which it may be told wrong by a fit to the others."""
+
+FEWEST_WEIGHTS = 3
 
 FORMAT = 1
 OLDEST = timedelta(days=180)
@@ -39,9 +48,13 @@ _KEYS = {
     "line": set(_LINE),
     "hysteresis": {"thresholds", "weights", "linear", "stretch"},
     "creep": {"share", "time_constant"},
+    "weights": {
+        *("rigidity", "rigidity_sd", "thickness", "rim_stiffness", "deepest"),
+        *("weights", "told", "left_out"),
+    },
 }
 
-_OPTIONAL = {"hysteresis", "creep"}
+_OPTIONAL = {"hysteresis", "creep", "weights"}
 _AGAIN = "calibrate again, or restore the file from a copy"
 
 
@@ -53,6 +66,87 @@ def fingerprint(layout: SensorLayout) -> str:
     sides = (layout.patch.a, layout.patch.b)
     where = np.rint(np.array([sides, *layout.positions]) * 1e9).astype("<i8")
     return hashlib.sha256(where.tobytes()).hexdigest()
+
+
+@dataclass(frozen=True)
+class KnownWeights:
+    """What known weights say of a skin, and how well.
+
+    `rigidity` D and its standard error in N m; `thickness` in m by which the skin stretches, 0
+    where no stiffening was seen; `rim_stiffness` in N/m^2 of an elastic edge, 0 of any other.
+    `weights` (n,) in N were laid on, `told` (n,) is what the fit makes of their readings, and
+    `left_out` (n,) by how much of itself each is told wrong by the fit to the others. No
+    displacement was beyond `deepest` in m.
+    """
+
+    rigidity: float
+    rigidity_sd: float
+    thickness: float
+    rim_stiffness: float
+    weights: tuple[float, ...]
+    told: tuple[float, ...]
+    left_out: tuple[float, ...]
+    deepest: float
+
+    def __post_init__(self) -> None:
+        numbers = (self.rigidity, self.rigidity_sd, self.thickness, self.rim_stiffness)
+        if not (all(map(math.isfinite, numbers)) and self.rigidity > 0 and min(numbers) >= 0):
+            raise Refusal(f"expected a rigidity above zero and finite numbers, got {numbers}")
+        if not len(self.weights) == len(self.told) == len(self.left_out) >= FEWEST_WEIGHTS:
+            raise Refusal(f"expected at least {FEWEST_WEIGHTS} weights, got {len(self.weights)}")
+
+    @property
+    def passed(self) -> bool:
+        """Whether each weight is told by the others within `LIMIT`."""
+        return max(map(abs, self.left_out)) <= LIMIT
+
+    def plate(self, plate: Plate) -> Plate:
+        """The skin as the weights found it: all that resists, by the same share stiffer."""
+        ratio = self.rigidity / plate.rigidity
+        return replace(
+            plate,
+            rigidity=self.rigidity,
+            tension=ratio * plate.tension,
+            foundation=ratio * plate.foundation,
+            axial_stiffness=plate.axial_stiffness and ratio * plate.axial_stiffness,
+            rim_stiffness=self.rim_stiffness or ratio * plate.rim_stiffness,
+            thickness=self.thickness or plate.thickness,
+        )
+
+    def lines(self) -> list[str]:
+        """A summary and a line for each weight."""
+        worst = max(range(len(self.weights)), key=lambda n: abs(self.left_out[n]))
+        verdict = (
+            f"passed: every weight is told by the others within {100 * LIMIT:g} %"
+            if self.passed
+            else f"failed: weight {worst + 1} is told {100 * self.left_out[worst]:+.1f} % wrong by "
+            f"the others, more than {100 * LIMIT:g} %; check its mass, or take a lighter one"
+        )
+        stiff = (
+            f"it stretches as a sheet of {1e3 * self.thickness:.3g} mm"
+            if self.thickness
+            else f"no stiffening down to {1e3 * self.deepest:.2g} mm"
+        )
+        if self.rim_stiffness:
+            stiff = f"its edge gives: {self.rim_stiffness:.3g} N/m^2"
+        share = 100 * self.rigidity_sd / self.rigidity
+        head = f"rigidity {self.rigidity:.4g} N m +- {share:.2g} %; {stiff}"
+        each = zip(self.weights, self.told, self.left_out, strict=True)
+        return [
+            head,
+            *(
+                f"  weight {n}  {1e3 * laid / GRAVITY:8.2f} g  {laid:.4f} N  told {told:.4f} N "
+                f"({100 * (told / laid - 1):+.2f} %), by the others {100 * left:+.2f} %"
+                for n, (laid, told, left) in enumerate(each, 1)
+            ),
+            verdict,
+        ]
+
+    def to_json(self) -> dict[str, Any]:
+        """Everything in it, and the verdict, for `--json`."""
+        names = ("rigidity", "rigidity_sd", "thickness", "rim_stiffness", "deepest")
+        lists = {name: list(getattr(self, name)) for name in ("weights", "told", "left_out")}
+        return {name: getattr(self, name) for name in names} | lists | {"passed": self.passed}
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +171,7 @@ class Calibration:
     hysteresis: PrandtlIshlinskii | None = None
     creep: StandardLinearSolid | None = None
     failures: tuple[tuple[int, str], ...] = ()
+    weights: KnownWeights | None = None
 
     def __post_init__(self) -> None:
         if self.date.utcoffset() is None:
@@ -125,6 +220,9 @@ class Calibration:
                 "share": self.creep.share.tolist(),
                 "time_constant": self.creep.time_constant,
             }
+        if self.weights:
+            told = self.weights.to_json()
+            content["weights"] = {name: told[name] for name in sorted(_KEYS["weights"])}
         return content
 
     @cached_property
@@ -136,6 +234,17 @@ class Calibration:
 
     def __hash__(self) -> int:
         return hash(self.digest)
+
+    @staticmethod
+    def nominal(sensor: Sensor, date: datetime) -> "Calibration":
+        """What a sensor reads taken as it is, except for its dead channels."""
+        dead = ~sensor.layout.live.ravel()
+        zero, one = np.zeros(sensor.channels), np.where(dead, np.nan, 1.0)
+        return Calibration(
+            *(sensor.name, sensor.serial_number, sensor.firmware, fingerprint(sensor.layout), date),
+            *(one, zero, zero, zero),
+            failures=tuple((c, "dead") for c in np.flatnonzero(dead).tolist()),
+        )
 
     def check(self, sensor: Sensor) -> None:
         """Refuse a sensor that is not the one that was calibrated."""
@@ -150,6 +259,10 @@ class Calibration:
                 f"{sensor.name} {sensor.serial_number} has {sensor.layout} at other positions than "
                 "when it was calibrated; calibrate it again"
             )
+
+    def plate(self, plate: Plate) -> Plate:
+        """The skin of `plate` as known weights found it; as it was without them."""
+        return self.weights.plate(plate) if self.weights else plate
 
     def start(self) -> "Corrector":
         """The correction of readings of a skin that was at rest until now."""
@@ -203,6 +316,7 @@ class Calibration:
                 if creep
                 else None,
                 failures=tuple((int(c), str(why)) for c, why in content["failures"].items()),
+                weights=_weights(content["weights"]) if "weights" in content else None,
             )
         except (ValueError, TypeError, AttributeError, OverflowError) as error:
             raise Refusal(f"{path}: cannot be used ({error}); {_AGAIN}") from error
@@ -321,6 +435,19 @@ def _checked(path: Path, content: dict[str, Any]) -> dict[str, Any]:
     if stated != digest(content):
         raise Refusal(f"{path}: is damaged or was edited (its SHA-256 differs); {_AGAIN}")
     return content
+
+
+def _weights(table: dict[str, Any]) -> KnownWeights:
+    rigidity, rigidity_sd, thickness, rim_stiffness, deepest = (
+        float(table[name])
+        for name in ("rigidity", "rigidity_sd", "thickness", "rim_stiffness", "deepest")
+    )
+    weights, told, left_out = (
+        tuple(_array(table[name]).tolist()) for name in ("weights", "told", "left_out")
+    )
+    return KnownWeights(
+        *(rigidity, rigidity_sd, thickness, rim_stiffness), weights, told, left_out, deepest
+    )
 
 
 def _array(values: Any) -> Array:

@@ -33,7 +33,7 @@ _READ = 0.05  # s that one read may wait
 _SILENCE = 5.0  # s without a frame after which the source counts as dead
 _BEHIND = 1.0  # s that frames may be read late
 _MOST_FRAMES = 5000  # kept of one step, evenly: more add nothing
-_LONGEST = 3600.0  # s on one step
+LONGEST = 3600.0  # s on one step
 Report = Callable[[str], None]
 Prompt = Callable[[str], str]
 """A question to the answer that was typed."""
@@ -279,8 +279,18 @@ def _follow(
                 _add_frame(collected, frame, max(laid.dwell, step.hold))
 
 
-def _recorded(listener: DeviceReadings, seconds: float) -> list[Frame]:
-    """The frames of the next `seconds`: what came before was read while the skin was moved."""
+def recorded(listener: DeviceReadings, seconds: float, virtual: bool = False) -> list[Frame]:
+    """The frames of the next `seconds`: what came before was read while the skin was moved.
+
+    On a `virtual` clock nothing was.
+    """
+    if virtual:
+        first = listener.frames()
+        collected = first[:1]
+        while collected[-1].device_time < first[0].device_time + seconds:
+            for frame in listener.frames():
+                _add_frame(collected, frame, seconds)
+        return collected
     begun = now = time.monotonic()
     collected: list[Frame] = []
     while now < begun + seconds and time.monotonic() < begun + seconds + _BEHIND:
@@ -307,7 +317,7 @@ def _prompt_steps(
         if answer.strip().lower() == "r" and procedure.taken:
             procedure.redo()
             continue
-        frames = _recorded(listener, max(seconds, step.hold))
+        frames = recorded(listener, max(seconds, step.hold))
         try:
             report(f"    {procedure.take(*listener.read(frames))}")
         except Refusal as refusal:
@@ -333,8 +343,8 @@ def take_sweep(
     scene may name files outside its folder.
     """
     for what, value in (("seconds", seconds), ("dwell", dwell or seconds), ("hold", hold or 1.0)):
-        if not 0 < value <= _LONGEST:
-            raise Refusal(f"expected {what} above zero and at most {_LONGEST:g} s, got {value}")
+        if not 0 < value <= LONGEST:
+            raise Refusal(f"expected {what} above zero and at most {LONGEST:g} s, got {value}")
     simulated = name.startswith(SimulatedSource.SCHEME)
     if simulated:
         dwell = dwell or seconds

@@ -35,6 +35,13 @@ def _millimetres(text: str) -> tuple[float, ...]:
         raise Refusal(f"expected radii in millimetres such as 100,50,25, got {text!r}") from None
 
 
+def _grams(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise Refusal(f"expected masses in grams such as 10,20,50, got {text!r}") from None
+
+
 def _answer_to(question: str) -> str:
     show(question, error=True, end="")
     if answer := sys.stdin.readline() if sys.stdin else "":
@@ -55,18 +62,23 @@ def calibrate(
     *,
     out: Path,
     radii: str | None = None,
+    weights: str | None = None,
+    calibration: Path | None = None,
     seconds: float = 1.0,
     hold: float = 0.0,
     dwell: float | None = None,
     trust: Switch = False,
     json: Switch = False,
 ) -> int:
-    """Calibrate a sensor against cylinders of known radius.
+    """Calibrate a sensor against cylinders of known radius, or its skin against known weights.
 
-    Asks for one cylinder after the other and waits for Enter; a simulated source needs no help.
-    The exit code is 1 if a channel failed: the file is written without that channel.
+    Asks for one cylinder or weight after the other and waits for Enter; a simulated source needs no
+    help. The exit code is 1 if a channel failed: the file is written without that channel; or if a
+    weight is told wrong by the others.
 
     Example: `kappaskin calibrate /dev/ttyACM0 --out skin.toml --radii 100,50,33,25,20`
+
+    Example: `kappaskin calibrate /dev/ttyACM0 --out skin.toml --weights 5,10,20,10,5`
 
     Parameters
     ----------
@@ -76,8 +88,14 @@ def calibrate(
         The file to write.
     radii
         Radii of the cylinders in millimetres; by default those that the sensor can read.
+    weights
+        Masses in grams, each laid at another place: at least three. They give the rigidity of the
+        skin, how it stiffens or how far its edge gives, so that forces need no Young's modulus.
+    calibration
+        A calibration of this sensor whose gains the weights are laid on with, and which is
+        extended; without it the readings are taken as they are.
     seconds
-        Averaging time on each cylinder, in seconds.
+        Averaging time on each cylinder or weight, in seconds.
     hold
         Seconds on the smallest cylinder to measure creep; without it creep is not measured.
     dwell
@@ -94,6 +112,12 @@ def calibrate(
 
     check_output(out, source.removeprefix("sim:"))
     Calibration.check_writable(out)
+    if weights is not None:
+        if radii is not None or hold or dwell is not None:
+            raise Refusal("expected weights alone, without radii, hold and dwell; run it twice")
+        return _weigh(source, out, _grams(weights), calibration, seconds, trust=trust, json=json)
+    if calibration is not None:
+        raise Refusal("expected --calibration together with --weights")
     try:
         sensor, sweep = take_sweep(
             source,
@@ -112,6 +136,33 @@ def calibrate(
         raise Refusal("stopped before the last step; nothing was written") from None
     print_result(report.to_json(), json, lambda: lined(report.summary()))
     return FAILED if report.failed else 0
+
+
+def _weigh(
+    source: str,
+    out: Path,
+    masses: tuple[float, ...],
+    calibration: Path | None,
+    seconds: float,
+    *,
+    trust: bool,
+    json: bool,
+) -> int:
+    """Fit the skin to known weights, and write the calibration with them."""
+    from kappaskin.calibration import Calibration, take_weights
+
+    before = None if calibration is None else Calibration.read(calibration)
+    try:
+        sensor, known = take_weights(
+            source, masses, _answer_to, _report, seconds=seconds, trust=trust, before=before
+        )
+        now = datetime.now(UTC)
+        replace(before or Calibration.nominal(sensor, now), weights=known, date=now).save(out)
+    except KeyboardInterrupt:
+        show("", error=True)
+        raise Refusal("stopped before the last step; nothing was written") from None
+    print_result(known.to_json(), json, lambda: lined(known.lines()))
+    return 0 if known.passed else FAILED
 
 
 _READ = 0.05  # s that one read may wait

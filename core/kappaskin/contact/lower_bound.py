@@ -22,10 +22,12 @@ class LowerBound:
     the middle, in the shape that a point load makes of a plate that does not stretch, pressed in by
     h; a disk or polygon counts as the rectangle around it. Of a hinged square that is held, the
     change is right to 20 % up to w = h, also at a fifth of its sides, and 1.4 times too much at
-    w = 2.6 h.
+    w = 2.6 h. Where known weights showed no stiffening down to a displacement `seen` in m, none is
+    marked that is no deeper.
     """
 
-    def __init__(self, plate: Plate, edge: str) -> None:
+    def __init__(self, plate: Plate, edge: str, seen: float = 0.0) -> None:
+        self._seen = seen
         # A bent skin's force accounts for its stretch; a drum head's modulus is unknown.
         accounted = plate.stretches or plate.patch.base_curvature or not plate.rigidity
         self._h = plate.thickness or USUAL_THICKNESS
@@ -33,6 +35,8 @@ class LowerBound:
 
     def __call__(self, contact: Contact) -> Contact:
         """The contact, marked if its force is a lower bound."""
+        if abs(contact.displacement) <= self._seen:
+            return contact
         change = self._beta * (contact.displacement / self._h) ** 2 * abs(contact.force)
         return replace(contact, force_is_lower_bound=True) if change > contact.force_sd else contact
 

@@ -130,8 +130,10 @@ class Pipeline:
         on_skin = sensor.layout.patch.contains(points).reshape(setup.ny, setup.nx)
         self._skin = ... if on_skin.all() else on_skin
         self._surface = self.basis.on_grid(self._x, self._y)
-        self._contacts = Contacts(sensor.plate, sensor.layout, edge)
-        self._bounded = LowerBound(sensor.plate, edge)
+        known = setup.calibration and setup.calibration.weights
+        plate = known.plate(sensor.plate) if known else sensor.plate
+        self._contacts = Contacts(plate, sensor.layout, edge)
+        self._bounded = LowerBound(plate, edge, known.deepest if known else 0.0)
         self.left_out = Exclusion.none(sensor, self._whole, self._ideal())
         self._no_shape = np.full(self.basis.shape, np.nan)
         self._unknown = np.full((setup.ny, setup.nx), np.nan)

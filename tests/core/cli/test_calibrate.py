@@ -19,8 +19,10 @@ import numpy as np
 import pytest
 
 from kappaskin import Frame, Refusal, SensorLayout, Simulator, load_scene
-from kappaskin.calibration import Calibration, calibrate, take_sweep
+from kappaskin.calibration import Calibration, calibrate, take_sweep, take_weights
+from kappaskin.calibration.calibration import GRAVITY
 from kappaskin.errors import SourceError
+from kappaskin.mechanics import DiscLoad
 from kappaskin.scenes.cylinders import ADVICE, Presentation, schedule
 from kappaskin.scenes.effects import Creep, GaussianNoise, ReadingEffect, Size, Survey, Tolerance
 
@@ -353,6 +355,81 @@ def test_a_device_on_the_line_is_calibrated_within_the_standard_errors(run, tmp_
     ):
         within = np.mean(np.abs(read - true) < 1.96 * sd)
         assert within > 0.95 - 4 * np.sqrt(0.95 * 0.05 / 300)
+
+
+WEIGHTS = ("--weights", "5,10,20,10,5")
+
+
+def test_known_weights_extend_a_calibration_and_their_figures_are_printed(run, tmp_path) -> None:
+    first, out = tmp_path / "first.toml", tmp_path / "s.toml"
+    assert run("calibrate", "sim:calibration", "--out", first, *FAST)[0] == 0
+    more = ("--calibration", first, "--json")
+    code, printed, told = run("calibrate", "sim:calibration", "--out", out, *WEIGHTS, *more)
+    assert code == 0, told
+    assert told.count("a contact at (") == 5
+    found, before = Calibration.read(out), Calibration.read(first)
+    assert np.array_equal(found.gain, before.gain, equal_nan=True)
+    assert json.loads(printed)["rigidity"] == found.weights.rigidity
+    assert found.weights.rigidity == pytest.approx(SCENE.plate.rigidity, rel=0.03)
+
+
+def test_without_a_calibration_known_weights_take_the_readings_as_they_are(run, tmp_path) -> None:
+    out = tmp_path / "s.toml"
+    code, printed, told = run("calibrate", "sim:centre", "--out", out, *WEIGHTS)
+    assert code == 0, told
+    assert "passed: every weight is told by the others within 5 %" in printed
+    assert (Calibration.read(out).gain == 1.0).all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (("--weights", "5,10"), "expected at least 3 weights"),
+        (("--weights", "5,ten,20"), "expected masses in grams such as"),
+        (("--weights", "5000,1,1"), "missing|no contact"),
+        (("--weights", "5,10,20", "--radii", "100,50,25"), "expected weights alone"),
+        (("--weights", "5,10,20", "--hold", "5"), "expected weights alone"),
+        (("--weights", "5,10,20", "--seconds", "0"), "expected seconds above zero"),
+        (("--weights", "5,10,20", "--calibration", "none.toml"), "none.toml"),
+        (("--calibration", "none.toml"), "expected --calibration together with --weights"),
+    ],
+)
+def test_weights_that_make_no_sense_are_refused(run, tmp_path, arguments, reason) -> None:
+    found = run("calibrate", "sim:centre", "--out", tmp_path / "s.toml", *arguments)
+    refused(found, reason, tmp_path)
+
+
+class Scales(Rig):
+    """A rig whose person lays a weight on another place at each step."""
+
+    def _laid(self, index: int) -> None:
+        places = ((0.05, 0.05), (0.03, 0.04), (0.07, 0.06))
+        loads = [DiscLoad(*places[index - 1], radius=3e-3, force=0.05)] if index else []
+        scene = replace(self.scene, laid=None).touched_by(*loads)
+        if self.n:
+            self._simulator.change(scene)
+        else:
+            self._simulator = Simulator(scene)
+
+    def ask(self, question: str) -> str:
+        self.asked.append(question)
+        number = int(question.split("/")[0])
+        answers = self.answers.get(number, [])
+        answer = answers.pop(0) if answers else "\n"
+        if answer.strip() != "r":
+            self._laid(0 if answer == "forgot\n" else number)
+        return answer
+
+
+def test_a_person_lays_weights_on_forgets_one_and_repeats_another(monkeypatch) -> None:
+    rig = Scales(answers={1: ["forgot\n"], 3: ["r\n"]})
+    monkeypatch.setattr("kappaskin.calibration.weights.open_source", lambda _: rig)
+    masses = (0.05e3 / GRAVITY,) * 3
+    _, known = take_weights("a port", masses, rig.ask, rig.told.append, seconds=0.02)
+    assert rig.closed
+    assert [int(question.split("/")[0]) for question in rig.asked] == [0, 1, 1, 2, 3, 2, 3]
+    assert any("no contact was found" in line and "repeat" in line for line in rig.told)
+    assert known.rigidity == pytest.approx(SCENE.plate.rigidity, rel=0.03)
 
 
 def test_a_device_whose_line_is_lost_in_the_middle_leaves_no_file(run, tmp_path) -> None:
