@@ -2,7 +2,7 @@
 
 `python tests/truths/studies.py` prints all figures as the guide's table; a number of frames and the
 beginning of a case's name, both optional, say of how many and which; the name `told` prints what
-is told of one load and of two, `drift` what of drifts.
+is told of one load and of two, `drift` what of drifts, `weights` what known weights find.
 """
 
 import sys
@@ -13,6 +13,7 @@ from math import pi, sqrt
 
 import numpy as np
 
+from argyris import ArgyrisPlate
 from kappaskin import (
     LeastSquares,
     Patch,
@@ -25,6 +26,8 @@ from kappaskin import (
     estimator_for,
     load_scene,
 )
+from kappaskin.calibration import WeightFit
+from kappaskin.calibration.weights import newtons
 from kappaskin.contact import Contacts
 from kappaskin.health import HealthMonitor
 from navier import HingedPlate, Load
@@ -528,8 +531,57 @@ def drift_table(frames=1000):
         yield f"| {noises} | " + " | ".join(f"{100 * share:.1f} %" for share in shares) + " |"
 
 
+WEIGHED = 1.37 * 3.7e-3  # N m, of skins whose sensor tells 3.7e-3
+SCATTER = 0.01  # of each weight
+_PLACES = ((0.05, 0.05), (0.03, 0.04), (0.07, 0.06), (0.035, 0.07), (0.06, 0.03), (0.05, 0.065))
+
+
+def weighed(skin, masses, rng, **size):
+    """Readings (n, 3, P) in 1/m under weights of `masses` in g, each the mean of a second."""
+    at = load_scene("centre").sensor().layout.positions
+    loads = zip(_PLACES, newtons(masses), strict=True)
+    truth = [skin.readings(Load(*place, force, **size), at) for place, force in loads]
+    return np.array(truth) + rng.normal(0, 0.0231, (len(masses), 3, len(at)))
+
+
+def weights_table(frames=1000):
+    """What known weights find, as a table in Markdown; `frames` / 25 draws of a skin."""
+    hinged = HingedPlate(rigidity=WEIGHED)
+    held = StretchingPlate(rigidity=WEIGHED, thickness=0.6e-3)
+    springs = (ArgyrisPlate(rigidity=WEIGHED, edge="springs", springs=k) for k in (500.0, 20e3))
+    flat, light, heavy = (5, 10, 20, 10, 20, 5), (2, 5, 10, 4, 8, 12), (2, 5, 20, 4, 15, 30)
+    skins = (
+        ("Navier's, hinged", "hinged", hinged, flat),
+        ("von Kármán's, 0.6 mm, to 12 g", "hinged", held, light),
+        ("the same, to 30 g", "hinged", held, heavy),
+        *(
+            (f"Argyris', on springs of {skin.springs:g} N/m²", "elastic", skin, flat)
+            for skin in springs
+        ),
+    )
+    yield "| skin | rigidity, mean | scatter | covered | wrong weight named | right one refused |"
+    yield "|---|---|---|---|---|---|"
+    for name, edge, skin, masses in skins:
+        rng = np.random.default_rng(27)
+        fit = WeightFit(replace(load_scene("centre").sensor(), edge=edge))
+        size = {"sd": 3e-3} if edge == "elastic" else {"radius": 4e-3}
+        share, within, named, refused = [], [], [], []
+        for draw in range(frames // 25):
+            read, wrong = weighed(skin, masses, rng, **size), draw % len(masses)
+            weights = np.array(newtons(masses)) * rng.normal(1, SCATTER, len(masses))
+            known = fit(weights.tolist(), list(read))
+            share.append(known.rigidity / WEIGHED)
+            within.append(abs(known.rigidity - WEIGHED) < REACH * known.rigidity_sd)
+            refused.append(not known.passed)
+            weights[wrong] *= 1.2
+            known = fit(weights.tolist(), list(read))
+            named.append(not known.passed and np.argmax(np.abs(known.left_out)) == wrong)
+        shares = " | ".join(f"{100 * np.mean(each):.0f} %" for each in (within, named, refused))
+        yield f"| {name} | {np.mean(share):.3f} | {np.std(share):.3f} | {shares} |"
+
+
 def main(frames="1000", *name):
-    tables = {("told",): told_table, ("drift",): drift_table}
+    tables = {("told",): told_table, ("drift",): drift_table, ("weights",): weights_table}
     if name in tables:
         for row in tables[name](int(frames)):
             print(row, flush=True)

@@ -246,6 +246,11 @@ class Calibration:
             failures=tuple((c, "dead") for c in np.flatnonzero(dead).tolist()),
         )
 
+    @property
+    def is_nominal(self) -> bool:
+        """Whether the readings are taken as they are, because no gain was measured."""
+        return not (self.gain_sd > 0).any()
+
     def check(self, sensor: Sensor) -> None:
         """Refuse a sensor that is not the one that was calibrated."""
         if sensor.serial_number != self.serial_number:

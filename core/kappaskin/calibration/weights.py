@@ -268,19 +268,19 @@ _FOOT = 0.03  # of the shorter side: radius of a simulated weight's foot
 class Weighing:
     """The steps of known weights: the skin without one, then with each of `masses` in g.
 
-    `contacts` are those of the weights so far.
+    `taken` are the readings so far, (3, P) in 1/m each, and `contacts` those of the weights.
     """
 
     def __init__(self, sensor: Sensor, masses: Sequence[float], edge: str = "") -> None:
         self.masses, self.weights = tuple(masses), newtons(masses)
         self.fit = WeightFit(sensor, edge)
         self.contacts: list[Contact] = []
-        self._taken: list[Array] = []
+        self.taken: list[Array] = []
 
     @property
     def step(self) -> int:
         """The number of the present step: 0 is the skin without a weight."""
-        return len(self._taken)
+        return len(self.taken)
 
     @property
     def done(self) -> bool:
@@ -294,29 +294,29 @@ class Weighing:
         return "take everything off the skin"
 
     def take(self, readings: Array) -> str:
-        """Take the mean `readings` (3, P) in 1/m of the present step; says what they show.
+        """Take the `readings` (n, C) in 1/m of the present step's frames; says what they show.
 
         Raises a `Refusal` where the step must be repeated.
         """
-        found = "the skin without a weight"
-        if self._taken:
-            contact = self.fit.contact(readings - self._taken[0])
+        found, mean = "the skin without a weight", _mean(readings).reshape(3, -1)
+        if self.taken:
+            contact = self.fit.contact(mean - self.taken[0])
             x, y = (1e3 * contact.position).tolist()
             found = f"a contact at ({x:.1f}, {y:.1f}) mm"
             self.contacts.append(contact)
-        self._taken.append(readings)
+        self.taken.append(mean)
         return found
 
     def redo(self) -> None:
         """Go back by one step."""
-        if self._taken:
-            self._taken.pop()
-            del self.contacts[len(self._taken[1:]) :]
+        if self.taken:
+            self.taken.pop()
+            del self.contacts[len(self.taken[1:]) :]
 
     @property
     def bent(self) -> list[Array]:
         """What each weight so far changed in the readings (3, P) in 1/m."""
-        return [readings - self._taken[0] for readings in self._taken[1:]]
+        return [readings - self.taken[0] for readings in self.taken[1:]]
 
     def laid(self, scene: Scene) -> Scene:
         """The simulated `scene` as the present step wants it."""
@@ -387,8 +387,16 @@ def take_weights(
         return listener.sensor, weighing.fit(weighing.weights, weighing.bent)
 
 
+def _mean(readings: Array) -> Array:
+    """The mean (C,) of the finite `readings` (n, C)."""
+    read = np.isfinite(readings)
+    frames = np.where(read.any(axis=0), read.sum(axis=0), np.nan)
+    mean: Array = np.where(read, readings, 0.0).sum(axis=0) / frames
+    return mean
+
+
 class _Correction:
-    """Means (3, P) in 1/m of the readings of each step, corrected by an earlier calibration.
+    """Readings (n, C) in 1/m of each step, corrected by an earlier calibration: one, their mean.
 
     Its loops are followed as if the skin was bare between two weights.
     """
@@ -398,12 +406,10 @@ class _Correction:
         self._bare: Array | None = None
 
     def __call__(self, times: Array, readings: Array) -> Array:
-        read, time = np.isfinite(readings), float(times.mean())
-        frames = np.where(read.any(axis=0), read.sum(axis=0), np.nan)
-        mean: Array = np.where(read, readings, 0.0).sum(axis=0) / frames
-        if self._corrector is not None:
-            if self._bare is None:
-                self._bare = mean
-            self._corrector(self._bare, time)
-            mean = self._corrector(mean, time)
-        return mean.reshape(3, -1)
+        if self._corrector is None:
+            return readings
+        mean, time = _mean(readings), float(times.mean())
+        if self._bare is None:
+            self._bare = mean
+        self._corrector(self._bare, time)
+        return self._corrector(mean, time)[None]

@@ -1,24 +1,30 @@
-"""Calibration controller: steps of the procedure, and the calibration to use, save or load."""
+"""Procedures of a calibration: their steps, and the result to use, save or load."""
 
 import math
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 from PySide6.QtCore import QObject, Signal
 
 from kappaskin.calibration import (
+    Calibration,
     CalibrationReport,
+    KnownWeights,
     Procedure,
     Sweep,
+    Tare,
+    Weighing,
+    WeightFit,
     calibrate,
     load_calibration,
 )
 from kappaskin.errors import Refusal
-from kappaskin.frames import OVERTAKEN, Estimate
+from kappaskin.frames import OVERTAKEN, Array, Estimate
 from kappaskin.live import Status
 from kappaskin.scenes.cylinders import CylinderStep, schedule
 from kappaskin.sensing import Sensor
@@ -30,6 +36,7 @@ _SILENCE = 5.0  # s without a reading after which a step is aborted
 _FEWEST_FRAMES = 10  # of one step, to determine the noise
 _MOST_FRAMES = 5000  # stored of one step, evenly spaced
 _LONGEST = 3600.0  # s, longest step
+_RESTARTED = "The device's clock went back: it restarted. Start again."
 _STOPPED = "Computation cancelled; the captured steps are discarded."
 
 
@@ -42,22 +49,42 @@ class Result:
     report: CalibrationReport
 
 
+def parsed(text: str, what: str) -> tuple[float, ...]:
+    """The numbers in `text`; raises Refusal for other text, with `what` was expected."""
+    try:
+        return tuple(float(word) for word in text.replace(",", " ").replace(";", " ").split())
+    except ValueError as error:
+        raise Refusal(f"expected {what}; got {text!r:.60}") from error
+
+
 def parsed_radii(text: str) -> tuple[float, ...]:
     """Radii in m from a list in mm; raises Refusal for other text."""
-    try:
-        return tuple(float(word) / 1e3 for word in text.replace(",", " ").replace(";", " ").split())
-    except ValueError as error:
-        raise Refusal(f"expected radii in mm, such as 100, 50, 33; got {text!r:.60}") from error
+    return tuple(radius / 1e3 for radius in parsed(text, "radii in mm, such as 100, 50, 33"))
 
 
-class CalibrationController(QObject):
-    """Calibration by a user.
+class Steps(Protocol):
+    """A procedure that is taken in steps."""
+
+    @property
+    def done(self) -> bool: ...
+
+    @property
+    def taken(self) -> Sequence[object]: ...
+
+    def redo(self) -> None: ...
+
+
+P = TypeVar("P", bound=Steps)
+R = TypeVar("R")
+
+
+class StepController(QObject, Generic[P, R]):
+    """A procedure by a user, each step with readings of some seconds.
 
     There is a `procedure` while steps are captured; it is `computing` after the last, and then has
-    a `result`. `message` is the reason why a step or the procedure was refused, `file_refused` that
-    of a file, and `done` what else was done with the result. `changed` reports any change,
-    `step_requested` the step for a simulated skin (None at the end), and `used` a file loaded or
-    saved. During the procedure readings are to come without a calibration.
+    a `result`. `message` is the reason why a step or the procedure was refused, and `done` what
+    else was done with the result. `changed` reports any change, `step_requested` the step for a
+    simulated skin (None at the end), and `used` a file loaded or saved.
     """
 
     changed = Signal()
@@ -76,22 +103,46 @@ class CalibrationController(QObject):
         self._status = Status()
         self._connection = 0
         self.seconds = 1.0
-        self.procedure: Procedure | None = None
-        self.result: Result | None = None
-        self.message = self.done = self.file_refused = ""
+        self.procedure: P | None = None
+        self.result: R | None = None
+        self.message = self.done = ""
         self.automatic = False
         self._captured: list[Estimate] | None = None  # of the present step
         self._begin_time = self._last_time = 0.0
-        self._task = BackgroundTask(
-            tasks, "Computing the calibration", self._finish, self._refuse, cancelled=_STOPPED
-        )
+        words = "Computing the calibration"
+        self._task = BackgroundTask(tasks, words, self._finish, self._refuse, cancelled=_STOPPED)
 
-    # State.
+    # What a procedure has of its own.
 
     @property
-    def step(self) -> CylinderStep | None:
-        """The present step, None without a procedure or after the last."""
-        return self.procedure.step if self.procedure else None
+    def calibration(self) -> Calibration | None:
+        """The calibration with the result."""
+        raise NotImplementedError
+
+    @property
+    def _hold(self) -> float:
+        """The time in s for which the present step is held from its beginning; usually zero."""
+        return 0.0
+
+    def _belongs(self, estimate: Estimate) -> bool:
+        """Whether an estimate has the readings that the procedure wants."""
+        raise NotImplementedError
+
+    def _take(self, procedure: P, times: Array, readings: Array) -> None:
+        raise NotImplementedError
+
+    def _request_step(self) -> None:
+        """Request the present step."""
+        raise NotImplementedError
+
+    def _compute(self, procedure: P) -> None:
+        """Compute the result in the background."""
+        raise NotImplementedError
+
+    def _result(self, procedure: P, found: object) -> R:
+        raise NotImplementedError
+
+    # State.
 
     @property
     def computing(self) -> bool:
@@ -111,16 +162,15 @@ class CalibrationController(QObject):
 
     # Requests of the user.
 
-    def begin(self, radii: tuple[float, ...], seconds: float, hold: float = 0.0) -> None:
-        """Start with cylinders of `radii` in m, and `seconds` of readings per step."""
+    def _start(self, make: Callable[[Sensor], P], seconds: float) -> None:
+        """Start the procedure that `make` returns for the sensor, or report why not."""
         try:
             sensor = self._status.sensor
             if sensor is None or self._status.state != "streaming":
                 raise Refusal("no sensor is connected; connect one, then start")
             if not 0 < seconds <= _LONGEST:
                 raise Refusal(f"expected a time above zero and at most {_LONGEST:g} s")
-            steps = schedule(radii, hold, sensor.layout.patch.strip)
-            self.procedure = Procedure(sensor, steps)
+            self.procedure = make(sensor)
         except Refusal as refusal:
             self._report(str(refusal))
             return
@@ -130,15 +180,14 @@ class CalibrationController(QObject):
 
     def capture(self) -> None:
         """Capture the readings of the present step from now on."""
-        step = self.step
-        if step is None or self._captured is not None:
+        if self.procedure is None or self.procedure.done or self._captured is not None:
             return
         self._captured = []
         # A hold is captured from its beginning, which shows the creep.
-        self._begin_time = self._clock() + (0.0 if step.hold else _SETTLE)
+        self._begin_time = self._clock() + (0.0 if self._hold else _SETTLE)
         self._last_time = self._clock()
-        if step.hold:
-            self.step_requested.emit(step)
+        if self._hold:
+            self._request_step()
         self._report("")
 
     def capture_all(self) -> None:
@@ -175,37 +224,20 @@ class CalibrationController(QObject):
         self._report("")
 
     def use(self) -> None:
-        if self.result is not None:
-            self._apply("Use the calibration", self.result.report)
-
-    def stop_using(self) -> None:
-        self._history.change("Use no calibration", calibration=None)
+        """Use the calibration with the result."""
+        if self.calibration is not None:
+            self._history.change("Use the calibration", calibration=self.calibration)
+            self.changed.emit()
 
     def save(self, path: Path) -> None:
-        if self.result is not None:
+        """Write the calibration with the result to a file."""
+        if self.calibration is not None:
             try:
-                self.result.report.calibration.save(path)
+                self.calibration.save(path)
                 self.used.emit(path)
                 self._report("", f"saved as {path}")
             except Refusal as refusal:
                 self._report(str(refusal))
-
-    def load(self, path: Path) -> None:
-        """Use the calibration in `path`, if it belongs to the connected sensor."""
-        try:
-            if self._status.sensor is None:
-                raise Refusal(
-                    f"{path}: no sensor is connected; connect the one it belongs to first"
-                )
-            now = datetime.now(UTC)
-            calibration = load_calibration(path, self._status.sensor, now)
-        except Refusal as refusal:
-            self.file_refused = str(refusal)
-            self.changed.emit()
-            return
-        self._history.change("Load a calibration", calibration=calibration)
-        self.used.emit(path)
-        self._report("")
 
     # Input.
 
@@ -224,15 +256,14 @@ class CalibrationController(QObject):
 
     def receive(self, estimate: Estimate) -> None:
         """Capture an estimate of the present step, and finish the step after its last."""
-        captured, status = self._captured, self._status
-        setup = status.setup
-        plain = setup.calibration is None and setup.tare is None
-        nominal = plain and estimate.generation == status.generation
-        if captured is None or not nominal or estimate.host_time < self._begin_time:
+        captured = self._captured
+        if captured is None or estimate.host_time < self._begin_time:
+            return
+        if estimate.generation != self._status.generation or not self._belongs(estimate):
             return
         after = estimate.device_time - captured[-1].device_time if captured else math.inf
         if after < -OVERTAKEN:
-            self.cancel("The device's clock went back: it restarted. Start again.")
+            self.cancel(_RESTARTED)
             return
         self._last_time = estimate.host_time
         if after >= self._duration() / _MOST_FRAMES:  # late frames are excluded
@@ -248,22 +279,12 @@ class CalibrationController(QObject):
     # Steps.
 
     def _report(self, message: str, done: str = "") -> None:
-        self.message, self.done, self.file_refused = message, done, ""
-        self.changed.emit()
-
-    def _apply(self, text: str, report: CalibrationReport) -> None:
-        self._history.change(text, calibration=report.calibration)
+        self.message, self.done = message, done
         self.changed.emit()
 
     def _duration(self) -> float:
         """Duration of the present step in s."""
-        return max(self.seconds, self.step.hold if self.step else 0.0)
-
-    def _request_step(self) -> None:
-        """Request the next step, unless it is a hold, which begins with its capture."""
-        step = self.step
-        if step is not None and not step.hold:
-            self.step_requested.emit(step)
+        return max(self.seconds, self._hold)
 
     def _ended_by(self, status: Status) -> str:
         """Why the procedure cannot go on, or nothing."""
@@ -287,35 +308,164 @@ class CalibrationController(QObject):
             return
         times = np.array([estimate.device_time for estimate in captured])
         readings = np.array([estimate.curvature.ravel() for estimate in captured])
-        clock_went_back = bool(procedure.taken) and times[0] < procedure.taken[-1].time
-        if clock_went_back:
-            self.cancel("The device's clock went back: it restarted. Start again.")
-            return
         try:
-            procedure.take(times, readings)
+            self._take(procedure, times, readings)
         except Refusal as refusal:
             self._refuse_step(f"{refusal}.")
+            return
+        if self.procedure is None:  # cancelled by what was taken
             return
         self._captured = None
         if procedure.done:
             self._compute(procedure)
-            return
-        self._request_step()
-        if self.automatic:
-            self.capture()
+            self.automatic = False
+        else:
+            self._request_step()
+            if self.automatic:
+                self.capture()
         self._report("")
 
-    def _compute(self, procedure: Procedure) -> None:
-        """Compute the calibration in the background."""
-        self._task.run(calibrate, procedure.sweep(), procedure.sensor, datetime.now(UTC))
-        self.automatic = False
-        self._report("")
-
-    def _finish(self, report: CalibrationReport) -> None:
+    def _finish(self, found: object) -> None:
         if self.procedure is not None:
-            self.result = Result(self.procedure.sensor, self.procedure.sweep(), report)
+            self.result = self._result(self.procedure, found)
         self.cancel()
 
     def _refuse(self, error: Exception) -> None:
         why = f"No calibration: {error or type(error).__name__}."
         self.cancel(str(error) if isinstance(error, Cancelled) else why)
+
+
+class CalibrationController(StepController[Procedure, Result]):
+    """Calibration on cylinders by a user, whose readings are to come without a calibration.
+
+    `file_refused` is the reason why a file could not be loaded.
+    """
+
+    file_refused = ""
+
+    @property
+    def step(self) -> CylinderStep | None:
+        """The present step, None without a procedure or after the last."""
+        return self.procedure.step if self.procedure else None
+
+    @property
+    def calibration(self) -> Calibration | None:
+        """The calibration with the result."""
+        return self.result.report.calibration if self.result else None
+
+    def begin(self, radii: tuple[float, ...], seconds: float, hold: float = 0.0) -> None:
+        """Start with cylinders of `radii` in m, and `seconds` of readings per step."""
+
+        def procedure(sensor: Sensor) -> Procedure:
+            return Procedure(sensor, schedule(radii, hold, sensor.layout.patch.strip))
+
+        self._start(procedure, seconds)
+
+    def stop_using(self) -> None:
+        self._history.change("Use no calibration", calibration=None)
+
+    def load(self, path: Path) -> None:
+        """Use the calibration in `path`, if it belongs to the connected sensor."""
+        try:
+            if self._status.sensor is None:
+                raise Refusal(
+                    f"{path}: no sensor is connected; connect the one it belongs to first"
+                )
+            now = datetime.now(UTC)
+            calibration = load_calibration(path, self._status.sensor, now)
+        except Refusal as refusal:
+            self.file_refused = str(refusal)
+            self.changed.emit()
+            return
+        self._history.change("Load a calibration", calibration=calibration)
+        self.used.emit(path)
+        self._report("")
+
+    def _report(self, message: str, done: str = "") -> None:
+        self.file_refused = ""
+        super()._report(message, done)
+
+    @property
+    def _hold(self) -> float:
+        return self.step.hold if self.step else 0.0
+
+    def _belongs(self, estimate: Estimate) -> bool:
+        setup = self._status.setup
+        return setup.calibration is None and setup.tare is None
+
+    def _take(self, procedure: Procedure, times: Array, readings: Array) -> None:
+        if procedure.taken and times[0] < procedure.taken[-1].time:
+            self.cancel(_RESTARTED)
+            return
+        procedure.take(times, readings)
+
+    def _request_step(self) -> None:
+        """Request the present step, unless it is a hold, which begins with its capture."""
+        if self.step is not None and bool(self._hold) == self.capturing:
+            self.step_requested.emit(self.step)
+
+    def _compute(self, procedure: Procedure) -> None:
+        self._task.run(calibrate, procedure.sweep(), procedure.sensor, datetime.now(UTC))
+
+    def _result(self, procedure: Procedure, found: CalibrationReport) -> Result:
+        return Result(procedure.sensor, procedure.sweep(), found)
+
+
+class WeightController(StepController[Weighing, KnownWeights]):
+    """Known weights laid on by a user, with readings as they are corrected now.
+
+    `step_requested` has the procedure, whose present weight lies on a simulated skin.
+    """
+
+    _before: Calibration | None = None
+    _tare: Tare | None = None
+
+    @property
+    def calibration(self) -> Calibration | None:
+        """The calibration in use, or that of the data sheet, with what the weights found."""
+        sensor = self._status.sensor
+        if self.result is None or sensor is None:
+            return None
+        now = datetime.now(UTC)
+        before = self._before or Calibration.nominal(sensor, now)
+        return replace(before, weights=self.result, date=now)
+
+    def begin(self, masses: tuple[float, ...], seconds: float) -> None:
+        """Start with weights of `masses` in g, and `seconds` of readings for each."""
+        setup = self._status.setup
+        self._before, self._tare = setup.calibration, setup.tare
+        self._start(lambda sensor: Weighing(sensor, masses, setup.edge), seconds)
+
+    def _ended_by(self, status: Status) -> str:
+        setup = status.setup
+        if (setup.calibration, setup.tare) != (self._before, self._tare):
+            return "The calibration or the tare was changed: start again."
+        return super()._ended_by(status)
+
+    def _belongs(self, estimate: Estimate) -> bool:
+        return True
+
+    def _take(self, procedure: Weighing, times: Array, readings: Array) -> None:
+        procedure.take(readings)
+
+    def _request_step(self) -> None:
+        self.step_requested.emit(self.procedure)
+
+    def _compute(self, procedure: Weighing) -> None:
+        self._task.compute(
+            known_weights,
+            procedure.fit.sensor,
+            procedure.fit.edge,
+            procedure.weights,
+            procedure.bent,
+        )
+
+    def _result(self, procedure: Weighing, found: KnownWeights) -> KnownWeights:
+        return found
+
+
+def known_weights(
+    sensor: Sensor, edge: str, weights: Sequence[float], readings: Sequence[Array]
+) -> KnownWeights:
+    """What `weights` in N with these `readings` say, computed in a process of its own."""
+    return WeightFit(sensor, edge)(weights, readings)

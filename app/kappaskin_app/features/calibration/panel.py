@@ -16,6 +16,7 @@ from kappaskin_app.features.calibration.pages import (
     ResultPage,
     StartPage,
 )
+from kappaskin_app.features.calibration.weights import FILES
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.settings import Settings, calibration_text
@@ -26,8 +27,6 @@ from kappaskin_app.widgets.parts import (
     sentence,
     text_label,
 )
-
-_FILES = "Calibration (*.toml)"
 
 
 class InUsePanel(Panel):
@@ -51,7 +50,7 @@ class InUsePanel(Panel):
 
     def connect_to(self, controller: CalibrationController) -> None:
         def load() -> None:
-            path, _ = QFileDialog.getOpenFileName(self, "Load a calibration", "", _FILES)
+            path, _ = QFileDialog.getOpenFileName(self, "Load a calibration", "", FILES)
             if path:
                 controller.load(Path(path))
 
@@ -180,7 +179,7 @@ class CalibratePanel(Panel):
             return
         found = self._controller.result.report.calibration
         name = f"{found.serial_number}-{found.date.astimezone():%Y%m%d}.calibration.toml"
-        path, _ = QFileDialog.getSaveFileName(self, "Save the calibration", name, _FILES)
+        path, _ = QFileDialog.getSaveFileName(self, "Save the calibration", name, FILES)
         if path:
             self._controller.save(Path(path))
 

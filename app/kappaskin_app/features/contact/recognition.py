@@ -5,6 +5,9 @@ from PySide6.QtCore import QObject, Signal
 from kappaskin.contact import NO_OBJECT, ContactObject, ObjectFinder, as_one
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
+from kappaskin.mechanics import Plate
+from kappaskin.pipeline import Setup
+from kappaskin.sensing import Sensor
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.widgets.parts import with_error
 
@@ -35,7 +38,7 @@ class ObjectRecognition(QObject):
         words = "Computing the readings of objects"
         self._preparation = BackgroundTask(tasks, words, self._set_finder, self._set_finder)
         self._recognition = BackgroundTask(tasks, "", self._finish)
-        self._key: tuple[int, str] | None = None
+        self._key: tuple[int, Plate, str] | None = None
         self._finder: ObjectFinder | str = ""
 
     def start(self, status: Status, estimate: Estimate | None) -> None:
@@ -44,9 +47,9 @@ class ObjectRecognition(QObject):
         if estimate is None or sensor is None:
             self._recognition.stop()
             self.described.emit("")
-        elif self._key != (key := (status.connections, status.setup.edge or sensor.edge)):
+        elif self._key != (key := (status.connections, *_skin(sensor, status.setup))):
             self._key = key
-            self._preparation.run(ObjectFinder, sensor.plate, sensor.layout, key[1])
+            self._preparation.run(ObjectFinder, key[1], sensor.layout, key[2])
         elif self._preparation.running:
             self.described.emit(_PREPARING)
         elif estimate.generation == status.generation and not self._recognition.running:
@@ -60,6 +63,12 @@ class ObjectRecognition(QObject):
         words, *found = described
         self.described.emit(words)
         self.found.emit(*found)
+
+
+def _skin(sensor: Sensor, setup: Setup) -> tuple[Plate, str]:
+    """The skin and its edge, as the setup has them."""
+    known = setup.calibration
+    return known.plate(sensor.plate) if known else sensor.plate, setup.edge or sensor.edge
 
 
 def _recognise(

@@ -84,10 +84,12 @@ def form_field(name: str) -> FormField:
 
 
 def calibration_text(calibration: Calibration) -> str:
-    """When a calibration was made, and how many channels passed."""
+    """When a calibration was made, how many channels passed, and what known weights found."""
     passed, all_ = int(np.isfinite(calibration.gain).sum()), len(calibration.gain)
-    day = calibration.date.astimezone()
-    return f"calibrated {day:%Y-%m-%d}, {passed} of {all_} channels"
+    day, known = calibration.date.astimezone(), calibration.weights
+    channels = "nominal curvature" if calibration.is_nominal else f"{passed} of {all_} channels"
+    stiff = f", rigidity {known.rigidity:.3g} N m by {len(known.weights)} weights" if known else ""
+    return f"calibrated {day:%Y-%m-%d}, {channels}{stiff}"
 
 
 def change_text(name: str, before: Settings, after: Settings) -> str:
