@@ -239,9 +239,9 @@ class Estimate:
     a reading in 1/m as the residual tells it; `suspect` (P,) numbers in `FAULTS` why an element was
     left out, 0 if it was not; `converged` is False where an iteration gave up for least squares;
     `fit_time` in s is what the fit took; `drift` in 1/m, by RMS, is how far all readings have
-    smoothly shifted, 0 where no drift is told. `second` is a weaker contact beside `contact`, which
-    are told as two; none is there where its numbers are NaN. `geometry` is that of the skin at the
-    first contact.
+    smoothly shifted, 0 where no drift is told; the shape and contacts are without it. `second` is a
+    weaker contact beside `contact`, which are told as two; none is there where its numbers are NaN.
+    `geometry` is that of the skin at the first contact.
     `true_surface`, `true_contact`, `error_at_load` and `error_rms` (all in m) are NaN unless a
     simulation made the frame. `ready_time` is when the estimate was done, on the clock of
     `host_time`; `taken` +- `taken_sd`, in s on it too, when the scan began, as the frame says.

@@ -480,13 +480,15 @@ class Drifted:
     """Shares of frames in which a drift was told, and a contact: of no load, and of one.
 
     `size` is the mean size told over the true one; `covered` (3,) the shares of intervals of x, y
-    and force that hold the truth, in frames with a load.
+    and force that hold the truth, in frames with a load, and `surface` the share of the surface
+    that its 95 % bands hold, in frames without one (False) and with one (True).
     """
 
     told: tuple[float, float]
     present: tuple[float, float]
     size: float
     covered: np.ndarray
+    surface: tuple[float, float]
 
 
 def drifted(noises, frames, seed=0) -> Drifted:
@@ -494,10 +496,12 @@ def drifted(noises, frames, seed=0) -> Drifted:
     case = FLAT[0]
     rng, layout = np.random.default_rng(seed), case.layout
     read, contacts = case.truth(layout), Contacts(case.skin, layout)
+    plate = HingedPlate()
     fit = LeastSquares(basis_for(case.skin.patch, "hinged", 8, 8), layout)
     x, y = (layout.positions - 0.05).T / 0.05
     size = noises * case.noise / sqrt(3)
-    told, present, sizes, covered = [0, 0], [0, 0], [], []
+    told, present, sizes, covered, surface = [0, 0], [0, 0], [], [], ([], [])
+    places = np.stack(np.meshgrid(*case.skin.patch.grid(11, 11)), -1)[1:-1, 1:-1].reshape(-1, 2)
     for frame in range(2 * frames):
         level, along, across = rng.normal(size=(3, 3, 1))
         field = level + along * x + across * y
@@ -506,15 +510,21 @@ def drifted(noises, frames, seed=0) -> Drifted:
         load = Load(*rng.uniform(0.02, 0.08, 2), 0.06, radius=rng.uniform(0, 5e-3))
         loaded = frame % 2
         curvature = curvature + loaded * read(load)
-        contact = contacts(curvature, fit(curvature))[0]
-        told[loaded] += contacts.drift > 0
+        shape = fit(curvature)
+        contact, drift = contacts(curvature, shape)[0], contacts.drift
+        shape = drift.fit if drift else shape
+        told[loaded] += drift is not None
         present[loaded] += contact.present
-        sizes.append(contacts.drift / size if size else 0.0)
+        sizes.append(drift.size / size if drift and size else 0.0)
+        true = loaded * plate.displacement(load, places)
+        off = shape.estimator.basis.at(places) @ shape.coefficients.ravel() - true
+        surface[loaded].append(np.mean(np.abs(off) <= REACH * shape.surface_sd(places)))
         if loaded and contact.present:
             off = np.array([*(contact.position - (load.x, load.y)), contact.force - load.force])
             covered.append(np.abs(off) <= (*contact.position_95, contact.force_95))
     shares = (tuple(count / frames for count in counts) for counts in (told, present))
-    return Drifted(*shares, float(np.mean(sizes)), np.mean(covered, axis=0))
+    held = tuple(float(np.mean(shares)) for shares in surface)
+    return Drifted(*shares, float(np.mean(sizes)), np.mean(covered, axis=0), held)
 
 
 DRIFTS = (0, 1, 2, 3, 4, 6)
@@ -523,11 +533,20 @@ DRIFTS = (0, 1, 2, 3, 4, 6)
 def drift_table(frames=1000):
     """What is told of drifts, as a table in Markdown."""
     heads = "told as drift, no load | false contacts | told as drift, 0.06 N | contact found"
-    yield f"| drift, in noises | {heads} | size told | x | y | force |"
-    yield "|---|---|---|---|---|---|---|---|---|"
+    heads += " | size told | x | y | force | surface, no load | surface, 0.06 N"
+    yield f"| drift, in noises | {heads} |"
+    yield "|---|---|---|---|---|---|---|---|---|---|---|"
     for noises in DRIFTS:
         of = drifted(noises, frames)
-        shares = (of.told[0], of.present[0], of.told[1], of.present[1], of.size, *of.covered)
+        shares = (
+            of.told[0],
+            of.present[0],
+            of.told[1],
+            of.present[1],
+            of.size,
+            *of.covered,
+            *of.surface,
+        )
         yield f"| {noises} | " + " | ".join(f"{100 * share:.1f} %" for share in shares) + " |"
 
 

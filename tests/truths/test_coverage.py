@@ -207,6 +207,7 @@ def test_a_drift_is_told_as_one_and_contacts_are_found_beside_it(noises, frames)
     assert found.present[1] >= 0.95
     assert min(found.told) >= 0.95
     assert min(found.covered) >= 0.90
+    assert min(found.surface) >= 0.90
     assert abs(found.size - 1) < 0.05
 
 

@@ -46,7 +46,7 @@ _TIP = (
     "give the same readings; select an elastic edge if the edge is elastic (Basis). "
     "Strain: beyond 1 % a metal gage is not elastic; these elements are crossed out in the "
     "heatmaps. Drift: all readings have shifted smoothly over the skin, which no load does; "
-    "contacts are found beside it, but the surface still shows it. "
+    "the contact and the surface are those without it (Tracking keeps it in the surface). "
     "Slopes: most estimators take the skin for nearly flat; select Finite slope (Basis). "
     "Excluded: elements, counted from 0, that are inconsistent with the others, or have "
     "faulty channels: Health (F3) lists these, and letters in the heatmaps give the reason."

@@ -1,14 +1,23 @@
 """Drift: a smooth change of all readings, which is no load, told beside a contact."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
 
 from kappaskin.contact.point import NO_CONTACT, PointContact, left_by_chance, orthonormal
 from kappaskin.errors import RankDeficient
-from kappaskin.estimation import Direct, Estimator, Fast, Fit, LeastSquares, PatternCache
+from kappaskin.estimation import (
+    DenseUncertainty,
+    Direct,
+    Estimator,
+    Fast,
+    Fit,
+    LeastSquares,
+    PatternCache,
+    Uncertainty,
+)
 from kappaskin.frames import Array, Contact, Mask
 from kappaskin.mechanics import Plate
 from kappaskin.sensing import SensorLayout
@@ -17,6 +26,20 @@ _HINT = 21.7  # chi-squared of nine numbers that one frame in 100 without a drif
 _EVIDENT = 36.0  # -2 ln of the likelihood ratio: one in 25,000
 _OF_LOAD = 4  # unknowns of a load
 _LEFT = 1e-3  # of frames of a drift and a load leave more than noise explains
+_MOST = 2_000  # functions: the uncertainty of a shape beside a drift takes their whole covariance
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FittedDrift:
+    """A drift of `size` in 1/m by RMS, the `contacts` beside it, and the `fit` to what is left.
+
+    That is the fit as it was, whose shape still has the drift, of an estimator that has a memory,
+    was given a sigma or has more than 2,000 functions.
+    """
+
+    size: float
+    contacts: tuple[Contact, Contact]
+    fit: Fit
 
 
 def level_and_slopes(layout: SensorLayout) -> Array:
@@ -50,8 +73,8 @@ class SmoothDrift:
         contacts: tuple[Contact, Contact],
         rest: Array,
         left: float,
-    ) -> tuple[tuple[Contact, Contact], float]:
-        """The contacts beside a drift, and the drift's size in 1/m by RMS; 0 where there is none.
+    ) -> FittedDrift | None:
+        """The drift and what is beside it; None where there is none.
 
         For `curvature` (3, P) in 1/m, NaN where missing, the `fit` to it, the `rest` (3 P,) that
         one load leaves of it, 0 where missing, and the squares `left` by the `contacts` found.
@@ -61,12 +84,13 @@ class SmoothDrift:
         spare = max(int(used.sum()) - len(Q), 1)
         score = float(np.square(Q @ rest).sum())
         if not score > _HINT * max(float(rest.dot(rest)) - score, 0.0) / spare:
-            return contacts, 0.0
+            return None
         told = self._noise(curvature, fit, used)
         if told is None:
-            return contacts, 0.0
+            return None
         noise, of_noise = told
-        found = self._beside(curvature, replace(fit, known_noise=np.array(noise), spare=of_noise))
+        judged = {"known_noise": np.array(noise), "spare": of_noise}
+        found = self._beside(curvature, replace(fit, **judged))
         after = self._beside.rest
         along = Q @ after
         squares = float(after.dot(after) - along.dot(along)) / noise**2
@@ -76,9 +100,17 @@ class SmoothDrift:
         spare -= _OF_LOAD * found.present
         usual = spare * left_by_chance(_LEFT, spare, of_noise)
         if better < _EVIDENT or squares > usual:
-            return contacts, 0.0
-        drifted = along + Q @ np.where(used, curvature.ravel(), 0.0)
-        return (found, NO_CONTACT), math.sqrt(float(drifted.dot(drifted)) / used.sum())
+            return None
+        drift = along + Q @ np.where(used, curvature.ravel(), 0.0)
+        size = math.sqrt(float(drift.dot(drift)) / used.sum())
+        estimator = fit.estimator
+        if estimator.has_memory or estimator.sigma is not None or estimator.basis.size > _MOST:
+            return FittedDrift(size, (found, NO_CONTACT), fit)
+        rows = self._beside.linear if found.present else np.empty((0, len(used)))
+        beside = estimator(fit.curvature - (drift @ Q).reshape(curvature.shape))
+        whole = _beside_drift(beside, Q, np.where(used, rows, 0.0))
+        beside = replace(beside, uncertainty=whole, **judged)
+        return FittedDrift(size, (self._beside(curvature, beside), NO_CONTACT), beside)
 
     def _orthonormal(self, used: Mask) -> Array:
         return orthonormal(np.where(used, self._columns, 0.0))
@@ -117,3 +149,25 @@ class SmoothDrift:
         """Directions (r, C) of what a fit leaves of the drift's columns."""
         columns = np.where(used, self._columns, np.nan).reshape(-1, 3, len(used) // 3)
         return orthonormal(np.nan_to_num(estimator(columns).residual.reshape(len(columns), -1)))
+
+
+def _beside_drift(fit: Fit, Q: Array, rows: Array) -> Uncertainty:
+    """Uncertainty of a `fit` to readings less their drift along Q (r, C), which is estimated too.
+
+    Beside a load, of which the readings and derivatives are `rows` (n, C). With P = 1 - J'(JJ')^-1J
+    for the rows J, the drift is d = S Q P K, where S = (Q P Q')^-1 is its covariance for unit
+    noise. With A = L Q' and B = L P Q', c = L (K - Q'd) has the covariance
+    C - A S B' - B S A' + A S A', where C is that of c for a known drift, and L = C M'.
+    """
+    estimator, unit = fit.estimator, cast("Uncertainty", fit.uncertainty)
+
+    def covariance() -> Array:
+        M = np.where(np.isfinite(fit.curvature).reshape(-1, 1), estimator.M, 0.0)
+        C, J = unit.covariance_of(np.eye(estimator.basis.size)), orthonormal(rows)
+        beside = Q - (Q @ J.T) @ J
+        A, B = C @ (Q @ M).T, C @ (beside @ M).T
+        S = np.linalg.inv(beside @ beside.T)
+        across = A @ S @ B.T
+        return C - across - across.T + A @ S @ A.T
+
+    return DenseUncertainty(covariance)

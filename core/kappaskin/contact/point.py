@@ -216,7 +216,8 @@ class PointContact:
         """Variance that the last contact leaves of the readings, over that of the fit."""
         self.rest = self._readings
         """What the last contact leaves (3 P,) of the readings in 1/m; 0 where one is missing."""
-        self._linear = self._rows[:0]  # readings and derivatives that the last steps are from
+        self.linear = self._rows[:0]
+        """Readings of the last contact for a unit force, and their derivatives, (n, 3 P)."""
 
     def _tables(self, used: Mask) -> _Tables:
         """The tables for the readings `used` (3 P,)."""
@@ -266,7 +267,7 @@ class PointContact:
     def _first(self, row: int, column: int) -> _Linearised:
         """As `_linearised`, where all readings are used, at a point of the grid."""
         rows, first, inverse = self._at_node(row, column)
-        K, self._linear = self._readings, rows
+        K, self.linear = self._readings, rows
         return self._step(self._start, first, inverse, rows.dot(K), float(K.dot(K)), None)
 
     def _node(self, row: int, column: int) -> tuple[Array, float, Array]:
@@ -292,7 +293,7 @@ class PointContact:
             if gain <= self._worth(x, y) * variance + _NO_GAIN * here.power:
                 break
             here = self._linearised(x, y, s, force, tables, variance)
-        self.rest = self._rows[4] - np.dot(here.steps[: self._unknowns], self._linear)
+        self.rest = self._rows[4] - np.dot(here.steps[: self._unknowns], self.linear)
         if tables.weights is not None:
             self.rest *= tables.weights
         return self._contact(x, y, s, here, tables, fit)
@@ -313,7 +314,7 @@ class PointContact:
         rows = self._rows if weights is None else self._rows * weights
         products = _without_free(rows.dot(self._rows.T))
         n = self._unknowns
-        self._linear = self._rows[:n]
+        self.linear = self._rows[:n]
         H, g = products[:n, :n], products[:n, 4]
         first = H.item(0, 0)
         return self._step(s, first, _inverse(H), g, products.item(4, 4), weights)

@@ -8,7 +8,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from kappaskin.bases import basis_for
-from kappaskin.contact.drift import SmoothDrift
+from kappaskin.contact.drift import FittedDrift, SmoothDrift
 from kappaskin.contact.influence import influence_of
 from kappaskin.contact.point import NO_CONTACT, PointContact, left_by_chance
 from kappaskin.estimation import Fit, PatternCache
@@ -58,8 +58,8 @@ class Contacts:
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str = "hinged") -> None:
         self._one = PointContact(plate, layout, edge)
         self._drift = SmoothDrift(plate, layout, edge)
-        self.drift = 0.0
-        """Size in 1/m of the drift beside the last contacts, by RMS; 0 where none is told."""
+        self.drift: FittedDrift | None = None
+        """The drift beside the last contacts; None where there is none."""
         self._pairs = None if plate.stretches else _Pairs(plate, layout, edge)
 
     def __call__(self, curvature: Array, fit: Fit) -> tuple[Contact, Contact]:
@@ -72,8 +72,8 @@ class Contacts:
         left = float(rest.dot(rest))
         if found[1].present and self._pairs is not None:
             left = self._pairs.left * float(fit.noise) ** 2
-        beside, self.drift = self._drift(curvature, fit, found, rest, left)
-        return beside if self.drift else found
+        self.drift = self._drift(curvature, fit, found, rest, left)
+        return self.drift.contacts if self.drift else found
 
     def _pressed(self, curvature: Array, fit: Fit) -> tuple[Contact, Contact]:
         """The contacts where nothing drifts."""

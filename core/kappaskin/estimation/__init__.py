@@ -10,6 +10,7 @@ from kappaskin.estimation.estimator import Estimator as Estimator
 from kappaskin.estimation.estimator import PatternCache as PatternCache
 from kappaskin.estimation.estimator import column_lengths as column_lengths
 from kappaskin.estimation.fast import Fast as Fast
+from kappaskin.estimation.fit import DenseUncertainty as DenseUncertainty
 from kappaskin.estimation.fit import Fit as Fit
 from kappaskin.estimation.fit import Uncertainty as Uncertainty
 from kappaskin.estimation.fit import power_of_two as power_of_two

@@ -236,14 +236,15 @@ class Pipeline:
         began = time.perf_counter()
         fit = self.fitted = self._fitted(frame, out(scanned), out(curvature))
         fit_time = time.perf_counter() - began
-        surface = self._surface(fit.coefficients)
-        noise = float(fit.noise)
+        surface, noise = self._surface(fit.coefficients), float(fit.noise)
+        if self.drift is not None:
+            self.drift.follow(frame.device_time, curvature, surface, noise)
         contact, second, drift = NO_CONTACT, NO_CONTACT, 0.0
         if math.isfinite(noise):
             contact, second = map(self._bounded, self._contacts(fit.curvature, fit))
-            drift = self._contacts.drift
-        if self.drift is not None:
-            self.drift.follow(frame.device_time, curvature, surface, noise)
+        if math.isfinite(noise) and (drifted := self._contacts.drift) is not None:
+            fit, drift = drifted.fit, drifted.size
+            self.fitted, surface, noise = fit, self._surface(fit.coefficients), float(fit.noise)
         return Estimate(
             self.generation,
             frame.sequence,

@@ -245,9 +245,11 @@ def reconstruct(
         contacts_of, bounded = Contacts(plate, layout, edge), LowerBound(plate, edge)
         fits = [fitter(frame) for frame in curvature]
         pairs, drifts = list[tuple[Contact, Contact]](), list[float]()
-        for one in fits:
+        for frame, one in enumerate(fits):
             pairs.append(contacts_of(one.curvature, one))
-            drifts.append(contacts_of.drift)
+            drift = contacts_of.drift
+            drifts.append(drift.size if drift else 0.0)
+            fits[frame] = drift.fit if drift else one
         out["drift"] = np.array(drifts)
         contacts = [bounded(first) for first, _ in pairs]
         out |= _contacts(fits, contacts, forces="rigidity" in found)

@@ -29,8 +29,12 @@ def readings(*loads, size=0.0, seed=0):
 
 
 def told(K, method="least-squares", contacts=CONTACTS):
-    found = contacts(K, METHODS[method](BASIS, TENS)(K))
-    return found[0], contacts.drift
+    return pressed(K, METHODS[method](BASIS, TENS)(K), contacts)
+
+
+def pressed(K, fit, contacts):
+    found = contacts(K, fit)
+    return found[0], contacts.drift.size if contacts.drift else 0.0
 
 
 @pytest.mark.parametrize("size", [0.5, 1.0, 1.4])
@@ -49,6 +53,30 @@ def test_a_contact_is_found_beside_a_drift(method):
     assert contact.single
     assert np.all(np.abs(contact.position - (PRESS.x, PRESS.y)) < 4 * contact.position_sd)
     assert abs(contact.force - PRESS.force) < 4 * contact.force_sd
+
+
+@pytest.mark.parametrize("method", ["least-squares", "fast", "bayes", "robust", "finite-slope"])
+@pytest.mark.parametrize("loads", [(), (PRESS,)], ids=["at rest", "pressed"])
+def test_the_surface_beside_a_drift_is_within_its_bands(method, loads):
+    places = np.stack(np.meshgrid(*[np.linspace(0.01, 0.09, 9)] * 2), -1).reshape(-1, 2)
+    estimator, held = METHODS[method](BASIS, TENS), []
+    true = sum(HingedPlate().displacement(load, places) for load in loads)
+    for seed in range(12):
+        K = readings(*loads, size=1.0, seed=seed)
+        CONTACTS(K, estimator(K))
+        fit = CONTACTS.drift.fit
+        off = BASIS.at(places) @ fit.coefficients.ravel() - true
+        held.append(np.abs(off) < 1.96 * fit.surface_sd(places))
+
+    assert np.mean(held) > 0.85
+
+
+def test_a_surface_by_a_method_with_memory_keeps_the_drift():
+    K = readings(PRESS, size=1.0)
+    fit = METHODS["tracking"](BASIS, TENS)(K)
+    CONTACTS(K, fit)
+
+    assert CONTACTS.drift.fit is fit
 
 
 def test_without_a_drift_none_is_told():
@@ -70,7 +98,7 @@ def test_too_few_readings_for_a_drift_tell_none():
     K = np.full((3, 100), np.nan)
     K[:, 40:62] = warm(5.0)[:, 40:62]
 
-    contact, drift = CONTACTS(K, LeastSquares(SineBasis(SQUARE, 2, 2), TENS)(K))[0], CONTACTS.drift
+    contact, drift = pressed(K, LeastSquares(SineBasis(SQUARE, 2, 2), TENS)(K), CONTACTS)
 
     assert np.isfinite(drift)
     assert contact.present in (True, False)
@@ -95,10 +123,10 @@ def test_a_drift_is_told_on_other_skins(skin):
     basis = SineBasis(patch, *((6, 1) if skin == "strip" else (6, 6)))
     contacts, rng = Contacts(Plate(patch), layout), np.random.default_rng(5)
     K = rng.normal(0, 0.1, (3, len(layout))) + 1.0
-    found = contacts(K, LeastSquares(basis, layout)(K))[0]
+    contact, drift = pressed(K, LeastSquares(basis, layout)(K), contacts)
 
-    assert contacts.drift == pytest.approx(1.0, rel=0.1)
-    assert not found.present
+    assert drift == pytest.approx(1.0, rel=0.1)
+    assert not contact.present
 
 
 def test_a_room_that_warms_one_side_is_a_drift(tmp_path):

@@ -19,6 +19,7 @@ from kappaskin import (
     Transduction,
     load_scene,
 )
+from kappaskin.scenes.effects import Temperature
 from kappaskin.sensing import Amplifier, Converter
 
 SETUP = Setup(nx=33, ny=17, hold=0)
@@ -105,6 +106,18 @@ def test_the_contact_is_found_in_the_noise_of_table_1():
     assert estimate.contact.present
     np.testing.assert_allclose(estimate.contact.position, [0.05, 0.05], atol=1e-3)
     assert estimate.contact.displacement == pytest.approx(4.65e-3, abs=0.15e-3)
+
+
+def test_a_warm_side_does_not_show_in_the_surface():
+    warmth = Temperature(rise=10.0, time_constant=0.1, offset=0.1, gradient_x=8.0)
+    cold = load_scene("centre")
+    warm = replace(cold, effects=(*cold.effects, warmth))
+
+    before, after = (pipeline_of(scene)(frame_of(scene, n=900)) for scene in (cold, warm))
+
+    assert after.drift == pytest.approx(1.0, rel=0.2)
+    assert after.error_rms < 3 * before.error_rms
+    assert np.abs(after.error_at_load) < 3 * after.contact.displacement_sd
 
 
 def test_the_generation_times_and_number_are_carried():
