@@ -201,8 +201,8 @@ class Bayes(Estimator):
         return _BayesSolver(likelihood, self._root @ likelihood.V)
 
     # Repeated readings of one load scatter by the noise alone: with c = B diag(gamma s / d) y each
-    # y_k has the variance of the noise. What the readings leave open, which error bars have besides,
-    # is the same in all of them.
+    # y_k has the variance of the noise. What readings leave open, which is in error bars, is alike
+    # in all of them.
     def scatter(self, noise: float, curvature: Array | None = None) -> Uncertainty:
         if curvature is None:
             raise Refusal(

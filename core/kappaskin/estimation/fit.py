@@ -103,20 +103,20 @@ _OFF = 1.25  # times, or as a share of the given sigma, is too far off
 
 
 # A shape that the functions cannot follow leaves residuals too, mostly near the contact and in all
-# frames alike. So three sums of squares are taken, in units of sigma: of all readings; of the half of
-# the elements farthest from the one that bends most; and of the differences between two frames.
+# frames alike. So three sums of squares are taken, in units of sigma: of all readings; of the half
+# of the elements farthest from the one that bends most; and of the differences between two frames.
 # Misfit only adds to each, so the least is nearest to the noise: sigma is too small where even that
-# is too much, and too large where one of them is too little, by the chi-squared limits of its degrees
-# of freedom. Under a prior the noise shares these with what it does not let follow, most of it near
-# the contact: there sigma is too large only by the sum of all.
+# is too much, and too large where one of them is too little, by the chi-squared limits of its
+# degrees of freedom. Under a prior those are partly of what it keeps the shape from following, most
+# of it near the contact: then sigma is too large only by the sum of all.
 def sigma_ratio(
     scaled: Array, bend: Array, positions: Array, spare: Array, prior: bool = False
 ) -> float:
     """Noise over sigma by the residuals over sigma, `scaled` (T, 3, P); 1 where sigma may be right.
 
-    `bend` (T, P) in any unit says how far the skin is bent at each element, `positions` (P, 2) where
-    that is; `spare` (T,) are the degrees of freedom, those of a `prior` or of least squares. NaN
-    residuals do not count.
+    `bend` (T, P) in any unit says how far the skin is bent at each element, `positions` (P, 2) in m
+    where that is; `spare` (T,) are the degrees of freedom, left by a `prior` or by least squares.
+    NaN residuals do not count.
     """
     there = np.isfinite(scaled)
     share = np.maximum(spare, 0.0) / np.maximum(there.sum(axis=(1, 2)), 1)
@@ -132,17 +132,20 @@ def sigma_ratio(
         (np.sum(differ**2) / 2, np.minimum(free[one], free[other]).sum()),
     ]
     known = [(float(total), float(count)) for total, count in sums if count >= 1]
+    if not known:
+        return 1.0
     tail = _ALARM / (2 * len(sums))
-    for tail, least, found in (
-        (tail, _OFF, known),
-        (1 - tail, 1 / _OFF, known[:1] if prior else known),
-    ):
-        limits = [total / float(scipy.special.chdtri(count, tail)) for total, count in found]
-        ratio = math.sqrt(min((total / count for total, count in found), default=1.0))
-        off = math.sqrt(min(limits, default=1.0))
-        if off > least > 1 or off < least < 1:
-            return ratio
+    if min(total / _chi_squared(count, tail) for total, count in known) > _OFF**2:
+        return math.sqrt(min(total / count for total, count in known))
+    low = known[:1] if prior else known
+    if min(total / _chi_squared(count, 1 - tail) for total, count in low) < 1 / _OFF**2:
+        return math.sqrt(min(total / count for total, count in low))
     return 1.0
+
+
+def _chi_squared(count: float, tail: float) -> float:
+    """The value that chi-squared of `count` degrees of freedom exceeds with this probability."""
+    return float(scipy.special.chdtri(count, tail))
 
 
 def sigma_warning(ratio: float) -> str:
@@ -329,9 +332,7 @@ class Fit:
         bend = (self.curvature - self.residual).reshape(-1, 3, P) ** 2
         spare = np.broadcast_to(np.asarray(self.spare, float), residual.shape[:-2]).reshape(-1)
         places, bent = self.estimator.layout.positions, np.nansum(bend, axis=1)
-        return sigma_ratio(
-            scaled.reshape(-1, 3, P), bent, places, spare, self.estimator.has_prior
-        )
+        return sigma_ratio(scaled.reshape(-1, 3, P), bent, places, spare, self.estimator.has_prior)
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -59,10 +59,10 @@ def predicted_sd(
 ) -> Array:
     """Standard deviation (G,) in m of the displacement at `positions` (G, 2), for `noise` in 1/m.
 
-    How far estimates of the same load differ from frame to frame, and what no reading determines of
-    an elastic rim; from the covariance alone, without simulation. What the basis cannot represent is
-    not in it, nor what a prior decides. `curvature` (3, P) in 1/m are the readings of the load
-    without noise, at rest when None; `bayes` needs them, as its prior's scale follows from them.
+    How far estimates of one load differ from frame to frame, and what no reading determines of an
+    elastic rim; from the covariance alone, without simulation. Neither what the basis cannot
+    represent is in it nor what a prior decides. `curvature` (3, P) in 1/m are the readings of the
+    load without noise, at rest when None; `bayes` needs them: its prior's scale follows from them.
     """
     rows = estimator.basis.at(positions)
     undecided = np.linalg.norm(rows @ estimator.undecided, axis=1)
