@@ -17,10 +17,10 @@ ROOMS = (
 # What the house may come to at most; who brings a count down brings its limit down. The house is
 # to have 340 modules and 32,000 statements. A feature that raises a count says why beside it.
 LIMITS = {
-    # mechanics: shell and stretching; contact: influence, stretched, lower_bound.
-    "modules": 334,
+    # mechanics: shell and stretching; contact: influence, stretched, lower_bound; studies: summed.
+    "modules": 335,
     # Shells and plates that stretch, a load's size, slopes on shells, revisions of estimates.
-    "statements": 37_920,
+    "statements": 38_060,
     # _files: one way to read and write files; _text: text from outside. For all rooms and the app.
     "loose modules of core": 10,
     "loose modules of the app": 8,

@@ -2,7 +2,8 @@
 
 `python tests/truths/studies.py` prints all figures as the guide's table; a number of frames and the
 beginning of a case's name, both optional, say of how many and which; the name `told` prints what
-is told of one load and of two, `drift` what of drifts, `weights` what known weights find.
+is told of one load and of two, `drift` what of drifts, `weights` what known weights find,
+`beforehand` what is said of errors before there are frames, and of a sigma that is given.
 """
 
 import sys
@@ -19,17 +20,22 @@ from kappaskin import (
     Patch,
     Plate,
     PointContact,
+    PointLoad,
     Robust,
     SensorLayout,
     Simulator,
     basis_for,
     estimator_for,
     load_scene,
+    predicted_sd,
 )
 from kappaskin.calibration import WeightFit
 from kappaskin.calibration.weights import newtons
 from kappaskin.contact import Contacts
 from kappaskin.health import HealthMonitor
+from kappaskin.mechanics import DiscLoad
+from kappaskin.scenes.effects import UniformNoise
+from kappaskin.studies import Setting, costs
 from navier import HingedPlate, Load
 from sanders import CylinderShell
 from von_karman import StretchingPlate
@@ -599,8 +605,181 @@ def weights_table(frames=1000):
         yield f"| {name} | {np.mean(share):.3f} | {np.std(share):.3f} | {shares} |"
 
 
+# What is said beforehand: how estimates scatter, what error a setting has, and a given sigma
+
+PATCH = Patch(0.1, 0.1)
+_NAVIER = HingedPlate()
+_SEEN = np.stack(np.meshgrid(*2 * [np.linspace(0.005, 0.095, 19)]), axis=-1).reshape(-1, 2)
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A skin of m x m `elements`, `dead` of them, that `bayes` fits functions x functions to.
+
+    `noise` in 1/m RMS, `force` in N.
+    """
+
+    functions: int = 15
+    elements: int = 10
+    dead: int = 0
+    noise: float = NOISE / sqrt(3)
+    force: float = 0.15
+
+    def __str__(self):
+        dead = f", {self.dead} dead" if self.dead else ""
+        return (
+            f"{self.functions} x {self.functions} functions, {self.elements} x {self.elements} "
+            f"elements{dead}, noise {self.noise:.3g} 1/m, {self.force:g} N"
+        )
+
+
+PLANNED = [
+    Planned(),
+    Planned(functions=8),
+    Planned(noise=0.02),
+    Planned(noise=0.6),
+    Planned(dead=15),
+    Planned(elements=6),
+    Planned(force=0.02),
+    Planned(force=0.005),
+]
+_WIDTHS = ({}, {"radius": (1e-3, 5e-3)}, {"sd": (1e-3, 4e-3)})
+
+
+def _somewhere(rng, number, force):
+    """A point, a disc or a Gaussian in turn, from 0.2 to 0.8 of each side."""
+    width = {name: rng.uniform(*within) for name, within in _WIDTHS[number % 3].items()}
+    return Load(*rng.uniform(0.02, 0.08, 2), force, **width)
+
+
+def scatter(planned, frames, presses=9, seed=0) -> tuple[np.ndarray, float]:
+    """Scatter predicted of `bayes` over that of `frames` frames, over the skin, of each press.
+
+    And its error bars over its errors, by RMS over the skin and all presses.
+    """
+    rng, m = np.random.default_rng(seed), planned.elements
+    live = np.ones((3, m * m), bool)
+    live[:, rng.permutation(m * m)[: planned.dead]] = False
+    layout = replace(SensorLayout.regular(PATCH, m, m), live=live)
+    basis = basis_for(PATCH, "hinged", planned.functions, planned.functions)
+    fit, rows = estimator_for("bayes", basis, layout), basis.at(_SEEN)
+    ratios, bars, errors = [], [], []
+    for number in range(presses):
+        c = _NAVIER.coefficients(_somewhere(rng, number, planned.force))
+        exact = _NAVIER.curvature(c, layout.positions)
+        noise = sqrt(3) * planned.noise * rng.uniform(-1, 1, (frames, *exact.shape))
+        found = fit(np.where(live, exact + noise, np.nan))
+        w = found.coefficients.reshape(frames, -1) @ rows.T
+        predicted = predicted_sd(fit, planned.noise, _SEEN, np.where(live, exact, np.nan))
+        ratios.append(np.linalg.norm(predicted) / np.linalg.norm(w.std(axis=0, ddof=1)))
+        bars.append(np.mean(found.surface_sd(_SEEN) ** 2))
+        errors.append(np.mean((w - _NAVIER.surface(c, _SEEN)) ** 2))
+    return np.array(ratios), sqrt(np.mean(bars) / np.mean(errors))
+
+
+SMALL = [  # radius of a disc in m, force in N, noise in 1/m RMS
+    (0.0, 0.15, NOISE / sqrt(3)),
+    (1e-3, 0.15, NOISE / sqrt(3)),
+    (3e-3, 0.15, NOISE / sqrt(3)),
+    (1e-3, 0.005, NOISE / sqrt(3)),
+    (1e-3, 0.15, 0.03),
+    (3e-3, 0.15, 0.03),
+]
+SETTINGS = [
+    Setting("least-squares", (8, 8), (10, 10)),
+    Setting("bayes", (12, 12), (10, 10)),
+    Setting("least-squares", (12, 12), (16, 16)),
+]
+
+
+def promised(setting, radius, force, noise, frames, places=8, seed=0) -> np.ndarray:
+    """RMS errors that `cost` gives over those of the truth, (2,): without noise, and with it.
+
+    Means over presses at random places, by `frames` frames in all.
+    """
+    rng, scene = np.random.default_rng(seed), load_scene("centre")
+    (m, n), functions = setting.elements, setting.functions
+    layout = SensorLayout.regular(PATCH, m, n)
+    basis = basis_for(PATCH, "hinged", *functions)
+    fit = estimator_for(setting.method, basis, layout)
+    grid = np.stack(np.meshgrid(*2 * [np.linspace(0, 0.1, 41)]), axis=-1).reshape(-1, 2)
+    said, true = [], []
+    for number, (x, y) in enumerate(rng.uniform(0.02, 0.08, (places, 2))):
+        disc = DiscLoad(x, y, radius, force) if radius else PointLoad(x, y, force)
+        pressed = replace(
+            scene.touched_by(disc), effects=(UniformNoise(noise),), seed=seed + number
+        )
+        (cost,) = costs(pressed, [setting])
+        said.append((cost.errors.rms_exact, cost.errors.rms))
+        c = _NAVIER.coefficients(Load(x, y, force, radius=radius))
+        exact, w = _NAVIER.curvature(c, layout.positions), _NAVIER.surface(c, grid)
+        spread = sqrt(3) * noise * rng.uniform(-1, 1, (frames // places, *exact.shape))
+        read = np.concatenate([exact[None], exact + spread])
+        off = fit(read).coefficients.reshape(len(read), -1) @ basis.at(grid).T - w
+        rms = np.sqrt(np.mean(off**2, axis=1))
+        true.append((rms[0], rms[1:].mean()))
+    return np.mean(said, axis=0) / np.mean(true, axis=0)
+
+
+SIGMA_FITS = [("least-squares", 8), ("bayes", 15), ("least-squares", 6), ("robust", 8)]
+
+
+def sigma_said(method, functions, told, frames, seed=0) -> tuple[float, float]:
+    """Shares of frames, and of recordings of 50, that say a sigma of `told` times the noise is off.
+
+    Each frame of its own press; the recordings are of one press each.
+    """
+    rng, layout = np.random.default_rng(seed), SensorLayout.regular(PATCH, 10, 10)
+    basis = basis_for(PATCH, "hinged", functions, functions)
+    fit = estimator_for(method, basis, layout, told * NOISE / sqrt(3))
+
+    def said(count, number):
+        exact = _NAVIER.readings(_somewhere(rng, number, 0.15), layout.positions)
+        noise = rng.uniform(-NOISE, NOISE, (count, 3, 100))
+        return fit((exact + noise)[0] if count == 1 else exact + noise).sigma_ratio != 1
+
+    recordings = max(frames // 50, 3)
+    return (
+        float(np.mean([said(1, number) for number in range(frames)])),
+        float(np.mean([said(50, number) for number in range(recordings)])),
+    )
+
+
+def beforehand_table(frames=1000):
+    """What is said beforehand over what comes, as three tables in Markdown."""
+    yield "| bayes | scatter predicted / that of frames | from | to | error bars / errors |"
+    yield "|---|---|---|---|---|"
+    for planned in PLANNED:
+        ratios, bars = scatter(planned, frames)
+        share = f"{ratios.mean():.2f} | {ratios.min():.2f} | {ratios.max():.2f} | {bars:.2f}"
+        yield f"| {planned} | {share} |"
+    yield ""
+    yield "| load | setting | RMS promised / true, without noise | with noise |"
+    yield "|---|---|---|---|"
+    for radius, force, noise in SMALL:
+        for one in SETTINGS:
+            exact, noisy = promised(one, radius, force, noise, frames)
+            what = f"disc of {1e3 * radius:g} mm" if radius else "point"
+            (N, _), (m, _) = one.functions, one.elements
+            how = f"{one.method}, {N} x {N} functions, {m} x {m} elements"
+            yield f"| {what}, {force:g} N, {noise:.3g} 1/m | {how} | {exact:.2f} | {noisy:.2f} |"
+    yield ""
+    yield "| estimator | sigma given / noise | frames that say so | recordings that say so |"
+    yield "|---|---|---|---|"
+    for method, functions in SIGMA_FITS:
+        for off in (0.5, 1.0, 2.0):
+            each, all_of = sigma_said(method, functions, off, frames)
+            name = f"{method}, {functions} x {functions}"
+            yield f"| {name} | {off:g} | {100 * each:.1f} % | {100 * all_of:.1f} % |"
+
+
 def main(frames="1000", *name):
-    tables = {("told",): told_table, ("drift",): drift_table, ("weights",): weights_table}
+    tables = {
+        ("told",): told_table,
+        ("drift",): drift_table,
+        ("weights",): weights_table,
+        ("beforehand",): beforehand_table,
+    }
     if name in tables:
         for row in tables[name](int(frames)):
             print(row, flush=True)

@@ -8,8 +8,9 @@ import numpy as np
 from scipy import linalg
 
 from kappaskin.bases import Basis, SineBasis
+from kappaskin.errors import Refusal
 from kappaskin.estimation.estimator import Estimator, PatternCache
-from kappaskin.estimation.fit import Fit, power_of_two
+from kappaskin.estimation.fit import Fit, Uncertainty, power_of_two
 from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import Plate
 
@@ -110,21 +111,32 @@ class MarginalLikelihood:
         y, gamma, sigma = self._likeliest(K / unit)
         return y * unit, gamma, sigma * unit[:, 0]
 
-    def _likeliest(self, K: Array) -> tuple[Array, Array, Array]:
-        """The same for readings whose squares can be added up; sigma as if it were not known."""
+    def expected(self, K: Array, noise: float) -> float:
+        """gamma of the readings K (R,) with `noise` on them: that of their mean squares."""
+        _, y2, left = self._squares(K[None])
+        return float(self._scale(y2 + noise**2, left + noise**2 * (len(K) - self._k))[0])
+
+    def _squares(self, K: Array) -> tuple[Array, Array, Array]:
+        """y (T, k), their squares, and those of what is orthogonal to U (T,)."""
         y = K @ self.U
         rest = K - y @ self.U.T
         power = np.vecdot(K, K)
         # Rounding looks like noise: below it there is none to be found.
-        left = np.maximum(np.vecdot(rest, rest), self._floor * power)
-        y2 = y**2
+        return y, y**2, np.maximum(np.vecdot(rest, rest), self._floor * power)
+
+    def _likeliest(self, K: Array) -> tuple[Array, Array, Array]:
+        """The same for readings whose squares can be added up; sigma as if it were not known."""
+        y, y2, left = self._squares(K)
+        gamma = self._scale(y2, left)
+        fit = np.vecdot(y2, 1 / (1 + gamma[:, None] * self.s2[: self._k])) + left
+        return y, gamma, np.sqrt(fit / self._readings)
+
+    def _scale(self, y2: Array, left: Array) -> Array:
+        """The most likely gamma (T,) of squares y2 (T, k) and `left` (T,)."""
         fit = y2 @ self._share.T + left[:, None]
         cost = self._cost(fit, self._volume) - _AWAY * _GRID
         best = np.argmin(cost, axis=1)
-        t = self._refined(_GRID[best], y2, left)
-        gamma = np.exp(t - self._top)
-        fit = np.vecdot(y2, 1 / (1 + gamma[:, None] * self.s2[: self._k])) + left
-        return y, gamma, np.sqrt(fit / self._readings)
+        return np.exp(self._refined(_GRID[best], y2, left) - self._top)
 
     def _cost(self, fit: Array, volume: Array) -> Array:
         if self._sigma_known:
@@ -187,6 +199,25 @@ class Bayes(Estimator):
         sigma_known, rounding = self.sigma is not None, float(np.finfo(self.dtype).eps)
         likelihood = MarginalLikelihood(A, sigma_known, rounding**2)
         return _BayesSolver(likelihood, self._root @ likelihood.V)
+
+    # Repeated readings of one load scatter by the noise alone: with c = B diag(gamma s / d) y each
+    # y_k has the variance of the noise. What readings leave open, which is in error bars, is alike
+    # in all of them.
+    def scatter(self, noise: float, curvature: Array | None = None) -> Uncertainty:
+        if curvature is None:
+            raise Refusal(
+                "expected the curvature of a load as well, since the prior's scale follows from "
+                "it; got none; give the readings (3, P) of the load without noise"
+            )
+        self._check_shape(curvature)
+        flat = curvature.ravel()
+        used = self._there(flat)
+        if not used.any():
+            raise self.refusal(0, 0)
+        solver = self._solvers(used, self._made)
+        gamma = solver.likelihood.expected(flat[used] * self.weight[used], noise)
+        s2 = solver.likelihood.s2
+        return PosteriorUncertainty(solver.B, gamma**2 * s2 / (1 + gamma * s2) ** 2)
 
     def _fit(self, flat: Array, used: Mask) -> Fit:
         if not used.any():

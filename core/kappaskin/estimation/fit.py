@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Protocol, cast
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from kappaskin.errors import Refusal
@@ -96,6 +97,70 @@ def slope_warning(slope: float) -> str:
     return f"slopes reach {slope:.2g}: up to {flat} % too flat; use finite-slope"
 
 
+_ALARM = 1e-3
+"""Probability of a warning of a right sigma by chance, of a fit of any number of frames."""
+_OFF = 1.25  # times, or as a share of the given sigma, is too far off
+
+
+# A shape that the functions cannot follow leaves residuals too, mostly near the contact and in all
+# frames alike. So three sums of squares are taken, in units of sigma: of all readings; of the half
+# of the elements farthest from the one that bends most; and of the differences between two frames.
+# Misfit only adds to each, so the least is nearest to the noise: sigma is too small where even that
+# is too much, and too large where one of them is too little, by the chi-squared limits of its
+# degrees of freedom. Under a prior those are partly of what it keeps the shape from following, most
+# of it near the contact: then sigma is too large only by the sum of all.
+def sigma_ratio(
+    scaled: Array, bend: Array, positions: Array, spare: Array, prior: bool = False
+) -> float:
+    """Noise over sigma by the residuals over sigma, `scaled` (T, 3, P); 1 where sigma may be right.
+
+    `bend` (T, P) in any unit says how far the skin is bent at each element, `positions` (P, 2) in m
+    where that is; `spare` (T,) are the degrees of freedom, left by a `prior` or by least squares.
+    NaN residuals do not count.
+    """
+    there = np.isfinite(scaled)
+    share = np.maximum(spare, 0.0) / np.maximum(there.sum(axis=(1, 2)), 1)
+    squares, free = np.where(there, scaled, 0.0) ** 2, there * share[:, None, None]
+    away = np.sum((positions - positions[np.argmax(bend, axis=1), None]) ** 2, axis=2)
+    far = (away >= np.median(away, axis=1, keepdims=True))[:, None]
+    one, other = slice(0, len(scaled) // 2 * 2, 2), slice(1, None, 2)
+    both = there[one] & there[other]
+    differ = np.subtract(scaled[one], scaled[other], where=both, out=np.zeros(both.shape))
+    sums = [
+        (squares.sum(), free.sum()),
+        (squares.sum(where=far), free.sum(where=far)),
+        (np.sum(differ**2) / 2, np.minimum(free[one], free[other]).sum()),
+    ]
+    known = [(float(total), float(count)) for total, count in sums if count >= 1]
+    if not known:
+        return 1.0
+    tail = _ALARM / (2 * len(sums))
+    if min(total / _chi_squared(count, tail) for total, count in known) > _OFF**2:
+        return math.sqrt(min(total / count for total, count in known))
+    low = known[:1] if prior else known
+    if min(total / _chi_squared(count, 1 - tail) for total, count in low) < 1 / _OFF**2:
+        return math.sqrt(min(total / count for total, count in low))
+    return 1.0
+
+
+def _chi_squared(count: float, tail: float) -> float:
+    """The value that chi-squared of `count` degrees of freedom exceeds with this probability."""
+    return float(scipy.special.chdtri(count, tail))
+
+
+def sigma_warning(ratio: float) -> str:
+    """What to say of a `sigma_ratio`; nothing of 1."""
+    if ratio == 1:
+        return ""
+    said = f"residuals are {ratio:.2g} times what the given sigma explains"
+    if ratio < 1:
+        return f"{said}: sigma is too large, and so are the error bars; check it"
+    return (
+        f"{said}: sigma is too small, or the functions cannot follow the shape; check sigma, "
+        "or use more functions"
+    )
+
+
 def propagated_covariance(rows: Array, covariance: Array) -> Array:
     """Covariance (..., R, R) of `rows` (..., R, N) times what has this `covariance` (..., N, N)."""
     if rows.ndim == 2:
@@ -128,6 +193,7 @@ class Fit:
     (...) in 1/m is the noise where the estimator knows it. An iteration took `steps` (...); where
     it has not `converged` (...), the result is that of least squares. `suspect` (..., P) says which
     elements were excluded and why, as numbers in `FAULTS`; None where the estimator excludes none.
+    `weights` (T, 3 P) in m are 1 / sigma of each frame, None where they are the estimator's.
     """
 
     estimator: "Estimator"
@@ -139,6 +205,7 @@ class Fit:
     steps: ArrayLike = 0
     converged: ArrayLike = True
     suspect: "NDArray[np.uint8] | None" = None
+    weights: Array | None = None
 
     @cached_property
     def residual(self) -> Array:
@@ -250,12 +317,29 @@ class Fit:
             matters = (slope >= STEEP) | (slope**2 > error.ravel())
         return float(np.max(slope, initial=0.0, where=matters))
 
+    @cached_property
+    def sigma_ratio(self) -> float:
+        """Noise over the sigma that was given, by the residuals; 1 where that may be right.
+
+        And where none was given, or the estimator has a memory, whose residuals it decides itself.
+        Of one frame, or of all of them together.
+        """
+        if self.estimator.sigma is None or self.estimator.has_memory or not self.curvature.size:
+            return 1.0
+        weight = self.estimator.weight if self.weights is None else self.weights
+        residual, P = self.residual.astype(float), len(self.estimator.layout)
+        scaled = residual.reshape(-1, 3 * P) * weight
+        bend = (self.curvature - self.residual).reshape(-1, 3, P) ** 2
+        spare = np.broadcast_to(np.asarray(self.spare, float), residual.shape[:-2]).reshape(-1)
+        places, bent = self.estimator.layout.positions, np.nansum(bend, axis=1)
+        return sigma_ratio(scaled.reshape(-1, 3, P), bent, places, spare, self.estimator.has_prior)
+
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the answer neglects, in words."""
         frames = np.size(self.converged)
         lost = frames - np.count_nonzero(self.converged)
-        found = (slope_warning(self.neglected_slope),)
+        found = (slope_warning(self.neglected_slope), sigma_warning(self.sigma_ratio))
         if lost:
             where = f" in {lost} of {frames} frames" if frames > 1 else ""
             found += (self.estimator.failure.format(where),)
@@ -296,6 +380,8 @@ class Fit:
         for fit in fits:
             own = fit.uncertainty
             uncertainties.extend(own if isinstance(own, Sequence) else [own] * len(fit.curvature))
+        one = all(fit.estimator is fits[0].estimator for fit in fits)
+        weights = [np.tile(fit.estimator.weight, (len(fit.curvature), 1)) for fit in fits]
         known_noises = [fit.known_noise for fit in fits if fit.known_noise is not None]
         suspect: list[NDArray[np.uint8]] = [fit.suspect for fit in fits if fit.suspect is not None]
         return Fit(
@@ -308,6 +394,7 @@ class Fit:
             of_each("steps"),
             of_each("converged"),
             np.concatenate(suspect)[order] if suspect else None,
+            None if one else joined(weights),
         )
 
     @staticmethod

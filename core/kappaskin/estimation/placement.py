@@ -17,7 +17,6 @@ from scipy import linalg
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
 from kappaskin.estimation.estimator import Estimator, column_lengths
-from kappaskin.estimation.fit import Uncertainty
 from kappaskin.frames import Array, Mask
 from kappaskin.sensing import SensorLayout
 
@@ -55,15 +54,19 @@ Placement = Callable[[SensorLayout, Basis, float], SensorLayout]
 """A function of layout, basis to determine, and least distance in m; a layout as large."""
 
 
-def predicted_sd(estimator: Estimator, noise: float, positions: Array) -> Array:
-    """Standard deviation (P,) in m of the displacement at `positions` (P, 2), for `noise` in 1/m.
+def predicted_sd(
+    estimator: Estimator, noise: float, positions: Array, curvature: Array | None = None
+) -> Array:
+    """Standard deviation (G,) in m of the displacement at `positions` (G, 2), for `noise` in 1/m.
 
-    From the covariance alone, without simulation. What the basis cannot represent is not in it.
+    How far estimates of one load differ from frame to frame, and what no reading determines of an
+    elastic rim; from the covariance alone, without simulation. Neither what the basis cannot
+    represent is in it nor what a prior decides. `curvature` (3, P) in 1/m are the readings of the
+    load without noise, at rest when None; `bayes` needs them: its prior's scale follows from them.
     """
     rows = estimator.basis.at(positions)
     undecided = np.linalg.norm(rows @ estimator.undecided, axis=1)
-    spread = cast("Uncertainty", estimator.at_rest().uncertainty)
-    return np.hypot(noise * spread.sd_of(rows), undecided)
+    return np.hypot(noise * estimator.scatter(noise, curvature).sd_of(rows), undecided)
 
 
 def _at(places: Array, layout: SensorLayout) -> SensorLayout:

@@ -13,7 +13,7 @@ from kappaskin.bases import Basis
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation.bayes import prior_root
 from kappaskin.estimation.estimator import Estimator, real_array
-from kappaskin.estimation.fit import Fit, RootUncertainty
+from kappaskin.estimation.fit import Fit, RootUncertainty, Uncertainty
 from kappaskin.estimation.kalman import START_SPEED, ModalKalmanFilter, SignalLevel
 from kappaskin.frames import Array, Mask
 
@@ -119,6 +119,12 @@ class Tracking(Estimator, Stateful):
         fresh = copy(self)
         fresh.restart()
         return fresh(self._rest(missing))
+
+    def scatter(self, noise: float, curvature: Array | None = None) -> Uncertainty:
+        raise Refusal(
+            "expected an estimator without memory to predict the scatter of, got tracking, whose "
+            "estimates depend on the frames before; simulate them"
+        )
 
     def __call__(self, curvature: ArrayLike) -> Fit:
         """Fit the next frame (3, P) in 1/m, or T of them (T, 3, P), read 6 ms after each other."""

@@ -65,9 +65,13 @@ def covered(fit: Fit, reference: Basis, true: Array) -> Array:
 
 def points_on(patch: Patch) -> Array:
     """The points (G, 2) of the skin over which errors are averaged."""
-    x, y = patch.grid(_POINTS, 2 if patch.strip else _POINTS)
-    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    points = np.stack(np.meshgrid(*grid_on(patch)), axis=-1).reshape(-1, 2)
     return points[patch.contains(points)]
+
+
+def grid_on(patch: Patch) -> tuple[Array, Array]:
+    """x (nx,) and y (ny,) in m of the grid that these points lie on."""
+    return patch.grid(_POINTS, 2 if patch.strip else _POINTS)
 
 
 def traced(made: Callable[[], _Made]) -> tuple[_Made, int]:

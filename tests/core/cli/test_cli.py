@@ -73,6 +73,24 @@ def test_reconstruct_says_what_each_method_neglects(run, npz, tmp_path) -> None:
     sigma = np.full(K.shape, 0.2)
     assert re.fullmatch(words, run("reconstruct", npz(curvature=K, sigma=sigma), *out)[2])
 
+
+@pytest.mark.parametrize("off", [0.5, 2.0])
+@pytest.mark.parametrize("shape", [(), (3, 100), (4, 3, 100)])
+def test_reconstruct_says_that_a_sigma_contradicts_the_residuals(
+    run, npz, tmp_path, shape, off
+) -> None:
+    rng, out = np.random.default_rng(0), ("--out", tmp_path / "out.npz")
+    noise = np.array([0.1, 0.2, 0.4, 0.8])[:, None, None] if len(shape) > 2 else 0.2
+    K = READINGS["curvature"] / 30 + noise * rng.normal(size=(4, 3, 100))
+    sigma = off * np.broadcast_to(noise, shape)
+    told = run("reconstruct", npz(curvature=K, sigma=sigma), *out)[2]
+    what = "small, or the functions" if off < 1 else "large, and so are the error bars"
+    ratio = r"(2|1\.9|2\.1)" if off < 1 else r"0\.(5|49|48|51)"
+    said = rf"kappaskin: residuals are {ratio} times what the given sigma explains: sigma is too "
+    assert re.search(said + what, told), told
+    right = run("reconstruct", npz(curvature=K, sigma=sigma / off), *out)[2]
+    assert "sigma" not in right
+
     finite = (*out, "--method", "finite-slope")
     assert run("reconstruct", npz(curvature=K), *finite)[2] == f"{out[1]}: 4 shapes\n"
     lost = "kappaskin: no convergence in 4 of 4 frames; least squares shown\n"

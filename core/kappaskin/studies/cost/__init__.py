@@ -77,6 +77,16 @@ class Setting:
 
 
 @dataclass(frozen=True)
+class Errors:
+    """Errors in m, as those of a `Cost`."""
+
+    e_exact: float
+    rms_exact: float
+    e: float
+    rms: float
+
+
+@dataclass(frozen=True)
 class Cost:
     """What a setting gives and takes; lengths in m, times in s, memory in bytes.
 
@@ -88,7 +98,9 @@ class Cost:
     `e` is the mean of the signed error at the load over the frames and `e_sd` its standard
     deviation, `rms` the mean of the RMS error over the skin; `e_exact` and `rms_exact` are those
     of readings that nothing spoils. `shape_rms` is the RMS of the true shape itself, the error
-    of an answer that is always zero.
+    of an answer that is always zero. These take the scene's functions for the whole truth; `summed`
+    are the same errors where the skin's response is summed until it stands, None of a skin whose
+    response is not (`SummedResponse`).
     """
 
     setting: Setting
@@ -105,6 +117,12 @@ class Cost:
     e_sd: float
     rms: float
     shape_rms: float
+    summed: Errors | None = None
+
+    @property
+    def errors(self) -> Errors:
+        """The errors to expect of a real skin, as far as they are known."""
+        return self.summed or Errors(self.e_exact, self.rms_exact, self.e, self.rms)
 
     @property
     def ratio(self) -> float:
@@ -185,8 +203,11 @@ def frontier(costs: Iterable[Cost | Refused], total: bool = False) -> tuple[Cost
 
 
 def cheapest(costs: Iterable[Cost | Refused], within: float) -> Cost | None:
-    """The cost with the least total time whose RMS error, with noise, is `within` m or less."""
+    """The cost with the least total time whose RMS error, with noise, is `within` m or less.
+
+    It is that of `Cost.errors`.
+    """
     if not 0 < within < math.inf:
         raise Refusal(f"expected an accuracy above zero in m, got {within}")
-    able = [cost for cost in costs if isinstance(cost, Cost) and cost.rms <= within]
-    return min(able, key=lambda cost: (cost.total_time, cost.rms), default=None)
+    able = [cost for cost in costs if isinstance(cost, Cost) and cost.errors.rms <= within]
+    return min(able, key=lambda cost: (cost.total_time, cost.errors.rms), default=None)

@@ -5,6 +5,7 @@ from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import cycle, islice
+from typing import cast
 
 import numpy as np
 
@@ -39,8 +40,9 @@ from kappaskin.studies.accuracy import (
     seconds,
     traced,
 )
-from kappaskin.studies.cost import SCANS, Cost, Refused, Setting, own_elements
+from kappaskin.studies.cost import SCANS, Cost, Errors, Refused, Setting, own_elements
 from kappaskin.studies.simulation import costs_of
+from kappaskin.studies.summed import SummedResponse
 
 SETTLING, DRAWS = 8, 40
 """Frames that methods with a memory are given to settle, and those that are judged after them."""
@@ -50,11 +52,16 @@ _CALLS, _SLOW = 5, 1e-3  # in a turn; one of a method whose frame takes longer, 
 
 @dataclass(frozen=True, eq=False)
 class _SkinReadings:
-    """Elements, and what they read of the scene: (T, 3, P) in 1/m, `exact` and as it is `read`."""
+    """Elements, and what they read of the scene: (T, 3, P) in 1/m, `exact` and as it is `read`.
+
+    `beyond` is what they read of the skin's response beyond the scene's functions, where that is
+    known.
+    """
 
     sensor: Sensor
     exact: Array
     read: Array
+    beyond: Array | None
 
     @property
     def layout(self) -> SensorLayout:
@@ -113,6 +120,13 @@ class Bench:
         forces = np.array([pressed.force.ravel() for pressed in self._pressed])
         return shapes_under(self.scene.plate, self.scene.basis, forces)
 
+    @cached_property
+    def _response(self) -> SummedResponse | None:
+        """The skin's response beyond the scene's functions, where it is known."""
+        if not SummedResponse.is_known(self.scene):
+            return None
+        return SummedResponse(self.scene, [pressed.loads for pressed in self._pressed])
+
     def _skin(self, elements: tuple[int, int] | None) -> _SkinReadings:
         if elements not in self._skins:
             self._skins[elements] = self._read_by(elements)
@@ -127,9 +141,9 @@ class Bench:
             read.append(sensor.nominal(simulator.scanned(sensor.scan(), n, t, lambda: 0.0)))
         operator = scene.layout.curvature_operator(scene.basis, scene.plate)
         shape = (len(read), 3, len(scene.layout))
-        return _SkinReadings(
-            sensor, (self._truth @ operator.T).reshape(shape), np.reshape(read, shape)
-        )
+        beyond = None if self._response is None else self._response.readings(scene.layout)
+        exact = (self._truth @ operator.T).reshape(shape)
+        return _SkinReadings(sensor, exact, np.reshape(read, shape), beyond)
 
     def __call__(self, setting: Setting) -> Cost | Refused:
         """What `setting` costs, or why it gives no answer."""
@@ -165,6 +179,13 @@ class Bench:
         time_per_frame, lstsq_time = _medians(fit, layout, exact, read)
         e_exact, rms_exact = self._errors(exactly, exact)
         e, rms = self._errors(fit, read)
+        summed = None
+        if skin.beyond is not None:
+            of_exact, of_read = (
+                self._summed_errors(fit, curvature + skin.beyond)
+                for fit, curvature in ((exactly, exact), (fit, read))
+            )
+            summed = Errors(*of_exact, *of_read)
         reference, w = self.scene.basis, self._truth[SETTLING:]
         shape = rms_distance(reference, np.zeros_like(w), reference, w)
         return Cost(
@@ -182,7 +203,17 @@ class Bench:
             float(e.std(ddof=1)),
             float(rms.mean()),
             root_mean_square(shape),
+            summed,
         )
+
+    def _summed_errors(self, fit: Estimator, curvature: Array) -> tuple[float, float]:
+        """Means of the errors at the load and over the skin, beside the whole response."""
+        c = fit(curvature).coefficients.reshape(len(curvature), -1).astype(float)
+        contact = np.array([pressed.contact for pressed in self._pressed])
+        response = cast("SummedResponse", self._response)
+        e, rms = response.errors(fit.basis, c, self._truth, contact)
+        check_finite(e, rms)
+        return float(e[SETTLING:].mean()), float(rms[SETTLING:].mean())
 
     def _errors(self, fit: Estimator, curvature: Array) -> tuple[Array, Array]:
         """Errors (DRAWS,) at the load and over the skin in m, of the frames after the settling."""

@@ -30,8 +30,9 @@ from kappaskin.studies.figures import style
 
 _HEAD = (
     f"   {'method':<14}{'basis':<6}{'elements':<9}{'bits':>4}{'channels':>12}{'set-up':>8}"
-    f"{'frame':>7}{'/lstsq':>7}{'memory':>7}{'scan':>6}{'exact':>9}{'RMS':>8}{'E at load':>16}\n"
-    f"{'':48}{'ms':>8}{'us':>7}{'':>7}{'KiB':>7}{'ms':>6}{'mm':>9}{'mm':>8}{'mm':>16}"
+    f"{'frame':>7}{'/lstsq':>7}{'memory':>7}{'scan':>6}{'exact':>8}{'RMS':>7}"
+    f"{'summed':>7}{'E at load':>15}\n"
+    f"{'':48}{'ms':>8}{'us':>7}{'':>7}{'KiB':>7}{'ms':>6}{'mm':>8}{'mm':>7}{'mm':>7}{'mm':>15}"
 )
 
 
@@ -53,7 +54,11 @@ def row(cost: Cost | Refused) -> dict[str, Any]:
     return setting | {name: figure(cost) for name, figure in _FIGURES.items()} | {"refused": None}
 
 
-_FIGURES: dict[str, Callable[[Cost], float]] = {
+def _in_mm(length: float | None) -> float | None:
+    return None if length is None else 1e3 * length
+
+
+_FIGURES: dict[str, Callable[[Cost], float | None]] = {
     "element_count": lambda cost: cost.count,
     "channels": lambda cost: cost.channels,
     "setup_s": lambda cost: cost.setup_time,
@@ -69,6 +74,10 @@ _FIGURES: dict[str, Callable[[Cost], float]] = {
     "e_sd_mm": lambda cost: 1e3 * cost.e_sd,
     "rms_mm": lambda cost: 1e3 * cost.rms,
     "shape_rms_mm": lambda cost: 1e3 * cost.shape_rms,
+    "summed_e_exact_mm": lambda cost: _in_mm(cost.summed and cost.summed.e_exact),
+    "summed_rms_exact_mm": lambda cost: _in_mm(cost.summed and cost.summed.rms_exact),
+    "summed_e_mm": lambda cost: _in_mm(cost.summed and cost.summed.e),
+    "summed_rms_mm": lambda cost: _in_mm(cost.summed and cost.summed.rms),
 }
 
 
@@ -156,6 +165,7 @@ What accuracy costs in the scene {name}: a {patch.name}, {1e6 * each:g} us per c
 frame   median from readings to coefficients, and over numpy.linalg.lstsq on the same operator
 scan    conversion of the channels; set-up to the first answer, memory at its highest point
 RMS     error over the skin, mean of {DRAWS} frames with the scene's noise; exact: without noise
+summed  RMS with noise, where the skin's response is summed beyond the scene's functions
 E       signed error at the load, mean +- standard deviation of those frames
 * +     more accurate, by {100 * ALIKE:.0f} % at least, than all faster ones: *frame, +with scan"""
 
@@ -183,8 +193,9 @@ def _figures_text(cost: Cost | Refused) -> str:
     return (
         f"{f'{c.setting.scanned} {c.channels}':>12}{1e3 * c.setup_time:>8.2f}"
         f"{1e6 * c.time_per_frame:>7.0f}{c.ratio:>7.2f}{c.memory / 1024:>7.0f}"
-        f"{1e3 * c.conversion_time:>6.2f}{_mm(c.rms_exact, 9)}{_mm(c.rms, 8)}"
-        f"{f'{1e3 * c.e:+.3f} +-{1e3 * c.e_sd:.3f}':>16}"
+        f"{1e3 * c.conversion_time:>6.2f}{_mm(c.rms_exact, 8)}{_mm(c.rms, 7)}"
+        f"{_mm(c.summed.rms, 7) if c.summed else ' ' * 6 + '-'}"
+        f"{f'{1e3 * c.e:+.3f} +-{1e3 * c.e_sd:.3f}':>15}"
     )
 
 
@@ -271,7 +282,7 @@ def accuracy_verdict(
     known = [cost for cost in costs if isinstance(cost, Cost)]
     if not known:
         return AccuracyVerdict(False, None, ("No measured setting gives a shape.",))
-    best = min(known, key=lambda cost: cost.rms)
+    best = min(known, key=lambda cost: cost.errors.rms)
     line = f"{_mm_text(within)} is reached by none of {len(known)} settings; the nearest is"
     return AccuracyVerdict(False, best, (line, *described(best), *_missing(scene, known, within)))
 
@@ -291,13 +302,13 @@ def elements_text(cost: Cost) -> str:
 
 def described(cost: Cost) -> tuple[str, ...]:
     """A setting and its figures, in three lines."""
-    s = cost.setting
+    s, error = cost.setting, cost.errors
     scanned = f"{'all' if s.scanned == ALL else s.scanned + ','} {cost.channels} channels scanned"
     return (
         f"  {s.method}, {s.functions[0]} x {s.functions[1]} functions, {s.precision}, "
         f"{elements_text(cost)} elements, {scanned}",
-        f"  RMS error {_mm_text(cost.rms)}, {_mm_text(cost.rms_exact)} without noise; at the load "
-        f"{1e3 * cost.e:+.3f} +- {1e3 * cost.e_sd:.3f} mm",
+        f"  RMS error {_mm_text(error.rms)}, {_mm_text(error.rms_exact)} without noise; at the "
+        f"load {1e3 * error.e:+.3f} +- {1e3 * cost.e_sd:.3f} mm",
         f"  an estimate after {_s(cost.total_time)}: {_s(cost.conversion_time)} of conversion, "
         f"{_s(cost.time_per_frame)} of arithmetic",
     )
@@ -312,7 +323,7 @@ def _remarks(
     if found.setting.elements != own:
         mine = [c for c in costs if isinstance(c, Cost) and c.setting.elements == own]
         with_mine = cheapest(mine, within)
-        nearest = min(mine, key=lambda cost: cost.rms, default=None)
+        nearest = min(mine, key=lambda cost: cost.errors.rms, default=None)
         if with_mine is not None:
             lines += [
                 "That is another sensor; with the scene's own elements",
@@ -336,13 +347,13 @@ def _remarks(
 def _missing(scene: Scene, known: Sequence[Cost], within: float) -> list[str]:
     """What it would take to reach `within`, which none of `known` does."""
     whole = [cost for cost in known if cost.setting.scanned == ALL] or known
-    able = [cost for cost in whole if cost.rms_exact < within]
+    able = [cost for cost in whole if cost.errors.rms_exact < within]
     if not able:
-        least = min(whole, key=lambda cost: cost.rms_exact)
+        least = min(whole, key=lambda cost: cost.errors.rms_exact)
         Ni, Nj = least.setting.functions
         return [
             "More functions are needed, and elements to distinguish them: without noise the error "
-            f"is {_mm_text(least.rms_exact)}",
+            f"is {_mm_text(least.errors.rms_exact)}",
             f"at best, with {Ni} x {Nj} functions on {elements_text(least)} elements. Neither a "
             "faster conversion nor more time helps.",
         ]
@@ -351,7 +362,7 @@ def _missing(scene: Scene, known: Sequence[Cost], within: float) -> list[str]:
     frames = math.ceil(times)
     return [
         f"More readings are needed: without noise {Ni} x {Nj} functions on {elements_text(cost)} "
-        f"elements reach {_mm_text(cost.rms_exact)}. It takes {times:.2g} times as many:",
+        f"elements reach {_mm_text(cost.errors.rms_exact)}. It takes {times:.2g} times as many:",
         f"  more elements: {_more_elements(scene, cost, times)}",
         f"  or more time: about {frames} frames averaged, {_s(frames * cost.total_time)} for an "
         "estimate, while the load is constant",
@@ -361,7 +372,8 @@ def _missing(scene: Scene, known: Sequence[Cost], within: float) -> list[str]:
 def _times(cost: Cost, within: float) -> float:
     """How many times the readings of `cost` bring its error down to `within`."""
     # Independent noise: its share of the error goes with 1 / sqrt(readings).
-    return (cost.rms**2 - cost.rms_exact**2) / (within**2 - cost.rms_exact**2)
+    error = cost.errors
+    return (error.rms**2 - error.rms_exact**2) / (within**2 - error.rms_exact**2)
 
 
 def _more_elements(scene: Scene, cost: Cost, times: float) -> str:

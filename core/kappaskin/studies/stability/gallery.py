@@ -228,6 +228,7 @@ def _loads() -> Iterator[HardCase]:
     plate, finest = Plate(_SQUARE), SineBasis(_SQUARE, 60, 60)
     resolved = {
         "point load, summed": ([PointLoad(0.031, 0.052)], "a point load, of 60 x 60 functions"),
+        "disc of 1 mm": ([DiscLoad(0.031, 0.052, radius=1e-3)], "a disc of 1 mm radius, 60 x 60"),
         "disc of 5 mm": ([DiscLoad(0.031, 0.052, radius=5e-3)], "a disc of 5 mm radius, 60 x 60"),
         "two loads": (
             [PointLoad(0.031, 0.052), PointLoad(0.051, 0.052)],
