@@ -2,7 +2,8 @@
 
 `python tests/truths/studies.py` prints all figures as the guide's table; a number of frames and the
 beginning of a case's name, both optional, say of how many and which; the name `told` prints what
-is told of one load and of two, `drift` what of drifts, `weights` what known weights find.
+is told of one load and of two, `drift` what of drifts, `weights` what known weights find, and
+`objects` how objects are named.
 """
 
 import sys
@@ -31,6 +32,7 @@ from kappaskin.calibration.weights import newtons
 from kappaskin.contact import Contacts
 from kappaskin.health import HealthMonitor
 from navier import HingedPlate, Load
+from objects import objects_table
 from sanders import CylinderShell
 from von_karman import StretchingPlate
 
@@ -581,7 +583,10 @@ def weights_table(frames=1000):
 
 
 def main(frames="1000", *name):
-    tables = {("told",): told_table, ("drift",): drift_table, ("weights",): weights_table}
+    tables = {
+        **{("told",): told_table, ("drift",): drift_table, ("weights",): weights_table},
+        ("objects",): objects_table,
+    }
     if name in tables:
         for row in tables[name](int(frames)):
             print(row, flush=True)
