@@ -390,9 +390,11 @@ class WeightedReadings:
         U, s, _ = np.linalg.svd(free[:, near], full_matrices=False)
         explained, k = float(np.sum((U[:, s > _ALIKE].T @ left) ** 2)), int((s > _ALIKE).sum())
         remains = max(squares - explained, _EXACT) / (rest - k)
-        many = float(scipy.special.fdtrc(k, rest - k, explained / k / remains))
+        many = cast(
+            "float", scipy.special.fdtrc(float(k), float(rest - k), explained / k / remains)
+        )
         t = math.sqrt(one / max(squares - one, _EXACT) * (rest - 1))
-        single = 2 * len(size) * float(scipy.special.stdtr(rest - 1, -t))
+        single = 2 * len(size) * float(scipy.special.stdtr(float(rest - 1), -t))
         return min(2 * min(many, single), 1.0)
 
     def rounded(self, cylinder: Optimum, edge: Optimum) -> Optimum:
