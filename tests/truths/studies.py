@@ -3,7 +3,8 @@
 `python tests/truths/studies.py` prints all figures as the guide's table; a number of frames and the
 beginning of a case's name, both optional, say of how many and which; the name `told` prints what
 is told of one load and of two, `drift` what of drifts, `weights` what known weights find,
-`beforehand` what is said of errors before there are frames, and of a sigma that is given.
+`beforehand` what is said of errors before there are frames, and of a sigma that is given, `objects`
+how objects are named.
 """
 
 import sys
@@ -37,6 +38,7 @@ from kappaskin.mechanics import DiscLoad
 from kappaskin.scenes.effects import UniformNoise
 from kappaskin.studies import Setting, costs
 from navier import HingedPlate, Load
+from objects import objects_table
 from sanders import CylinderShell
 from von_karman import StretchingPlate
 
@@ -779,6 +781,7 @@ def main(frames="1000", *name):
         ("drift",): drift_table,
         ("weights",): weights_table,
         ("beforehand",): beforehand_table,
+        ("objects",): objects_table,
     }
     if name in tables:
         for row in tables[name](int(frames)):

@@ -105,6 +105,30 @@ def _at_ends(parameters: Array, across: Array, middle: float) -> PointForces:
     return PointForces(points, force * growth[2], moves, growth)
 
 
+def oval(parameters: Array) -> PointForces:
+    """Parameters of `ends` and q: forces around an ellipse, as long and 2 sqrt(q) wide.
+
+    They are as 1 + 2 share to 1 - 2 share at its two ends, and change evenly from one to the other.
+    """
+    force, angle, length, share = *parameters[2:4], math.sqrt(parameters[4]), parameters[5]
+    n, b = len(_AROUND), math.sqrt(parameters[6])
+    axis = np.array([math.cos(angle), math.sin(angle)])
+    normal = np.array([-axis[1], axis[0]])
+    along, across = np.cos(_AROUND), np.sin(_AROUND)
+    place = (along - share) / 2
+    u, v = length * place, b * across
+    moves, growth = np.zeros((7, n, 2)), np.zeros((7, n))
+    moves[0, :, 0] = moves[1, :, 1] = 1
+    moves[3] = np.multiply.outer(u, normal) - np.multiply.outer(v, axis)
+    moves[4] = np.multiply.outer(place / (2 * length), axis)
+    moves[5] = -length / 2 * axis
+    moves[6] = np.multiply.outer(across / (2 * b), normal)
+    growth[2], growth[5] = (1 + 2 * share * along) / n, 2 * along * force / n
+    points = parameters[:2] + np.multiply.outer(u, axis) + np.multiply.outer(v, normal)
+    return PointForces(points, force * growth[2], moves, growth)
+
+
+_GRID = 13  # places along each side
 _MOST = 2000  # elements: 100 MB
 _SEARCHED = np.array([0.025, 0.045, 0.07, 0.1, 0.14, 0.19, 0.26, 0.35])  # of the shorter side
 _ANGLES = 16
@@ -134,6 +158,12 @@ class ElasticSkin:
         self.half_wave = max(patch.a, patch.b) / functions
         self.bend = 1 / (4 * math.pi * plate.rigidity)
         """Curvature in 1/m lost inside a ring or an arc per N and e-fold of its size."""
+        steps = (np.arange(_GRID) + 0.5) / _GRID
+        x, y = np.meshgrid(patch.a * steps, patch.b * steps)
+        self.grid = np.stack([x.ravel(), y.ravel()], axis=-1)
+        """Places (k, 2) in m all over the skin."""
+        self.under = (self._M @ self._felt(self.grid).T.astype(np.float32)).astype(float)
+        """Curvature (R, k) in 1/m of all channels for 1 N at each of them."""
 
     def _on_skin(self, points: Array) -> Array:
         return np.array([self.patch.inward(x, y) for x, y in points.tolist()])

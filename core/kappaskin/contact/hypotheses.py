@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import cast
 
 import numpy as np
+import scipy
 
 from kappaskin.contact.elastic_skin import (
     ARC,
@@ -18,6 +19,7 @@ from kappaskin.contact.elastic_skin import (
     arcs,
     ends,
     optimise,
+    oval,
     ring,
 )
 from kappaskin.frames import Array, Contact, Mask
@@ -215,6 +217,9 @@ _ANGLE = 0.9  # rad, of an axis that is not known
 
 _INEXACT = 0.02  # of a reading: that closely does a skin behave like a plate at best
 _START = 0.025  # of a side: as wide as it is at first
+_NEAR = 25  # places of the grid near a contact
+_EXACT = 1e-12  # chi-squared: less is left of exact readings
+_ALIKE = 1e-3  # of a column of unit length: what is left of one that others explain
 _SHORT = 0.25  # of a side: an object as long may lie across what looks like its axis
 _WORSE = 1.25  # times the cost of a ring, that one a little further on never has
 _BETTER = 6.0  # chi-squared that another axis must gain
@@ -229,6 +234,7 @@ class Hypotheses:
     cylinder: Hypothesis
     noise: float
     readings: int
+    weighted: "WeightedReadings"
 
 
 def fit_hypotheses(
@@ -244,14 +250,14 @@ def fit_hypotheses(
     First on the `coarse` skin: a reading grows without bound as a force comes close, and with many
     functions a force would stay on the side of an element where it started.
     """
-    frame = _WeightedReadings(coarse, readings, used)
+    frame = WeightedReadings(coarse, readings, used)
     pair, forces = coarse.best_pair(contact.position, readings, used)
     frame.trust(noise, _at(contact.position[None], np.array([contact.force])), _at(pair, forces))
     sphere, edge = frame.sphere(contact), frame.edge(pair, forces)
     cylinder = frame.cylinder(edge)
     tried = (sphere, edge, cylinder)
     noise *= frame.spread(tried)
-    frame = _WeightedReadings(skin, readings, used)
+    frame = WeightedReadings(skin, readings, used)
     frame.trust(noise, *(o.contact(o.parameters) for o in tried))
     sphere = frame.shaped(sphere)
     edge = min((frame.edged(edge), frame.edged(cylinder)), key=_cost)
@@ -265,6 +271,7 @@ def fit_hypotheses(
         fitted_cylinder(skin, cylinder),
         noise,
         int(used.sum()),
+        frame,
     )
 
 
@@ -276,7 +283,7 @@ def _at(points: Array, forces: Array) -> PointForces:
     return PointForces(points, forces, np.zeros((0, len(forces), 2)), np.zeros((0, len(forces))))
 
 
-class _WeightedReadings:
+class WeightedReadings:
     """The readings of one frame, weighted by their noise and by what the models leave out."""
 
     def __init__(self, skin: ElasticSkin, readings: Array, used: Mask) -> None:
@@ -354,6 +361,42 @@ class _WeightedReadings:
         """The cylinder next to an edge."""
         return self._climb(arcs(EVEN, 0.0), np.append(edge.parameters, self._start / 10), 4)
 
+    def oval(self, cylinder: Optimum, edge: Optimum) -> Optimum:
+        """The oval nearest to the better one of the two."""
+        start = np.append(edge.parameters, self._start)
+        if cylinder.cost < edge.cost:
+            start = cylinder.parameters.copy()
+        start[4] *= 2 * (1 - 4 * start[5] ** 2)  # as long by the mean square of its forces
+        return self._climb(oval, start, 6)
+
+    def chance(self, optimum: Optimum) -> float:
+        """Probability that noise alone leaves as much that other forces than these explain.
+
+        The lower of two, doubled: of an F test of forces on all places of the grid near the
+        contact, and of a t test of the one place anywhere that explains most.
+        """
+        K, slopes = self.skin.readings(optimum.contact(optimum.parameters))
+        n = slopes.shape[1]
+        columns = self._weight[:, None] * np.hstack([slopes, self.skin.under])
+        columns /= np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        Q, _ = np.linalg.qr(columns[:, :n])
+        left = self._weight * (self._readings - K)
+        left, free = left - Q @ (Q.T @ left), columns[:, n:] - Q @ (Q.T @ columns[:, n:])
+        size = np.linalg.norm(free, axis=0)
+        one = float(np.max((free.T @ left) ** 2 / np.where(size > _ALIKE, size, np.inf) ** 2))
+        rest, squares = int(self._used.sum()) - n, float(left @ left)
+        away = np.hypot(*(self.skin.grid - optimum.parameters[:2]).T)
+        near = np.argsort(away)[: min(_NEAR, rest // 2)]
+        U, s, _ = np.linalg.svd(free[:, near], full_matrices=False)
+        explained, k = float(np.sum((U[:, s > _ALIKE].T @ left) ** 2)), int((s > _ALIKE).sum())
+        remains = max(squares - explained, _EXACT) / (rest - k)
+        many = cast(
+            "float", scipy.special.fdtrc(float(k), float(rest - k), explained / k / remains)
+        )
+        t = math.sqrt(one / max(squares - one, _EXACT) * (rest - 1))
+        single = 2 * len(size) * float(scipy.special.stdtr(float(rest - 1), -t))
+        return min(2 * min(many, single), 1.0)
+
     def rounded(self, cylinder: Optimum, edge: Optimum) -> Optimum:
         """The cylinder with one curvature at both ends and the force between them of an edge."""
         share = middle(self.skin, edge)
@@ -390,6 +433,14 @@ def laplace_integral(best: Optimum, all_of: Hypotheses) -> float:
     correlation = best.covariance / np.multiply.outer(scale, scale)
     volume = np.linalg.slogdet(2 * np.pi * correlation)[1] / 2 + np.log(scale).sum()
     return float(volume) - (all_of.readings - 3) / 2 * math.log(best.squares)
+
+
+def oval_likelihood(skin: ElasticSkin, all_of: Hypotheses, best: Optimum) -> float:
+    """Log of the marginal likelihood of an oval, up to the constant of `log_likelihoods`."""
+    q, sd = best.parameters[-1], math.sqrt(best.covariance[-1, -1])
+    widths = np.linspace(0, skin.side / 4, 400)
+    likely = np.exp(-0.5 * ((widths**2 - q) / sd) ** 2)
+    return laplace_integral(best, all_of) + length_prior(skin, best) + _line(sd, likely)
 
 
 def _line(sd: float, likely: Array) -> float:

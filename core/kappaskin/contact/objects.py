@@ -14,6 +14,7 @@ from kappaskin.contact.hypotheses import (
     Width,
     fit_hypotheses,
     log_likelihoods,
+    oval_likelihood,
 )
 from kappaskin.frames import Array, Contact
 from kappaskin.mechanics import Block, Cylinder, PlacedObject, Plate, RigidObject, Sphere, Wedge
@@ -25,7 +26,7 @@ KINDS = ("plane", "cylinder", "sphere", "edge")
 
 _COARSE = 15  # functions along each side, at first; of a disk or a polygon to the end
 _FINE, _FINE_MIXED = 40, 30  # and then: of waves that do not mix, and of those that do
-_WELL = 1.2  # times the residual of the fitted shape that an object may leave
+_WELL = 1.2  # times the residual of the fitted shape, or of an oval, that an object may leave
 _ENOUGH = 20  # readings at least
 _INEXACT = 0.02  # of a curvature: what a ring or arcs leave out of a real contact
 # On a bent skin, of its curvature and the object's: 0.02 to 0.07 of shells from 0.25 to 2 mm thick,
@@ -35,6 +36,8 @@ _QUIET = 1e-4  # of the largest reading: no skin is quieter
 _SEEN = 2.6  # standard deviations: a width below is only an upper bound, or noise passes for one
 _LEAST, _DEEPEST = 1e-12, 10.0  # of a side: displacements beyond show no shape of an object
 _SURE = 0.4  # probability below which no kind is named
+_LEVEL = 0.01  # probability that noise leaves as much of the readings unexplained
+_ODDS = math.log(9)  # that it touches at two ends, over an oval anywhere: a probability of 0.9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,8 +50,13 @@ class ContactObject:
     widths. `radius` in m has the 95 % interval `radius_95`: from 0 when only an upper bound is
     known, up to infinity when it may be flat. `axis` is the angle in rad from x of a cylinder's
     axis or of an edge, `length` its length in m, both with 95 % half widths. What does not apply is
-    NaN. A flat face on a flat skin touches at its rim alone and looks like the sphere or cylinder
-    that touches there; two points look like the edge that joins them.
+    NaN. `fits` is false where the readings differ from those of the likeliest kind by more than
+    noise does.
+
+    Other objects read the same: a flat face `face` in m wide with the 95 % interval `face_95`,
+    round for a sphere and a bar for a cylinder, that bears at its rim; where the interval begins at
+    0, any tip for a sphere, and any two ends for an edge or a cylinder, that are as narrow. A
+    cylinder whose radius is in `radius_95` of an edge reads as that edge.
     """
 
     kind: str
@@ -63,6 +71,9 @@ class ContactObject:
     axis_95: float
     length: float
     length_95: float
+    face: float = math.nan
+    face_95: tuple[float, float] = (math.nan, math.nan)
+    fits: bool = True
 
     @property
     def ranked(self) -> list[tuple[str, float]]:
@@ -74,8 +85,10 @@ class ContactObject:
         if not self.probability:
             return "no contact"
         (likeliest, first), (second, chance) = self.ranked[:2]
-        if not self.kind and first >= _SURE:
+        if not self.fits:
             return f"undetermined: no object fits, {likeliest} is nearest"
+        if not self.kind and first >= _SURE:
+            return f"undetermined: {likeliest}, or another contact that reads the same"
         if not self.kind:
             odds = f"{100 * first:.0f} % to {100 * chance:.0f} %"
             return f"{likeliest} or {second}: undetermined ({odds})"
@@ -84,7 +97,19 @@ class ContactObject:
             parts.append(self._radius())
         if self.kind in ("cylinder", "edge"):
             parts.append(f"{1e3 * self.length:.0f} mm long, axis {math.degrees(self.axis):.0f} deg")
+        parts += self._alike()
         return f"{', '.join(parts)}; second guess {second} {100 * chance:.0f} %"
+
+    def _alike(self) -> list[str]:
+        """What else would read the same."""
+        (low, high), flattest = (1e3 * np.array(two) for two in (self.face_95, self.radius_95))
+        if self.kind == "plane" or not high < math.inf:
+            return []
+        if low:
+            return [f"or a flat face {_digits(1e3 * self.face)} mm wide"]
+        thin = [f"or a cylinder of radius below {_digits(flattest[1])} mm"]
+        other = "any tip" if self.kind == "sphere" else "any two ends"
+        return thin * (self.kind == "edge") + [f"or {other} less than {_digits(high)} mm wide"]
 
     def _radius(self) -> str:
         low, high = (1e3 * radius for radius in self.radius_95)
@@ -166,11 +191,22 @@ def _judged(skin: ElasticSkin, all_of: Hypotheses, noise: float) -> ContactObjec
     kind = max(KINDS, key=probability.__getitem__)
     found = {"sphere": all_of.sphere, "edge": all_of.edge}.get(kind, all_of.cylinder)
     reach = float(scipy.special.stdtrit(all_of.readings - len(found.best.parameters), 0.975))
-    radius, radius_95 = _radius(skin, cast("Width", found.width or all_of.cylinder.width), reach)
-    known = probability[kind] >= _SURE and all_of.noise <= _WELL * noise
+    width = found.width or cast("Width", all_of.cylinder.width)
+    radius, radius_95 = _radius(skin, width, reach)
+    fits = all_of.noise <= _WELL * noise
+    known = probability[kind] >= _SURE
+    flat = not skin.patch.base_curvature
+    if flat:
+        fits = fits and all_of.weighted.chance(found.best) >= _LEVEL
+    if kind != "sphere":
+        oval = all_of.weighted.oval(all_of.cylinder.best, all_of.edge.best)
+        if flat:
+            known = known and weights[kind] - oval_likelihood(skin, all_of, oval) >= _ODDS
+        else:  # arcs are too rough to be weighed against it, as they leave more than noise
+            fits = fits and found.best.squares <= _WELL**2 * oval.squares
     known = known and not (kind == "plane" and math.isnan(radius))  # flattened, not just touched
     return ContactObject(
-        kind if known else "",
+        kind if known and fits else "",
         probability,
         found.best.parameters[:2],
         reach * np.sqrt(np.diag(found.best.covariance)[:2]),
@@ -180,6 +216,8 @@ def _judged(skin: ElasticSkin, all_of: Hypotheses, noise: float) -> ContactObjec
         radius_95,
         *_axis(found, radius_95, reach),
         *_length(found, reach),
+        *_face(skin, kind, width, reach),
+        fits,
     )
 
 
@@ -215,6 +253,21 @@ def _radius(skin: ElasticSkin, width: Width, reach: float) -> tuple[float, tuple
     off = _INEXACT_BENT * (best + bent) if bent else _INEXACT * best
     up, down = math.hypot(width.curvature(low) - best, off), math.hypot(best - flattest, off)
     return _inverse(best), (_inverse(best + up), _inverse(best - down))
+
+
+def _face(
+    skin: ElasticSkin, kind: str, width: Width, reach: float
+) -> tuple[float, tuple[float, float]]:
+    """Width in m of the flat face that presses as wide as the object, and its interval.
+
+    Round for a sphere; a bar's two edges as far from its axis as the force on an arc is by RMS.
+    """
+    per = 2.0 if kind == "sphere" else math.sqrt(2)
+    q = np.array([width.q, width.q - reach * width.sd, max(width.q, 0.0) + reach * width.sd])
+    face, low, high = per * np.sqrt(np.maximum(q, 0.0))
+    if kind == "edge" or width.q < _SEEN * width.sd or low == 0:
+        return math.nan, (0.0, float(high))
+    return float(face), (float(low), float(high))
 
 
 def _inverse(curvature: float) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kappaskin import LeastSquares, Patch, Plate, PointContact, PointLoad, SensorLayout, basis_for
-from kappaskin.contact.elastic_skin import EVEN, ROUND, ElasticSkin, Optimum, arcs, ends, ring
+from kappaskin.contact.elastic_skin import EVEN, ROUND, ElasticSkin, Optimum, arcs, ends, oval, ring
 from kappaskin.contact.hypotheses import arc_widths, fit_hypotheses
 
 SQUARE = Patch(0.1, 0.1)
@@ -20,6 +20,7 @@ CONTACTS = {
     "ends": (ends(0.0), ENDS),
     "ends and middle": (ends(0.3), ENDS),
     "arcs": (arcs(EVEN, 0.0), np.append(ENDS, 0.004**2)),
+    "oval": (oval, np.append(ENDS, 0.004**2)),
     "arcs and middle": (arcs((1.0, 0.4), 0.3), np.append(ENDS, 0.004**2)),
 }
 every_contact = pytest.mark.parametrize(("contact", "p"), CONTACTS.values(), ids=CONTACTS)

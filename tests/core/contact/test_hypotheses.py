@@ -12,6 +12,7 @@ from kappaskin.contact.hypotheses import (
     SHARE,
     Hypotheses,
     Hypothesis,
+    WeightedReadings,
     Width,
     laplace_integral,
     length_prior,
@@ -58,9 +59,14 @@ def test_a_radius_is_as_likely_as_any_multiple_of_it(k0: float) -> None:
     assert told == pytest.approx(math.log(expected), abs=0.02)
 
 
+def all_alike(best: Optimum) -> Hypotheses:
+    readings = WeightedReadings(FLAT, np.zeros(27), np.ones(27, dtype=bool))
+    return Hypotheses(Hypothesis(best), Hypothesis(best), Hypothesis(best), 0.2, 300, readings)
+
+
 def test_the_volume_of_a_peak_is_that_of_its_normal_distribution() -> None:
     best = optimum(squares=1.0)
-    all_of = Hypotheses(Hypothesis(best), Hypothesis(best), Hypothesis(best), 0.2, 300)
+    all_of = all_alike(best)
 
     at_the_top = stats.multivariate_normal(cov=best.covariance, allow_singular=True).logpdf
     assert laplace_integral(best, all_of) == pytest.approx(-at_the_top(np.zeros(6)))
@@ -68,7 +74,7 @@ def test_the_volume_of_a_peak_is_that_of_its_normal_distribution() -> None:
 
 def test_of_all_but_three_readings_each_halves_the_log_of_what_is_left() -> None:
     one, other = optimum(squares=90.0), optimum(squares=120.0)
-    all_of = Hypotheses(Hypothesis(one), Hypothesis(one), Hypothesis(one), 0.2, 300)
+    all_of = all_alike(one)
 
     better = laplace_integral(one, all_of) - laplace_integral(other, all_of)
 

@@ -489,15 +489,24 @@ def test_a_touch_that_flattens_nothing_is_not_called_a_plane(finger):
 def test_one_line_describes_it():
     rod, ball = PAPER.find(noisy(RODS[0])), PAPER.find(noisy(BALLS[0]))
 
-    text = r"{}, radius [\d.]+ mm \([\d.]+ to [\d.]+\){}; second guess \w+ \d+ %"
+    text = r"{}, radius [\d.]+ mm \([\d.]+ to [\d.]+\){}, or a flat face [\d.]+ mm wide; .*"
+    narrow = {"face": math.nan, "face_95": (0.0, 0.004), "radius_95": (0.0, 0.03)}
+    ends = "or any two ends less than 4 mm wide; second guess"
+    edge = r"edge, \d+ mm long, axis \d+ deg, or a cylinder of radius below 30 mm, "
     for found, pattern in (
         (rod, text.format("cylinder", r", \d+ mm long, axis \d+ deg")),
         (ball, text.format("sphere", "")),
-        (replace(ball, kind=""), "undetermined: no object fits, sphere is nearest"),
-        (replace(rod, kind="edge"), r"edge, \d+ mm long, axis \d+ deg; second guess \w+ \d+ %"),
-        (replace(ball, radius_95=(0.05, math.inf)), r"sphere, radius above 50 mm; .*"),
-        (replace(ball, radius_95=(0.0, 2.756)), r"sphere, radius below 2756 mm; .*"),
-        (replace(ball, radius_95=(0.0, math.inf)), r"sphere, radius unknown; .*"),
+        (replace(ball, kind=""), "undetermined: sphere, or another contact that reads the same"),
+        (replace(ball, kind="", fits=False), "undetermined: no object fits, sphere is nearest"),
+        (replace(rod, kind="edge", **narrow), edge + ends + r" \w+ \d+ %"),
+        (replace(rod, **narrow), r"cylinder, radius below 30 mm, .*, " + ends + r" \w+ \d+ %"),
+        (replace(ball, **narrow), r"sphere, .*, or any tip less than 4 mm wide; second guess .*"),
+        (
+            replace(ball, radius_95=(0.05, math.inf)),
+            r"sphere, radius above 50 mm, or a flat face .*",
+        ),
+        (replace(ball, radius_95=(0.0, 2.756)), r"sphere, radius below 2756 mm, or a flat face .*"),
+        (replace(ball, radius_95=(0.0, math.inf)), r"sphere, radius unknown, or a flat face .*"),
         (
             replace(rod, radius_95=(math.inf, math.inf)),
             r"cylinder, flat or hollow, \d+ mm .*",
@@ -538,7 +547,9 @@ def test_a_weak_press_into_a_corner_is_answered():
     for number in range(3):
         estimate = pipeline(simulator.frame(number, lambda: 0.0))
         found = find(estimate.curvature, estimate.noise, estimate.contact)
-        assert found.kind in found.probability
+        assert found.kind in ("", *found.probability)
+        assert np.isfinite(found.position).all()
+        assert not (found.kind and found.length < found.length_95)
 
 
 def test_a_skin_that_cannot_tell_is_refused():

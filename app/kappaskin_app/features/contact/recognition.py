@@ -11,6 +11,10 @@ from kappaskin.sensing import Sensor
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.widgets.parts import with_error
 
+_NOTHING_FITS = (
+    "no object fits, {} is nearest: it may bear at several places or on part of its rim; press it "
+    "straight and at one place"
+)
 _PREPARING = "computing the model readings of objects on this skin\N{HORIZONTAL ELLIPSIS}"
 
 
@@ -79,7 +83,7 @@ def _recognise(
     else:
         whole = as_one(estimate.contact, estimate.second)
         found = finder(estimate.curvature, estimate.noise, whole)
-        what = found.describe()
+        what = found.describe() if found.fits else _NOTHING_FITS.format(found.ranked[0][0])
         if estimate.second.present:
             what = f"if one object makes both contacts: {what}"
     return "; ".join(filter(None, [what, curvature_text(estimate)])), found, estimate

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from kappaskin import Pipeline, PointLoad, Setup, Simulator, load_scene
+from kappaskin import ObjectFinder, Pipeline, PointLoad, Setup, Simulator, load_scene
 from kappaskin_app.features.contact import recognition
 from kappaskin_app.features.contact.recognition import curvature_text
 
@@ -39,6 +39,20 @@ def test_the_window_describes_the_object_in_contact(window, until):
 
     window.session.disconnect_from()
     until(lambda: not window.display.status_bar.object.text())
+
+
+def test_what_fits_no_object_is_said_with_its_cause_and_what_to_do():
+    scene = load_scene("centre")
+    corners = [PointLoad(x, y, 0.15) for x, y in ((0.03, 0.03), (0.07, 0.04), (0.04, 0.075))]
+    estimate = _estimate(*corners)
+    finder = ObjectFinder(scene.sensor().plate, scene.sensor().layout)
+
+    words, found, _ = recognition._recognise(finder, estimate)  # noqa: SLF001
+
+    assert not found.fits
+    assert not found.kind
+    assert "no object fits, " in words
+    assert "it may bear at several places or on part of its rim; press it straight" in words
 
 
 def test_a_new_skin_shows_that_the_finder_is_being_computed(window, until, monkeypatch):
