@@ -15,6 +15,7 @@ _NOTHING_FITS = (
     "no object fits, {} is nearest: it may bear at several places or on part of its rim; press it "
     "straight and at one place"
 )
+_DRIFTING = "no object is named while readings drift: tare at rest"
 _PREPARING = "computing the model readings of objects on this skin\N{HORIZONTAL ELLIPSIS}"
 
 
@@ -80,6 +81,8 @@ def _recognise(
 ) -> tuple[str, ContactObject, Estimate]:
     if isinstance(finder, str):
         found, what = NO_OBJECT, finder
+    elif estimate.drift:  # which is in the readings still
+        found, what = NO_OBJECT, _DRIFTING
     else:
         whole = as_one(estimate.contact, estimate.second)
         found = finder(estimate.curvature, estimate.noise, whole)

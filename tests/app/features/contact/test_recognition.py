@@ -2,6 +2,7 @@
 
 import threading
 import time
+from dataclasses import replace
 
 import pytest
 
@@ -53,6 +54,15 @@ def test_what_fits_no_object_is_said_with_its_cause_and_what_to_do():
     assert not found.kind
     assert "no object fits, " in words
     assert "it may bear at several places or on part of its rim; press it straight" in words
+
+
+def test_no_object_is_named_while_readings_drift():
+    estimate = replace(_estimate(PointLoad(0.05, 0.05, 0.15)), drift=0.5)
+
+    words, found, _ = recognition._recognise(None, estimate)  # noqa: SLF001
+
+    assert found.probability == {}
+    assert words.startswith("no object is named while readings drift: tare at rest; principal")
 
 
 def test_a_new_skin_shows_that_the_finder_is_being_computed(window, until, monkeypatch):
