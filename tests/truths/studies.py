@@ -2,7 +2,8 @@
 
 `python tests/truths/studies.py` prints all figures as the guide's table; a number of frames and the
 beginning of a case's name, both optional, say of how many and which; the name `told` prints what
-is told of one load and of two, `drift` what of drifts, `weights` what known weights find.
+is told of one load and of two, `drift` what of drifts, `weights` what known weights find, `effects`
+what the planner says of effects, `sweeps` how well a calibration knows its own error.
 """
 
 import sys
@@ -31,7 +32,9 @@ from kappaskin.calibration.weights import newtons
 from kappaskin.contact import Contacts
 from kappaskin.health import HealthMonitor
 from navier import HingedPlate, Load
+from planned import effects_table
 from sanders import CylinderShell
+from sweeps import sweeps_table
 from von_karman import StretchingPlate
 
 NOISE = 0.4  # 1/m, uniform to either side as Table 1's: 0.231 rms
@@ -581,7 +584,13 @@ def weights_table(frames=1000):
 
 
 def main(frames="1000", *name):
-    tables = {("told",): told_table, ("drift",): drift_table, ("weights",): weights_table}
+    tables = {
+        ("told",): told_table,
+        ("drift",): drift_table,
+        ("weights",): weights_table,
+        ("effects",): effects_table,
+        ("sweeps",): sweeps_table,
+    }
     if name in tables:
         for row in tables[name](int(frames)):
             print(row, flush=True)
