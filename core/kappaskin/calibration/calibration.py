@@ -258,6 +258,10 @@ class Calibration:
         """Whether the readings are taken as they are, because no gain was measured."""
         return not (self.gain_sd > 0).any()
 
+    def with_weights(self, weights: KnownWeights, now: datetime) -> "Calibration":
+        """The same with known weights, laid on `now`; measured gains do not get younger by that."""
+        return replace(self, weights=weights, date=now if self.is_nominal else self.date)
+
     def check(self, sensor: Sensor) -> None:
         """Refuse a sensor that is not the one that was calibrated."""
         if sensor.serial_number != self.serial_number:
