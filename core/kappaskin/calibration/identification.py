@@ -272,14 +272,13 @@ def unseen_error(
     """
     X, Y, part = x[used], y[used], parts[used]
     A = _columns(x, y, used, r, np.log(loops.stretch), fitted.offset)[0]
-    known = np.flatnonzero(np.isfinite(fitted.rms))
-    looped = loops.weights.any(axis=0)
+    looped = np.flatnonzero(np.isfinite(fitted.rms) & (loops.weights != 0).any(axis=0))
     off = np.full(Y.shape, np.nan)
     for number in np.unique(part[part >= 0]):
         out = part == number
         line = fit_lines(X[~out], Y[~out])
         off[out] = Y[out] - line.offset - np.outer(X[out], line.gain)
-        for c in known[looped[known]]:
+        for c in looped:
             # A play that moves only where it is left out would be an offset of any size.
             moving = np.ptp(A[~out, :, c], axis=0) > 0
             G, o = _solved(A[~out][:, moving, c], Y[~out, c])
