@@ -4,7 +4,8 @@
 beginning of a case's name, both optional, say of how many and which; the name `told` prints what
 is told of one load and of two, `drift` what of drifts, `weights` what known weights find,
 `beforehand` what is said of errors before there are frames, and of a sigma that is given, `objects`
-how objects are named.
+how objects are named, `effects` what the planner says of effects, `sweeps` how well a calibration
+knows its own error.
 """
 
 import sys
@@ -39,7 +40,9 @@ from kappaskin.scenes.effects import UniformNoise
 from kappaskin.studies import Setting, costs
 from navier import HingedPlate, Load
 from objects import objects_table
+from planned import effects_table
 from sanders import CylinderShell
+from sweeps import sweeps_table
 from von_karman import StretchingPlate
 
 NOISE = 0.4  # 1/m, uniform to either side as Table 1's: 0.231 rms
@@ -782,6 +785,8 @@ def main(frames="1000", *name):
         ("weights",): weights_table,
         ("beforehand",): beforehand_table,
         ("objects",): objects_table,
+        ("effects",): effects_table,
+        ("sweeps",): sweeps_table,
     }
     if name in tables:
         for row in tables[name](int(frames)):

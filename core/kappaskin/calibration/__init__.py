@@ -1,5 +1,6 @@
 """Calibration: cylinders, tare, channel map."""
 
+from kappaskin.calibration.calibration import GRAVITY as GRAVITY
 from kappaskin.calibration.calibration import Calibration as Calibration
 from kappaskin.calibration.calibration import Corrector as Corrector
 from kappaskin.calibration.calibration import KnownWeights as KnownWeights

@@ -48,13 +48,14 @@ _KEYS = {
     "line": set(_LINE),
     "hysteresis": {"thresholds", "weights", "linear", "stretch"},
     "creep": {"share", "time_constant"},
+    "unseen": {"error"},
     "weights": {
         *("rigidity", "rigidity_sd", "thickness", "rim_stiffness", "deepest"),
         *("weights", "told", "left_out"),
     },
 }
 
-_OPTIONAL = {"hysteresis", "creep", "weights"}
+_OPTIONAL = {"hysteresis", "creep", "unseen", "weights"}
 _AGAIN = "calibrate again, or restore the file from a copy"
 
 
@@ -155,8 +156,10 @@ class Calibration:
 
     reading = offset + gain * creep(hysteresis(curvature)). `gain` is NaN for the channels that
     failed, and `failures` says why, as (channel, reason). `gain_sd` and `offset_sd` are standard
-    errors. `layout` is the `fingerprint` of the skin, `date` when it was calibrated. Calibrations
-    of the same content are equal.
+    errors of these two, of gages whose loops are as fitted; `error` in 1/m is that of corrected
+    curvature on a path that the sweep did not take, None in files that do not say. `layout` is the
+    `fingerprint` of the skin, `date` when it was calibrated. Calibrations of the same content are
+    equal.
     """
 
     name: str
@@ -172,6 +175,7 @@ class Calibration:
     creep: StandardLinearSolid | None = None
     failures: tuple[tuple[int, str], ...] = ()
     weights: KnownWeights | None = None
+    error: Array | None = None
 
     def __post_init__(self) -> None:
         if self.date.utcoffset() is None:
@@ -180,6 +184,7 @@ class Calibration:
         shapes = [part.shape for part in (self.gain, self.offset, self.gain_sd, self.offset_sd)]
         shapes += [self.hysteresis.linear.shape] if self.hysteresis else []
         shapes += [self.creep.share.shape] if self.creep else []
+        shapes += [] if self.error is None else [self.error.shape]
         if not 0 < C <= _MOST_CHANNELS or set(shapes) != {(C,)}:
             raise Refusal(
                 f"expected arrays of equal length for 1 to {_MOST_CHANNELS} channels, got "
@@ -220,6 +225,8 @@ class Calibration:
                 "share": self.creep.share.tolist(),
                 "time_constant": self.creep.time_constant,
             }
+        if self.error is not None:
+            content["unseen"] = {"error": self.error.tolist()}
         if self.weights:
             told = self.weights.to_json()
             content["weights"] = {name: told[name] for name in sorted(_KEYS["weights"])}
@@ -250,6 +257,10 @@ class Calibration:
     def is_nominal(self) -> bool:
         """Whether the readings are taken as they are, because no gain was measured."""
         return not (self.gain_sd > 0).any()
+
+    def with_weights(self, weights: KnownWeights, now: datetime) -> "Calibration":
+        """The same with known weights, laid on `now`; measured gains do not get younger by that."""
+        return replace(self, weights=weights, date=now if self.is_nominal else self.date)
 
     def check(self, sensor: Sensor) -> None:
         """Refuse a sensor that is not the one that was calibrated."""
@@ -322,6 +333,7 @@ class Calibration:
                 else None,
                 failures=tuple((int(c), str(why)) for c, why in content["failures"].items()),
                 weights=_weights(content["weights"]) if "weights" in content else None,
+                error=_array(content["unseen"]["error"]) if "unseen" in content else None,
             )
         except (ValueError, TypeError, AttributeError, OverflowError) as error:
             raise Refusal(f"{path}: cannot be used ({error}); {_AGAIN}") from error

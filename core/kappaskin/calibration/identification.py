@@ -255,6 +255,39 @@ def identify_hysteresis(
     return LineFits(*numbers), PrandtlIshlinskii(np.tile(r[:, None], C), p, q, a)
 
 
+def unseen_error(
+    x: Array,
+    y: Array,
+    used: Mask,
+    parts: Array,
+    r: Array,
+    fitted: LineFits,
+    loops: PrandtlIshlinskii,
+) -> Array:
+    """RMS error (C,) in 1/m of curvature on parts of a sweep that are left out of the fit.
+
+    Each of the `parts` (S,) from 0 on is left out in turn, as a whole: where real loops are not
+    plays, what the fit leaves is alike along a way, and leaving out one reading between its
+    neighbours does not show it. The asymmetry stays as `fitted`.
+    """
+    X, Y, part = x[used], y[used], parts[used]
+    A = _columns(x, y, used, r, np.log(loops.stretch), fitted.offset)[0]
+    looped = np.flatnonzero(np.isfinite(fitted.rms) & (loops.weights != 0).any(axis=0))
+    off = np.full(Y.shape, np.nan)
+    for number in np.unique(part[part >= 0]):
+        out = part == number
+        line = fit_lines(X[~out], Y[~out])
+        off[out] = Y[out] - line.offset - np.outer(X[out], line.gain)
+        for c in looped:
+            # A play that moves only where it is left out would be an offset of any size.
+            moving = np.ptp(A[~out, :, c], axis=0) > 0
+            G, o = _solved(A[~out][:, moving, c], Y[~out, c])
+            off[out, c] = Y[out, c] - o - A[out][:, moving, c] @ G
+    with np.errstate(divide="ignore", invalid="ignore"):  # a stuck or never bent one, which fails
+        squares = (off[part >= 0] ** 2).sum(axis=0) / (part >= 0).sum()
+        return np.sqrt(squares) / np.abs(fitted.gain)
+
+
 def _bent_at(course: Array) -> int:
     """The first moment at which the channels are together more than half as far as at the end."""
     far = course @ np.sign(course[-1])

@@ -14,6 +14,7 @@ from kappaskin.calibration.identification import (
     identify_creep,
     identify_hysteresis,
     play_thresholds,
+    unseen_error,
 )
 from kappaskin.calibration.sweep import Sweep
 from kappaskin.errors import Refusal
@@ -114,7 +115,8 @@ class CalibrationReport:
     `line` is the paper's least-squares line per gage pair, `fitted` what the calibration applies:
     the same where no loops were found. `gaps` (2, C) are the widest difference between the ways at
     one cylinder on the inner and on the outer face, `gaps_left` what the calibration leaves of
-    them, `noise` (C,) the standard deviation of one frame; all three as curvature in 1/m.
+    them, `noise` (C,) the standard deviation of one frame, `error` (C,) the standard error of what
+    is corrected on a path that the sweep did not take; all four as curvature in 1/m.
     """
 
     calibration: Calibration
@@ -123,6 +125,7 @@ class CalibrationReport:
     gaps: Array
     gaps_left: Array
     noise: Array
+    error: Array
 
     @property
     def passed(self) -> Mask:
@@ -144,7 +147,7 @@ class CalibrationReport:
             "line_gain": self.line.gain,
             "line_offset": self.line.offset,
             "line_error": self.line.left_out,
-            "error": self.fitted.left_out,
+            "error": self.error,
             "gap_inner": self.gaps[0],
             "gap_outer": self.gaps[1],
             "gap_inner_left": self.gaps_left[0],
@@ -190,7 +193,7 @@ class CalibrationReport:
             here = np.flatnonzero(self.passed[c * P : (c + 1) * P]) + c * P
             if here.size:
                 loops = self.gaps[:, here].max(), self.gaps_left[:, here].max()
-                errors = self.fitted.left_out[here].max(), self.line.left_out[here].max()
+                errors = self.error[here].max(), self.line.left_out[here].max()
                 lines.append(
                     f"{name:<11}{spread(self.fitted.gain[here]):<18}"
                     f"{spread(self.fitted.offset[here]):<18}"
@@ -201,9 +204,11 @@ class CalibrationReport:
             lines.append(
                 f"creep      {100 * share:.1f} % in {calibration.creep.time_constant:.3g} s"
             )
-        worst = np.argsort(np.where(self.passed, -self.fitted.left_out, 0.0))[:_WORST]
-        named = (f"{_named(c, P)} {self.fitted.left_out[c]:.3f}" for c in worst)
+        worst = np.argsort(np.where(self.passed, -self.error, 0.0))[:_WORST]
+        named = (f"{_named(c, P)} {self.error[c]:.3f}" for c in worst)
         lines.append(f"worst      {', '.join(named)}")
+        told = float(np.sqrt((self.error[self.passed] ** 2).mean()))
+        lines.append(f"expect a standard error of {told:.2g} 1/m of corrected curvature in use")
         return lines + [f"failed     {_named(c, P)}: {why}" for c, why in self.failed.items()]
 
 
@@ -306,6 +311,35 @@ def _joined(kind: type[_Part], parts: Sequence[_Part]) -> _Part:
     return kind(*(np.concatenate([getattr(p, n) for p in parts], axis=-1) for n in names))
 
 
+def _unseen(sweep: Sweep, readings: Array, fitted: LineFits, loops: PrandtlIshlinskii) -> Array:
+    """The error (C,) in 1/m of curvature in each direction of bending and face that is left out."""
+    keys = [(step.along, step.face) for step in sweep.steps]
+    ways = {way: k for k, way in enumerate(dict.fromkeys(keys))}
+    flat = np.array([step.flat for step in sweep.steps])
+    number = np.where(flat, -1, [ways[key] for key in keys])
+    radii = len({step.radius for step in sweep.steps if not step.flat})
+    errors: list[Array] = []
+    for k, (x, y) in enumerate(zip(sweep.curvature.T, np.split(readings, 3, axis=1), strict=True)):
+        here = slice(k * y.shape[1], (k + 1) * y.shape[1])
+        used, parts = _informative(x, flat), np.where(x == 0, -1, number)
+        of_fit = LineFits(*(getattr(fitted, field.name)[here] for field in fields(LineFits)))
+        names = [field.name for field in fields(PrandtlIshlinskii)]
+        of_loops = PrandtlIshlinskii(*(getattr(loops, name)[..., here] for name in names))
+        errors.append(unseen_error(x, y, used, parts, play_thresholds(x, radii), of_fit, of_loops))
+    return np.concatenate(errors)
+
+
+def _steadied(error: Array, passed: Mask) -> Array:
+    """The `error` (C,) of each channel and of all that `passed` in its component, half and half.
+
+    A few ways tell one channel's own error badly, and the gages of a component are made alike.
+    """
+    squares = np.where(passed, error, np.nan).reshape(3, -1) ** 2
+    known = np.isfinite(squares)
+    mean = np.where(known, squares, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    return np.sqrt((squares + mean[:, None]) / 2).ravel()
+
+
 def _gaps(sweep: Sweep, values: Array) -> Array:
     """Widest difference between the ways (2, C) of `values` (S, C), on the inner and outer face."""
     out: list[Array] = []
@@ -351,6 +385,7 @@ def calibrate(
             f"none of {sensor.channels} channels passed; {COMPONENTS[c // P]} of element {c % P}: "
             f"{reason}"
         )
+    error = _steadied(_unseen(sweep, readings, fitted, loops), passed)
     calibration = Calibration(
         sensor.name,
         sensor.serial_number,
@@ -364,10 +399,11 @@ def calibrate(
         _needed(loops, passed),
         creep,
         tuple(failures.items()),
+        error=error,
     )
     left = _in_time(sweep, calibration.start())
     return CalibrationReport(
-        calibration, line, fitted, _gaps(sweep, by_line), _gaps(sweep, left), noise
+        calibration, line, fitted, _gaps(sweep, by_line), _gaps(sweep, left), noise, error
     )
 
 

@@ -20,6 +20,7 @@ from kappaskin.scenes import Scene, load_scene
 from kappaskin.sensing import Sensor
 from kappaskin.sources import SimulatedSource, Source, VirtualClock, open_source
 
+_ABSURD = 100.0  # times: no sensor states a rigidity as wrong as that
 _SCATTER = 0.01  # of a weight: what it is off by besides the noise, at least
 _LIGHTEST, _HEAVIEST = 1e-4, 1e3  # N
 _APART = 0.05  # of the shorter side: weights nearer to each other lie at one place
@@ -97,7 +98,7 @@ class WeightFit:
                 f"{len(readings)}"
             )
         contacts = [self.contact(each) for each in readings]
-        self._check_places(contacts)
+        self.check_places(contacts)
         told = np.array([one.force for one in contacts])
         sd = np.hypot(_SCATTER, np.array([one.force_sd for one in contacts]) / told)
         curve, second = self._choice(W, sd, readings, told)
@@ -142,12 +143,13 @@ class WeightFit:
             return usual, None
         return curve, second
 
-    def _check_places(self, contacts: Sequence[Contact]) -> None:
+    def check_places(self, contacts: Sequence[Contact]) -> None:
+        """Refuse contacts that all lie at one place."""
         places = np.array([one.position for one in contacts])
         if np.hypot(*np.ptp(places, axis=0)) < _APART * self._side:
             raise Refusal(
-                "all weights lay at one place: lay them at several, some nearer to the edge, so "
-                "that a boundary condition that is wrong shows"
+                "all weights lay at one place: lay this one elsewhere, nearer to the edge, so that "
+                "a boundary condition that is wrong shows"
             )
 
     def _second(
@@ -301,11 +303,23 @@ class Weighing:
         found, mean = "the skin without a weight", _mean(readings).reshape(3, -1)
         if self.taken:
             contact = self.fit.contact(mean - self.taken[0])
+            self._check_unit(contact.force)
+            if self.step == len(self.weights):
+                self.fit.check_places([*self.contacts, contact])
             x, y = (1e3 * contact.position).tolist()
             found = f"a contact at ({x:.1f}, {y:.1f}) mm"
             self.contacts.append(contact)
         self.taken.append(mean)
         return found
+
+    def _check_unit(self, force: float) -> None:
+        """Refuse a weight that is told as another one by far, as one given in kg is."""
+        mass, told = self.masses[self.step - 1], 1e3 * force / GRAVITY
+        if not 1 / _ABSURD < told / mass < _ABSURD:
+            raise Refusal(
+                f"the readings tell about {told:.3g} g, where {mass:g} g were expected: give all "
+                "masses in grams, and check the rigidity that the sensor states"
+            )
 
     def redo(self) -> None:
         """Go back by one step."""

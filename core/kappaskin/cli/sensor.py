@@ -157,7 +157,7 @@ def _weigh(
             source, masses, _answer_to, _report, seconds=seconds, trust=trust, before=before
         )
         now = datetime.now(UTC)
-        replace(before or Calibration.nominal(sensor, now), weights=known, date=now).save(out)
+        (before or Calibration.nominal(sensor, now)).with_weights(known, now).save(out)
     except KeyboardInterrupt:
         show("", error=True)
         raise Refusal("stopped before the last step; nothing was written") from None

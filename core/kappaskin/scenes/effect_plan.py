@@ -15,11 +15,13 @@ from kappaskin.scenes.effects import (
     Fluid,
     Foam,
     GageLength,
+    IntermittentElements,
     Quantisation,
     Saturation,
     Size,
     Skew,
     StretchingEffect,
+    Survey,
     Temperature,
     Tension,
 )
@@ -96,7 +98,7 @@ def effects_of(scene: Scene) -> dict[str, Effect]:
 def plan(scene: Scene) -> Plan:
     """Plan of `scene` by its `choice`, with the size of every effect."""
     there, seen = effects_of(scene), survey(scene)
-    sizes = {name: effect.size(seen) for name, effect in there.items()}
+    sizes = _sizes(there, seen)
     reasons = _reasons(scene.choice, there, sizes)
     return Plan(
         tuple(
@@ -107,6 +109,25 @@ def plan(scene: Scene) -> Plan:
         ),
         tuple(effect for name, effect in there.items() if reasons[name][0]),
     )
+
+
+def _sizes(there: dict[str, Effect], seen: Survey) -> dict[str, Size]:
+    """The size of each effect in `there`, in physical order, among all the others.
+
+    Whichever are left out, a reading that one of them changes is off by what those before it add
+    at most, and what it changes is amplified by those after it.
+    """
+    sizes, carried = dict[str, Size](), 0.0
+    for name, effect in there.items():
+        sizes[name] = effect.size(replace(seen, carried=carried))
+        carried += sizes[name].error * seen.peak
+        if isinstance(effect, IntermittentElements):  # which drop to 0 from whatever they read
+            carried += seen.most * seen.peak
+    after = 1.0
+    for name in reversed(sizes):
+        sizes[name] = replace(sizes[name], error=after * sizes[name].error)
+        after *= max(1.0, there[name].amplification(seen))
+    return sizes
 
 
 def _reasons(

@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+import sweeps
 from kappaskin import (
     Calibration,
     Engine,
@@ -320,6 +321,21 @@ def test_loops_of_another_make_shrink_as_well():
     before = played(UNSEEN, [Smooth(), TOLERANCE], by_line(report), 48)[180:, :32]
     after = played(UNSEEN, [Smooth(), TOLERANCE], report.calibration.start(), 48)[180:, :32]
     assert before.std() > 3 * after.std()
+
+
+@pytest.mark.parametrize("loops", [sweeps.BoucWen, sweeps.Preisach, sweeps.ManyPlays])
+def test_the_error_told_covers_paths_that_were_not_calibrated_on(loops):
+    found = [sweeps.off(loops, seed) for seed in range(2)]
+    for path in ("other order", "other radii", "partial loops"):
+        errors = np.concatenate([one[path].ravel() for one in found])
+        assert np.mean(np.abs(errors) < 1.96) > 0.9
+        assert np.sqrt(np.mean(errors**2)) > 0.4  # and is not far too large
+
+
+def test_without_loops_the_error_told_is_that_of_the_noise(plain):
+    of_a_mean = 0.23 / 6
+    assert np.median(plain.error) == pytest.approx(of_a_mean, rel=0.3)
+    assert plain.calibration.error is plain.error
 
 
 def test_the_identified_weights_are_those_of_a_sweep_they_explain():

@@ -143,6 +143,13 @@ def test_a_calibration_of_more_channels_than_the_sensor_has_is_refused():
         )
 
 
+def test_the_error_on_other_paths_comes_back_and_older_files_have_none(tmp_path, path):
+    error = np.linspace(0.1, 0.3, len(CALIBRATION.gain))
+    replace(CALIBRATION, error=error).save(tmp_path / "a.toml")
+    np.testing.assert_array_equal(Calibration.read(tmp_path / "a.toml").error, error)
+    assert Calibration.read(path).error is None
+
+
 @pytest.mark.parametrize("place", ["no/such/folder/skin.toml", "."])
 def test_a_place_that_is_none_is_refused(tmp_path, place):
     with pytest.raises(Refusal, match="expected a file in a folder that exists"):

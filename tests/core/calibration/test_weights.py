@@ -120,6 +120,39 @@ def test_weights_at_one_place_are_refused() -> None:
         WeightFit(SENSOR)(newtons(MASSES[:3]), bent)
 
 
+def test_the_last_weight_at_the_same_place_as_all_others_is_laid_elsewhere() -> None:
+    weighing, at = Weighing(SENSOR, (10, 10, 10)), SENSOR.layout.positions
+    rng, (w, *_) = np.random.default_rng(0), newtons((10, 10, 10))
+
+    def take(x) -> str:
+        load = HINGED.readings(Load(x, 0.05, w, radius=4e-3), at) if x else np.zeros((3, 100))
+        return weighing.take((load + rng.normal(0, NOISE, (3, 100))).reshape(1, -1))
+
+    for x in (None, 0.05, 0.05):
+        take(x)
+    with pytest.raises(Refusal, match="lay this one elsewhere"):
+        take(0.05)
+    assert not weighing.done
+    assert "a contact at" in take(0.03)
+    assert weighing.done
+
+
+def test_masses_in_kilograms_are_noticed_at_the_first_weight() -> None:
+    weighing, at = Weighing(SENSOR, (0.05, 0.1, 0.2)), SENSOR.layout.positions
+    (heavy, *_), rest = newtons((50, 100, 200)), np.zeros((1, SENSOR.channels))
+    weighing.take(rest)
+    with pytest.raises(Refusal, match=r"the readings tell about .* g, where 0\.05 g were expected"):
+        weighing.take(HINGED.readings(Load(0.05, 0.05, heavy, radius=4e-3), at).reshape(1, -1))
+
+
+def test_weights_make_measured_gains_no_younger() -> None:
+    later, known = NOW + timedelta(days=170), found()
+    nominal = Calibration.nominal(SENSOR, NOW)
+    measured = replace(nominal, gain_sd=np.full(SENSOR.channels, 1e-3))
+    assert measured.with_weights(known, later).date == NOW
+    assert nominal.with_weights(known, later).date == later
+
+
 def test_a_drum_head_is_refused() -> None:
     drum = replace(SENSOR, plate=Plate(SENSOR.plate.patch, rigidity=0.0, tension=20.0))
     with pytest.raises(Refusal, match="drum head"):

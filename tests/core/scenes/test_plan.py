@@ -21,7 +21,7 @@ from kappaskin import (
 from kappaskin.scenes import SCENES, EffectSelection, Orbit, kept_effects, plan
 from kappaskin.scenes.cylinders import Presentation, schedule
 from kappaskin.scenes.effect_plan import effects_of
-from kappaskin.scenes.effects import EFFECTS, GaussianNoise
+from kappaskin.scenes.effects import EFFECTS, Creep, CrossTalk, GaussianNoise, Tolerance
 from kappaskin.scenes.scene import survey
 from kappaskin.scenes.stimulus import (
     HoldStep,
@@ -31,6 +31,7 @@ from kappaskin.scenes.stimulus import (
     ReleaseStep,
     TapStep,
 )
+from planned import measured, random_scene
 
 pytestmark = pytest.mark.slow
 
@@ -89,6 +90,23 @@ def test_what_is_left_out_changes_no_reading_by_more_than_the_accuracy(name, acc
 
     assert change <= accuracy
     assert plan(auto).left_out <= accuracy
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_omitting_one_effect_of_many_changes_no_reading_by_more_than_the_plan_says(seed):
+    for name, error, change in measured(random_scene(np.random.default_rng(seed))):
+        # What moves is surveyed at 48 moments, between which it may be a little larger.
+        assert change <= 1.02 * error + 1e-9, name
+
+
+@pytest.mark.parametrize("share", [0.02, 0.5])
+def test_cross_talk_of_offsets_that_exceed_the_signal_is_planned_for(share):
+    scene = replace(BARE.touched_by(GaussianLoad(0.05, 0.05, 0.01, 0.01)), effects=(
+        Creep(0.05, 8.0), Tolerance(0.05, 10.0), CrossTalk(share)
+    ))  # fmt: skip
+    ((error, change),) = [pair for name, *pair in measured(scene) if name == "cross-talk"]
+    assert 0.5 * error <= change <= error
+    assert error > 20 * share  # of the peak, of which offsets are many times
 
 
 SQUARE = Patch(0.1, 0.1)

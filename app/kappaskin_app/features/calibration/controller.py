@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Generic, Protocol, TypeVar
@@ -428,7 +428,7 @@ class WeightController(StepController[Weighing, KnownWeights]):
             return None
         now = datetime.now(UTC)
         before = self._before or Calibration.nominal(sensor, now)
-        return replace(before, weights=self.result, date=now)
+        return before.with_weights(self.result, now)
 
     def begin(self, masses: tuple[float, ...], seconds: float) -> None:
         """Start with weights of `masses` in g, and `seconds` of readings for each."""

@@ -239,7 +239,8 @@ class ResultPage(QWidget):
             rich=True,
             tip="RMS of the residuals from the cylinders' curvature, and the largest difference of "
             "readings at falling and rising radius. Both with a straight line for each gage pair "
-            "(section 5 of the paper), and with hysteresis compensated.",
+            "(section 5 of the paper), and with hysteresis compensated. The standard error in use "
+            "is that of corrected curvature on other cylinders and in another order.",
         )
         self.map, self.plot, self.channel = PassMap(), LoopPlot(), text_label()
         self.worst = text_label(tip="Click a channel to see its readings.", rich=True)
@@ -279,6 +280,7 @@ class ResultPage(QWidget):
         before, after = (
             float(np.sqrt(np.mean(lines.rms[good] ** 2))) for lines in (report.line, report.fitted)
         )
+        expected = float(np.sqrt(np.mean(report.error[good] ** 2)))
         wide, left = (float(gaps[:, good].max()) for gaps in (report.gaps, report.gaps_left))
         self.errors.setText(
             "<table cellspacing=0 cellpadding=1>"
@@ -287,10 +289,12 @@ class ResultPage(QWidget):
             f"<tr><td>Residual, RMS</td><td align=right>{before:.2f}</td>"
             f"<td align=right>{after:.2f} 1/m</td></tr>"
             f"<tr><td>Widest hysteresis loop</td><td align=right>{wide:.2f}</td>"
-            f"<td align=right>{left:.2f} 1/m</td></tr></table>"
+            f"<td align=right>{left:.2f} 1/m</td></tr>"
+            "<tr><td>Standard error in use</td><td></td>"
+            f"<td align=right>{expected:.2f} 1/m</td></tr></table>"
         )
         failures = dict(report.calibration.failures)
-        order = np.argsort(np.where(good, -report.fitted.left_out, -np.inf), kind="stable")
+        order = np.argsort(np.where(good, -report.error, -np.inf), kind="stable")
         worst = [int(channel) for channel in order[:_WORST]]
         self._worst = worst
         self._show_worst()
@@ -304,7 +308,7 @@ class ResultPage(QWidget):
         elements, failures = len(report.passed) // 3, dict(report.calibration.failures)
         lines = [
             f'<a href="{c}" style="color: {current().accent}">{_name(c, elements)}</a>: '
-            + escape(failures.get(c, f"error {report.fitted.left_out[c]:.2f} 1/m"))
+            + escape(failures.get(c, f"error {report.error[c]:.2f} 1/m"))
             for c in self._worst
         ]
         self.worst.setText("<br>".join(["Worst:", *lines]))
@@ -321,7 +325,7 @@ class ResultPage(QWidget):
         return (
             f"{name}: gain {fit.gain[channel]:.3f}, offset "
             f"{number(float(fit.offset[channel]), '+.2f')} 1/m, error "
-            f"{fit.left_out[channel]:.2f} 1/m"
+            f"{report.error[channel]:.2f} 1/m"
         )
 
     def show_channel(self, channel: int) -> None:

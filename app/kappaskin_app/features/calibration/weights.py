@@ -12,7 +12,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin.calibration import WEIGHT_ADVICE, KnownWeights, Weighing
+from kappaskin.calibration import GRAVITY, WEIGHT_ADVICE, KnownWeights, Weighing
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
 from kappaskin_app.features.calibration.controller import WeightController, parsed
@@ -222,8 +222,8 @@ class _ResultPage(QWidget):
         rows = [("<i>weight</i>", "<i>told</i>", "<i>by the others</i>")]
         rows += [
             (
-                f"{number(1e3 * laid, '.1f')} mN",
-                f"{number(1e3 * told, '.1f')} mN",
+                f"{number(1e3 * laid / GRAVITY, '.4g')} g",
+                f"{number(1e3 * told / GRAVITY, '.4g')} g",
                 f"{number(100 * left, '+.1f')} %",
             )
             for laid, told, left in zip(known.weights, known.told, known.left_out, strict=True)

@@ -36,7 +36,8 @@ class Survey:
     `coefficients` (S, N) in m at `times` (S,) in s are of `basis`; `forces` (S, N) in N the modal
     forces that make them, all zero where the skin lies on a cylinder; `curvature` (S, 3, P) in 1/m
     is what point-like elements of `layout` would read; `rates` (3 P,) in 1/m/s is the fastest that
-    each of them changes, and `read_after` (3 P,) in s when in a scan it is read.
+    each of them changes, and `read_after` (3 P,) in s when in a scan it is read. Effects that act
+    before the one that is judged add at most `carried` in 1/m to a reading.
     """
 
     plate: Plate
@@ -50,6 +51,7 @@ class Survey:
     rates: Array
     duration: float
     read_after: Array
+    carried: float = 0.0
 
     @cached_property
     def peak(self) -> float:
@@ -87,6 +89,11 @@ class Survey:
     def share(self, change: Array) -> float:
         """The largest `change` of a reading in 1/m as a share of the peak."""
         return float(np.abs(change).max(initial=0.0)) / self.peak
+
+    @property
+    def most(self) -> float:
+        """The largest reading in 1/m, with what is carried, as a share of the peak."""
+        return (float(np.abs(self.curvature).max(initial=0.0)) + self.carried) / self.peak
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +140,10 @@ class Effect(ABC):
     @abstractmethod
     def size(self, survey: Survey) -> Size:
         """Its size in a surveyed scene."""
+
+    def amplification(self, survey: Survey) -> float:
+        """How many times as large at most it makes a change of the readings before it."""
+        return 1.0
 
 
 class ReadingEffect(Effect):

@@ -76,9 +76,12 @@ class CrossTalk(ReadingEffect):
         K = survey.curvature.reshape(len(survey.times), -1)
         largest = np.abs(K).max(axis=0, initial=0.0)
         between_frames = float(largest[0] + largest[-1])
-        step = max(float(np.abs(np.diff(K)).max(initial=0.0)), between_frames)
-        # |y_c - x_c| <= s (|x_(c-1) - x_c| + |y_(c-1) - x_(c-1)|), so the largest is s/(1-s) steps.
-        return Size(self.share, self.share / (1 - self.share) * step / survey.peak)
+        step = max(float(np.abs(np.diff(K)).max(initial=0.0)), between_frames) + 2 * survey.carried
+        # |y_c - x_c| <= s (|x_(c-1) - x_c| + |y_(c-1) - x_(c-1)|), so the largest is s/(1-s) steps;
+        # and y_(c-1) is a mean of readings before, and of rest.
+        range_ = max(K.max(initial=0.0), 0.0) - min(K.min(initial=0.0), 0.0) + 2 * survey.carried
+        most = min(step / (1 - self.share), float(range_))
+        return Size(self.share, self.share * most / survey.peak)
 
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
         from kappaskin.scenes.effects.at_work.electronics import cross_talk
@@ -129,7 +132,9 @@ class Saturation(ReadingEffect):
     def size(self, survey: Survey) -> Size:
         (low, high), K = self.rails, survey.curvature
         number = float(np.maximum(K / low, K / high).max(initial=0.0))
-        return Size(number, survey.share(np.clip(K, low, high) - K))
+        above = float(K.max(initial=0.0)) + survey.carried - high
+        below = low - float(K.min(initial=0.0)) + survey.carried
+        return Size(number, max(above, below, 0.0) / survey.peak)
 
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
         from kappaskin.scenes.effects.at_work.electronics import saturation

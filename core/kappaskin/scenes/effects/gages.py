@@ -99,7 +99,11 @@ class StrainLimit(ReadingEffect):
 
     def size(self, survey: Survey) -> Size:
         most = float(np.abs(survey.curvature).max(initial=0.0))
-        return Size(most / self.limit, self.share * max(most - self.limit, 0.0) / survey.peak)
+        error = self.share * max(survey.most - self.limit / survey.peak, 0.0)
+        return Size(most / self.limit, error)
+
+    def amplification(self, survey: Survey) -> float:
+        return 1 + self.share
 
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
         from kappaskin.scenes.effects.at_work.gages import strain_limit
@@ -151,9 +155,14 @@ class Hysteresis(ReadingEffect):
     def size(self, survey: Survey) -> Size:
         # Each play lags behind by its threshold, or by all there is to lag behind of.
         wider = max(self.asymmetry, 1.0)
-        lags = np.minimum(np.array(self.thresholds) * wider, survey.peak) * self.weights
-        number = float(lags.sum()) / survey.peak
-        return Size(number, number)
+        widths = np.array(self.thresholds) * wider / survey.peak
+        number, error = (
+            float((np.minimum(widths, most) * self.weights).sum()) for most in (1.0, survey.most)
+        )
+        return Size(number, error)
+
+    def amplification(self, survey: Survey) -> float:
+        return max(self.asymmetry, 1 / self.asymmetry)
 
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
         from kappaskin.scenes.effects.at_work.gages import hysteresis
@@ -195,7 +204,10 @@ class Creep(ReadingEffect):
 
     def size(self, survey: Survey) -> Size:
         gone = -self.share * math.expm1(-survey.duration / self.time_constant)
-        return Size(gone, gone)
+        return Size(gone, gone * survey.most)
+
+    def amplification(self, survey: Survey) -> float:
+        return 1 + self.share
 
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
         from kappaskin.scenes.effects.at_work.gages import creep
@@ -254,7 +266,15 @@ class Temperature(ReadingEffect):
         K = survey.curvature.reshape(len(survey.times), -1)
         change = T * (self.gain * self.shares(K.shape[1:]) * K + self.offsets(K.shape[1:]))
         number = T * (abs(self.offset) / survey.peak + abs(self.gain))
-        return Size(number, survey.share(change))
+        error = (
+            survey.share(change) + (self.amplification(survey) - 1) * survey.carried / survey.peak
+        )
+        return Size(number, error)
+
+    def amplification(self, survey: Survey) -> float:
+        T = abs(self.warmer(survey.duration))
+        shares = self.shares((3 * len(survey.layout),))
+        return 1 + T * abs(self.gain) * float(np.abs(shares).max())
 
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
         from kappaskin.scenes.effects.at_work.gages import temperature
@@ -298,7 +318,11 @@ class Tolerance(ReadingEffect):
         gain, offset = self.errors((3 * len(survey.layout),))
         K = survey.curvature.reshape(len(survey.times), -1)
         off = survey.share((gain - 1) * K + offset)
+        off += float(np.abs(gain - 1).max()) * survey.carried / survey.peak
         return Size(self.gain_sd + self.offset_sd / survey.peak, off)
+
+    def amplification(self, survey: Survey) -> float:
+        return float(np.abs(self.errors((3 * len(survey.layout),))[0]).max())
 
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
         from kappaskin.scenes.effects.at_work.gages import tolerance

@@ -211,6 +211,21 @@ def test_what_an_effect_says_is_near_what_leaving_it_out_does(effect, seed):
     assert error <= WITHIN.get(effect.name, NEARLY) * changed
 
 
+@pytest.mark.parametrize("share", [0.01, 0.1, 0.5])
+@every_scenery
+def test_cross_talk_of_what_is_carried_before_it_stays_within_what_it_says(share, seed):
+    s, rng = survey(seed), np.random.default_rng(seed)
+    carried = 3 * s.peak
+    K = s.curvature.reshape(FRAMES, -1)
+    K = K + rng.choice([-carried, carried], K.shape)
+
+    running = CrossTalk(share).start(K.shape[1:], rng)
+    changed = max(np.abs(running(k, t) - k).max() for k, t in zip(K, s.times, strict=True))
+
+    error = CrossTalk(share).size(replace(s, carried=carried)).error * s.peak
+    assert 0.6 * error <= changed <= error
+
+
 @pytest.mark.parametrize("effect", EVERY, ids=lambda effect: effect.name)
 def test_sizes_are_numbers_also_where_nothing_touches(effect):
     for moments in (survey(0), replace(survey(0), **at_rest(survey(0)))):
