@@ -202,7 +202,7 @@ class Bayes(Estimator):
         spent = (1 - 1 / d).sum(axis=1)
         return Fit(
             self,
-            flat.reshape(*frames, 3, len(self.layout)),
+            flat.reshape(*frames, *self.frame_shape),
             c.reshape(*frames, *self.basis.shape),
             spreads if frames else spreads[0],
             (int(used.sum()) - spent).reshape(frames),

@@ -122,7 +122,7 @@ def _root(variance: Array) -> Array:
 class Fit:
     """The shape that explains the readings best, of one frame or of T (leading axis).
 
-    `curvature` (..., 3, P) in 1/m are the readings used, NaN where one is missing or excluded;
+    `readings` (..., 3, P) in 1/m are those used, NaN where one is missing or excluded;
     `coefficients` (..., Ni, Nj) in m; `uncertainty` theirs for unit noise, of each frame when there
     are several; `spare` (...) the degrees of freedom left, readings less unknowns. `known_noise`
     (...) in 1/m is the noise where the estimator knows it. An iteration took `steps` (...); where
@@ -131,7 +131,7 @@ class Fit:
     """
 
     estimator: "Estimator"
-    curvature: Array
+    readings: Array
     coefficients: Array
     uncertainty: "Uncertainty | Sequence[Uncertainty]"
     spare: ArrayLike
@@ -143,7 +143,7 @@ class Fit:
     @cached_property
     def residual(self) -> Array:
         """Residual (..., 3, P) in 1/m, readings less those of the shape; NaN where none is used."""
-        return self.curvature - self.estimator.predicted(self.coefficients)
+        return self.readings - self.estimator.predicted(self.coefficients)
 
     @cached_property
     def noise(self) -> Array:
@@ -153,7 +153,7 @@ class Fit:
         """
         if self.known_noise is not None:
             return self.known_noise
-        left = self.residual.reshape(*self.residual.shape[:-2], 3 * len(self.estimator.layout))
+        left = self.estimator.flattened(self.residual)
         squares = np.vecdot(left, left)
         if np.count_nonzero(squares != squares):  # NaN, found in a tenth of the time of any()
             left = np.where(np.isnan(left), 0.0, left)
@@ -276,7 +276,7 @@ class Fit:
         for t, uncertainty in enumerate(each):
             yield replace(
                 self,
-                curvature=self.curvature[t],
+                readings=self.readings[t],
                 coefficients=self.coefficients[t],
                 uncertainty=uncertainty,
                 known_noise=None if self.known_noise is None else self.known_noise[t],
@@ -290,17 +290,17 @@ class Fit:
             return np.concatenate(parts)[order]
 
         def of_each(name: str) -> Array:
-            return joined([np.broadcast_to(getattr(f, name), len(f.curvature)) for f in fits])
+            return joined([np.broadcast_to(getattr(f, name), len(f.readings)) for f in fits])
 
         uncertainties: list[Uncertainty] = []
         for fit in fits:
             own = fit.uncertainty
-            uncertainties.extend(own if isinstance(own, Sequence) else [own] * len(fit.curvature))
+            uncertainties.extend(own if isinstance(own, Sequence) else [own] * len(fit.readings))
         known_noises = [fit.known_noise for fit in fits if fit.known_noise is not None]
         suspect: list[NDArray[np.uint8]] = [fit.suspect for fit in fits if fit.suspect is not None]
         return Fit(
             fits[0].estimator,
-            joined([fit.curvature for fit in fits]),
+            joined([fit.readings for fit in fits]),
             joined([fit.coefficients for fit in fits]),
             [uncertainties[int(place)] for place in order],
             of_each("spare"),
@@ -317,7 +317,7 @@ class Fit:
         def alone(fit: Fit) -> Fit:
             return replace(
                 fit,
-                curvature=fit.curvature[None],
+                readings=fit.readings[None],
                 coefficients=fit.coefficients[None],
                 uncertainty=[cast("Uncertainty", fit.uncertainty)],
                 spare=np.reshape(fit.spare, (1,)),

@@ -240,7 +240,7 @@ class Pipeline:
         noise = float(fit.noise)
         contact, second, drift = NO_CONTACT, NO_CONTACT, 0.0
         if math.isfinite(noise):
-            contact, second = map(self._bounded, self._contacts(fit.curvature, fit))
+            contact, second = map(self._bounded, self._contacts(fit.readings, fit))
             drift = self._contacts.drift
         if self.drift is not None:
             self.drift.follow(frame.device_time, curvature, surface, noise)

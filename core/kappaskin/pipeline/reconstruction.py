@@ -246,7 +246,7 @@ def reconstruct(
         fits = [fitter(frame) for frame in curvature]
         pairs, drifts = list[tuple[Contact, Contact]](), list[float]()
         for one in fits:
-            pairs.append(contacts_of(one.curvature, one))
+            pairs.append(contacts_of(one.readings, one))
             drifts.append(contacts_of.drift)
         out["drift"] = np.array(drifts)
         contacts = [bounded(first) for first, _ in pairs]
