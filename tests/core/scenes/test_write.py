@@ -221,7 +221,7 @@ def motions(draw, patch: Patch):
 
 
 @st.composite
-def stimuli(draw, patch: Patch):
+def stimuli(draw, patch: Patch, stretches: bool = False):
     x, y = 0.4 * patch.a, 0.4 * patch.b
     size = st.floats(1e-4, 0.03 * patch.b)
     if draw(st.booleans()):
@@ -232,7 +232,7 @@ def stimuli(draw, patch: Patch):
             st.builds(Punch, size),
             st.builds(Block, size, size),
         )
-        pressed = draw(st.sampled_from(["force", "depth"]))
+        pressed = "force" if stretches else draw(st.sampled_from(["force", "depth"]))
         what = Indenter(
             draw(rigid), x, y, **{pressed: draw(st.floats(1e-4, 0.02))}, turn=draw(shares)
         )
@@ -317,7 +317,7 @@ def scenes(draw) -> Scene:
         "a scene",
         plate,
         draw(layouts(patch)),
-        draw(stimuli(patch)),
+        draw(stimuli(patch, plate.stretches)),
         draw(effects(chain)),
         chain,
         draw(st.floats(1.0, 50.0)),
