@@ -31,10 +31,10 @@ _MOST = 2_000  # functions: the uncertainty of a shape beside a drift takes thei
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FittedDrift:
-    """A drift of `size` in 1/m by RMS, the `contacts` beside it, and the `fit` to what is left.
+    """A drift of `size` in 1/m by RMS, and `contacts` and `fit` of the readings without it.
 
-    That is the fit as it was, whose shape still has the drift, of an estimator that has a memory,
-    was given a sigma or has more than 2,000 functions.
+    The fit is the original one, with the drift in its shape, of an estimator that has a memory, was
+    given a sigma or has more than 2,000 functions.
     """
 
     size: float
@@ -74,7 +74,7 @@ class SmoothDrift:
         rest: Array,
         left: float,
     ) -> FittedDrift | None:
-        """The drift and what is beside it; None where there is none.
+        """The drift, with the contacts and the fit without it; None where there is none.
 
         For `curvature` (3, P) in 1/m, NaN where missing, the `fit` to it, the `rest` (3 P,) that
         one load leaves of it, 0 where missing, and the squares `left` by the `contacts` found.

@@ -77,7 +77,7 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Errors:
+class ShapeErrors:
     """Errors in m, as those of a `Cost`."""
 
     e_exact: float
@@ -117,12 +117,12 @@ class Cost:
     e_sd: float
     rms: float
     shape_rms: float
-    summed: Errors | None = None
+    summed: ShapeErrors | None = None
 
     @property
-    def errors(self) -> Errors:
+    def errors(self) -> ShapeErrors:
         """The errors to expect of a real skin, as far as they are known."""
-        return self.summed or Errors(self.e_exact, self.rms_exact, self.e, self.rms)
+        return self.summed or ShapeErrors(self.e_exact, self.rms_exact, self.e, self.rms)
 
     @property
     def ratio(self) -> float:

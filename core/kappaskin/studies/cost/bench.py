@@ -40,7 +40,7 @@ from kappaskin.studies.accuracy import (
     seconds,
     traced,
 )
-from kappaskin.studies.cost import SCANS, Cost, Errors, Refused, Setting, own_elements
+from kappaskin.studies.cost import SCANS, Cost, Refused, Setting, ShapeErrors, own_elements
 from kappaskin.studies.simulation import costs_of
 from kappaskin.studies.summed import SummedResponse
 
@@ -185,7 +185,7 @@ class Bench:
                 self._summed_errors(fit, curvature + skin.beyond)
                 for fit, curvature in ((exactly, exact), (fit, read))
             )
-            summed = Errors(*of_exact, *of_read)
+            summed = ShapeErrors(*of_exact, *of_read)
         reference, w = self.scene.basis, self._truth[SETTLING:]
         shape = rms_distance(reference, np.zeros_like(w), reference, w)
         return Cost(
