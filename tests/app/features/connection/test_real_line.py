@@ -95,7 +95,7 @@ def test_a_line_may_fail_at_any_moment(plug, opened, until, qtbot, colours_in) -
     until(lambda: window.display.badge.state == "LIVE")
     assert alarm.text == ""
     assert window.session.status.generation == generation
-    assert kinds(window) == ["back", "gone", "met"]
+    until(lambda: kinds(window) == ["back", "gone", "met"])  # told after the state
     until(lambda: "restarted once" in window.connection.losses.text())
 
     # Another device on the port is said, with both names.
