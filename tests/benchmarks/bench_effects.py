@@ -70,7 +70,7 @@ def test_finite_slopes_take_a_few_times_the_operator(medians, figure, ratio) -> 
     patch = Patch(0.1, 0.1)
     basis, layout = SineBasis(patch, 15, 15), SensorLayout.regular(patch, 10, 10)
     c = np.random.default_rng(0).normal(0, 1e-4, (15, 15))
-    M, sensed = layout.curvature_operator(basis), FiniteSlopeEffect().sensed(basis, layout)
+    M, sensed = layout.operator(basis), FiniteSlopeEffect().sensed(basis, layout)
 
     ours, baseline = medians(lambda: sensed(c), lambda: M @ c.ravel(), turns=60, calls=100)
 

@@ -17,7 +17,7 @@ class Bench:
         simulator = Simulator(self.scene)
         self.frames = [simulator.frame(n, time.monotonic) for n in range(64)]
         self.pipeline = Pipeline(self.scene.sensor(), Setup())
-        self._M = self.scene.layout.curvature_operator(self.pipeline.basis)
+        self._M = self.scene.layout.operator(self.pipeline.basis)
 
     def lstsq_and_summation(self) -> np.ndarray:
         a, b = self.scene.plate.patch.a, self.scene.plate.patch.b

@@ -87,7 +87,7 @@ def test_contact_and_geometry_take_a_tenth_of_scipys_contact(medians, figure, ra
 def test_the_search_by_waves_takes_three_quarters_of_a_whole_matrix(medians, figure, ratio) -> None:
     basis = SineBasis(PATCH, 15, 15)
     compliance = PLATE.compliance(basis)
-    M = compliance.after(LAYOUT.curvature_operator(basis))
+    M = compliance.after(LAYOUT.operator(basis))
     by_waves = modal_projection(LAYOUT, basis, compliance, M)
     K = next(frames())[0].ravel()
     np.testing.assert_allclose(by_waves(K), K @ M, rtol=1e-9, atol=1e-9 * np.abs(K @ M).max())

@@ -152,7 +152,7 @@ def load_case_stimuli(case: str, plate: Plate, edge: str) -> tuple[Stimulus, ...
             "further inside; select a free load and drag it there"
         )
     load = load.scaled(size * moved / gives)
-    bent = SensorLayout.regular(patch, 21, 21).curvature_operator(basis, plate)
+    bent = SensorLayout.regular(patch, 21, 21).operator(basis, plate)
     most = float(np.abs(bent @ compliance(load.modal(basis)).ravel()).max())
     motion = paper.stimuli[0].motion
     if isinstance(motion, Orbit):

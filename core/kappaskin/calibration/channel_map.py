@@ -246,7 +246,7 @@ def _expected(sensor: Sensor, pressed: list[int]) -> Array:
     """The expected change of all by a press of each element, (N, 3, P) in 1/m for unit force."""
     layout, plate = sensor.layout, sensor.plate
     basis = basis_for(layout.patch, sensor.edge, _FUNCTIONS, _FUNCTIONS)
-    compliance, M = plate.compliance(basis), layout.curvature_operator(basis, plate)
+    compliance, M = plate.compliance(basis), layout.operator(basis, plate)
     loads = [PointLoad(x, y, 1.0) for x, y in layout.positions[pressed].tolist()]
     c = [compliance(load.modal(basis)).ravel() for load in loads]
     return (np.array(c) @ M.T).reshape(len(c), 3, -1)

@@ -272,7 +272,7 @@ def _finger(scene: Scene) -> Callable[[int], Scene]:
     Ri, Rj = (max(_FINEST, count) for count in scene.reference)
     bare = replace(scene.touched_by(), reference=(Ri, 1 if patch.strip else Rj))
     chain = bare.transduction
-    M = bare.layout.curvature_operator(bare.basis, bare.plate)
+    M = bare.layout.operator(bare.basis, bare.plate)
     most = _OF_THE_RANGE * chain.resolution * min(abs(limit) for limit in chain.limits)
 
     def pressed(element: int) -> Scene:

@@ -107,7 +107,7 @@ class SmoothDrift:
         if estimator.has_memory or estimator.sigma is not None or estimator.basis.size > _MOST:
             return FittedDrift(size, (found, NO_CONTACT), fit)
         rows = self._beside.linear if found.present else np.empty((0, len(used)))
-        beside = estimator(fit.curvature - (drift @ Q).reshape(curvature.shape))
+        beside = estimator(fit.readings - (drift @ Q).reshape(curvature.shape))
         whole = _beside_drift(beside, Q, np.where(used, rows, 0.0))
         beside = replace(beside, uncertainty=whole, **judged)
         return FittedDrift(size, (self._beside(curvature, beside), NO_CONTACT), beside)
@@ -162,7 +162,7 @@ def _beside_drift(fit: Fit, Q: Array, rows: Array) -> Uncertainty:
     estimator, unit = fit.estimator, cast("Uncertainty", fit.uncertainty)
 
     def covariance() -> Array:
-        M = np.where(np.isfinite(fit.curvature).reshape(-1, 1), estimator.M, 0.0)
+        M = np.where(np.isfinite(fit.readings).reshape(-1, 1), estimator.M, 0.0)
         C, J = unit.covariance_of(np.eye(estimator.basis.size)), orthonormal(rows)
         beside = Q - (Q @ J.T) @ J
         A, B = C @ (Q @ M).T, C @ (beside @ M).T

@@ -153,7 +153,7 @@ class ElasticSkin:
         self._basis = basis_for(patch, edge, functions, functions)
         self._compliance = plate.compliance(self._basis)
         # Most of the time goes into reading it: half of the memory.
-        M = self._compliance.after(layout.curvature_operator(self._basis, plate))
+        M = self._compliance.after(layout.operator(self._basis, plate))
         self._M: NDArray[np.float32] = M.astype(np.float32)
         self.half_wave = max(patch.a, patch.b) / functions
         self.bend = 1 / (4 * math.pi * plate.rigidity)

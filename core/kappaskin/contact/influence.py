@@ -65,7 +65,7 @@ class _OfFunctions:
     ) -> None:
         self._basis = basis_for(plate.patch, edge, functions, 1 if plate.patch.strip else functions)
         compliance = plate.compliance(self._basis)
-        self._readings = compliance.after(layout.curvature_operator(self._basis, plate)).T.copy()
+        self._readings = compliance.after(layout.operator(self._basis, plate)).T.copy()
         self._C, self._out = compliance.after(np.eye(self._basis.size)), out
 
     def at(self, x: float, y: float, s: float) -> None:
@@ -339,7 +339,7 @@ def _of_functions(
     for i in range(0, len(layout), _TOGETHER):
         here = slice(i, i + _TOGETHER)
         part = replace(layout, positions=layout.positions[here], live=layout.live[:, here])
-        M = compliance.after(part.curvature_operator(basis, plate)).reshape(-1, *basis.shape)
+        M = compliance.after(part.operator(basis, plate)).reshape(-1, *basis.shape)
         read = unit * (along_x @ (M @ along_y.T)).T
         T[..., here] = read.reshape(len(y), len(x), 3, len(part))
     return T, _displacement(basis, compliance, x, y), sd

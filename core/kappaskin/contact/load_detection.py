@@ -61,7 +61,7 @@ class LoadDetector:
         x, y = patch.grid(_SEARCHED + 2, 3 if strip else _SEARCHED + 2)
         points = np.stack(np.meshgrid(x[1:-1], y[1:-1]), -1).reshape(-1, 2)
         self._points = points[patch.moves(points)]
-        M = plate.compliance(basis).after(layout.curvature_operator(basis, plate))
+        M = plate.compliance(basis).after(layout.operator(basis, plate))
         self._T = M @ basis.at(self._points).T
         self._plain = level_and_slopes(layout).T
         self._live = layout.live.ravel()

@@ -188,7 +188,7 @@ class PointContact:
         self.patch, strip = plate.patch, plate.patch.strip
         self.basis = basis_for(self.patch, edge, _FUNCTIONS, 1 if strip else _FUNCTIONS)
         compliance = plate.compliance(self.basis)
-        self._M = compliance.after(layout.curvature_operator(self.basis, plate))
+        self._M = compliance.after(layout.operator(self.basis, plate))
         self._modal = modal_projection(layout, self.basis, compliance, self._M)
         self._free = np.empty((0, len(self._M))) if free is None else free
         # The readings of a load, their derivatives by x, y and s, what the elements read, and the

@@ -28,7 +28,7 @@ class StretchedSkin:
         self._stretching = Stretching(plate, self._basis)
         compliance = plate.compliance(self._basis)
         self._C = compliance.after(np.eye(self._basis.size))
-        self._readings = compliance.after(layout.curvature_operator(self._basis))
+        self._readings = compliance.after(layout.operator(self._basis))
         self._q, self._change = np.zeros(self._basis.size), np.zeros((4, self._basis.size))
 
     def begin(self, x: float, y: float, displacement: float) -> None:

@@ -255,7 +255,7 @@ class _Pairs:
         places = np.stack(np.meshgrid(x[1:-1], y[1:-1]), -1).reshape(-1, 2)
         self._places = places[self.patch.moves(places)]
         self._felt = self._basis.at(self._places)
-        M = self._compliance.after(layout.curvature_operator(self._basis, plate))
+        M = self._compliance.after(layout.operator(self._basis, plate))
         self._M = M * self._loads.influence.unit
         self._pairs = PatternCache[tuple[Array, Array, Array]]()
         self.left = math.nan

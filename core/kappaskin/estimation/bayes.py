@@ -209,7 +209,7 @@ class Bayes(Estimator):
                 "expected the curvature of a load as well, since the prior's scale follows from "
                 "it; got none; give the readings (3, P) of the load without noise"
             )
-        self._check_shape(curvature)
+        self._of_one_frame(curvature)
         flat = curvature.ravel()
         used = self._there(flat)
         if not used.any():
@@ -233,7 +233,7 @@ class Bayes(Estimator):
         spent = (1 - 1 / d).sum(axis=1)
         return Fit(
             self,
-            flat.reshape(*frames, 3, len(self.layout)),
+            flat.reshape(*frames, *self.frame_shape),
             c.reshape(*frames, *self.basis.shape),
             spreads if frames else spreads[0],
             (int(used.sum()) - spent).reshape(frames),

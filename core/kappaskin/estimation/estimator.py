@@ -1,4 +1,4 @@
-"""The interface of all estimators: curvature to coefficients with error bars."""
+"""The interface of all estimators: readings to coefficients with error bars."""
 
 import math
 from abc import ABC, abstractmethod
@@ -71,7 +71,7 @@ def column_lengths(A: Array) -> Array:
 
 
 class Estimator(ABC):
-    """`fit = LeastSquares(basis, layout)`, factored once; `fit(curvature)` is a `Fit`.
+    """`fit = LeastSquares(basis, layout)`, factored once; `fit(readings)` is a `Fit`.
 
     `sigma`, a scalar or (3, P) in 1/m, is the standard deviation of each reading; without it all
     readings weigh the same and their noise is estimated. An infinite sigma excludes a reading.
@@ -85,7 +85,7 @@ class Estimator(ABC):
     linear: ClassVar = True
     """Whether it takes the readings for those of slight slopes."""
     has_matrix: ClassVar = True
-    """Whether it uses the curvature operator M as a matrix, 3 P x Ni Nj numbers."""
+    """Whether it uses the layout's operator M as a matrix, R x Ni Nj numbers."""
     has_prior: ClassVar = False
     """Whether a prior decides what the readings do not, so that no basis is too large."""
     has_memory: ClassVar = False
@@ -119,12 +119,14 @@ class Estimator(ABC):
         numbers = np.finfo(self.dtype)
         self._largest, self._faint = float(numbers.max) ** _SAFE, float(numbers.tiny)
         self._faintest = float(numbers.tiny / numbers.eps)
+        self.frame_shape = layout.frame_shape
+        """The shape of the readings of a frame, (3, P)."""
         self.sigma = None if sigma is None else real_array(sigma, "sigma")
         """The given standard deviations in 1/m, one or (3, P); None if none were given."""
         self.weight = self._weights(1.0 if self.sigma is None else self.sigma)
-        """Weight 1 / sigma (3 P,) of each reading in m; 1 without a sigma."""
+        """Weight 1 / sigma (R,) of each reading in m; 1 without a sigma."""
         self.readable: Mask = layout.live.ravel() & (self.weight > 0)
-        """Which readings (3 P,) are used when they are present."""
+        """Which readings (R,) are used when they are present."""
         self._all_readable = bool(self.readable.all())
         self.unknowns = basis.size if basis.free is None else basis.free.shape[1]
         """Number of unknowns: the coefficients minus those fixed by the boundary conditions."""
@@ -136,9 +138,9 @@ class Estimator(ABC):
 
     def _weights(self, sigma: float | Array) -> Array:
         sigma = np.asarray(sigma)
-        if sigma.shape not in ((), (3, len(self.layout))):
+        if sigma.shape not in ((), self.frame_shape):
             raise Refusal(
-                f"expected sigma to be one number or (3, {len(self.layout)}), got {sigma.shape}"
+                f"expected sigma to be one number or {self.frame_shape}, got {sigma.shape}"
             )
         if not np.all(sigma > 0):
             raise Refusal("expected every sigma above zero in 1/m, got zero, less or NaN")
@@ -148,12 +150,12 @@ class Estimator(ABC):
                 f"expected every sigma from {1 / most:.1g} to {most:.1g} 1/m, or infinite, in "
                 f"{self.dtype}, got {known.min():g} to {known.max():g}"
             )
-        return np.broadcast_to(1 / sigma, (3, len(self.layout))).reshape(-1)
+        return np.broadcast_to(1 / sigma, self.frame_shape).reshape(-1)
 
     @cached_property
     def M(self) -> Array:
-        """The curvature operator (3 P, Ni Nj) (Eq. 2)."""
-        return self.layout.curvature_operator(self.basis)
+        """The layout's operator (R, Ni Nj) (Eq. 2)."""
+        return self.layout.operator(self.basis)
 
     @cached_property
     def _M_T(self) -> Array:
@@ -163,7 +165,12 @@ class Estimator(ABC):
         """Readings (..., 3, P) in 1/m that `coefficients` (..., Ni, Nj) in m would cause."""
         frames = coefficients.shape[:-2]
         flat = coefficients.reshape(*frames, self.basis.size)
-        return np.dot(flat, self._M_T).reshape(*frames, 3, len(self.layout))
+        return np.dot(flat, self._M_T).reshape(*frames, *self.frame_shape)
+
+    def flattened(self, readings: Array) -> Array:
+        """Readings (..., 3, P) of one frame or several as (..., R)."""
+        frames = readings.shape[: readings.ndim - len(self.frame_shape)]
+        return readings.reshape(*frames, self.layout.channels)
 
     @cached_property
     def _slopes(self) -> list[list[tuple[float, ValueMap]]]:
@@ -185,25 +192,26 @@ class Estimator(ABC):
             squares = np.square(x) + np.square(y)
             return math.sqrt(np.max(squares, initial=0.0, where=squares >= 0))
 
-    def _check_shape(self, K: Array) -> None:
-        if K.ndim not in (2, 3) or K.shape[-2:] != (3, len(self.layout)):
-            raise Refusal(
-                f"expected curvature of shape (3, {len(self.layout)}) or (T, 3, "
-                f"{len(self.layout)}), got {K.shape}"
-            )
+    def _of_one_frame(self, K: Array) -> bool:
+        """Whether K is one frame, not T of them; raises a `Refusal` for any other shape."""
+        shape, one = K.shape, self.frame_shape
+        if shape == one:
+            return True
+        if shape[1:] == one:
+            return False
+        raise Refusal(f"expected readings of shape {one} or (T, {str(one)[1:]}, got {shape}")
 
-    def __call__(self, curvature: ArrayLike) -> Fit:
-        """Fit `curvature` (3, P) or (T, 3, P) in 1/m; NaN and infinity mean a missing reading.
+    def __call__(self, readings: ArrayLike) -> Fit:
+        """Fit `readings` (3, P) or (T, 3, P) in 1/m; NaN and infinity mean a missing reading.
 
         So do single readings too large to compute with: 4e9 in float32, 1e77 in float64; a frame
         without any above 1e-31 in float32, 1e-292 in float64, is of zeros. Raises
         `RankDeficient` when the readings do not determine the shape, or are so large throughout.
         """
-        K = real_array(
-            curvature, "curvature", self.dtype
-        )  # a copy: residuals are computed from it later
-        self._check_shape(K)
-        flat = K.reshape(*K.shape[:-2], 3 * len(self.layout))
+        # A copy: residuals are computed from it later.
+        K = real_array(readings, "readings", self.dtype)
+        alone = self._of_one_frame(K)
+        flat = K.reshape(-1) if alone else self.flattened(K)
         squares = _squares(flat)
         if np.count_nonzero(~(squares >= self._faint)):  # NaN too
             self._flush(flat)
@@ -213,7 +221,7 @@ class Estimator(ABC):
         flat[~used] = np.nan
         if np.all(used == self.readable):
             return self._fit(flat, self.readable)
-        if K.ndim == 2:
+        if alone:
             return self._fit(flat, used)
         patterns, which = np.unique(used, axis=0, return_inverse=True)
         which = which.ravel()
@@ -230,7 +238,7 @@ class Estimator(ABC):
         return Fit.merged(fits, np.argsort(np.argsort(which, kind="stable")))
 
     def _there(self, flat: Array) -> Mask:
-        """Which readings (..., 3 P) are used; those missing or too large to compute with are not.
+        """Which readings (..., R) are used; those missing or too large to compute with are not.
 
         Raises `RankDeficient` where they are too large throughout: the small ones are no shape.
         """
@@ -248,15 +256,15 @@ class Estimator(ABC):
         return small & self.readable
 
     def _flush(self, flat: Array) -> None:
-        """Set readings (..., 3 P) to zero where they are so small throughout that digits are lost.
+        """Set readings (..., R) to zero where they are so small throughout that digits are lost.
 
         Their coefficients, some thousand times smaller, would have next to none.
         """
         largest = np.max(np.abs(flat), axis=-1, initial=0.0, where=np.isfinite(flat), keepdims=True)
         flat[(largest < self._faintest) & np.isfinite(flat)] = 0.0
 
-    def follow(self, curvature: Array, times: Array, held: Array) -> Fit:
-        """Fit the next frame: `curvature` (3, P) in 1/m read at `times` (3, P) in s.
+    def follow(self, readings: Array, times: Array, held: Array) -> Fit:
+        """Fit the next frame: `readings` (3, P) in 1/m read at `times` (3, P) in s.
 
         Both are NaN where nothing was read; `held` (3, P) also has the readings held from earlier
         frames. An estimator without memory fits `held`.
@@ -277,21 +285,21 @@ class Estimator(ABC):
         return cast("Uncertainty", fit.uncertainty)
 
     def _rest(self, missing: Mask | None) -> Array:
-        rest = np.zeros((3, len(self.layout)))
+        rest = np.zeros(self.frame_shape)
         return rest if missing is None else np.where(missing, np.nan, rest)
 
     @abstractmethod
     def _fit(self, flat: Array, used: Mask) -> Fit:
-        """Fit readings (3 P,) or (T, 3 P), of which those `used` (3 P,) are there, the rest NaN."""
+        """Fit readings (R,) or (T, R), of which those `used` (R,) are there, the rest NaN."""
 
     def _answer(
         self, flat: Array, c: Array, spread: Uncertainty, spare: int, steps: ArrayLike = 0
     ) -> Fit:
-        """The fit of `c` (..., N) or (..., Ni, Nj) to `flat` (..., 3 P), all of one `spread`."""
+        """The fit of `c` (..., N) or (..., Ni, Nj) to `flat` (..., R), all of one `spread`."""
         frames = flat.shape[:-1]
         return Fit(
             self,
-            flat.reshape(*frames, 3, len(self.layout)),
+            flat.reshape(*frames, *self.frame_shape),
             c.reshape(*frames, *self.basis.shape),
             [spread] * frames[0] if frames else spread,
             spare,
@@ -318,7 +326,7 @@ class Estimator(ABC):
             return RankDeficient(
                 f"{what}: no readings are left; check the connection and the dead elements"
             )
-        channels = len(layout) if layout.patch.strip else 3 * len(layout)
+        channels = int(np.count_nonzero(layout.live | layout.lacking))
         missing = channels - readings
         if self._moves_as_a_whole():
             return RankDeficient(

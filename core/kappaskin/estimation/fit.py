@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
+from kappaskin.sensing import SensorLayout
 
 if TYPE_CHECKING:
     from kappaskin.estimation.estimator import Estimator
@@ -110,19 +111,19 @@ _OFF = 1.25  # times, or as a share of the given sigma, is too far off
 # degrees of freedom. Under a prior those are partly of what it keeps the shape from following, most
 # of it near the contact: then sigma is too large only by the sum of all.
 def sigma_ratio(
-    scaled: Array, bend: Array, positions: Array, spare: Array, prior: bool = False
+    scaled: Array, bend: Array, layout: SensorLayout, spare: Array, prior: bool = False
 ) -> float:
-    """Noise over sigma by the residuals over sigma, `scaled` (T, 3, P); 1 where sigma may be right.
+    """Noise over sigma by the residuals over sigma, `scaled` (T, R); 1 where sigma may be right.
 
-    `bend` (T, P) in any unit says how far the skin is bent at each element, `positions` (P, 2) in m
-    where that is; `spare` (T,) are the degrees of freedom, left by a `prior` or by least squares.
-    NaN residuals do not count.
+    `bend` (T, P) in any unit says how far the skin is bent at each element of the `layout`; `spare`
+    (T,) are the degrees of freedom, left by a `prior` or by least squares. NaN residuals do not
+    count.
     """
-    there = np.isfinite(scaled)
-    share = np.maximum(spare, 0.0) / np.maximum(there.sum(axis=(1, 2)), 1)
-    squares, free = np.where(there, scaled, 0.0) ** 2, there * share[:, None, None]
+    there, positions = np.isfinite(scaled), layout.positions
+    share = np.maximum(spare, 0.0) / np.maximum(there.sum(axis=1), 1)
+    squares, free = np.where(there, scaled, 0.0) ** 2, there * share[:, None]
     away = np.sum((positions - positions[np.argmax(bend, axis=1), None]) ** 2, axis=2)
-    far = (away >= np.median(away, axis=1, keepdims=True))[:, None]
+    far = (away >= np.median(away, axis=1, keepdims=True))[:, layout.element]
     one, other = slice(0, len(scaled) // 2 * 2, 2), slice(1, None, 2)
     both = there[one] & there[other]
     differ = np.subtract(scaled[one], scaled[other], where=both, out=np.zeros(both.shape))
@@ -187,7 +188,7 @@ def _root(variance: Array) -> Array:
 class Fit:
     """The shape that explains the readings best, of one frame or of T (leading axis).
 
-    `curvature` (..., 3, P) in 1/m are the readings used, NaN where one is missing or excluded;
+    `readings` (..., 3, P) in 1/m are those used, NaN where one is missing or excluded;
     `coefficients` (..., Ni, Nj) in m; `uncertainty` theirs for unit noise, of each frame when there
     are several; `spare` (...) the degrees of freedom left, readings less unknowns. `known_noise`
     (...) in 1/m is the noise where the estimator knows it. An iteration took `steps` (...); where
@@ -197,7 +198,7 @@ class Fit:
     """
 
     estimator: "Estimator"
-    curvature: Array
+    readings: Array
     coefficients: Array
     uncertainty: "Uncertainty | Sequence[Uncertainty]"
     spare: ArrayLike
@@ -210,7 +211,7 @@ class Fit:
     @cached_property
     def residual(self) -> Array:
         """Residual (..., 3, P) in 1/m, readings less those of the shape; NaN where none is used."""
-        return self.curvature - self.estimator.predicted(self.coefficients)
+        return self.readings - self.estimator.predicted(self.coefficients)
 
     @cached_property
     def noise(self) -> Array:
@@ -220,7 +221,7 @@ class Fit:
         """
         if self.known_noise is not None:
             return self.known_noise
-        left = self.residual.reshape(*self.residual.shape[:-2], 3 * len(self.estimator.layout))
+        left = self.estimator.flattened(self.residual)
         squares = np.vecdot(left, left)
         if np.count_nonzero(squares != squares):  # NaN, found in a tenth of the time of any()
             left = np.where(np.isnan(left), 0.0, left)
@@ -324,15 +325,18 @@ class Fit:
         And where none was given, or the estimator has a memory, whose residuals it decides itself.
         Of one frame, or of all of them together.
         """
-        if self.estimator.sigma is None or self.estimator.has_memory or not self.curvature.size:
+        if self.estimator.sigma is None or self.estimator.has_memory or not self.readings.size:
             return 1.0
-        weight = self.estimator.weight if self.weights is None else self.weights
-        residual, P = self.residual.astype(float), len(self.estimator.layout)
-        scaled = residual.reshape(-1, 3 * P) * weight
-        bend = (self.curvature - self.residual).reshape(-1, 3, P) ** 2
-        spare = np.broadcast_to(np.asarray(self.spare, float), residual.shape[:-2]).reshape(-1)
-        places, bent = self.estimator.layout.positions, np.nansum(bend, axis=1)
-        return sigma_ratio(scaled.reshape(-1, 3, P), bent, places, spare, self.estimator.has_prior)
+        estimator, layout = self.estimator, self.estimator.layout
+        weight = estimator.weight if self.weights is None else self.weights
+        residual, read = (
+            np.atleast_2d(estimator.flattened(each.astype(float))) * weight
+            for each in (self.residual, self.readings)
+        )
+        bend = np.zeros((len(read), len(layout)))
+        np.add.at(bend, (slice(None), layout.element), np.nan_to_num(read - residual) ** 2)
+        spare = np.broadcast_to(np.asarray(self.spare, float), len(read))
+        return sigma_ratio(residual, bend, layout, spare, estimator.has_prior)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -360,7 +364,7 @@ class Fit:
         for t, uncertainty in enumerate(each):
             yield replace(
                 self,
-                curvature=self.curvature[t],
+                readings=self.readings[t],
                 coefficients=self.coefficients[t],
                 uncertainty=uncertainty,
                 known_noise=None if self.known_noise is None else self.known_noise[t],
@@ -374,19 +378,19 @@ class Fit:
             return np.concatenate(parts)[order]
 
         def of_each(name: str) -> Array:
-            return joined([np.broadcast_to(getattr(f, name), len(f.curvature)) for f in fits])
+            return joined([np.broadcast_to(getattr(f, name), len(f.readings)) for f in fits])
 
         uncertainties: list[Uncertainty] = []
         for fit in fits:
             own = fit.uncertainty
-            uncertainties.extend(own if isinstance(own, Sequence) else [own] * len(fit.curvature))
+            uncertainties.extend(own if isinstance(own, Sequence) else [own] * len(fit.readings))
         one = all(fit.estimator is fits[0].estimator for fit in fits)
-        weights = [np.tile(fit.estimator.weight, (len(fit.curvature), 1)) for fit in fits]
+        weights = [np.tile(fit.estimator.weight, (len(fit.readings), 1)) for fit in fits]
         known_noises = [fit.known_noise for fit in fits if fit.known_noise is not None]
         suspect: list[NDArray[np.uint8]] = [fit.suspect for fit in fits if fit.suspect is not None]
         return Fit(
             fits[0].estimator,
-            joined([fit.curvature for fit in fits]),
+            joined([fit.readings for fit in fits]),
             joined([fit.coefficients for fit in fits]),
             [uncertainties[int(place)] for place in order],
             of_each("spare"),
@@ -404,7 +408,7 @@ class Fit:
         def alone(fit: Fit) -> Fit:
             return replace(
                 fit,
-                curvature=fit.curvature[None],
+                readings=fit.readings[None],
                 coefficients=fit.coefficients[None],
                 uncertainty=[cast("Uncertainty", fit.uncertainty)],
                 spare=np.reshape(fit.spare, (1,)),

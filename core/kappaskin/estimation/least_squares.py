@@ -20,7 +20,7 @@ _REFACTOR = 1e-6  # below this share of a direction left, updating loses digits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _FactoredSolver:
-    """The transposed solution operator (R, N) for the R readings `used` (3 P,).
+    """The transposed solution operator (R, N) for those of the readings that are `used` (R,).
 
     It is the product of the `factors`: one, or two, (R, F) and (F, N), where rounding of a single
     one would show in the residual.
@@ -33,7 +33,7 @@ class _FactoredSolver:
 
 
 class LeastSquares(Estimator):
-    """The least-squares shape (Eq. 6): `fit = LeastSquares(basis, layout)`; `fit(curvature)`.
+    """The least-squares shape (Eq. 6): `fit = LeastSquares(basis, layout)`; `fit(readings)`.
 
     The normal equations of Eq. 6 square the condition number, so they are never formed: the
     columns of M are scaled to unit length and factored, M = Q R by Householder reflections and
@@ -78,7 +78,7 @@ class LeastSquares(Estimator):
         return _FactoredSolver(used, tuple(f.astype(self.dtype) for f in factors), spread, len(U))
 
     def _without(self, used: Mask) -> _FactoredSolver:
-        """The solver for the readings `used` (3 P,), cached for the next frames."""
+        """The solver for the readings `used` (R,), cached for the next frames."""
         return self._solver if used is self.readable else self._reduced(used, self._downdate)
 
     def _downdate(self, used: Mask) -> _FactoredSolver:
@@ -93,7 +93,8 @@ class LeastSquares(Estimator):
         if len(U_r) < self.unknowns or np.linalg.eigvalsh(G)[0] < _REFACTOR:
             weight = np.where(used, self.weight, 0.0)
             sigma = np.divide(1.0, weight, where=used, out=np.full(len(weight), np.inf))
-            fresh = LeastSquares(self.basis, self.layout, sigma.reshape(3, -1), dtype=self.dtype)
+            sigma = sigma.reshape(self.frame_shape)
+            fresh = LeastSquares(self.basis, self.layout, sigma, dtype=self.dtype)
             return fresh._solver
         inverse = np.eye(self.unknowns) + U_k.T @ np.linalg.solve(G, U_k)
         return self._made(used, self._root, U_r, inverse)

@@ -30,7 +30,7 @@ def singular_values(basis: Basis, layout: SensorLayout) -> tuple[Array, Array]:
     of an elastic rim are among them. The squared coefficients of each shape, in m, sum to 1 m^2.
     """
     W = np.eye(basis.size) if basis.free is None else basis.free
-    M_W = layout.curvature_operator(basis)[layout.live.ravel()] @ W
+    M_W = layout.operator(basis)[layout.live.ravel()] @ W
     length = column_lengths(M_W)
     A, back = M_W / length, W / np.where(np.isfinite(length), length, 1.0)
     R = cast("tuple[Array]", linalg.qr(A, mode="r"))[0][: A.shape[1]] if len(A) else A
@@ -153,7 +153,7 @@ def _scaled(layout: SensorLayout, basis: Basis, places: Array) -> tuple[Array, A
     And the mean products (F, F) of the functions over the skin, scaled alike.
     """
     W = np.eye(basis.size) if basis.free is None else basis.free
-    M = _at(places, layout).curvature_operator(basis) @ W
+    M = _at(places, layout).operator(basis) @ W
     length = np.linalg.norm(M, axis=0) / math.sqrt(len(places))
     points, weights = basis.quadrature()
     shapes = basis.at(points) @ W / length

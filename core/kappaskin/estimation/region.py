@@ -186,7 +186,7 @@ def contact_bound(
     )
     slopes = np.stack([contact.force * by_x, contact.force * by_y, by_force], axis=1)
     weights = np.where(layout.live, 1.0 if weight is None else weight, 0.0)
-    M = layout.curvature_operator(basis, sensor.plate)
+    M = layout.operator(basis, sensor.plate)
     J: Array = np.sqrt(weights).reshape(-1, 1) * (M @ slopes)
     length = np.linalg.norm(J, axis=0)
     observed = length > 0  # not y on a strip, nor where a contact of no force is

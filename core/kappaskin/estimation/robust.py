@@ -20,6 +20,7 @@ from kappaskin.estimation.fit import Fit, power_of_two
 from kappaskin.estimation.least_squares import LeastSquares
 from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import Plate
+from kappaskin.sensing import SensorLayout
 
 _FUNCTIONS = 15  # along each side at least, of the shapes that elements are tested against
 _ALARM = 1e-3  # chance that a frame of good readings has any of them suspected
@@ -50,15 +51,54 @@ FAULTS = ("", "spike", "stuck", "noisy", "swapped", "offset", "dead", "saturated
 """Faults of an element by number; 0, the empty word, means none."""
 
 
+class _Elements:
+    """Which readings are of which of P elements; `of` (R,) is the element of each reading."""
+
+    def __init__(self, layout: SensorLayout) -> None:
+        self.of, self.count = layout.element, len(layout)
+        self.kind = layout.kind
+        counts = np.bincount(self.of, minlength=self.count)
+        order = np.argsort(self.of, kind="stable")
+        place = np.arange(len(order)) - np.repeat(np.cumsum(counts) - counts, counts)
+        self.members = np.full((self.count, counts.max()), -1)
+        """The readings (P, k) of each element, filled up with -1."""
+        self.members[self.of[order], place] = order
+        self._uneven = bool(counts.min() < counts.max())
+
+    def total(self, values: Array | Mask) -> Array:
+        """Sums (P,) of `values` (R,) over the readings of each element."""
+        return np.bincount(self.of, values, self.count).astype(float)
+
+    def size(self, values: Array) -> Array:
+        """Root (P,) of the summed squares of `values` (R,)."""
+        return np.sqrt(self.total(values * values))
+
+    def rows(self, values: Array) -> Array:
+        """The rows (P, k, ...) of `values` (R, ...) of each element; zeros fill up."""
+        rows = values[self.members]
+        if self._uneven:
+            rows[self.members < 0] = 0
+        return rows
+
+    def alike(self, p: int, q: int) -> bool:
+        """Whether two elements read the same."""
+        there = (self.members[[p, q]] >= 0).all(axis=0)
+        own, other = self.members[[p, q]]
+        return bool(
+            np.array_equal(own < 0, other < 0) and (self.kind[own] == self.kind[other])[there].all()
+        )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _OutlierTest:
-    """What depends on which readings are `used` (3 P,), `count` of them.
+    """What depends on which readings are `used` (R,), `count` of them.
 
-    `U` (3 P, k) are the directions of the likelihood, zero where there is no reading. For a load at
+    `U` (R, k) are the directions of the likelihood, zero where there is no reading. For a load at
     each of G places, `by_load` (G, k) are the squared components along them, `beyond` (G,) those
     along none. `sensed` (P,) is the number of readings of each element.
     """
 
+    elements: _Elements
     likelihood: MarginalLikelihood
     U: Array
     by_load: Array
@@ -72,7 +112,7 @@ class _OutlierTest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _OutlierResult:
-    """Suspected elements (P,), and how far `off` (3, P) their readings are, 0 for the others.
+    """Suspected elements (P,), and how far `off` (R,) their readings are, 0 for the others.
 
     `cost` is -2 ln of its evidence, infinite where too many elements are suspects; `converged` is
     False then, where other suspects are as likely, and where outliers are taken for noise.
@@ -116,14 +156,13 @@ class Robust(Estimator, Stateful):
         self._linear = LeastSquares(basis, layout, self.sigma, self.rim_sd, self.dtype)
         across = 1 if basis.patch.strip else max(basis.shape[1], _FUNCTIONS)
         rich = replace(cast("Any", basis), Ni=max(basis.shape[0], _FUNCTIONS), Nj=across)
-        self._A: Array = self.weight[:, None] * (layout.curvature_operator(rich) @ prior_root(rich))
+        self._A: Array = self.weight[:, None] * (layout.operator(rich) @ prior_root(rich))
         self._set_up_loads(rich)
         self._tests = PatternCache[_OutlierTest]()
-        P = len(layout)
-        sensing = np.maximum(layout.live.sum(axis=0), 1)
-        self._sensing: Array = sensing.astype(float)
-        self._limit: Array = scipy.special.chdtri(sensing, _ALARM / P)
-        self._history = _SuspectHistory(P)
+        self._elements = _Elements(layout)
+        self._sensing = np.maximum(self._elements.total(layout.live.ravel()), 1)
+        self._limit = cast("Array", scipy.special.chdtri(self._sensing, _ALARM / len(layout)))
+        self._history = _SuspectHistory(self._elements, self.frame_shape)
         self._tests(self.readable, self._outlier_test)
 
     def _set_up_loads(self, rich: Basis) -> None:
@@ -133,12 +172,12 @@ class Robust(Estimator, Stateful):
         points = np.stack(np.meshgrid(x[1:-1], y[1:-1]), -1).reshape(-1, 2)
         points = points[patch.moves(points)]
         plate, orders = Plate(patch), ((0, 0), (1, 0), (0, 1))
-        read = self.weight[:, None] * self.layout.curvature_operator(rich, plate)
+        read = self.weight[:, None] * self.layout.operator(rich, plate)
         M = plate.compliance(rich).after(read)
         jets = [rich.at(points, *order) for order in orders[: 2 if patch.strip else 3]]
         wider = rich.at(points, 2, 0) + (0.0 if patch.strip else rich.at(points, 0, 2))
         self._load_readings: Array = np.stack([M @ jet.T for jet in (*jets, wider)], axis=-1)
-        """Per place (3 P, G, 4): of a force, of moving it along x, along y, of widening it."""
+        """Per place (R, G, 4): of a force, of moving it along x, along y, of widening it."""
         self._load_readings /= np.linalg.norm(self._load_readings, axis=0)
         self._forces = np.ascontiguousarray(self._load_readings[..., 0])
         self._load_limit = float(scipy.special.chdtri(1, _ALARM / len(points)))
@@ -157,18 +196,21 @@ class Robust(Estimator, Stateful):
         U[used] = likelihood.U
         by_load = (self._forces.T @ U) ** 2
         beyond = np.sum(self._forces[used] ** 2, axis=0) - by_load.sum(axis=1)
-        sensed = cast("NDArray[np.intp]", used.reshape(3, -1).sum(axis=0))
+        sensed = self._elements.total(used).astype(np.intp)
         prior = _PriorStrength(likelihood.s2[: U.shape[1]])
-        first = _FirstSuspects(U, prior.shares(_DECIDED * sensed.sum()), sensed)
+        shares = prior.shares(_DECIDED * sensed.sum())
+        first = _FirstSuspects(self._elements, U, shares, sensed)
         beyond, count = np.maximum(beyond, 0.0), int(used.sum())
-        return _OutlierTest(likelihood, U, by_load, beyond, used, count, sensed, prior, first)
+        return _OutlierTest(
+            self._elements, likelihood, U, by_load, beyond, used, count, sensed, prior, first
+        )
 
-    def __call__(self, curvature: ArrayLike) -> Fit:
-        """Fit `curvature` (3, P), or (T, 3, P) in the order of time, in 1/m."""
-        K = real_array(curvature, "curvature", self.dtype)
-        self._check_shape(K)
+    def __call__(self, readings: ArrayLike) -> Fit:
+        """Fit `readings` (3, P), or (T, 3, P) in the order of time, in 1/m."""
+        K = real_array(readings, "readings", self.dtype)
+        alone = self._of_one_frame(K)
         there = np.abs(K) <= self._largest
-        if K.ndim == 2 or (there == there[:1]).all():
+        if alone or (there == there[:1]).all():
             return super().__call__(K)
         # Not grouped by missing readings: faults are identified from the frames before.
         return Fit.stacked([self._next(frame, t) for t, frame in enumerate(K)])
@@ -181,7 +223,8 @@ class Robust(Estimator, Stateful):
 
     def at_rest(self, missing: Mask | None = None) -> Fit:
         """The fit to a skin at rest, which does not enter the history."""
-        past, self._history = self._history, _SuspectHistory(len(self.layout))
+        past = self._history
+        self._history = _SuspectHistory(self._elements, self.frame_shape)
         try:
             return super().at_rest(missing)
         finally:
@@ -191,15 +234,16 @@ class Robust(Estimator, Stateful):
         if not used.any():
             raise self.refusal(0, 0)
         frames, P = flat.shape[:-1], len(self.layout)
-        K = flat.reshape(*frames, 3, P)
-        results = [self._screened(frame, used) for frame in np.atleast_2d(flat)]
+        every = np.atleast_2d(flat)
+        results = [self._screened(frame, used) for frame in every]
         why = [
             self._history(readings, result.suspects, result.off)
-            for readings, result in zip(K.reshape(-1, 3, P), results, strict=True)
+            for readings, result in zip(every, results, strict=True)
         ]
-        out = np.reshape([result.suspects for result in results], (*frames, 1, P))
+        out = np.array([result.suspects[self._elements.of] for result in results], bool)
+        left = np.where(out.reshape(flat.shape), np.nan, flat)
         return replace(
-            self._linear(np.where(out, np.nan, K)),
+            self._linear(left.reshape(*frames, *self.frame_shape)),
             estimator=self,
             steps=np.array([result.rounds for result in results], int).reshape(frames),
             converged=np.array([result.converged for result in results], bool).reshape(frames),
@@ -218,20 +262,21 @@ class Robust(Estimator, Stateful):
             ends.append(self._searched(K, test, first))
         best, rounds = min(ends, key=lambda end: end.cost), sum(end.rounds for end in ends)
         if not math.isfinite(best.cost):
-            return _OutlierResult(none, np.zeros((3, P)), rounds)
+            return _OutlierResult(none, np.zeros(len(flat)), rounds)
         off = best.off * unit
-        np.divide(off, self.weight.reshape(3, P), where=off != 0, out=off)
+        np.divide(off, self.weight, where=off != 0, out=off)
         converged = best.converged and not _undecided(best, ends)
         return replace(best, off=off, rounds=rounds, converged=converged)
 
     def _searched(self, K: Array, test: _OutlierTest, suspects: Mask) -> _OutlierResult:
         """Where rounds end that begin with some `suspects` (P,), in units of sigma."""
-        loads, rounds, P, used = list[int](), 0, len(suspects), test.used
+        loads, rounds, used, of = list[int](), 0, test.used, self._elements.of
         most = _MOST * np.count_nonzero(test.sensed)
-        (gamma,) = test.likelihood(np.where(np.tile(suspects, 3), 0.0, K)[None, used])[1]
+        (gamma,) = test.likelihood(np.where(suspects[of], 0.0, K)[None, used])[1]
         while suspects.sum() <= most:
-            free = np.hstack([_columns(suspects), *(self._load_readings[:, g] for g in loads)])
-            left, out = test.count - free.shape[1], np.tile(suspects, 3)
+            out = suspects[of]
+            free = np.hstack([_columns(out), *(self._load_readings[:, g] for g in loads)])
+            left = test.count - free.shape[1]
             if left < 1:  # as many free directions as readings: nothing is left to contradict
                 break
             residuals = _Residuals(test, K, free, float(gamma), out)
@@ -244,16 +289,16 @@ class Robust(Estimator, Stateful):
             if place is not None and len(loads) < _LOADS and left > a_load:
                 loads.append(place)
             elif (found == suspects).all() or rounds == _ROUNDS:
-                off = np.zeros(3 * P)
-                off[out & used] = residuals.amounts[: 3 * suspects.sum()][used[out]]
-                cost = residuals.cost(K, self.sigma is not None)
+                off = np.zeros(len(K))
+                off[out & used] = residuals.amounts[: np.count_nonzero(out)][used[out]]
+                cost = residuals.cost(K, self.sigma is not None, int(suspects.sum()))
                 good = (test.sensed > 0) & ~suspects
                 even = self._even(residuals.chi_squared(suspects)[good], variance, good, K)
-                return _OutlierResult(suspects, off.reshape(3, P), rounds, cost, even)
+                return _OutlierResult(suspects, off, rounds, cost, even)
             else:
                 suspects = found
             rounds += 1
-        return _OutlierResult(suspects, np.zeros((3, P)), rounds)
+        return _OutlierResult(suspects, np.zeros(len(K)), rounds)
 
     def _even(self, t: Array, variance: float, good: Mask, K: Array) -> bool:
         """Whether half of the `good` (P,) elements, with t (g,), scatter as the noise of all says.
@@ -299,47 +344,50 @@ class _FirstSuspects:
 
     With Q as above, for a prior that decides a third of the readings by its `shares` w (k,),
     (K - o)^T Q (K - o) / 2 + sum_p limit_p |o_p| is minimised over what the elements are off by, o
-    (3, P): none pulls at the shape harder than its limit. That is convex, and solved by accelerated
+    (R,): none pulls at the shape harder than its limit. That is convex, and solved by accelerated
     proximal steps (doi:10.1137/080716542) for lower and lower limits, until more than a third of
     the elements would be off.
     """
 
-    def __init__(self, U: Array, shares: Array, sensed: NDArray[np.intp]) -> None:
+    def __init__(
+        self, elements: _Elements, U: Array, shares: Array, sensed: NDArray[np.intp]
+    ) -> None:
+        self._elements = elements
         self._root = U * np.sqrt(shares)
         self._there = sensed > 0
         n = np.maximum(sensed, 1)
-        left = 1 - np.square(self._root).sum(axis=1).reshape(3, -1).sum(axis=0) / n
+        left = 1 - elements.total(np.square(self._root).sum(axis=1)) / n
         self._limit: Array = np.sqrt(scipy.special.chdtri(n, _ALARM))
         lowest = scipy.special.chdtri(n, 1 - _QUIET)
         self._usual: Array = np.sqrt(np.maximum(left, 1e-3) * lowest)
 
     def __call__(self, K: Array, least: float) -> Mask:
-        """Suspected elements (P,) from weighted readings K (3 P,) of noise `least` or more."""
+        """Suspected elements (P,) from weighted readings K (R,) of noise `least` or more."""
         o, sigma = np.zeros_like(K), self._noise(K)
         most = _MOST * np.count_nonzero(self._there)
         while sigma:
             found = self._solved(K, o, sigma * self._limit)
-            if np.count_nonzero(found.reshape(3, -1).any(axis=0)) > most:
+            if np.count_nonzero(self._elements.total(found != 0)) > most:
                 break
             o, sigma = found, _LOWER * sigma
         limit = max(self._noise(K - o), least) * self._limit
-        return self._there & (np.linalg.norm(o.reshape(3, -1), axis=0) > limit)
+        return self._there & (self._elements.size(o) > limit)
 
     def _rest(self, K: Array) -> Array:
-        """Q K (3 P,)."""
+        """Q K (R,)."""
         return K - self._root @ (K @ self._root)
 
     def _noise(self, K: Array) -> float:
-        size = np.linalg.norm(self._rest(K).reshape(3, -1), axis=0)
+        size = self._elements.size(self._rest(K))
         return float(np.quantile((size / self._usual)[self._there], _QUIET))
 
     def _solved(self, K: Array, o: Array, limit: Array) -> Array:
-        """What the elements are off by (3 P,) for a `limit` (P,) each, from o on."""
+        """What the elements are off by (R,) for a `limit` (P,) each, from o on."""
         ahead, pace, still = o, 1.0, _STILL * limit.min()
         for _ in range(_STEPS):
-            pulled = (ahead + self._rest(K - ahead)).reshape(3, -1)
-            size = np.linalg.norm(pulled, axis=0)
-            new = (pulled * (1 - limit / np.maximum(size, limit))).ravel()
+            pulled = ahead + self._rest(K - ahead)
+            size = self._elements.size(pulled)
+            new = pulled * (1 - limit / np.maximum(size, limit))[self._elements.of]
             moved, faster = new - o, (1 + math.sqrt(1 + 4 * pace**2)) / 2
             ahead, o = new + (pace - 1) / faster * moved, new
             pace = faster
@@ -370,23 +418,23 @@ class _PriorStrength:
         return gs2 / (1 + gs2)
 
 
-def _columns(elements: Mask) -> Array:
-    """A unit column (3 P, 3 e) for each reading of some elements (P,)."""
-    readings = np.flatnonzero(np.tile(elements, 3))
-    columns = np.zeros((3 * len(elements), len(readings)))
+def _columns(out: Mask) -> Array:
+    """A unit column (R, r) for each of the r readings `out` (R,)."""
+    readings = np.flatnonzero(out)
+    columns = np.zeros((len(out), len(readings)))
     columns[readings, np.arange(len(readings))] = 1
     return columns
 
 
 class _Residuals:
-    """Residuals of the readings K (3 P,) against each other, in units of sigma.
+    """Residuals of the readings K (R,) against each other, in units of sigma.
 
-    `free` (3 P, f) are directions in which they are not constrained: the readings `out` (3 P,) of
+    `free` (R, f) are directions in which they are not constrained: the readings `out` (R,) of
     whole elements, then loads.
     """
 
     def __init__(self, test: _OutlierTest, K: Array, free: Array, gamma: float, out: Mask) -> None:
-        U = test.U
+        U, self._elements = test.U, test.elements
         s2 = test.likelihood.s2[: U.shape[1]]
         s2 = min(gamma, _CLEAREST / s2[0]) * s2
         self.w = s2 / (1 + s2)
@@ -400,9 +448,9 @@ class _Residuals:
         self._left, self._out = test.count - free.shape[1], int(np.count_nonzero(out))
         amounts = self._inverse @ (free.T @ r)
         self.unexplained = rest - free @ amounts
-        """K (3 P,) without its part along the free directions."""
+        """K (R,) without its part along the free directions."""
         self.r = r - self._QF @ amounts
-        """Q K (3 P,) without its free part."""
+        """Q K (R,) without its free part."""
         self.amounts = amounts
         """Of the part of K along the free directions (f,)."""
         self.amounts[: np.count_nonzero(out)] += K[out]
@@ -412,64 +460,70 @@ class _Residuals:
         """How many readings neither the free directions nor the prior decide, 1 at least."""
         return max(self._left - float(self.w.sum()), 1.0)
 
-    def cost(self, K: Array, sigma_known: bool) -> float:
-        """-2 ln of the evidence for the free directions.
+    def cost(self, K: Array, sigma_known: bool, outliers: int) -> float:
+        """-2 ln of the evidence for the free directions, with `outliers` elements among them.
 
-        The amount of an outlier may be anything up to the largest of the readings K (3 P,); a
+        The amount of an outlier may be anything up to the largest of the readings K (R,); a
         direction of a load costs 1.5 times what Schwarz's criterion says.
         """
-        tiny, P, f = np.finfo(float).tiny, len(K) // 3, len(self._inverse)
+        tiny, P, f = np.finfo(float).tiny, self._elements.count, len(self._inverse)
         squares = max(float(self.unexplained @ self.r), tiny)
         variance = 1.0 if sigma_known else max(squares / self._left, tiny)
         width = math.log(max(float(np.abs(K).max()) ** 2, tiny)) - math.log(variance)
         volume = -np.log1p(-self.w).sum() - np.linalg.slogdet(self._inverse)[1]
-        count, outliers = self._left + f, self._out / 3
+        count = self._left + f
         cost = squares / variance + count * math.log(variance) + float(volume)
-        cost += outliers * (3 * width + 2 * math.log(P / _BAD))
+        cost += self._out * width + outliers * 2 * math.log(P / _BAD)
         return cost + 1.5 * (f - self._out) * math.log(count)
 
     def chi_squared(self, out: Mask) -> Array:
         """Chi-squared (P,) of each element against the rest; those `out` are free directions."""
-        P = len(out)
-        taken = _element_blocks(self._QF @ self._inverse, self._QF, P)
-        D: Array = np.eye(3) - _element_blocks(self._Uw, self._U, P) - taken
-        r = self.r.reshape(3, P).T.copy()
-        own = np.flatnonzero(out)
-        block = np.arange(len(own))[:, None] + len(own) * np.arange(3)
-        D[own] = self._inverse[block[:, :, None], block[:, None, :]]
-        r[own] = self.amounts[block]
+        rows, members = self._elements.rows, self._elements.members
+        taken = self._blocks(self._QF @ self._inverse, self._QF)
+        D: Array = np.eye(members.shape[1]) - self._blocks(self._Uw, self._U) - taken
+        r = rows(self.r)
+        place = np.cumsum(out[self._elements.of]) - 1  # of a reading among those that are out
+        for p in np.flatnonzero(out):
+            there = members[p] >= 0
+            own = place[members[p, there]]
+            D[np.ix_([p], there, there)] = self._inverse[np.ix_(own, own)]
+            r[p, there] = self.amounts[own]
         return np.vecdot(r, np.linalg.solve(D, r[..., None])[..., 0])
 
-
-def _element_blocks(left: Array, right: Array, P: int) -> Array:
-    """The diagonal blocks (P, 3, 3) of left right^T, one per element, for rows (3 P, k)."""
-    left, right = (rows.reshape(3, P, -1).swapaxes(0, 1) for rows in (left, right))
-    return np.matmul(left, right.swapaxes(1, 2))
+    def _blocks(self, left: Array, right: Array) -> Array:
+        """The diagonal blocks (P, k, k) of left right^T, one per element, for rows (R, ...)."""
+        rows = self._elements.rows
+        return np.matmul(rows(left), rows(right).swapaxes(1, 2))
 
 
 class _SuspectHistory(Stateful):
     """The last frames of P elements, from which the fault of each suspect is identified."""
 
-    def __init__(self, P: int) -> None:
-        self._P = P
+    def __init__(self, elements: _Elements, shape: tuple[int, ...]) -> None:
+        self._elements, P = elements, elements.count
+        self._shape = (2 * shape[0] + 1, P) if len(shape) == 2 else (2 * shape[0] + P,)
         self._frames: deque[tuple[Array, Mask, Array]] = deque(maxlen=_FRAMES)
 
     def state(self, prefix: str = "") -> StateArrays:
-        frames = [np.vstack(frame).astype(float) for frame in self._frames]
-        return {f"{prefix}frames": np.array(frames)} if frames else {}
+        frames = [np.concatenate(frame).astype(float) for frame in self._frames]
+        if not frames:
+            return {}
+        return {f"{prefix}frames": np.reshape(frames, (len(frames), *self._shape))}
 
     def restore(self, state: Mapping[str, NDArray[np.float64]], prefix: str = "") -> None:
-        saved = state.get(f"{prefix}frames", np.empty((0, 7, self._P)))
-        if saved.ndim != 3 or saved.shape[1:] != (7, self._P):
+        saved = state.get(f"{prefix}frames", np.empty((0, *self._shape)))
+        if saved.shape[1:] != self._shape:
             raise Refusal(
-                f"expected {prefix}frames of shape (T, 7, {self._P}) to go on from, got "
+                f"expected {prefix}frames of shape (T, {str(self._shape)[1:]} to go on from, got "
                 f"shape {saved.shape}"
             )
+        P, R = self._elements.count, len(self._elements.of)
         self._frames.clear()
-        self._frames.extend((frame[:3], frame[3] > 0, frame[4:]) for frame in saved)
+        for frame in saved.reshape(-1, 2 * R + P):
+            self._frames.append((frame[:R], frame[R : R + P] > 0, frame[R + P :]))
 
     def __call__(self, K: Array, suspects: Mask, off: Array) -> NDArray[np.uint8]:
-        """Faults (P,) by number in `FAULTS`, for readings K (3, P) that are `off` (3, P) in 1/m."""
+        """Faults (P,) by number in `FAULTS`, for readings K (R,) that are `off` (R,)."""
         self._frames.append((K, suspects, off))
         why = np.where(suspects, FAULTS.index("spike"), 0).astype(np.uint8)
         if not suspects.any():
@@ -483,23 +537,28 @@ class _SuspectHistory(Stateful):
         Ks, were, offs = (np.stack(part) for part in zip(*self._frames, strict=True))
         latest = Ks[-_ENOUGH:]
         # A missing reading, as of a dead channel, contradicts nothing.
-        still = ((latest == latest[-1]) | np.isnan(latest)).all(axis=(0, 1))
+        changed = ((latest != latest[-1]) & ~np.isnan(latest)).any(axis=0)
+        still = self._elements.total(changed) == 0
         spans = np.ptp(latest, axis=0)
         moving = np.count_nonzero(spans > 0) > np.count_nonzero(spans == 0)
         for p in suspects:
             if still[p] and moving:
                 why[p] = FAULTS.index("stuck")
             elif were[:, p].mean() > _OFTEN:
-                steady = offs[were[:, p], :, p]
+                steady = offs[np.ix_(were[:, p], self._elements.of == p)]
                 drift = np.abs(steady.mean(axis=0)).max() > steady.std(axis=0).max()
                 why[p] = FAULTS.index("offset" if drift else "noisy")
 
     def _swapped(
         self, why: NDArray[np.uint8], K: Array, off: Array, suspects: NDArray[np.intp]
     ) -> None:
-        expected = K - off
+        expected, members = K - off, self._elements.members
         for p, q in combinations(suspects, 2):
-            both = np.isfinite(K[:, p] + K[:, q])  # channels
-            crossed = (K[both, p] - expected[both, q]) ** 2 + (K[both, q] - expected[both, p]) ** 2
-            if crossed.sum() < _CROSSED * np.sum(off[both, p] ** 2 + off[both, q] ** 2):
+            if not self._elements.alike(p, q):
+                continue
+            own, other = members[[p, q]]
+            both = (own >= 0) & np.isfinite(K[own] + K[other])
+            own, other = own[both], other[both]
+            crossed = (K[own] - expected[other]) ** 2 + (K[other] - expected[own]) ** 2
+            if crossed.sum() < _CROSSED * np.sum(off[own] ** 2 + off[other] ** 2):
                 why[[p, q]] = FAULTS.index("swapped")

@@ -73,7 +73,7 @@ _PLACE = 6.0  # of the contact's depth, times its distance in sides of the skin,
 
 
 class Tracking(Estimator, Stateful):
-    """`fit = Tracking(basis, layout)`; `fit(curvature)` tracks the skin frame by frame.
+    """`fit = Tracking(basis, layout)`; `fit(readings)` tracks the skin frame by frame.
 
     A Kalman filter of a plate under unknown loads (`prior_root`), whose modes move the faster the
     finer they are (`ModalKalmanFilter`). It has a memory: each frame, complete or not, is used at
@@ -126,11 +126,10 @@ class Tracking(Estimator, Stateful):
             "estimates depend on the frames before; simulate them"
         )
 
-    def __call__(self, curvature: ArrayLike) -> Fit:
+    def __call__(self, readings: ArrayLike) -> Fit:
         """Fit the next frame (3, P) in 1/m, or T of them (T, 3, P), read 6 ms after each other."""
-        K = real_array(curvature, "curvature")
-        self._check_shape(K)
-        if K.ndim == 2:
+        K = real_array(readings, "readings")
+        if self._of_one_frame(K):
             return self.follow(K, np.full(K.shape, self._next))
         if not len(K):
             none = np.empty((0, *self.basis.shape), self.dtype)
@@ -142,20 +141,19 @@ class Tracking(Estimator, Stateful):
         """Time in s of a frame that comes without one."""
         return self._now + _PERIOD if math.isfinite(self._now) else 0.0
 
-    def follow(self, curvature: ArrayLike, times: ArrayLike, held: Array | None = None) -> Fit:
-        """Fit `curvature` (3, P) in 1/m read at `times` (3, P) in s on the device's clock.
+    def follow(self, readings: ArrayLike, times: ArrayLike, held: Array | None = None) -> Fit:
+        """Fit `readings` (3, P) in 1/m read at `times` (3, P) in s on the device's clock.
 
         Missing readings are NaN as in any estimator; the time of a channel that was not read at
         all is NaN too. Readings of one channel must come in the order of their times. A clock that
         goes back means that the device has restarted. `held`, readings of earlier frames, is not
         used: the filter knows them. Raises a `Refusal` for a reading without a time.
         """
-        frame, when = real_array(curvature, "curvature"), real_array(times, "times")
-        self._check_shape(frame)
-        if frame.ndim != 2 or when.shape != frame.shape:
+        frame, when = real_array(readings, "readings"), real_array(times, "times")
+        if not self._of_one_frame(frame) or when.shape != frame.shape:
             raise Refusal(
-                f"expected curvature and times of shape (3, {len(self.layout)}), got {frame.shape} "
-                f"and {when.shape}"
+                f"expected readings and times of shape {self.frame_shape}, got {frame.shape} and "
+                f"{when.shape}"
             )
         K, t = frame.ravel(), when.ravel()
         used = np.flatnonzero(self._there(K))
@@ -202,7 +200,7 @@ class Tracking(Estimator, Stateful):
         return np.vstack([coarse, share * jet[1:3]])
 
     def _aged(self, lead: float) -> Array:
-        """Share (3 P,) of the next reading of each channel that would be new."""
+        """Share (R,) of the next reading of each channel that would be new."""
         level = self._level
         if level is None:  # nothing was read yet
             return np.ones(len(self._read))
@@ -282,7 +280,7 @@ class Tracking(Estimator, Stateful):
             noise, spare = 1.0, int(there.sum())
         return Fit(
             self,
-            K.reshape(3, -1).astype(self.dtype),
+            K.reshape(self.frame_shape).astype(self.dtype),
             c,
             RootUncertainty(lambda: root.astype(float) @ self._modes.T),
             spare,
@@ -290,7 +288,7 @@ class Tracking(Estimator, Stateful):
         )
 
     def _fit(self, flat: Array, used: Mask) -> Fit:
-        return self(flat.reshape(*flat.shape[:-1], 3, -1))
+        return self(flat.reshape(*flat.shape[:-1], *self.frame_shape))
 
 
 def _principal(basis: Basis) -> tuple[Array, Array, Array]:

@@ -241,7 +241,7 @@ class Pipeline:
             self.drift.follow(frame.device_time, curvature, surface, noise)
         contact, second, drift = NO_CONTACT, NO_CONTACT, 0.0
         if math.isfinite(noise):
-            contact, second = map(self._bounded, self._contacts(fit.curvature, fit))
+            contact, second = map(self._bounded, self._contacts(fit.readings, fit))
         if math.isfinite(noise) and (drifted := self._contacts.drift) is not None:
             fit, drift = drifted.fit, drifted.size
             self.fitted, surface, noise = fit, self._surface(fit.coefficients), float(fit.noise)

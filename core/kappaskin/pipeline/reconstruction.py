@@ -246,7 +246,7 @@ def reconstruct(
         fits = [fitter(frame) for frame in curvature]
         pairs, drifts = list[tuple[Contact, Contact]](), list[float]()
         for frame, one in enumerate(fits):
-            pairs.append(contacts_of(one.curvature, one))
+            pairs.append(contacts_of(one.readings, one))
             drift = contacts_of.drift
             drifts.append(drift.size if drift else 0.0)
             fits[frame] = drift.fit if drift else one

@@ -285,7 +285,7 @@ def survey(scene: Scene) -> Survey:
     basis = scene.basis
     layout = replace(scene.layout, gage_length=0.0)
     times = np.array(scene.survey_times)
-    M = layout.curvature_operator(basis, scene.plate)
+    M = layout.operator(basis, scene.plate)
     pressing = LoadingHistory(scene, scene.plate)
     step = min([_STEP, *(np.diff(s.motion.moments).min() / 4 for s in scene.stimuli if s.motion)])
     pairs = [(pressing(t), pressing(t + step) if scene.moves else None) for t in times.tolist()]

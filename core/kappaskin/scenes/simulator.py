@@ -108,7 +108,7 @@ class Simulator:
         if sloped:
             self._sensed = sloped[0].sensed(self._basis, layout, plate)
         else:
-            self._sensed = _linear(layout.curvature_operator(self._basis, plate))
+            self._sensed = _linear(layout.operator(self._basis, plate))
 
     def _truth(self, time: float) -> Truth:
         if self._still is not None:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, DTypeLike
 
 from kappaskin.bases import Basis, SineBasis, curvature_at, gauss, hoop_at
 from kappaskin.errors import Refusal
-from kappaskin.frames import Array, Mask
+from kappaskin.frames import Array, Indices, Mask
 from kappaskin.mechanics import Plate
 from kappaskin.skin import Patch
 
@@ -190,8 +190,28 @@ class SensorLayout:
     def __str__(self) -> str:
         return "{} x {} elements".format(*self.shape) if self.shape else f"{len(self)} elements"
 
-    def curvature_operator(self, basis: Basis, plate: Plate | None = None) -> Array:
-        """M (3 P, N): `M @ coefficients.ravel()` is curvature (3, P) flattened (Eqs. 2-5, 11).
+    @property
+    def frame_shape(self) -> tuple[int, ...]:
+        """The shape of the readings of a frame: (3, P)."""
+        return self.live.shape
+
+    @property
+    def channels(self) -> int:
+        """The number R of readings of a frame."""
+        return self.live.size
+
+    @property
+    def element(self) -> Indices:
+        """The element (R,) of each reading."""
+        return np.tile(np.arange(len(self)), 3)
+
+    @property
+    def kind(self) -> Indices:
+        """What each reading (R,) is of its element, as a number: xx, yy, xy."""
+        return np.repeat(np.arange(3), len(self))
+
+    def operator(self, basis: Basis, plate: Plate | None = None) -> Array:
+        """M (R, N): `M @ coefficients.ravel()` is a frame's readings, flattened (Eqs. 2-5, 11).
 
         With a `plate`, that of its deflection under loads: a bent skin stretches under them.
         """
@@ -199,7 +219,7 @@ class SensorLayout:
             raise Refusal(f"the layout is on {self.patch}, the basis on {basis.patch}; use one")
         curvature = plate.curvature(basis) if plate else None
         K = mean_curvature_at(basis, self.positions, self.gage_length, curvature)
-        return K.reshape(3 * len(self), basis.size)
+        return K.reshape(self.channels, basis.size)
 
 
 # The deflected skin is r = r0 - f n0 + v t. r0 is the skin at rest, of curvature H along x, t and e
@@ -332,7 +352,7 @@ class NormalCurvature:
         plate: Plate | None = None,
     ) -> None:
         places, H = layout.positions, basis.patch.base_curvature
-        maps = [*layout.curvature_operator(basis, plate).reshape(3, len(layout), basis.size)]
+        maps = [*layout.operator(basis, plate).reshape(3, len(layout), basis.size)]
         maps += [basis.at(places, 1, 0), basis.at(places, 0, 1)]
         if H:
             v, *turns = plate.hoop(basis, places) if plate else hoop_at(basis, places)

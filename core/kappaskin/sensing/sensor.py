@@ -100,7 +100,7 @@ class Sensor:
 
     @property
     def channels(self) -> int:
-        return 3 * len(self.layout)
+        return self.layout.channels
 
     def scan(self, channels: ArrayLike | None = None) -> Scan:
         """The scan of `channels` (C,) in this order; None means all of them."""

@@ -66,7 +66,7 @@ def kappaskin_solver(
 def _operator(case: LoadCase) -> tuple[Array, Mask]:
     """M (R, N), and which readings (3, P) are its rows."""
     layout = case.scene.layout
-    return layout.curvature_operator(case.fit.basis)[layout.live.ravel()], layout.live
+    return layout.operator(case.fit.basis)[layout.live.ravel()], layout.live
 
 
 def lstsq_solver(case: LoadCase) -> Solver:

@@ -67,7 +67,7 @@ class LoadCase:
         truth = scene.plate.deflection(scene.loads, reference).reshape(1, -1)
         Ni, Nj = functions
         basis = basis_for(patch, scene.edge, Ni, 1 if patch.strip else Nj)
-        M = scene.layout.curvature_operator(reference, scene.plate)
+        M = scene.layout.operator(reference, scene.plate)
         read = (truth @ M.T).reshape(3, -1)
         return cls(scene, method, estimator_for(method, basis, scene.layout), truth, read)
 
@@ -206,7 +206,7 @@ def noisy_fit(
     `sigma` in 1/m is the noise of a reading, where it is known.
     """
     truth = scene.plate.deflection(scene.loads, scene.basis).ravel()
-    M = scene.layout.curvature_operator(scene.basis, scene.plate)
+    M = scene.layout.operator(scene.basis, scene.plate)
     readings = (M @ truth).reshape(3, -1)
     for effect in scene.reading_effects:
         readings = effect.start(readings.shape, rng)(readings, 0.0)
@@ -266,8 +266,8 @@ _THETA = np.linspace(0.0, math.pi, 101)
 def _equation_6() -> dict[str, Any]:
     scene = fingertip_scene(1e3 * _U)
     truth = scene.plate.deflection(scene.loads, scene.basis)
-    M = scene.layout.curvature_operator(_EIGHT)[:10]
-    K = scene.layout.curvature_operator(scene.basis, scene.plate)[:10] @ truth.ravel()
+    M = scene.layout.operator(_EIGHT)[:10]
+    K = scene.layout.operator(scene.basis, scene.plate)[:10] @ truth.ravel()
     length = np.linalg.norm(M, axis=0)
     # Dropping what curvature does not see, as a pseudo-inverse with a tolerance does.
     c = np.linalg.pinv(M, rcond=1e-9) @ K

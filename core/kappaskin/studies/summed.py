@@ -69,5 +69,5 @@ class SummedResponse:
 
     def readings(self, layout: SensorLayout) -> Array:
         """Curvature (T, 3, P) in 1/m to be added to what the elements read of the true shape."""
-        operator = layout.curvature_operator(self.basis, self._plate)
+        operator = layout.operator(self.basis, self._plate)
         return (self.coefficients @ operator.T).reshape(-1, 3, len(layout))

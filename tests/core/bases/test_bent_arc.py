@@ -49,7 +49,7 @@ def test_a_radius_smaller_than_the_arc_allows_is_refused(radius):
 def test_the_first_function_of_half_a_circle_bends_nothing():
     layout = SensorLayout.regular(FINGERTIP, 10, 1)
 
-    M = layout.curvature_operator(SineBasis(FINGERTIP, 8, 1))
+    M = layout.operator(SineBasis(FINGERTIP, 8, 1))
 
     assert np.abs(M[:10, 0]).max() < 1e-10 * np.abs(M[:10, 1]).min()
 
@@ -58,7 +58,7 @@ def test_pinned_ends_decide_what_curvature_cannot_see():
     layout, basis = SensorLayout.regular(FINGERTIP, 10, 1), SineBasis(FINGERTIP, 8, 1)
     c = 1e-4 * np.random.default_rng(1).normal(size=(8, 1))
     c[0] = -np.sum(c[2::2, 0] / np.arange(3, 8, 2))
-    K = (layout.curvature_operator(basis) @ c.ravel()).reshape(3, -1)
+    K = (layout.operator(basis) @ c.ravel()).reshape(3, -1)
 
     np.testing.assert_allclose(LeastSquares(basis, layout)(K).coefficients, c, atol=1e-17)
 
@@ -76,7 +76,7 @@ def test_sliding_ends_of_a_shorter_arc_are_decided():
     patch = Patch(2.0 * R, 0.02, R, strip=True)
     layout, basis = SensorLayout.regular(patch, 10, 1), SineBasis(patch, 6, 1, sliding=True)
     c = 1e-4 * np.random.default_rng(2).normal(size=(6, 1))
-    K = (layout.curvature_operator(basis) @ c.ravel()).reshape(3, -1)
+    K = (layout.operator(basis) @ c.ravel()).reshape(3, -1)
 
     np.testing.assert_allclose(LeastSquares(basis, layout)(K).coefficients, c, atol=1e-16)
 
@@ -107,7 +107,7 @@ def test_a_cylinder_skins_first_function_is_seen_along_its_axis():
         basis = basis_for(patch, edge, 8, 8)
         if basis.free is not None:
             c[0] = basis.free[:8] @ c[1:].ravel()
-        K = (layout.curvature_operator(basis) @ c.ravel()).reshape(3, -1)
+        K = (layout.operator(basis) @ c.ravel()).reshape(3, -1)
 
         fit = LeastSquares(basis, layout)
 
@@ -121,7 +121,7 @@ def test_the_twist_turns_with_the_tangential_displacement():
     p = np.array([[0.3 * patch.a, 0.2 * patch.b]])
     basis = SineBasis(patch, 3, 1, sliding=True)
 
-    twist = SensorLayout.scattered(patch, p).curvature_operator(basis)[2]
+    twist = SensorLayout.scattered(patch, p).operator(basis)[2]
     plain = basis.at(p, 1, 1)[0]
 
     # The constant of the even function keeps its two ends at rest.
@@ -150,7 +150,7 @@ def test_missing_readings_of_a_pinned_skin_are_left_out_exactly():
     answer = fit(K)
 
     W = basis.free
-    A = (layout.curvature_operator(basis) @ W)[there]
+    A = (layout.operator(basis) @ W)[there]
     g = np.linalg.lstsq(A, K.ravel()[there])[0]
     covariance = W @ np.linalg.inv(A.T @ A) @ W.T * answer.noise**2
     np.testing.assert_allclose(answer.coefficients.ravel(), W @ g, rtol=0, atol=1e-16)

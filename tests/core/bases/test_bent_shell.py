@@ -296,7 +296,7 @@ def test_its_readings_in_sines_converge_to_the_shells(functions, off):
     load, basis = GaussianLoad(0.4 * ARC, 0.016, 2e-3), SineBasis(FINGERTIP, functions, functions)
 
     c = plate.deflection([load], basis).ravel()
-    K = layout.curvature_operator(basis, plate) @ c
+    K = layout.operator(basis, plate) @ c
 
     expected, _ = Shell(plate.sheet(), 2e-3).readings_under(
         layout, np.array([load.x]), np.array([load.y])
@@ -311,7 +311,7 @@ def test_clamped_skins_read_alike_with_more_waves_than_functions():
 
     def read(functions):
         basis = basis_for(FINGERTIP, "clamped", functions, functions)
-        return layout.curvature_operator(basis, plate) @ plate.deflection([load], basis).ravel()
+        return layout.operator(basis, plate) @ plate.deflection([load], basis).ravel()
 
     finest = read(30)
     off = [np.abs(read(n) - finest).max() / np.abs(finest).max() for n in (8, 12, 18)]
@@ -326,7 +326,7 @@ def test_the_shape_is_told_as_if_inextensible_within_the_strain(gage_length):
     plate, basis = Plate.of_material(FINGERTIP, **THIN), SineBasis(FINGERTIP, 8, 8)
     layout = replace(SensorLayout.regular(FINGERTIP, 10, 10), gage_length=gage_length)
     c = plate.deflection([GaussianLoad(0.4 * ARC, 0.016, ARC / 18, 0.5)], basis)
-    K = (layout.curvature_operator(basis, plate) @ c.ravel()).reshape(3, -1)
+    K = (layout.operator(basis, plate) @ c.ravel()).reshape(3, -1)
 
     fit = LeastSquares(basis, layout)(K)
 

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 
 SCENE = load_scene("centre")
 SENSOR = SCENE.sensor()
-M = SCENE.layout.curvature_operator(SCENE.basis)
+M = SCENE.layout.operator(SCENE.basis)
 NOISE = 0.2
 STEP = 0.01  # s
 
@@ -269,7 +269,7 @@ def test_back_asks_for_the_last_one_again():
 def test_a_strip_has_elements_to_press_but_no_components_to_exchange():
     scene = replace(load_scene("fingertip"), reference=(15, 1))
     test = PressTest(scene.sensor(), PressTest.choose_elements(scene.layout, quick=True))
-    operator = scene.layout.curvature_operator(scene.basis)
+    operator = scene.layout.operator(scene.basis)
     rng, time = np.random.default_rng(0), 0.0
     for element in (0, 1, 2, 4, 3, 5, 6, 7, 8, 9):
         x, y = scene.layout.positions[element]

@@ -28,7 +28,7 @@ TRUTH = Plate(BASIS.patch).deflection([PointLoad(0.03, 0.06)], BASIS)
 READINGS = {
     "size": SIZE,
     "positions": LAYOUT.positions,
-    "curvature": (LAYOUT.curvature_operator(BASIS) @ TRUTH.ravel()).reshape(3, -1),
+    "curvature": (LAYOUT.operator(BASIS) @ TRUTH.ravel()).reshape(3, -1),
 }
 
 

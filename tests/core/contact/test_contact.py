@@ -307,7 +307,7 @@ def test_with_the_same_functions_the_contact_on_a_strip_is_the_place_along_it():
     layout, plate = SensorLayout.regular(strip, 20, 1), Plate(strip)
     basis = SineBasis(strip, 15, 1)  # those of the estimator: this checks its algebra
     load = PointLoad(0.013, 0.002, 0.5)
-    K = layout.curvature_operator(basis) @ plate.deflection([load], basis).ravel()
+    K = layout.operator(basis) @ plate.deflection([load], basis).ravel()
     fit = LeastSquares(SineBasis(strip, 12, 1), layout)
 
     touch = PointContact(plate, layout)(K.reshape(3, -1), fit(K.reshape(3, -1)))

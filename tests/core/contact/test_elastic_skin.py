@@ -52,7 +52,7 @@ def test_forces_move_and_grow_as_their_derivatives_say(contact, p):
 
 
 BASIS = basis_for(SQUARE, "hinged", 12, 12)
-M = LAYOUT.curvature_operator(BASIS)
+M = LAYOUT.operator(BASIS)
 # A sum of n products is off by n + 2 roundings of what its terms come to without their signs, in
 # whatever order a processor adds them: n - 1 sums, a product, and a rounding of either factor.
 ROUNDINGS = (BASIS.size + 2) * float(np.finfo(np.float32).eps) / 2
@@ -104,7 +104,7 @@ def test_the_arcs_of_an_object_seen_from_its_other_end_change_places(share, midd
 def test_a_contact_beside_the_rim_is_doubted_where_that_is_held(edge, doubted):
     layout, plate = SensorLayout.regular(SQUARE, 10, 10), Plate(SQUARE, rim_stiffness=2e3)
     basis, load = basis_for(SQUARE, edge, 10, 10), PointLoad(0.003, 0.05, 0.2)
-    K = layout.curvature_operator(basis) @ plate.deflection([load], basis).ravel()
+    K = layout.operator(basis) @ plate.deflection([load], basis).ravel()
     fit = LeastSquares(basis_for(SQUARE, edge, 6, 6), layout)(K.reshape(3, -1))
 
     touch = PointContact(plate, layout, edge)(K.reshape(3, -1), fit)

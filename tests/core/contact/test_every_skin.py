@@ -38,7 +38,7 @@ def touched(held_skin):
     patch, basis = held_skin.patch, held_skin.basis(FUNCTIONS, FUNCTIONS)
     load = PointLoad(0.42 * patch.a, 0.3 * patch.b, 0.05)
     c = plate(held_skin).deflection([load], basis)
-    M = layout(held_skin).curvature_operator(basis, plate(held_skin))
+    M = layout(held_skin).operator(basis, plate(held_skin))
     return load, basis, c, (M @ c.ravel()).reshape(3, -1)
 
 
@@ -48,7 +48,7 @@ def layout(held_skin):
 
 
 def read(held_skin, basis, c):
-    return (layout(held_skin).curvature_operator(basis) @ c.ravel()).reshape(3, -1)
+    return (layout(held_skin).operator(basis) @ c.ravel()).reshape(3, -1)
 
 
 def at_rest(fit, values, positions):

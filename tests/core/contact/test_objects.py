@@ -281,7 +281,7 @@ def test_nothing_touches_without_a_contact():
 def test_what_fits_no_single_object_is_not_named():
     basis, plate = SineBasis(Patch(SIDE, SIDE), 40, 40), Plate(Patch(SIDE, SIDE))
     corners = [PointLoad(x, y, 0.15) for x, y in ((0.03, 0.03), (0.07, 0.04), (0.04, 0.075))]
-    K = PAPER.layout.curvature_operator(basis) @ plate.deflection(corners, basis).ravel()
+    K = PAPER.layout.operator(basis) @ plate.deflection(corners, basis).ravel()
 
     for one in PAPER.finds(K.reshape(3, -1), 5):
         assert one.kind == ""
@@ -391,7 +391,7 @@ class Finger:
         self.skin = Skin(self.patch, plate)
         self.basis = basis_for(self.patch, "hinged", 40, 40)
         self.compliance = plate.compliance(self.basis)
-        self.M = self.skin.layout.curvature_operator(self.basis, plate)
+        self.M = self.skin.layout.operator(self.basis, plate)
 
     def curvature(self, rigid):
         u, v = rigid.grid(8e-3, 6e-4)
@@ -521,7 +521,7 @@ HEXAGON = [(0.025, 0), (0.075, 0), (0.1, 0.0433), (0.075, 0.0866), (0.025, 0.086
 @pytest.mark.parametrize("patch", [Disk(0.05), Polygon(HEXAGON)], ids=["disk", "hexagon"])
 def test_objects_on_other_outlines_are_told_apart(patch):
     skin, truth = Skin(patch), basis_for(patch, "hinged", 15, 15)
-    bent, answer = skin.layout.curvature_operator(truth), Plate(patch).compliance(truth)
+    bent, answer = skin.layout.operator(truth), Plate(patch).compliance(truth)
 
     def found(*loads):
         modal = answer(sum(load.modal(truth) for load in loads))

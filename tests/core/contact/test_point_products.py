@@ -27,7 +27,7 @@ SKINS = {
 @pytest.mark.parametrize(("plate", "layout", "basis"), SKINS.values(), ids=SKINS)
 @given(inside, inside)
 def test_squares_of_readings_on_a_grid_are_those_at_each_place(plate, layout, basis, x, y):
-    M = plate.compliance(basis).after(layout.curvature_operator(basis))
+    M = plate.compliance(basis).after(layout.operator(basis))
     x, y = np.array([1e-4, x]) * basis.patch.a, np.array([y, 0.9, 1 - 1e-4]) * basis.patch.b
 
     squares = _squares_on_grid(basis, M.T @ M, x, y)
@@ -44,7 +44,7 @@ def test_readings_on_a_grid_meet_the_functions_as_by_the_whole_matrix(patch, gag
     layout = replace(SensorLayout.regular(patch, 6, across[0]), gage_length=gage_length)
     plate, basis = Plate(patch, tension=3.0, foundation=1e4), SineBasis(patch, 9, across[1])
     compliance = plate.compliance(basis)
-    M = compliance.after(layout.curvature_operator(basis))
+    M = compliance.after(layout.operator(basis))
     K = np.random.default_rng(0).normal(size=len(M))
     small = modal_projection(
         layout, basis, compliance, np.full_like(M, np.nan)
@@ -71,7 +71,7 @@ def scattered():
 )
 def test_what_is_no_product_of_small_matrices_is_met_by_the_whole_one(plate, layout, basis):
     compliance = plate.compliance(basis)
-    M = compliance.after(layout.curvature_operator(basis))
+    M = compliance.after(layout.operator(basis))
     K = np.random.default_rng(0).normal(size=len(M))
 
     np.testing.assert_array_equal(modal_projection(layout, basis, compliance, M)(K), K @ M)

@@ -25,7 +25,7 @@ NOISE = 0.231
 
 def pressed():
     basis = SineBasis(SQUARE, 15, 15)
-    M = TENS.curvature_operator(basis)
+    M = TENS.operator(basis)
     K = (M @ Plate(SQUARE).deflection([LOAD], basis).ravel()).reshape(3, -1)
     return K + np.random.default_rng(0).normal(0, NOISE, K.shape)
 

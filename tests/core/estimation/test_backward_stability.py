@@ -29,7 +29,7 @@ class Problem:
         self.basis, self.layout = basis, layout
         self.live = layout.live.ravel()
         self.W = np.eye(basis.size) if basis.free is None else basis.free
-        A = layout.curvature_operator(basis)[self.live] @ self.W
+        A = layout.operator(basis)[self.live] @ self.W
         self.length = np.linalg.norm(A, axis=0)
         self.length[self.length <= 1e-15 * self.length.max()] = np.inf  # nothing but rounding
         self.A = A / self.length

@@ -24,7 +24,7 @@ class Case:
     def __init__(self, name):
         scene = load_scene(name)
         self.truth = scene.plate.deflection(scene.loads, FIFTEEN)
-        self.K = (TENS.curvature_operator(FIFTEEN) @ self.truth.ravel()).reshape(3, -1)
+        self.K = (TENS.operator(FIFTEEN) @ self.truth.ravel()).reshape(3, -1)
 
     def rms(self, answer):
         """RMS over 101 x 101 points in mm."""
@@ -63,7 +63,7 @@ def from_the_prior(frames, noise, seed=0, height=3e-3):
     """
     rng = np.random.default_rng(seed)
     c = height * rng.normal(size=(frames, 225)) @ prior_root(FIFTEEN).T
-    K = (c @ TENS.curvature_operator(FIFTEEN).T).reshape(frames, 3, 100)
+    K = (c @ TENS.operator(FIFTEEN).T).reshape(frames, 3, 100)
     return c.reshape(frames, 15, 15), K + rng.normal(0, noise, K.shape)
 
 
@@ -85,7 +85,7 @@ def test_95_percent_of_draws_of_the_prior_lie_in_the_posteriors_bands(noise, tol
 
 def test_so_do_95_percent_of_their_curvatures():
     truth, K = from_the_prior(500, 0.231)
-    rows = TENS.curvature_operator(FIFTEEN)[::7]
+    rows = TENS.operator(FIFTEEN)[::7]
 
     answer = Bayes(FIFTEEN, TENS)(K)
 
@@ -98,7 +98,7 @@ def test_the_posterior_is_that_of_textbook_regression():
     basis, layout = SineBasis(SQUARE, 3, 2), SensorLayout.regular(SQUARE, 4, 3)
     K = np.random.default_rng(2).normal(size=(3, 12))
     fit = Bayes(basis, layout, 0.5)
-    M, L = layout.curvature_operator(basis), prior_root(basis)
+    M, L = layout.operator(basis), prior_root(basis)
 
     answer = fit(K)
 
@@ -172,7 +172,7 @@ def test_every_skin_has_a_prior_that_draws_truths_its_bands_cover(held_skin):
     basis = held_skin.basis(5, 5)
     m, n = (14, 1) if held_skin.patch.strip else (8, 8)
     layout = SensorLayout.regular(held_skin.patch, m, n)
-    M, rng = layout.curvature_operator(basis), np.random.default_rng(0)
+    M, rng = layout.operator(basis), np.random.default_rng(0)
     c = rng.normal(size=(300, prior_root(basis).shape[1])) @ prior_root(basis).T
     K = c @ M.T
     sd = 0.05 * np.sqrt(np.mean(K[:, layout.live.ravel()] ** 2))

@@ -39,7 +39,7 @@ def shape():
 
 @cache
 def exact():
-    return (TENS.curvature_operator(EIGHT) @ shape().ravel()).reshape(3, -1)
+    return (TENS.operator(EIGHT) @ shape().ravel()).reshape(3, -1)
 
 
 def noisy(seed=0, frames=None, sd=NOISE):
@@ -81,7 +81,7 @@ def test_the_residual_is_what_the_prediction_leaves(method):
 
     answer = fit(noisy())
 
-    left = answer.curvature - fit.predicted(answer.coefficients)
+    left = answer.readings - fit.predicted(answer.coefficients)
     np.testing.assert_array_equal(answer.residual, left)
 
 
@@ -274,7 +274,7 @@ def test_the_readings_are_left_as_they_came_and_may_be_written_over(method):
 
     answer = made(method)(K)
     np.testing.assert_array_equal(K, kept)
-    residual = answer.curvature - made(method).predicted(answer.coefficients)
+    residual = answer.readings - made(method).predicted(answer.coefficients)
     K[:] = 7
 
     np.testing.assert_array_equal(answer.residual, residual)
@@ -302,7 +302,7 @@ def test_a_batch_of_no_frames_has_no_answers(method):
 @every_method
 @pytest.mark.parametrize("wrong", [np.zeros((3, 99)), np.zeros(300), np.zeros((1, 1, 3, 100))])
 def test_curvature_of_another_shape_is_refused(method, wrong):
-    with pytest.raises(Refusal, match=r"expected curvature of shape \(3, 100\).*got \("):
+    with pytest.raises(Refusal, match=r"expected readings of shape \(3, 100\).*got \("):
         made(method)(wrong)
 
 
@@ -313,7 +313,7 @@ def test_curvature_of_another_shape_is_refused(method, wrong):
     ids=["text", "ragged", "complex", "masked", "nothing"],
 )
 def test_what_is_no_array_of_real_numbers_is_refused(method, wrong):
-    with pytest.raises(Refusal, match="expected curvature as an array of real numbers"):
+    with pytest.raises(Refusal, match="expected readings as an array of real numbers"):
         made(method)(wrong)
     if wrong is not None:
         with pytest.raises(Refusal, match="expected sigma as an array of real numbers"):

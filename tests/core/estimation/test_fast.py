@@ -60,7 +60,7 @@ every_setup = pytest.mark.parametrize("setup", SETUPS.values(), ids=SETUPS)
 def lengths(basis, layout, K=None):
     """Lengths of the columns of M, of the rows whose readings in `K` are there."""
     there = layout.live if K is None else layout.live & np.isfinite(K)
-    M = layout.curvature_operator(basis)
+    M = layout.operator(basis)
     return np.linalg.norm(M[there.ravel()], axis=0).reshape(basis.shape)
 
 
@@ -68,7 +68,7 @@ def readings(basis, layout, frames=(), noise=0.3, seed=0):
     """Curvature (..., 3, P) of a shape whose every function bends alike, with noise."""
     rng, P = np.random.default_rng(seed), len(layout)
     c = rng.normal(size=basis.shape) / lengths(basis, layout) * np.sqrt(3 * P)
-    K = (layout.curvature_operator(basis) @ c.ravel()).reshape(3, P)
+    K = (layout.operator(basis) @ c.ravel()).reshape(3, P)
     return K + rng.normal(0, noise, (*frames, 3, P))
 
 
@@ -79,7 +79,7 @@ def least_squares(basis, layout, K, sigma=1.0):
 
 def share_seen(basis, layout, K):
     """The least of the scaled functions' combinations that the readings there are see."""
-    A = layout.curvature_operator(basis)[np.isfinite(K).ravel() & layout.live.ravel()]
+    A = layout.operator(basis)[np.isfinite(K).ravel() & layout.live.ravel()]
     length = lengths(basis, layout, K)
     if len(A) < basis.size or (length < 1e-14 * lengths(basis, layout)).any():
         return 0.0
@@ -133,7 +133,7 @@ def test_what_is_predicted_is_the_curvature_operator_times_the_coefficients(setu
 
     predicted = Fast(*setup).predicted(c)
 
-    M = setup[1].curvature_operator(setup[0])
+    M = setup[1].operator(setup[0])
     np.testing.assert_allclose(predicted.reshape(3, -1), c.reshape(3, -1) @ M.T, atol=1e-13)
 
 

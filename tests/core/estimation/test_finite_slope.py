@@ -91,7 +91,7 @@ def test_few_steps_take_away_what_slopes_cost(name, linear, finite):
 
 
 def test_the_fixed_operator_of_first_order_ends_beside_the_least_squares():
-    case, M = Case("off-centre"), TENS.curvature_operator(EIGHT)
+    case, M = Case("off-centre"), TENS.operator(EIGHT)
     c = np.zeros(64)
     for _ in range(20):
         c = c + np.linalg.pinv(M) @ (case.K - on_a_slope(EIGHT, c)).ravel()

@@ -406,7 +406,7 @@ def test_too_few_readings_left_are_refused_with_their_number():
 
 @pytest.mark.parametrize("shape", [(3, 99), (100, 3), (300,), (2, 3, 99), (1, 1, 3, 100)])
 def test_curvature_of_another_shape_is_refused(shape):
-    with pytest.raises(Refusal, match=r"expected curvature of shape \(3, 100\).*got \("):
+    with pytest.raises(Refusal, match=r"expected readings of shape \(3, 100\).*got \("):
         factored(*SETUPS["regular"])(np.zeros(shape))
 
 

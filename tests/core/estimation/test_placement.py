@@ -29,7 +29,7 @@ def variance(M):
 
 
 def operator(layout):
-    return layout.curvature_operator(BASIS)
+    return layout.operator(BASIS)
 
 
 CRITERIA = pytest.mark.parametrize(("by", "bad"), [("D", volume), ("A", variance)])

@@ -26,7 +26,7 @@ def frame(seed=0, missing=()):
     i, j = np.arange(1, 9)[:, None], np.arange(1, 9)
     rng = np.random.default_rng(seed)
     shape = 0.016 * rng.normal(size=(8, 8)) / (i**2 + j**2) ** 2
-    K = (TENS.curvature_operator(EIGHT) @ shape.ravel()).reshape(3, -1)
+    K = (TENS.operator(EIGHT) @ shape.ravel()).reshape(3, -1)
     K += rng.normal(0, NOISE, K.shape)
     K[1, list(missing)] = np.nan
     return K

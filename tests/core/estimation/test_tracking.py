@@ -154,7 +154,7 @@ class Moving:
 
 def read(layout, basis, coefficients, rng, noise=NOISE):
     """Curvature (3, P) of `coefficients` (N,), or with those of each channel (3 P, N)."""
-    flat = np.vecdot(layout.curvature_operator(basis), coefficients)
+    flat = np.vecdot(layout.operator(basis), coefficients)
     return (flat + rng.normal(0, noise, flat.shape)).reshape(3, -1)
 
 
@@ -181,7 +181,7 @@ def test_the_first_frame_is_sound(held_skin):
     basis = held_skin.basis()
     layout = SensorLayout.regular(held_skin.patch, 8, 1 if held_skin.patch.strip else 8)
     rng, L, live = np.random.default_rng(0), prior_root(basis), layout.live.ravel()
-    M = layout.curvature_operator(basis)[live]
+    M = layout.operator(basis)[live]
     L = L * 30 * NOISE / np.sqrt(np.mean(np.sum((M @ L) ** 2, axis=1)))  # thirty times the noise
     scores = []
     for _ in range(20):
@@ -263,7 +263,7 @@ def test_readings_at_their_own_times_beat_one_time_for_all():
 
 def test_a_held_reading_is_told_as_it_would_be_now():
     shape, rng = Moving(1, 0.3), np.random.default_rng(1)
-    fit, M = Tracking(FOURS, SIXES, sigma=0.01), SIXES.curvature_operator(FOURS)
+    fit, M = Tracking(FOURS, SIXES, sigma=0.01), SIXES.operator(FOURS)
     stale, held = [], []
     last_read = np.full(108, np.nan)
     for n in range(60):
@@ -276,7 +276,7 @@ def test_a_held_reading_is_told_as_it_would_be_now():
         answer = fit.follow(K, t)
         if n > 20:
             now = M @ shape(np.nanmax(t))
-            held.append(answer.curvature.ravel() - now)
+            held.append(answer.readings.ravel() - now)
             stale.append(last_read - now)
     assert np.isfinite(held).all()
     assert np.std(held) < 0.2 * np.std(stale)
@@ -294,10 +294,10 @@ def test_what_was_never_read_or_long_ago_is_missing_and_the_shape_goes_on():
     failed = fit.follow(half, np.where(np.isnan(half), np.nan, 1.06))
     late = fit.follow(none, np.full((3, 36), 1.3))
 
-    np.testing.assert_array_equal(np.isnan(first.curvature), np.isnan(half))
-    assert np.isnan(soon.curvature).all()  # they were read again, and failed
-    np.testing.assert_array_equal(np.isnan(failed.curvature), np.isnan(half))
-    assert np.isnan(late.curvature).all()
+    np.testing.assert_array_equal(np.isnan(first.readings), np.isnan(half))
+    assert np.isnan(soon.readings).all()  # they were read again, and failed
+    np.testing.assert_array_equal(np.isnan(failed.readings), np.isnan(half))
+    assert np.isnan(late.readings).all()
     assert np.isfinite(late.coefficients).all()
     assert (late.sd > failed.sd).all()
 
@@ -327,7 +327,7 @@ def test_several_frames_are_followed_one_after_the_other():
         alone = one_by_one(K)
         np.testing.assert_array_equal(batch.coefficients[n], alone.coefficients)
         np.testing.assert_array_equal(batch.sd[n], alone.sd)
-        np.testing.assert_array_equal(batch.curvature[n], alone.curvature)
+        np.testing.assert_array_equal(batch.readings[n], alone.readings)
         assert (batch.noise[n], batch.spare[n]) == (alone.noise, alone.spare)
 
 
@@ -461,7 +461,7 @@ def test_dead_channels_tell_nothing_and_are_never_chosen():
     answer = fit(spoilt)
 
     np.testing.assert_array_equal(answer.coefficients, clean(K).coefficients)
-    np.testing.assert_array_equal(np.isnan(answer.curvature), ~layout.live)
+    np.testing.assert_array_equal(np.isnan(answer.readings), ~layout.live)
     chosen = fit.choose(1000, np.array([0.05, 0.05]), 1e-3)
     assert set(chosen.tolist()) == set(np.flatnonzero(layout.live.ravel()).tolist())
 
@@ -594,7 +594,7 @@ def test_another_surface_goes_on_tracking_and_another_basis_starts_anew():
 def test_readings_that_see_nothing_of_the_modes_spoil_nothing(sigma):
     x = np.linspace(0, 0.1, 6)  # on the rim, hinged modes do not bend
     layout = SensorLayout.scattered(SQUARE, np.column_stack([np.tile(x, 6), np.repeat(x, 6)]))
-    track, seen = Tracking(FOURS, layout, sigma), layout.curvature_operator(FOURS)
+    track, seen = Tracking(FOURS, layout, sigma), layout.operator(FOURS)
     c = 3e-3 * np.eye(16)[0]
     K = (seen @ c + 0.05 * np.random.default_rng(0).normal(size=len(seen))).reshape(3, -1)
     bent = K + 5.0 * (np.abs(seen).max(axis=1) < 1e-6).reshape(3, -1)

@@ -279,7 +279,7 @@ def test_no_healthy_scene_has_a_finding(name) -> None:
 def after_jumps(seed):
     """Which channels (300,) are ever found under a point that jumps anywhere and rests there."""
     rng = np.random.default_rng(seed)
-    M = ROUND.layout.curvature_operator(ROUND.basis)
+    M = ROUND.layout.operator(ROUND.basis)
     time, frames = 0.0, []
     for _ in range(12):
         x, y = rng.uniform(0.004, 0.096, 2)

@@ -37,7 +37,7 @@ def pipeline_of(scene, setup=SETUP, **kwargs):
 
 
 def true_curvature(scene):
-    operator = scene.layout.curvature_operator(scene.basis)
+    operator = scene.layout.operator(scene.basis)
     return (operator @ scene.plate.deflection(scene.loads, scene.basis).ravel()).reshape(3, -1)
 
 
@@ -61,7 +61,7 @@ def test_the_errors_are_those_of_an_independent_calculation(name):
 
     basis = SineBasis(scene.plate.patch, 8, 8)
     K = frame.counts * (2.5 / 2**15) / 0.065625
-    c = np.linalg.lstsq(scene.layout.curvature_operator(basis), K)[0]
+    c = np.linalg.lstsq(scene.layout.operator(basis), K)[0]
     w = rows_of_ones(SETUP, basis) @ c
     true_w = rows_of_ones(SETUP, scene.basis) @ frame.truth.coefficients.ravel()
     contact = frame.truth.contact[None]
@@ -94,7 +94,7 @@ def test_curvature_is_the_true_one_within_half_a_count():
 def test_the_residual_is_the_curvature_the_shape_does_not_explain():
     estimate = pipeline_of(QUIET)(frame_of(QUIET))
 
-    M = QUIET.layout.curvature_operator(SineBasis(QUIET.plate.patch, 8, 8))
+    M = QUIET.layout.operator(SineBasis(QUIET.plate.patch, 8, 8))
     expected = estimate.curvature - (M @ estimate.coefficients.ravel()).reshape(3, -1)
     np.testing.assert_allclose(estimate.residual, expected, atol=1e-12)
     assert estimate.noise == pytest.approx(np.sqrt(np.sum(expected**2) / (300 - 64)), rel=1e-9)
@@ -178,7 +178,7 @@ def test_a_partial_frame_gives_the_shape_of_its_readings():
     there = np.isin(np.arange(300), scanned).reshape(3, 100)
     np.testing.assert_array_equal(np.isfinite(estimate.curvature), there)
     c = np.linalg.lstsq(
-        QUIET.layout.curvature_operator(SineBasis(QUIET.plate.patch, 8, 8))[there.ravel()],
+        QUIET.layout.operator(SineBasis(QUIET.plate.patch, 8, 8))[there.ravel()],
         estimate.curvature[there],
     )[0]
     np.testing.assert_allclose(estimate.coefficients.ravel(), c, rtol=0, atol=1e-9 * abs(c).max())

@@ -521,7 +521,7 @@ def test_what_touches_the_skin_is_written_for_each_frame(saved) -> None:
     curvature = np.random.default_rng(0).normal(0, 0.05, (3, 3, 100))
     for frame, loads in zip(curvature, (ends, [DiscLoad(0.045, 0.05, 0.012, 0.2)]), strict=False):
         deflection = Plate(patch).deflection(loads, truth)
-        frame += (layout.curvature_operator(truth) @ deflection.ravel()).reshape(3, 100)
+        frame += (layout.operator(truth) @ deflection.ravel()).reshape(3, 100)
     path = saved(size=[0.1, 0.1], positions=layout.positions, curvature=curvature)
 
     found = reconstruct(path, (8, 8), objects=True)
@@ -542,7 +542,7 @@ def test_a_disk_and_a_polygon_are_read_by_their_outline(saved) -> None:
     disk = Disk(0.05)
     layout, basis = SensorLayout.regular(disk, 10, 10), basis_for(disk, "clamped", 4, 4)
     c = np.random.default_rng(3).normal(0, 1e-4, basis.size)
-    curvature = (layout.curvature_operator(basis) @ c).reshape(3, -1)
+    curvature = (layout.operator(basis) @ c).reshape(3, -1)
     path = saved(size=[0.1, 0.1], positions=layout.positions, curvature=curvature, outline=0.05)
 
     found = reconstruct(path, (4, 4), (21, 21), edge="clamped")

@@ -17,7 +17,7 @@ every_method = pytest.mark.parametrize("method", [m for m in METHODS if m != "as
 def readings():
     basis = SineBasis(SQUARE, 15, 15)
     c = Plate(SQUARE).deflection([PointLoad(0.04, 0.06, 0.45)], basis)
-    K = (TENS.curvature_operator(basis) @ c.ravel()).reshape(3, -1)
+    K = (TENS.operator(basis) @ c.ravel()).reshape(3, -1)
     return K + np.random.default_rng(0).normal(0, 0.231, K.shape)
 
 

@@ -25,7 +25,7 @@ def counts(scene, frames=4):
 
 def test_without_effects_the_counts_are_those_of_the_true_curvature():
     c = QUIET.plate.deflection(QUIET.loads, QUIET.basis)
-    curvature = QUIET.layout.curvature_operator(QUIET.basis) @ c.ravel()
+    curvature = QUIET.layout.operator(QUIET.basis) @ c.ravel()
 
     expected = np.rint(curvature * 0.065625 / (2.5 / 2**15))
 

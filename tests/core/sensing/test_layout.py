@@ -59,14 +59,14 @@ def test_live_channels_of_another_shape_are_refused():
 
 def test_a_basis_on_another_patch_is_refused():
     with pytest.raises(Refusal, match=r"a=0\.1, b=0\.05.*a=0\.2, b=0\.05"):
-        SensorLayout.regular(PATCH, 4, 2).curvature_operator(SineBasis(Patch(0.2, 0.05), 2, 2))
+        SensorLayout.regular(PATCH, 4, 2).operator(SineBasis(Patch(0.2, 0.05), 2, 2))
 
 
 def test_the_operator_gives_the_second_differences_of_the_surface():
     basis, layout = SineBasis(PATCH, 3, 2), SensorLayout.regular(PATCH, 4, 3)
     c, h = np.random.default_rng(0).normal(size=basis.size), 1e-5
 
-    xx, yy, xy = (layout.curvature_operator(basis) @ c).reshape(3, -1)
+    xx, yy, xy = (layout.operator(basis) @ c).reshape(3, -1)
 
     def w(dx, dy):
         return basis.at(layout.positions + np.array([dx, dy]) * h) @ c
@@ -97,7 +97,7 @@ def squared_norms(m, n, Ni, Nj):
     [(10, 10, 8, 8), (10, 10, 9, 9), (7, 12, 6, 11), (10, 10, 10, 9), (6, 9, 6, 9), (1, 3, 1, 2)],
 )
 def test_the_operators_columns_are_orthogonal_with_the_known_norms(m, n, Ni, Nj):
-    M = SensorLayout.regular(PATCH, m, n).curvature_operator(SineBasis(PATCH, Ni, Nj))
+    M = SensorLayout.regular(PATCH, m, n).operator(SineBasis(PATCH, Ni, Nj))
 
     length = np.sqrt(squared_norms(m, n, Ni, Nj))
 
@@ -105,7 +105,7 @@ def test_the_operators_columns_are_orthogonal_with_the_known_norms(m, n, Ni, Nj)
 
 
 def test_functions_beyond_the_elements_are_not_orthogonal():
-    M = SensorLayout.regular(PATCH, 10, 10).curvature_operator(SineBasis(PATCH, 12, 8))
+    M = SensorLayout.regular(PATCH, 10, 10).operator(SineBasis(PATCH, 12, 8))
     scaled = M / np.linalg.norm(M, axis=0)
 
     assert np.abs(scaled.T @ scaled - np.eye(96)).max() > 0.1

@@ -84,7 +84,7 @@ def test_a_scan_of_a_channel_beyond_reason_is_refused_without_taking_memory():
 
 def exact(scene, scan, time):
     """Curvature (C,) of each channel at its own instant, one deflection at a time."""
-    operator = scene.layout.curvature_operator(scene.basis)
+    operator = scene.layout.operator(scene.basis)
     shapes = (
         scene.plate.deflection(scene.loads_at(time + t), scene.basis).ravel() for t in scan.times
     )

@@ -90,7 +90,7 @@ def test_slopes_are_integrated_to_the_surface_they_belong_to():
     case = LoadCase.of(scene, "least-squares", (8, 8))
     basis = SineBasis(scene.plate.patch, 3, 2)
     c = np.array([[1.0, -0.4], [0.3, 0.2], [-0.1, 0.15]])
-    readings = (scene.layout.curvature_operator(basis) @ c.ravel()).reshape(3, -1)
+    readings = (scene.layout.operator(basis) @ c.ravel()).reshape(3, -1)
     points = np.random.default_rng(0).uniform(0, 0.1, (50, 2))
 
     way = slopes_solver(case)

@@ -345,7 +345,7 @@ def off_by(found, A, b):
 def test_double_double_knows_what_the_edges_decide():
     case = CASES["fingertip, exact"]
     W, b = case.basis.free, case.curvature[0, 0]
-    A = case.layout.curvature_operator(case.basis)[:10]
+    A = case.layout.operator(case.basis)[:10]
 
     found = least_squares(A, W, b).unknowns
 
@@ -392,7 +392,7 @@ def test_shapes_leave_readings_that_are_orthogonal(name):
 
     _, shapes = singular_values(case.basis, case.layout)
 
-    K = case.layout.curvature_operator(case.basis) @ shapes.reshape(len(shapes), -1).T
+    K = case.layout.operator(case.basis) @ shapes.reshape(len(shapes), -1).T
     K /= np.linalg.norm(K, axis=0)
     np.testing.assert_allclose(K.T @ K, np.eye(len(shapes)), atol=1e-12)
 
@@ -403,7 +403,7 @@ def test_four_mixtures_of_12_by_12_functions_change_no_reading():
     values, shapes = singular_values(case.basis, case.layout)
 
     assert np.sum(values < 1e-12) == 4
-    K = case.layout.curvature_operator(case.basis) @ shapes[-4:].reshape(4, -1).T
+    K = case.layout.operator(case.basis) @ shapes[-4:].reshape(4, -1).T
     np.testing.assert_allclose(K, 0, atol=1e-8)
     assert np.linalg.matrix_rank(shapes[-4:].reshape(4, -1)) == 4
 

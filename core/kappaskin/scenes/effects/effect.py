@@ -62,7 +62,7 @@ class Survey:
     def operator(self) -> Array:
         """Coefficients to readings of point-like elements, (3 P, N)."""
         layout = replace(self.layout, gage_length=0.0)
-        return layout.curvature_operator(self.basis, self.plate)
+        return layout.operator(self.basis, self.plate)
 
     @cached_property
     def wavenumber(self) -> float:

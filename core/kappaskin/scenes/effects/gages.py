@@ -70,7 +70,7 @@ class GageLength(LayoutEffect):
         return replace(layout, gage_length=self.length)
 
     def size(self, survey: Survey) -> Size:
-        longer = self.of(survey.layout).curvature_operator(survey.basis, survey.plate)
+        longer = self.of(survey.layout).operator(survey.basis, survey.plate)
         change = survey.coefficients @ (longer - survey.operator).T
         return Size(survey.wavenumber * self.length / 2, survey.share(change))
 

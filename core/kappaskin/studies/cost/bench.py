@@ -139,7 +139,7 @@ class Bench:
         for n, (t, pressed) in enumerate(zip(self._times.tolist(), self._pressed, strict=True)):
             simulator.change(scene.touched_by(*pressed.loads))
             read.append(sensor.nominal(simulator.scanned(sensor.scan(), n, t, lambda: 0.0)))
-        operator = scene.layout.curvature_operator(scene.basis, scene.plate)
+        operator = scene.layout.operator(scene.basis, scene.plate)
         shape = (len(read), 3, len(scene.layout))
         beyond = None if self._response is None else self._response.readings(scene.layout)
         exact = (self._truth @ operator.T).reshape(shape)

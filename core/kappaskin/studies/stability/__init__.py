@@ -86,7 +86,7 @@ class MethodAnswer:
 
 def _reach(fit: Fit) -> Array:
     """Half widths of 95 % in standard deviations, (T,): Student's t where noise is estimated."""
-    frames = len(fit.curvature)
+    frames = len(fit.readings)
     if fit.estimator.sigma is not None:
         return np.full(frames, scipy.special.ndtri(0.975))
     spare = np.broadcast_to(np.asarray(fit.spare, float), (frames,))
@@ -122,7 +122,7 @@ def _in_blocks(case: HardCase, estimator: Estimator) -> Iterator[MethodAnswer]:
     every = max(1, len(case.curvature) // _BLOCK)
     for start in range(0, len(case.curvature), _BLOCK):
         fit = estimator(case.curvature[start : start + _BLOCK])
-        chosen = np.arange(0, len(fit.curvature), every)
+        chosen = np.arange(0, len(fit.readings), every)
         kept = fit if every == 1 else Fit.merged([fit], chosen)
         yield MethodAnswer.of(case, kept, start + chosen)
 

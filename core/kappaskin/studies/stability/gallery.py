@@ -83,7 +83,7 @@ def case_of(
     rng = np.random.default_rng(SEED)
     basis = SineBasis(layout.patch, *functions) if basis is None else basis
     true_basis = basis if true_basis is None else true_basis
-    M = layout.curvature_operator(true_basis)
+    M = layout.operator(true_basis)
     c = _even(true_basis, M, rng) if truth is None else truth
     clean = np.dot(c.reshape(-1, true_basis.size), M.T).reshape(-1, 3, len(layout))
     frames = (FRAMES if len(clean) == 1 else len(clean)) if noise else 1
@@ -376,7 +376,7 @@ def _readings() -> Iterator[HardCase]:
                       announced="an offset is no noise: too many may be told as such",
                       kind=CaseKind.OUTLIERS)  # fmt: skip
     dent = _dent(8)
-    signal = _TENS.curvature_operator(SineBasis(_SQUARE, 8, 8)) @ dent.ravel()
+    signal = _TENS.operator(SineBasis(_SQUARE, 8, 8)) @ dent.ravel()
     noise = 10 * root_mean_square(signal)
     yield case_of("noise 10 times the signal", "readings hold more noise than shape",
                   _TENS, (8, 8), truth=dent, noise=noise)  # fmt: skip
@@ -397,7 +397,7 @@ def _strong(chain: Transduction) -> Array:
     """A dent whose peak curvature is half as much again as the electronics can measure."""
     basis = SineBasis(_SQUARE, 8, 8)
     c = Plate(_SQUARE).deflection([PointLoad(0.045, 0.045)], basis)
-    peak = np.abs(_TENS.curvature_operator(basis) @ c.ravel()).max()
+    peak = np.abs(_TENS.operator(basis) @ c.ravel()).max()
     low, high = chain.limits
     return c * 1.5 * 0.5 * (high - low) * chain.resolution / peak
 

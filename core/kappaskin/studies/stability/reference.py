@@ -209,7 +209,7 @@ def reference_of(case: HardCase) -> Reference:
     if case.kind is CaseKind.LARGE:
         return _by_transforms(case)
     used = case.layout.live & np.isfinite(case.curvature[0])
-    M = case.layout.curvature_operator(case.basis)[used.ravel()]
+    M = case.layout.operator(case.basis)[used.ravel()]
     b, W = case.curvature[0][used], case.basis.free
     A = M if W is None else M @ W
     length = column_lengths(A)

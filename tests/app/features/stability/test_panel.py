@@ -45,7 +45,7 @@ def test_twelve_by_twelve_from_ten_by_ten_leave_four_shapes_unseen() -> None:
     assert spectrum.silent == 4
     assert "infinite: 4 of 144 modes are unobservable" in spectrum.describe()
     assert spectrum.mode_text(144).startswith("Unobservable")
-    operator = spectrum.layout.curvature_operator(spectrum.basis)
+    operator = spectrum.layout.operator(spectrum.basis)
     most = np.abs(operator @ spectrum.shapes[0].ravel()).max()
     assert np.abs(operator @ spectrum.shapes[-1].ravel()).max() < 1e-9 * most
 

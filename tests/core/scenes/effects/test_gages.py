@@ -73,10 +73,10 @@ def test_a_gage_reads_the_mean_of_many_short_ones(held_skin):
         return normal.reshape(400, len(layout), -1).mean(axis=0)
 
     expected = twist_of({name: mean(direction) for name, direction in LINES.items()})
-    M = live(layout, layout.curvature_operator(basis))
+    M = live(layout, layout.operator(basis))
     scale = np.abs(M).max()
     np.testing.assert_allclose(M, live(layout, expected), rtol=0, atol=1e-4 * scale)
-    short = live(layout, replace(layout, gage_length=0.0).curvature_operator(basis))
+    short = live(layout, replace(layout, gage_length=0.0).operator(basis))
     assert np.abs(M - short).max() > 0.03 * scale
 
 
@@ -85,7 +85,7 @@ def test_a_gage_reads_the_mean_of_many_short_ones(held_skin):
 def test_a_gage_on_a_polygon_reads_the_mean_of_very_many_short_ones(held_skin):
     basis, layout = held_skin.basis(), long_gages(held_skin)
     xx = curvature_mean_along_x(basis, layout)
-    M = layout.curvature_operator(basis).reshape(3, len(layout), -1)[0]
+    M = layout.operator(basis).reshape(3, len(layout), -1)[0]
     np.testing.assert_allclose(M, xx, rtol=0, atol=5e-4 * np.abs(M).max())
 
 
@@ -98,9 +98,9 @@ def curvature_mean_along_x(basis, layout, count=2000):
 
 def test_sines_are_read_by_one_multiplier_per_mode_and_channel():
     L, k = 8e-3, np.pi / 0.1
-    point = TENS.curvature_operator(EIGHT).reshape(3, 100, 8, 8)
+    point = TENS.operator(EIGHT).reshape(3, 100, 8, 8)
 
-    M = replace(TENS, gage_length=L).curvature_operator(EIGHT).reshape(3, 100, 8, 8)
+    M = replace(TENS, gage_length=L).operator(EIGHT).reshape(3, 100, 8, 8)
 
     i, j = np.meshgrid(np.arange(1, 9), np.arange(1, 9), indexing="ij")
     kx, ky, h = i * k, j * k, L / math.sqrt(8)
@@ -117,11 +117,11 @@ def test_sines_are_read_by_one_multiplier_per_mode_and_channel():
 @pytest.mark.where(which=lambda held: held.name in ("flat", "arc", "disk"))
 def test_short_gages_tend_to_points_with_the_square_of_their_length(held_skin):
     basis, layout = held_skin.basis(), long_gages(held_skin, 0.2)
-    point = replace(layout, gage_length=0.0).curvature_operator(basis)
+    point = replace(layout, gage_length=0.0).operator(basis)
 
     lengths = layout.gage_length / np.array([1, 2, 4])
     off = [
-        np.abs(live(layout, replace(layout, gage_length=L).curvature_operator(basis) - point)).max()
+        np.abs(live(layout, replace(layout, gage_length=L).operator(basis) - point)).max()
         for L in lengths
     ]
 
@@ -145,7 +145,7 @@ def test_gages_that_reach_over_a_round_rim_by_rounding_alone_read_numbers(edge):
     typed = replace(layout, gage_length=float(f"{longest:.10g}"))
 
     assert typed.gage_length > longest
-    assert np.isfinite(typed.curvature_operator(basis_for(disk, edge, 4, 4))).all()
+    assert np.isfinite(typed.operator(basis_for(disk, edge, 4, 4))).all()
 
 
 @pytest.mark.parametrize("patch", [SQUARE, Patch(0.1, 0.07), Disk(0.05), Disk(0.03)])
@@ -187,7 +187,7 @@ TRUTH = np.random.default_rng(0).normal(size=(8, 8)) / EIGHT.laplacian
 @pytest.mark.parametrize("dead", [(), (3, 44, 71)])
 def test_a_fit_gives_back_the_shape_that_long_gages_read(method, dead):
     layout = GageLength(9e-3).of(TENS).without(dead)
-    K = (layout.curvature_operator(EIGHT) @ TRUTH.ravel()).reshape(3, -1)
+    K = (layout.operator(EIGHT) @ TRUTH.ravel()).reshape(3, -1)
 
     answer = method(EIGHT, layout)(K)
 
@@ -260,7 +260,7 @@ def test_on_a_bent_skin_it_is_the_surface_in_space_that_is_sensed():
     sensed = FiniteSlopeEffect().sensed(basis, layout)(c).reshape(3, -1)
 
     expected = skin.readings(*layout.positions.T)
-    first_order = (layout.curvature_operator(basis) @ c.ravel()).reshape(3, -1)
+    first_order = (layout.operator(basis) @ c.ravel()).reshape(3, -1)
     np.testing.assert_allclose(sensed, expected, rtol=1e-10, atol=1e-10)
     assert np.abs(expected - first_order).max() > 0.05 * np.abs(first_order).max()
 
@@ -272,7 +272,7 @@ def test_on_slight_slopes_a_loaded_skin_is_sensed_as_the_shell_that_it_is():
 
     sensed = FiniteSlopeEffect().sensed(basis, layout, plate)(c)
 
-    shell, bent = (layout.curvature_operator(basis, of) @ c.ravel() for of in (plate, None))
+    shell, bent = (layout.operator(basis, of) @ c.ravel() for of in (plate, None))
     peak = np.abs(shell).max()
     np.testing.assert_allclose(sensed, shell, rtol=0, atol=1e-4 * peak)
     assert np.abs(shell - bent).max() > 3e-3 * peak

@@ -22,7 +22,7 @@ plate, layout = Plate(patch, tension=5.0), SensorLayout.regular(patch, 4, 4)
 basis, load = SineBasis(patch, 5, 5), PointLoad(0.04, 0.05, 1.0)
 force = load.modal(basis)
 c = plate.compliance(basis)(force)
-K = layout.curvature_operator(basis) @ c.ravel()
+K = layout.operator(basis) @ c.ravel()
 survey = Survey(
     plate, basis, layout, Transduction(), np.zeros(1), force.reshape(1, -1), c.reshape(1, -1),
     K.reshape(1, 3, -1), np.zeros(48), 1.0, np.zeros(48),

@@ -114,7 +114,7 @@ class Scenery:
 
     def readings(self, layout=None, plate=None):
         """What the elements read (L, 3 P) of each load all alone."""
-        M = (layout or self.layout).curvature_operator(self.basis, self.plate)
+        M = (layout or self.layout).operator(self.basis, self.plate)
         return self.shapes(plate or self.plate) @ M.T
 
     @property
@@ -172,7 +172,7 @@ def left_out(effect, seed):
             return 0.0
         stretching = Stretching(effect.of(scene.plate), scene.basis)
         shapes = [stretching(force.reshape(scene.basis.shape)).ravel() for force in s.forces]
-        return np.abs(shapes @ scene.layout.curvature_operator(scene.basis).T - K).max()
+        return np.abs(shapes @ scene.layout.operator(scene.basis).T - K).max()
     if isinstance(effect, SkinEffect):
         of, off = effect.of(scene.plate), effect.off(scene.plate)
         return np.abs(share @ (scene.readings(plate=off) - scene.readings(plate=of))).max()
@@ -302,7 +302,7 @@ def test_on_a_bent_skin_slopes_are_those_of_its_turned_tangents():
     basis, layout = basis_for(bent, "hinged", 8, 7), SensorLayout.regular(bent, 8, 6)
     H, places = 1 / 0.0129, layout.positions
     c = 1e-3 * np.outer(np.ones(2), np.arange(56) == 7)
-    first = (c @ layout.curvature_operator(basis, Plate(bent)).T).reshape(2, 3, -1)
+    first = (c @ layout.operator(basis, Plate(bent)).T).reshape(2, 3, -1)
     s = replace(survey(0), plate=Plate(bent), basis=basis, layout=layout)
     s = replace(s, coefficients=c, curvature=first)
 
