@@ -354,11 +354,14 @@ def reconstruct(
     objects: Switch = False,
     limit: Limit = "",
 ) -> None:
-    """Turn a file of curvature readings into a file of shapes.
+    """Turn a file of readings into a file of shapes.
 
     READINGS is an NPZ with `size` (2,) m, `positions` (P, 2) m, `curvature` (T, 3, P) or (3, P) in
     1/m with NaN for a missing reading, and optionally `sigma` in 1/m and `radius` in m, the base
-    radius along x (infinite when flat). A `size` (1,) with `positions` (P, 1) is a strip, for
+    radius along x (infinite when flat). Instead of `curvature` it may have `values` (T, R) of an
+    `element` (R,) each, an index into `positions`, with the `quantity` (R,) height, slope,
+    curvature or twist, its `direction` (R,) in rad from x, its `sigma` (R,) or (T, R), and in
+    `datum` the quantities of an unknown zero. A `size` (1,) with `positions` (P, 1) is a strip, for
     which only curvature xx is used. An `outline` in m is a polygon (V, 2) or the radius of a disk.
     With a `rigidity` in N m, forces are computed too; a `thickness` in m, `poisson` and `inplane`
     (held, diaphragm, free; hoop of a bent skin) say how the skin stretches.
@@ -381,7 +384,7 @@ def reconstruct(
         The estimator: least-squares, as-printed, direct, fast, bayes, finite-slope, tracking or
         robust.
     contact
-        Write the contact of each frame too, and the skin's geometry there.
+        Write the contact of each frame too, and the skin's geometry there; NaN of `values`.
     objects
         Write the contact and the object: plane, cylinder, sphere or edge; some 50 ms a frame.
     """

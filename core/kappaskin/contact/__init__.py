@@ -1,5 +1,6 @@
 """Contact: position, force, object, and local geometry of the skin."""
 
+from kappaskin.contact.geometry import NO_GEOMETRY as NO_GEOMETRY
 from kappaskin.contact.geometry import CurvatureFormMap as CurvatureFormMap
 from kappaskin.contact.geometry import contact_geometry as contact_geometry
 from kappaskin.contact.geometry import local_geometry as local_geometry

@@ -185,6 +185,7 @@ class PointContact:
         edge: str = "hinged",
         free: Array | None = None,
     ) -> None:
+        layout.check_curvature_sensor("contacts and objects")
         self.patch, strip = plate.patch, plate.patch.strip
         self.basis = basis_for(self.patch, edge, _FUNCTIONS, 1 if strip else _FUNCTIONS)
         compliance = plate.compliance(self.basis)

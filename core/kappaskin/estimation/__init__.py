@@ -9,6 +9,7 @@ from kappaskin.estimation.bayes import Bayes as Bayes
 from kappaskin.estimation.estimator import Estimator as Estimator
 from kappaskin.estimation.estimator import PatternCache as PatternCache
 from kappaskin.estimation.estimator import column_lengths as column_lengths
+from kappaskin.estimation.estimator import unobserved_function as unobserved_function
 from kappaskin.estimation.fast import Fast as Fast
 from kappaskin.estimation.fit import DenseUncertainty as DenseUncertainty
 from kappaskin.estimation.fit import Fit as Fit

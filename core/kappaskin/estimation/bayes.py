@@ -87,16 +87,21 @@ class PosteriorUncertainty:
 # it from there (doi:10.1007/s11336-013-9328-2): -2 p ln (tau sigma) = -p ln gamma - 2 p ln sigma^2
 # more. With p = 1, one function that is seen among others unseen would let tau run away.
 class MarginalLikelihood:
-    """The scale of the prior and the noise that make readings K = A z most likely, A (R, F)."""
+    """The scale of the prior and the noise that make readings K = A z most likely, A (R, F).
 
-    def __init__(self, A: Array, sigma_known: bool, floor: float) -> None:
+    Of the R readings `spent` have no say: both A and K lack their part along as many directions.
+    """
+
+    def __init__(self, A: Array, sigma_known: bool, floor: float, spent: int = 0) -> None:
         U, s, Vt = linalg.svd(A, full_matrices=len(A) < A.shape[1])
         k = len(s)
         self.U, self.V = U[:, :k], Vt.T
         self.s2 = np.zeros(len(Vt))
         self.s2[:k] = s**2
         self._k, self._sigma_known = k, sigma_known
-        self._readings = max(len(A) - 2 * _AWAY, 1.0)  # less what the density of sigma takes
+        self._readings = max(
+            len(A) - spent - 2 * _AWAY, 1.0
+        )  # less what the density of sigma takes
         self._top = math.log(self.s2[0]) if s[0] > 0 else 0.0
         self._floor = floor  # of the readings' own power: what their rounding leaves
         d = 1 + np.exp(_GRID - self._top)[:, None] * self.s2[:k]
@@ -170,10 +175,17 @@ class MarginalLikelihood:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _BayesSolver:
-    """What depends on which readings are used: the likelihood, and B = L V (N, F)."""
+    """What depends on which readings are used: the likelihood, and B = L V (N, F).
+
+    Of offsets that are unknown their weighted readings, orthonormal, `Q` (r, d), and what they are
+    of weighted readings, `inverse` (d, r).
+    """
 
     likelihood: MarginalLikelihood
     B: Array
+    Q: Array
+    inverse: Array
+    offsets: Array
 
 
 class Bayes(Estimator):
@@ -183,10 +195,14 @@ class Bayes(Estimator):
     white in space, for sines proportional to 1/(i^2/a^2 + j^2/b^2)^2. Its scale, and the noise
     unless `sigma` is given, are those that make the readings most likely (type II maximum
     likelihood, doi:10.1162/neco.1992.4.3.415), of each frame by itself. The prior decides what the
-    readings do not, with error bars that show it: no basis is too large.
+    readings do not, with error bars that show it: no basis is too large. Where the zero of readings
+    is unknown, the likelihood is that of what no offset changes (restricted maximum likelihood,
+    doi:10.1093/biomet/58.3.545).
     """
 
     has_prior = True
+    has_rim = False
+    has_datum = True
 
     def _set_up(self) -> None:
         self._root = prior_root(self.basis)
@@ -195,10 +211,15 @@ class Bayes(Estimator):
             self._solvers(self.readable, self._made)
 
     def _made(self, used: Mask) -> _BayesSolver:
-        A = self.weight[used, None] * (self.M[used] @ self._root)
+        whole = self.weight[used, None] * (self.M[used] @ self._root)
+        offsets = self.layout.offsets[:, self.layout.offsets[used].any(axis=0)]
+        D = self.weight[used, None] * offsets[used]
+        Q: Array = D / np.linalg.norm(D, axis=0)  # each reading has one offset at most
         sigma_known, rounding = self.sigma is not None, float(np.finfo(self.dtype).eps)
-        likelihood = MarginalLikelihood(A, sigma_known, rounding**2)
-        return _BayesSolver(likelihood, self._root @ likelihood.V)
+        A = whole - Q @ (Q.T @ whole) if Q.size else whole
+        likelihood = MarginalLikelihood(A, sigma_known, rounding**2, Q.shape[1])
+        inverse = Q.T / np.linalg.norm(D, axis=0)[:, None]
+        return _BayesSolver(likelihood, self._root @ likelihood.V, Q, inverse, offsets)
 
     # Repeated readings of one load scatter by the noise alone: with c = B diag(gamma s / d) y each
     # y_k has the variance of the noise. What readings leave open, which is in error bars, is alike
@@ -223,14 +244,18 @@ class Bayes(Estimator):
         if not used.any():
             raise self.refusal(0, 0)
         solver, frames = self._solvers(used, self._made), flat.shape[:-1]
-        likelihood, B = solver.likelihood, solver.B
-        y, gamma, sigma = likelihood(np.atleast_2d(flat[..., used] * self.weight[used]))
+        likelihood, B, Q = solver.likelihood, solver.B, solver.Q
+        K = np.atleast_2d(flat[..., used] * self.weight[used])
+        y, gamma, sigma = likelihood(K - (K @ Q) @ Q.T if Q.size else K)
         d = 1 + gamma[:, None] * likelihood.s2
         k = y.shape[1]
         z = y * (gamma[:, None] * np.sqrt(likelihood.s2[:k]) / d[:, :k])
         c = (z @ B[:, :k].T).astype(self.dtype)
         spreads = [PosteriorUncertainty(B, v) for v in gamma[:, None] / d]
-        spent = (1 - 1 / d).sum(axis=1)
+        spent = (1 - 1 / d).sum(axis=1) + Q.shape[1]
+        if Q.size:
+            left = K - self.weight[used] * (c @ self.M[used].T)
+            flat = flat - (left @ solver.inverse.T @ solver.offsets.T).reshape(flat.shape)
         return Fit(
             self,
             flat.reshape(*frames, *self.frame_shape),

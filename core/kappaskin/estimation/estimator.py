@@ -42,6 +42,8 @@ class PatternCache(Generic[_Made]):
 _SAFE, _SAFE_SIGMA = 0.25, 0.2
 _WIDEST = 1e60  # m: squares of what it makes of any derivative of the displacement are numbers
 _FINEST = 65  # points along a side at most where slopes are computed
+_NAMED = 2**18  # readings times functions: of more, none that is not determined is named
+_NEARLY = 1e-6  # of the largest part: as large
 _UNSEEN = 1e-15  # of the longest column: a function whose curvature cancels, as on half a circle
 
 
@@ -73,11 +75,12 @@ def column_lengths(A: Array) -> Array:
 class Estimator(ABC):
     """`fit = LeastSquares(basis, layout)`, factored once; `fit(readings)` is a `Fit`.
 
-    `sigma`, a scalar or (3, P) in 1/m, is the standard deviation of each reading; without it all
-    readings weigh the same and their noise is estimated. An infinite sigma excludes a reading.
-    `rim_sd` in m is the standard deviation of each unobservable movement of an elastic rim, by RMS
-    along it. Frames are computed in `dtype`, float64 or float32; the factorisation is always in
-    float64.
+    A frame has the shape (3, P) and the unit 1/m, as below, where a curvature sensor reads; other
+    readings are (R,) in units of their own. `sigma`, a scalar or (3, P), is the standard deviation
+    of each reading; without it all weigh the same and their noise is estimated. An infinite sigma
+    excludes a reading. `rim_sd` in m is the standard deviation of each unobservable movement of an
+    elastic rim, by RMS along it; readings of height or slope determine these, and it is not used.
+    Frames are computed in `dtype`, float64 or float32; the factorisation is always in float64.
     """
 
     RIM_SD: ClassVar = 0.2e-3
@@ -90,6 +93,11 @@ class Estimator(ABC):
     """Whether a prior decides what the readings do not, so that no basis is too large."""
     has_memory: ClassVar = False
     """Whether a fit depends on earlier frames: `follow` each frame once, in order."""
+
+    has_rim: ClassVar = True
+    """Whether it can estimate how an elastic rim moves, where the readings tell."""
+    has_datum: ClassVar = False
+    """Whether it can estimate the offset of readings whose zero is unknown."""
 
     failure: ClassVar = "no convergence{}; least squares shown"
     """Why a fit has not converged, and what to do, in words; {} is for the frames."""
@@ -111,16 +119,16 @@ class Estimator(ABC):
         self.basis, self.layout, self.rim_sd = basis, layout, rim_sd
         # Typed as float64: what holds for one holds for the other.
         self.dtype = cast("np.dtype[np.float64]", np.dtype(dtype))
-        unobservable = (
-            np.empty((basis.size, 0)) if basis.unobservable is None else basis.unobservable
-        )
+        self.combinations, unobservable = _combinations(basis, layout)
+        """The combinations (N, F) of functions that are fitted; None for all of them."""
         self.undecided = rim_sd * unobservable
         """Unobservable shapes (N, q) in m, each one standard deviation large."""
         numbers = np.finfo(self.dtype)
         self._largest, self._faint = float(numbers.max) ** _SAFE, float(numbers.tiny)
         self._faintest = float(numbers.tiny / numbers.eps)
         self.frame_shape = layout.frame_shape
-        """The shape of the readings of a frame, (3, P)."""
+        """The shape of the readings of a frame, (3, P) or (R,)."""
+        self._check_readings(sigma is not None)
         self.sigma = None if sigma is None else real_array(sigma, "sigma")
         """The given standard deviations in 1/m, one or (3, P); None if none were given."""
         self.weight = self._weights(1.0 if self.sigma is None else self.sigma)
@@ -128,13 +136,33 @@ class Estimator(ABC):
         self.readable: Mask = layout.live.ravel() & (self.weight > 0)
         """Which readings (R,) are used when they are present."""
         self._all_readable = bool(self.readable.all())
-        self.unknowns = basis.size if basis.free is None else basis.free.shape[1]
+        self.unknowns: int = basis.size if self.combinations is None else self.combinations.shape[1]
         """Number of unknowns: the coefficients minus those fixed by the boundary conditions."""
         self._set_up()
 
     @abstractmethod
     def _set_up(self) -> None:
         """Compute once what no frame changes; raises a `Refusal` when no shape is determined."""
+
+    def _check_readings(self, sigma_known: bool) -> None:
+        """Raise a `Refusal` for readings that this estimator cannot take."""
+        basis, layout, name = self.basis, self.layout, type(self).__name__
+        if layout.offsets.size and not self.has_datum:
+            raise Refusal(
+                f"expected readings of a known zero for {name}, got a free datum of "
+                f"{' and '.join(layout.reads.free if layout.reads else ())}; use least-squares or "
+                "bayes"
+            )
+        if not self.has_rim and basis.unobservable is not None and not layout.senses_curvature_only:
+            raise Refusal(
+                f"expected readings of curvature alone for {name} on an elastic rim, got readings "
+                f"in {layout.units}, which move with the rim; use least-squares"
+            )
+        if not sigma_known and " or " in layout.units:
+            raise Refusal(
+                f"expected the sigma of readings that differ in unit, {layout.units}, got none; "
+                "give each its standard deviation"
+            )
 
     def _weights(self, sigma: float | Array) -> Array:
         sigma = np.asarray(sigma)
@@ -143,12 +171,14 @@ class Estimator(ABC):
                 f"expected sigma to be one number or {self.frame_shape}, got {sigma.shape}"
             )
         if not np.all(sigma > 0):
-            raise Refusal("expected every sigma above zero in 1/m, got zero, less or NaN")
+            raise Refusal(
+                f"expected every sigma above zero in {self.layout.units}, got zero, less or NaN"
+            )
         known, most = sigma[sigma < np.inf], float(np.finfo(self.dtype).max) ** _SAFE_SIGMA
         if np.any((known > most) | (known < 1 / most)):
             raise Refusal(
-                f"expected every sigma from {1 / most:.1g} to {most:.1g} 1/m, or infinite, in "
-                f"{self.dtype}, got {known.min():g} to {known.max():g}"
+                f"expected every sigma from {1 / most:.1g} to {most:.1g} {self.layout.units}, or "
+                f"infinite, in {self.dtype}, got {known.min():g} to {known.max():g}"
             )
         return np.broadcast_to(1 / sigma, self.frame_shape).reshape(-1)
 
@@ -199,7 +229,9 @@ class Estimator(ABC):
             return True
         if shape[1:] == one:
             return False
-        raise Refusal(f"expected readings of shape {one} or (T, {str(one)[1:]}, got {shape}")
+        raise Refusal(
+            f"expected readings of shape {one} or (T, {', '.join(map(str, one))}), got {shape}"
+        )
 
     def __call__(self, readings: ArrayLike) -> Fit:
         """Fit `readings` (3, P) or (T, 3, P) in 1/m; NaN and infinity mean a missing reading.
@@ -250,8 +282,9 @@ class Estimator(ABC):
             throughout = (kept > math.sqrt(self._largest)) | ~small.any(axis=-1)
             if np.any(throughout & beyond.any(axis=-1)):
                 raise RankDeficient(
-                    f"expected readings of at most {self._largest:.1g} 1/m in {self.dtype}, and "
-                    f"NaN for missing ones; got {size[beyond].max():.3g} 1/m; check their unit"
+                    f"expected readings of at most {self._largest:.1g} {self.layout.units} in "
+                    f"{self.dtype}, and NaN for missing ones; got {size[beyond].max():.3g}; check "
+                    "their unit"
                 )
         return small & self.readable
 
@@ -316,30 +349,47 @@ class Estimator(ABC):
         bends = curvature_at(self.basis, np.column_stack([x, np.repeat(y, len(x))]))[0]
         return bool(np.isinf(column_lengths(bends if W is None else bends @ W)).any())
 
-    def refusal(self, readings: int, rank: int) -> RankDeficient:
-        """The error for `readings` readings that determine only `rank` coefficients."""
+    def _columns(self, used: Mask) -> Array:
+        """The weighted operator (r, F) of the readings `used` on the unknowns."""
+        W = self.combinations
+        return self.weight[used, None] * (self.M[used] if W is None else self.M[used] @ W)
+
+    def _unobserved(self, used: Mask) -> str:
+        """A function that the readings `used` do not determine, in words; nothing of many."""
+        if np.count_nonzero(used) * self.basis.size > _NAMED:
+            return ""
+        return unobserved_function(self.basis, self.layout, self.M, used)
+
+    def refusal(self, readings: int, rank: int, used: Mask | None = None) -> RankDeficient:
+        """The error for `readings` readings that determine only `rank` coefficients.
+
+        Of those `used` (R,) it names a function that they do not determine.
+        """
         (Ni, Nj), N, layout = self.basis.shape, self.unknowns, self.layout
         bound = "at most " if readings < N else ""
         what = f"{layout} with {readings} readings determine {bound}{rank} of the {N} coefficients "
         what += f"of a {Ni} x {Nj} basis"
+        if d := layout.offsets.shape[1]:
+            what += f", {d} of them for the unknown zero"
         if readings == 0:
             return RankDeficient(
                 f"{what}: no readings are left; check the connection and the dead elements"
             )
+        unobserved = "" if used is None else self._unobserved(used)
         channels = int(np.count_nonzero(layout.live | layout.lacking))
         missing = channels - readings
-        if self._moves_as_a_whole():
+        if not layout.reads and self._moves_as_a_whole():
             return RankDeficient(
                 f"{what}: one function is a rigid motion without curvature; hold the "
                 "edges so that it is not possible (pin the ends of the arc)"
             )
-        if layout.shape and not missing:
+        if layout.shape and not missing and not layout.reads:
             m, n = layout.shape
             # Along each direction, mode m + q equals m - q at the cell centres.
             return RankDeficient(
                 f"{what}: functions finer than the elements have the readings of coarser ones; "
                 f"use at most {min(Ni, m)} x {min(Nj, n)} functions, or more elements, or a prior "
-                "(bayes)"
+                f"(bayes){unobserved}"
             )
         why = (
             f"{missing} of {channels} readings are missing"
@@ -348,8 +398,40 @@ class Estimator(ABC):
         )
         return RankDeficient(
             f"{what}: {why}; use a smaller basis (at most {rank} functions), more elements, or a "
-            "prior (bayes)"
+            f"prior (bayes){unobserved}"
         )
+
+
+def unobserved_function(basis: Basis, layout: SensorLayout, M: Array, used: Mask) -> str:
+    """The function of the largest part in what the readings `used` (R,) leave open, in words.
+
+    M (R, N) is the operator of the layout. Nothing where there is no such function.
+    """
+    W = _combinations(basis, layout)[0]
+    A = np.hstack([M[used] if W is None else M[used] @ W, layout.offsets[used]])
+    s, Vt = np.linalg.svd(A / column_lengths(A))[1:]
+    open_ = Vt[int(np.sum(s > s[:1] * max(A.shape) * np.finfo(float).eps)) :]
+    shapes = open_[:, : A.shape[1] - layout.offsets.shape[1]]
+    parts = np.linalg.norm(shapes if W is None else shapes @ W.T, axis=0)
+    if not parts.any():
+        return ""
+    # Of functions with the same readings the finest is one too many.
+    largest = int(np.flatnonzero(parts >= (1 - _NEARLY) * parts.max())[-1])
+    i, j = divmod(largest, basis.shape[1])
+    return f"; no reading determines function {i + 1} x {j + 1}"
+
+
+def _combinations(basis: Basis, layout: SensorLayout) -> tuple[Array | None, Array]:
+    """The combinations (N, F) that readings may determine, and those (N, q) that none does.
+
+    What has no curvature has heights and slopes.
+    """
+    free, still = basis.free, basis.unobservable
+    if still is None:
+        return free, np.empty((basis.size, 0))
+    if layout.senses_curvature_only:
+        return free, still
+    return np.hstack([np.eye(basis.size) if free is None else free, still]), still[:, :0]
 
 
 @np.errstate(over="ignore")

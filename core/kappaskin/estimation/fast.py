@@ -13,12 +13,13 @@ from kappaskin.bases import Basis, SineBasis
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation.estimator import Estimator, PatternCache
 from kappaskin.estimation.fit import Fit
-from kappaskin.frames import Array, Mask
-from kappaskin.sensing import SensorLayout, gage_multipliers
+from kappaskin.frames import Array, Indices, Mask
+from kappaskin.sensing import SensorLayout
 
 # Of a cell: an element so far off reads 3 parts in 10^9 wrong of the shortest wave, and positions
 # that were computed otherwise, of a million cells along a side, are no farther off.
 _OFF = 1e-9
+_ALONG = 1e-8  # rad that a direction may be off x or y, by its rounding
 _FEW = 0.5  # of the cells of a grid must have elements
 
 
@@ -40,6 +41,11 @@ class _GridSide:
         last = number % self.cells == 0
         sines = np.sqrt(self.cells / np.where(last, 1.0, 2.0))
         return sines, np.where(last, 0.0, sines)
+
+    def gain(self, k: Array, order: int) -> Array:
+        """Lengths (count,) of a derivative of the sampled sines of wave numbers k (count,)."""
+        sines, cosines = self.lengths
+        return (sines, k * cosines, -(k**2) * sines)[order]
 
     def analysed(self, K: Array, axis: int, cosines: bool, spend: bool = False) -> Array:
         """Components of `K` along the unit sines or cosines, without a last, vanishing cosine.
@@ -68,64 +74,94 @@ class _GridSide:
 class Transforms:
     """M of `basis` on a regular grid of m x n elements, and its transpose, computed in `dtype`.
 
-    The gages of the elements are `gage_length` in m long.
+    The elements are those of a `layout`, all of which read the same k quantities: channels.
 
     The sampled sines and cosines are orthogonal (DST-II and DCT-II), so that M c is one factor per
-    function and channel, `gain` (3, Nj, Ni), and a fast transform per channel. Readings here are
-    (..., 3, n, m) and coefficients (..., Nj, Ni): x runs fastest.
+    function and channel, `gain` (k, Nj, Ni), and a fast transform per channel. Readings here are
+    (..., k, n, m) and coefficients (..., Nj, Ni): x runs fastest.
     """
 
     def __init__(
-        self,
-        basis: SineBasis,
-        m: int,
-        n: int,
-        dtype: DTypeLike = np.float64,
-        gage_length: float = 0.0,
+        self, basis: SineBasis, layout: SensorLayout, m: int, n: int, dtype: DTypeLike = np.float64
     ) -> None:
         self.cells = (n, m)
         self._x = _GridSide(basis.Ni, m)
         self._y = _GridSide(basis.Nj, n, constant=basis.patch.strip)
-        (ki, kj), (sx, cx), (sy, cy) = basis.wavenumbers, self._x.lengths, self._y.lengths
-        xx, yy = np.outer(sy, -(ki**2) * sx), np.outer(-(kj**2) * sy, sx)
-        at_points = np.stack([xx, yy, np.outer(kj * cy, ki * cx)])
-        self.gain = (at_points * gage_multipliers(basis, gage_length).swapaxes(-1, -2)).astype(
-            dtype
-        )
+        self._orders = [_derivative(*kind) for kind in layout.kinds]
+        gain = [self._gain(basis, order) for order in self._orders]
+        self.gain = (gain * layout.multipliers(basis).swapaxes(-1, -2)).astype(dtype)
+
+    def _gain(self, basis: SineBasis, order: "_Derivative") -> Array:
+        """Factors (Nj, Ni) of a derivative, of functions of unit length on the grid."""
+        along = zip((self._y, self._x), basis.wavenumbers[::-1], order.orders[::-1], strict=True)
+        return order.sign * np.multiply.outer(*(side.gain(k, times) for side, k, times in along))
 
     def analysed(self, K: Array, scale: Array) -> Array:
-        """M^T K (..., Nj, Ni), each component times its `scale` (3,); one with zero is skipped."""
-        total = np.zeros((*K.shape[:-3], *self.gain.shape[1:]), self.gain.dtype)
+        """M^T K (..., Nj, Ni), each channel times its `scale` (k,); one with zero is skipped."""
+        total: Array | None = None
         for channel in np.flatnonzero(scale):
-            cosines = bool(channel == 2)
-            along_y = self._y.analysed(K[..., channel, :, :], -2, cosines)
-            parts = self._x.analysed(along_y, -1, cosines, spend=True)
+            in_x, in_y = self._orders[channel].cosines
+            along_y = self._y.analysed(K[..., channel, :, :], -2, in_y)
+            parts = self._x.analysed(along_y, -1, in_x, spend=True)
             Nj, Ni = parts.shape[-2:]  # at i = m and j = n the cosines have no part
             parts *= self.gain[channel, :Nj, :Ni]
             if scale[channel] != 1:
                 parts *= float(scale[channel])
+            if total is None and (Nj, Ni) == self.gain.shape[1:]:
+                total = parts
+                continue
+            if total is None:
+                total = np.zeros((*K.shape[:-3], *self.gain.shape[1:]), self.gain.dtype)
             total[..., :Nj, :Ni] += parts
+        if total is None:
+            return np.zeros((*K.shape[:-3], *self.gain.shape[1:]), self.gain.dtype)
         return total
 
     def readings(self, c: Array) -> Array:
-        """M c (..., 3, n, m)."""
-        K = np.zeros((*c.shape[:-2], 3, *self.cells), self.gain.dtype)
+        """M c (..., k, n, m)."""
+        (n, m), k = self.cells, len(self.gain)
+        K = np.zeros((*c.shape[:-2], k, n, m), self.gain.dtype)
         for channel in np.flatnonzero(self.gain.any(axis=(1, 2))):
-            cosines = bool(channel == 2)
-            parts = self.gain[channel] * c
-            if cosines:
-                n, m = self.cells
-                parts = parts[..., : n - 1, : m - 1]
-            along_x = self._x.summed(parts, -1, cosines)
-            K[..., channel, :, :] = self._y.summed(along_x, -2, cosines)
+            in_x, in_y = self._orders[channel].cosines
+            parts = (self.gain[channel] * c)[..., : n - in_y, : m - in_x]
+            along_x = self._x.summed(parts, -1, in_x)
+            K[..., channel, :, :] = self._y.summed(along_x, -2, in_y)
         return K
+
+
+@dataclass(frozen=True)
+class _Derivative:
+    """A derivative of the displacement: its orders along x and y, times a `sign`."""
+
+    orders: tuple[int, int]
+    sign: float = 1.0
+
+    @property
+    def cosines(self) -> tuple[bool, bool]:
+        """Whether sines become cosines by it, along x and along y."""
+        return self.orders[0] == 1, self.orders[1] == 1
+
+
+def _derivative(quantity: str, direction: float) -> _Derivative:
+    """What a reading is; raises a `Refusal` for a sum of derivatives, which is not orthogonal."""
+    if quantity in ("height", "twist"):
+        return _Derivative((0, 0) if quantity == "height" else (1, 1))
+    quarter = round(direction / (math.pi / 2))
+    if abs(direction - quarter * math.pi / 2) > _ALONG:
+        raise Refusal(
+            f"expected slopes and curvatures along x or y for the fast transforms, got {quantity} "
+            f"at {math.degrees(direction):g} degrees; use least-squares"
+        )
+    order = 1 if quantity == "slope" else 2
+    sign = -1.0 if quantity == "slope" and quarter in (2, 3) else 1.0
+    return _Derivative((0, order) if quarter % 2 else (order, 0), sign)
 
 
 @dataclass(frozen=True, eq=False)
 class ScaledOperator:
     """A = w M D^-1/2 on the grid, whose columns have about unit length.
 
-    `weights` (3, n, m) or (3, 1, 1) are w, zero where there is no reading, and `root` (Nj, Ni) is
+    `weights` (k, n, m) or (k, 1, 1) are w, zero where there is no reading, and `root` (Nj, Ni) is
     D^-1/2 for a D that is exact when in each channel all weigh the same: then A^T A = 1.
     """
 
@@ -134,14 +170,14 @@ class ScaledOperator:
     root: Array
 
     def forward(self, g: Array) -> Array:
-        """A g (..., 3, n, m) for g (..., Nj, Ni)."""
+        """A g (..., k, n, m) for g (..., Nj, Ni)."""
         read = self.transforms.readings(self.root * g)
         read *= self.weights
         return read
 
     def back(self, K: Array) -> Array:
-        """A^T K (..., Nj, Ni) for K (..., 3, n, m)."""
-        return self.root * self.transforms.analysed(self.weights * K, np.ones(3))
+        """A^T K (..., Nj, Ni) for K (..., k, n, m)."""
+        return self.root * self.transforms.analysed(self.weights * K, np.ones(len(self.weights)))
 
 
 def grid_cells(layout: SensorLayout) -> tuple[int, int, NDArray[np.intp] | None]:
@@ -165,6 +201,24 @@ def grid_cells(layout: SensorLayout) -> tuple[int, int, NDArray[np.intp] | None]
         )
     in_order = len(P) == m * n and bool(np.all(cells == np.arange(m * n)))
     return m, n, None if in_order else cells
+
+
+def _places(layout: SensorLayout, count: int, cells: NDArray[np.intp] | None) -> Indices | None:
+    """The place of each reading among those of `count` cells, channel after channel.
+
+    None where they are in order; `cells` (P,) are those of the elements, None for 0, 1, 2, ...
+    """
+    element = layout.element if cells is None else cells[layout.element]
+    places = count * layout.kind + element
+    total = count * len(layout.kinds)
+    if len(places) == total and np.array_equal(places, np.arange(total)):
+        return None
+    if len(np.unique(places)) < len(places):
+        raise Refusal(
+            "expected each element to read a quantity once for the fast transforms, got some "
+            "twice; use least-squares"
+        )
+    return places
 
 
 _STEPS = 1000  # at most; most sets of missing readings that decide a shape take 10 to 100
@@ -230,7 +284,7 @@ def _least_of(diagonal: list[float], off_diagonal: list[float]) -> float:
 
 
 def _conjugate_gradients(A: ScaledOperator, K: Array) -> tuple[Array, NDArray[np.intp]] | None:
-    """The least-squares g (T, Nj, Ni) of A g = K (T, 3, n, m) and steps (T,); None without an end.
+    """The least-squares g (T, Nj, Ni) of A g = K (T, k, n, m) and steps (T,); None without an end.
 
     The residual is carried along in the place of `K` (CGLS), as accurate as A allows and not A^T A.
     It ends where A^T (K - A g) is what rounding leaves of it.
@@ -271,13 +325,13 @@ class _GridUncertainty:
 
     def __init__(self, transforms: Transforms, weights: Array) -> None:
         usual = [np.median(w[w > 0]) if w.any() else 0.0 for w in weights]
-        usual = np.array(usual).reshape(3, 1, 1)
+        usual = np.array(usual).reshape(-1, 1, 1)
         root = 1 / np.sqrt(np.sum((usual * transforms.gain) ** 2, axis=0))
         self._A = ScaledOperator(transforms, usual, root)
         share = np.divide(weights, usual, where=usual > 0, out=np.ones(weights.shape))
         self._other = np.flatnonzero(share != 1)
         self._E = 1 - share.ravel()[self._other] ** 2
-        self._whole = (3, *transforms.cells)
+        self._whole = (len(weights), *transforms.cells)
         self._readings = int(np.prod(self._whole))
 
     def _read(self, g: Array) -> Array:
@@ -354,8 +408,9 @@ class Fast(Estimator):
     """The least-squares shape of a flat skin with a regular grid of elements, in O(P log P).
 
     At the centres of an m x n grid sines and cosines are orthogonal up to i = m and j = n, so that
-    D = M^T M is diagonal: three fast transforms and a division give the shape exactly, also when
-    whole components are dead or have another weight. With single dead elements, missing readings
+    D = M^T M is diagonal: a fast transform of each component and a division give the shape exactly,
+    also when whole components are dead or have another weight. Components are xx, yy and xy, or the
+    heights, and the slopes along x and along y. With single dead elements, missing readings
     or individual weights, conjugate gradients in the unknowns D^1/2 c need a few steps
     (`Fit.steps`). M is never made. Elements may come in any order (`grid_cells`).
 
@@ -366,40 +421,40 @@ class Fast(Estimator):
 
     def _set_up(self) -> None:
         sines, layout = _sines(self.basis, self.layout), self.layout
-        m, n, self._cells = grid_cells(layout)
+        m, n, cells = grid_cells(layout)
+        self._places = _places(layout, m * n, cells)
         if sines.Ni > m or sines.Nj > n:
             raise Refusal(
                 f"expected at most {m} x {n} functions for the fast transforms of {layout}, got "
                 f"{sines.Ni} x {sines.Nj}; use fewer, or least-squares"
             )
-        length = layout.gage_length
-        self._exact = Transforms(sines, m, n, gage_length=length)
+        self._exact = Transforms(sines, layout, m, n)
         exactly = self.dtype == np.float64
-        self._transforms = self._exact if exactly else Transforms(sines, m, n, self.dtype, length)
+        self._transforms = self._exact if exactly else Transforms(sines, layout, m, n, self.dtype)
         self._least = math.sqrt(np.finfo(self.dtype).eps)  # half of the digits are left
         self._solvers = PatternCache[_GridSolver]()
         self._whole = self._made(self.readable)
 
     def _on_grid(self, flat: Array) -> Array:
-        """Readings (T, 3 P) as (T, 3, n, m); zero where an element was left out."""
-        n, m = self._exact.cells
-        if self._cells is None:
-            return flat.reshape(-1, 3, n, m)
-        K = np.zeros((len(flat), 3, n * m), flat.dtype)
-        K[..., self._cells] = flat.reshape(-1, 3, len(self.layout))
-        return K.reshape(-1, 3, n, m)
+        """Readings (T, R) as (T, k, n, m); zero where an element was left out."""
+        (n, m), k = self._exact.cells, len(self._exact.gain)
+        if self._places is None:
+            return flat.reshape(-1, k, n, m)
+        K = np.zeros((len(flat), k * n * m), flat.dtype)
+        K[:, self._places] = flat
+        return K.reshape(-1, k, n, m)
 
     def _made(self, used: Mask) -> _GridSolver:
         count, gain = int(used.sum()), self._exact.gain
         if count < self.unknowns:
-            raise self.refusal(count, count)
+            raise self.refusal(count, count, used)
         w = self._on_grid(np.where(used, self.weight, 0.0)[None])[0]
         if even := bool(np.all(w == w[:, :1, :1])):
             w = w[:, :1, :1].copy()
         scale = _squares(w, 2) / w[0].size
         D = np.einsum("c,cji,cji->ji", scale, gain, gain)
         if not np.all(D > 0):
-            raise self.refusal(count, int(np.count_nonzero(D > 0)))
+            raise self.refusal(count, int(np.count_nonzero(D > 0)), used)
         inverse, spread = (1 / D).astype(self.dtype), _GridUncertainty(self._exact, w)
         if even:
             return _GridSolver(count, scale, inverse, spread, None)
@@ -411,14 +466,16 @@ class Fast(Estimator):
 
     def predicted(self, coefficients: Array) -> Array:
         """What the elements would read, (..., 3, P) in 1/m, of `coefficients` (..., Ni, Nj)."""
-        (n, m), P, frames = self._exact.cells, len(self.layout), coefficients.shape[:-2]
+        frames, places = coefficients.shape[:-2], self._places
         c = coefficients.reshape(-1, *self.basis.shape).swapaxes(-1, -2)
-        K = _joined([self._transforms.readings(c[part]) for part in _parts(len(c), 3 * P)])
-        on_cells = K.reshape(*frames, 3, n * m)
-        return on_cells if self._cells is None else on_cells[..., self._cells]
+        parts = _parts(len(c), self.layout.channels)
+        K = _joined([self._transforms.readings(c[part]) for part in parts])
+        flat = K.reshape(len(c), math.prod(K.shape[1:]))
+        read = flat if places is None else flat[:, places]
+        return read.reshape(*frames, *self.frame_shape)
 
     def _solved(self, solver: _GridSolver, K: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Coefficients (T, Nj, Ni) and steps (T,) for readings K (T, 3, n, m)."""
+        """Coefficients (T, Nj, Ni) and steps (T,) for readings K (T, k, n, m)."""
         A = solver.A
         if A is None:
             c = self._transforms.analysed(K, solver.scale)
@@ -435,7 +492,7 @@ class Fast(Estimator):
         return A.root * found[0] * size[:, 0], found[1]
 
     def _hardly(self, readings: int) -> RankDeficient:
-        (Ni, Nj), total = self.basis.shape, 3 * len(self.layout)
+        (Ni, Nj), total = self.basis.shape, self.layout.channels
         return RankDeficient(
             f"{self.layout} with {readings} readings barely determine some of the {self.unknowns} "
             f"coefficients of a {Ni} x {Nj} basis: for some shape their sensitivity is below "

@@ -20,16 +20,19 @@ _REFACTOR = 1e-6  # below this share of a direction left, updating loses digits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _FactoredSolver:
-    """The transposed solution operator (R, N) for those of the readings that are `used` (R,).
+    """The transposed solution operator (r, N + d) for the r readings that are `used` (R,).
 
-    It is the product of the `factors`: one, or two, (R, F) and (F, N), where rounding of a single
-    one would show in the residual.
+    It is the product of the `factors`: one, or two, (r, F) and (F, N + d), where rounding of a
+    single one would show in the residual. `offsets` (R, d) are the readings of the offsets that are
+    unknown; `spare` are the degrees of freedom left.
     """
 
     used: Mask
     factors: tuple[Array, ...]
     spread: DenseUncertainty
     count: int
+    spare: int
+    offsets: Array | None
 
 
 class LeastSquares(Estimator):
@@ -39,33 +42,47 @@ class LeastSquares(Estimator):
     columns of M are scaled to unit length and factored, M = Q R by Householder reflections and
     R = U S V^T, once. Missing readings (NaN) are taken out by an update of that factorisation.
 
-    Where the basis leaves only some combinations free, c = W g, only those are fitted. Raises
+    Where the basis leaves only some combinations free, c = W g, only those are fitted. Offsets of
+    readings whose zero is unknown are fitted in the same factorisation, so that error bars and
+    degrees of freedom account for them; `Fit.readings` are less them. Raises
     `RankDeficient` when the readings do not determine the coefficients.
     """
 
+    has_datum = True
+
     def _set_up(self) -> None:
-        readings = int(self.readable.sum())
+        readings, offsets = int(self.readable.sum()), self.layout.offsets
+        self._offsets = offsets[:, offsets[self.readable].any(axis=0)]
+        self.unknowns += self._offsets.shape[1]
         if readings < self.unknowns:  # before any memory is taken for it
-            raise self.refusal(readings, readings)
+            raise self.refusal(readings, readings, self.readable)
         self._factor(self.readable)
         self._solver = self._made(self.readable, self._root, self._U)
         self._reduced = PatternCache[_FactoredSolver]()
 
     def _factor(self, used: Mask) -> None:
-        """U (R, F) orthonormal and root (N, F) with operator = root U^T, for the readings used."""
-        W = self.basis.free
-        A = self.weight[used, None] * (self.M[used] if W is None else self.M[used] @ W)
+        """U (r, F) orthonormal and root (N + d, F) with operator = root U^T, for readings used."""
+        W, A = self.combinations, self._columns(used)
         length = column_lengths(A)
         Q, R = cast("tuple[Array, Array]", linalg.qr(A / length, mode="economic"))
         U, s, Vt = linalg.svd(R)
         rank = int(np.sum(s > s[0] * max(A.shape) * np.finfo(float).eps))
         if rank < self.unknowns:
-            raise self.refusal(len(A), rank)
+            raise self.refusal(len(A), rank, used)
         self._U = Q @ U
         root = (Vt.T / s) / length[:, None]
-        self._root = root if W is None else W @ root
+        d = self._offsets.shape[1]
+        self._root = (
+            root if W is None else np.vstack([W @ root[: len(root) - d], root[len(root) - d :]])
+        )
         self.condition = float(s[0] / s[-1])
         """Condition number of M with its columns scaled to unit length."""
+
+    def _columns(self, used: Mask) -> Array:
+        shapes = super()._columns(used)
+        if not self._offsets.size:
+            return shapes
+        return np.hstack([shapes, self.weight[used, None] * self._offsets[used]])
 
     def _made(
         self, used: Mask, root: Array, U: Array, inverse: Array | None = None
@@ -74,8 +91,15 @@ class LeastSquares(Estimator):
         left = root if inverse is None else root @ inverse
         weighted = U if self.sigma is None else self.weight[used, None] * U
         factors = ((left @ weighted.T).T,) if self.condition <= _MILD else (weighted, left.T)
-        spread = DenseUncertainty(lambda: left @ root.T)
-        return _FactoredSolver(used, tuple(f.astype(self.dtype) for f in factors), spread, len(U))
+        N, count, offsets = self.basis.size, len(U), self._offsets
+        return _FactoredSolver(
+            used,
+            tuple(f.astype(self.dtype) for f in factors),
+            DenseUncertainty(lambda: left[:N] @ root[:N].T),
+            count,
+            count - self.unknowns,
+            offsets.astype(self.dtype) if offsets.size else None,
+        )
 
     def _without(self, used: Mask) -> _FactoredSolver:
         """The solver for the readings `used` (R,), cached for the next frames."""
@@ -104,16 +128,19 @@ class LeastSquares(Estimator):
         c = flat if solver.count == flat.shape[-1] else flat[..., used]
         for factor in solver.factors:
             c = np.dot(c, factor)
-        return self._answer(flat, c, solver.spread, solver.count - self.unknowns)
+        if solver.offsets is not None:
+            c, zero = np.split(c, [self.basis.size], axis=-1)
+            flat = flat - np.dot(zero, solver.offsets.T)
+        return self._answer(flat, c, solver.spread, solver.spare)
 
 
 class _PerFrame(Estimator):
     """Base of estimators that factor nothing: the weighted M is solved in each call."""
 
     def _set_up(self) -> None:
-        self._A = (self.weight[:, None] * self._columns()).astype(self.dtype)
+        self._A = (self.weight[:, None] * self._scaled()).astype(self.dtype)
 
-    def _columns(self) -> Array:
+    def _scaled(self) -> Array:
         return self.M
 
     def _rows(self, flat: Array, used: Mask) -> tuple[Array, Array]:
@@ -155,8 +182,8 @@ class Direct(_PerFrame):
     the readings do not determine the coefficients.
     """
 
-    def _columns(self) -> Array:
-        W = self.basis.free
+    def _scaled(self) -> Array:
+        W = self.combinations
         A = self.M if W is None else self.M @ W
         length = column_lengths((self.weight[:, None] * A)[self.readable])
         self._back = (np.eye(self.unknowns) if W is None else W) / length
@@ -165,10 +192,10 @@ class Direct(_PerFrame):
     def _fit(self, flat: Array, used: Mask) -> Fit:
         A, K = self._rows(flat, used)
         if len(A) < self.unknowns:
-            raise self.refusal(len(A), len(A))
+            raise self.refusal(len(A), len(A), used)
         g, _, rank, _ = np.linalg.lstsq(A, K, rcond=max(A.shape) * np.finfo(self.dtype).eps)
         if rank < self.unknowns:
-            raise self.refusal(len(A), int(rank))
+            raise self.refusal(len(A), int(rank), used)
         back = self._back
 
         def covariance() -> Array:

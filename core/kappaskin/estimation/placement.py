@@ -71,6 +71,7 @@ def predicted_sd(
 
 def _at(places: Array, layout: SensorLayout) -> SensorLayout:
     """Elements like those of `layout` at `places` (P, 2) in m."""
+    layout.check_curvature_sensor("a new placement")
     return replace(SensorLayout.scattered(layout.patch, places), gage_length=layout.gage_length)
 
 

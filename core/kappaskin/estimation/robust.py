@@ -149,6 +149,7 @@ class Robust(Estimator, Stateful):
         "too many elements contradict each other{}: the shape may be wrong; "
         "tare, or repair what Health lists"
     )
+    has_rim = False
     STATE = ("_history",)
 
     def _set_up(self) -> None:

@@ -87,6 +87,7 @@ class Tracking(Estimator, Stateful):
 
     has_memory: ClassVar = True
     has_prior: ClassVar = True
+    has_rim: ClassVar = False
     STATE = ("_filter", "_level", "_now", "_left", "_read")
 
     def _set_up(self) -> None:

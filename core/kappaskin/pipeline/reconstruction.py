@@ -1,4 +1,4 @@
-"""Reconstruction from a file of curvature readings to arrays of shapes."""
+"""Reconstruction from a file of readings to arrays of shapes."""
 
 import io
 import math
@@ -16,6 +16,9 @@ from kappaskin._files import Budget, check_memory, open_file
 from kappaskin.bases import Basis, basis_for
 from kappaskin.contact import (
     KINDS,
+    NO_CONTACT,
+    NO_GEOMETRY,
+    NO_OBJECT,
     ContactObject,
     Contacts,
     LowerBound,
@@ -24,20 +27,44 @@ from kappaskin.contact import (
     contact_geometry,
 )
 from kappaskin.errors import RankDeficient, Refusal
-from kappaskin.estimation import METHODS, Estimator, Fit, check_method, estimator_for
-from kappaskin.frames import Array, Contact
+from kappaskin.estimation import (
+    METHODS,
+    Estimator,
+    Fit,
+    check_method,
+    estimator_for,
+    unobserved_function,
+)
+from kappaskin.frames import Array, Contact, LocalGeometry
 from kappaskin.mechanics import Plate
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Disk, Patch, Polygon
 
-_NEEDED = "size (2,) in m, positions (P, 2) in m and curvature (T, 3, P) or (3, P) in 1/m"
+_NEEDED = (
+    "size (2,) in m, positions (P, 2) in m and curvature (T, 3, P) or (3, P) in 1/m, or values "
+    "(T, R) with element (R,) and quantity (R,)"
+)
 
 _SKIN = ("rigidity", "thickness", "poisson")
-_NAMES = ("size", "positions", "curvature", "sigma", "radius", "outline", *_SKIN, "inplane")
+_READ = ("element", "quantity", "direction", "datum")  # what values are
+_NAMES = (
+    "size",
+    "positions",
+    "curvature",
+    "values",
+    *_READ,
+    "sigma",
+    "radius",
+    "outline",
+    *_SKIN,
+    "inplane",
+)
+_TEXTS = ("quantity", "datum", "inplane")
 _HEADER = 2**16  # bytes of a member that say what it holds
 _READ_AS = 8  # bytes of each number in memory
 
 _MOST = 2**27  # numbers in one array: 1 GiB
+_NAMED = 2**18  # readings times functions: of more, none that is not determined is named
 
 # What a damaged archive makes zipfile and NumPy raise: RuntimeError when it seems encrypted or
 # packed by a method there is not, MemoryError when it claims to be huge.
@@ -89,8 +116,8 @@ def _declared(archive: zipfile.ZipFile, name: str) -> tuple[tuple[int, ...], int
     return shape, kind.itemsize
 
 
-def _read(path: Path) -> tuple[dict[str, Array], str]:
-    """The arrays of a readings file as numbers, and `inplane`; nothing in it is ever executed."""
+def _read(path: Path) -> tuple[dict[str, Array], dict[str, NDArray[np.str_]]]:
+    """The arrays of a readings file as numbers, and those of text; nothing is ever executed."""
     try:
         found = _arrays(path)
     except FileNotFoundError as error:
@@ -99,16 +126,24 @@ def _read(path: Path) -> tuple[dict[str, Array], str]:
         raise
     except _DAMAGES as error:
         raise Refusal(f"{path}: cannot be read as NPZ ({error}); expected {_NEEDED}") from error
-    for name in ("size", "positions", "curvature"):
+    needed = ("values", "element", "quantity") if "values" in found else ("curvature",)
+    for name in ("size", "positions", *needed):
         if name not in found:
             raise Refusal(f"{path}: has no {name!r} (it has {sorted(found)}); expected {_NEEDED}")
-    inplane = found.pop("inplane", np.array(""))
-    if inplane.dtype.kind != "U" or inplane.size != 1:
-        raise Refusal(f"{path}: expected inplane to be one text, got {inplane.dtype}")
+    if other := [name for name in ("values", *_READ) if "curvature" in found and name in found]:
+        raise Refusal(
+            f"{path}: expected curvature, or values and what they are, got curvature and "
+            f"{', '.join(other)}; write one of the two"
+        )
+    texts = {name: found.pop(name) for name in _TEXTS if name in found}
+    for name, values in texts.items():
+        if values.dtype.kind != "U" or (name == "inplane" and values.size != 1):
+            one = "one text" if name == "inplane" else "text"
+            raise Refusal(f"{path}: expected {name} to be {one}, got {values.dtype}")
     for name, values in found.items():
         if values.dtype.kind not in "fiu":
             raise Refusal(f"{path}: expected {name} to be real numbers, got {values.dtype}")
-    return {name: values.astype(float) for name, values in found.items()}, str(inplane.item())
+    return {name: values.astype(float) for name, values in found.items()}, texts
 
 
 def _plate(patch: Patch, found: dict[str, Array], inplane: str) -> Plate:
@@ -161,29 +196,67 @@ def _layout(path: Path, patch: Patch, positions: Array) -> SensorLayout:
     return SensorLayout.scattered(patch, positions)
 
 
+def _reading(
+    path: Path, layout: SensorLayout, found: dict[str, Array], texts: dict[str, NDArray[np.str_]]
+) -> SensorLayout:
+    """The `layout` that reads what the file says: `element`, `quantity`, `direction`, `datum`."""
+    element, quantity = found["element"], texts["quantity"]
+    if not np.array_equal(element, np.rint(element)):
+        raise Refusal(f"{path}: expected element to be whole numbers from 0, got {element!s:.80}")
+    direction = found.get("direction")
+    if direction is None:
+        if undirected := set(quantity.ravel().tolist()) & {"slope", "curvature"}:
+            raise Refusal(
+                f"{path}: has no 'direction', which a {min(undirected)} needs; expected direction "
+                f"(R,) in rad from x, any number where a height or twist needs none"
+            )
+        direction = np.zeros(element.shape)
+    datum = texts.get("datum", np.array([], str)).ravel().tolist()
+    try:
+        return layout.reading(element.astype(np.intp), quantity, direction, datum)
+    except Refusal as error:
+        raise Refusal(f"{path}: {error}") from error
+
+
+def _frames(path: Path, name: str, readings: Array, layout: SensorLayout) -> Array:
+    """The readings of all T frames, from those of one frame or more."""
+    one = layout.frame_shape
+    frames = readings[None] if readings.ndim == len(one) else readings
+    if frames.ndim != len(one) + 1 or frames.shape[1:] != one or not len(frames):
+        raise Refusal(
+            f"{path}: expected {name} of shape (T, {', '.join(map(str, one))}) or {one} for "
+            f"{len(layout)} positions, got {readings.shape}"
+        )
+    return frames
+
+
 def _shapes(
-    method: str, basis: Basis, layout: SensorLayout, curvature: Array, sigma: Array | None
+    method: str, basis: Basis, layout: SensorLayout, readings: Array, sigma: Array | None
 ) -> Fit:
     """The fit of all T frames; `sigma` may be of each of them."""
-    if sigma is None or sigma.ndim < 3:
-        return estimator_for(method, basis, layout, sigma)(curvature)
+    if sigma is None or sigma.ndim <= len(layout.frame_shape):
+        return estimator_for(method, basis, layout, sigma)(readings)
     frames: list[Fit] = []
     for number, own in enumerate(sigma):
         try:
-            frames.append(estimator_for(method, basis, layout, own)(curvature[number]))
+            frames.append(estimator_for(method, basis, layout, own)(readings[number]))
         except Refusal as error:
             raise type(error)(f"frame {number}: {error}") from error
     return Fit.stacked(frames)
 
 
-def _check_sizes(basis: Basis, readings: int, surface: int, method: type[Estimator]) -> None:
+def _check_sizes(basis: Basis, layout: SensorLayout, surface: int, method: type[Estimator]) -> None:
     """Refuse what would exhaust the memory before anything is computed."""
-    (Ni, Nj), N = basis.shape, basis.size
+    (Ni, Nj), N, readings = basis.shape, basis.size, int(layout.live.sum())
     if readings < N and not method.has_prior:
+        unobserved = ""
+        if readings * N <= _NAMED:
+            M = layout.operator(basis)
+            unobserved = unobserved_function(basis, layout, M, layout.live.ravel())
         raise RankDeficient(
             f"expected at most {readings} functions for {readings} readings per frame, got "
             f"{Ni} x {Nj} = {N}; use a smaller basis, more elements, or a "
-            "prior (bayes)"
+            f"prior (bayes){unobserved}"
         )
     operator = readings * N if method.has_matrix else N
     if max(operator, surface) > _MOST:
@@ -206,63 +279,77 @@ def reconstruct(
 ) -> dict[str, NDArray[Any]]:
     """What `kappaskin reconstruct` writes: `coefficients`, `sd`, `residual` and the surface.
 
-    `coefficients` and `sd` (T, Ni, Nj) in m, `residual` (T, 3, P) in 1/m; with a `grid` of nx x ny
+    `coefficients` and `sd` (T, Ni, Nj) in m, `residual` (T, 3, P) in 1/m, or (T, R) of `values` in
+    their units, less their offset where its datum is free; with a `grid` of nx x ny
     points also `grid_x` (nx,), `grid_y` (ny,) and `w` (T, ny, nx) in m. `edge` is one of `EDGES`,
     `method` one of `METHODS`. With `contact` also what `_contacts` and `_pairs` give, with
-    `objects` what `_objects` gives besides. What the shapes neglect goes to `warn`, in words.
+    `objects` what `_objects` gives besides: all NaN of `values`, from which no contact is found
+    yet. What the shapes neglect goes to `warn`, in words.
     """
-    found, inplane = _read(readings)
-    curvature, sigma = found["curvature"], found.get("sigma")
+    found, texts = _read(readings)
+    name, sigma = "values" if "values" in found else "curvature", found.get("sigma")
     radius = found.get("radius", np.array(np.inf))
     patch = _patch(readings, found["size"], radius, found.get("outline"))
     layout = _layout(readings, patch, found["positions"])
-    if curvature.ndim == 2:
-        curvature = curvature[None]
-    if curvature.shape[-2:] != (3, len(layout)) or curvature.ndim != 3 or not len(curvature):
+    if name == "values":
+        layout = _reading(readings, layout, found, texts)
+    frames = _frames(readings, name, found[name], layout)
+    one = layout.frame_shape
+    if sigma is not None and sigma.ndim > len(one) and sigma.shape != frames.shape:
         raise Refusal(
-            f"{readings}: expected curvature of shape (T, 3, {len(layout)}) or "
-            f"(3, {len(layout)}) for {len(layout)} positions, got {found['curvature'].shape}"
-        )
-    if sigma is not None and sigma.ndim > 2 and sigma.shape != curvature.shape:
-        raise Refusal(
-            f"{readings}: expected sigma of shape {curvature.shape} as curvature has, or "
-            f"(3, {len(layout)}), or one number; got {sigma.shape}"
+            f"{readings}: expected sigma of shape {frames.shape} as {name} has, or {one}, or one "
+            f"number; got {sigma.shape}"
         )
     functions = basis_for(patch, edge, *basis)
     check_method(method)
-    points = 0 if grid is None else len(curvature) * grid[0] * grid[1]
-    _check_sizes(functions, int(layout.live.sum()), points, METHODS[method])
-    fit = _shapes(method, functions, layout, curvature, sigma)
+    points = 0 if grid is None else len(frames) * grid[0] * grid[1]
+    _check_sizes(functions, layout, points, METHODS[method])
+    fit = _shapes(method, functions, layout, frames, sigma)
     for text in fit.warnings:
         warn(text)
     out = {"coefficients": fit.coefficients, "sd": fit.sd, "residual": fit.residual}
     if grid is not None:
         x, y = patch.grid(*grid)
         out |= {"grid_x": x, "grid_y": y, "w": functions.on_grid(x, y)(out["coefficients"])}
-    if contact or objects:
-        plate = _plate(patch, found, inplane)
-        fitter = estimator_for(method, functions, layout)
-        contacts_of, bounded = Contacts(plate, layout, edge), LowerBound(plate, edge)
-        fits = [fitter(frame) for frame in curvature]
-        pairs, drifts = list[tuple[Contact, Contact]](), list[float]()
-        for frame, one in enumerate(fits):
-            pairs.append(contacts_of(one.readings, one))
-            drift = contacts_of.drift
-            drifts.append(drift.size if drift else 0.0)
-            fits[frame] = drift.fit if drift else one
-        out["drift"] = np.array(drifts)
-        contacts = [bounded(first) for first, _ in pairs]
-        out |= _contacts(fits, contacts, forces="rigidity" in found)
-        out |= _pairs(pairs, forces="rigidity" in found)
-        if objects:
-            find = ObjectFinder(plate, layout, edge)
-            noises = [float(one.noise) for one in fits]
-            whole = [as_one(*pair) for pair in pairs]
-            out |= _objects([find(*each) for each in zip(curvature, noises, whole, strict=True)])
+    if not (contact or objects):
+        return out
+    if layout.reads:
+        warn("contacts are found from curvature sensors only yet: those written are NaN")
+        return out | _no_contacts(len(frames), "rigidity" in found, objects)
+    plate = _plate(patch, found, str(texts.get("inplane", np.array("")).item()))
+    fitter = estimator_for(method, functions, layout)
+    contacts_of, bounded = Contacts(plate, layout, edge), LowerBound(plate, edge)
+    fits = [fitter(frame) for frame in frames]
+    pairs, drifts = list[tuple[Contact, Contact]](), list[float]()
+    for frame, each in enumerate(fits):
+        pairs.append(contacts_of(each.readings, each))
+        drift = contacts_of.drift
+        drifts.append(drift.size if drift else 0.0)
+        fits[frame] = drift.fit if drift else each
+    out["drift"] = np.array(drifts)
+    contacts = [bounded(first) for first, _ in pairs]
+    there = [contact_geometry(*each) for each in zip(fits, contacts, strict=True)]
+    out |= _contacts(there, contacts, forces="rigidity" in found)
+    out |= _pairs(pairs, forces="rigidity" in found)
+    if objects:
+        find = ObjectFinder(plate, layout, edge)
+        noises = [float(each.noise) for each in fits]
+        whole = [as_one(*pair) for pair in pairs]
+        out |= _objects([find(*each) for each in zip(frames, noises, whole, strict=True)])
     return out
 
 
-def _contacts(fits: list[Fit], contacts: list[Contact], forces: bool) -> dict[str, NDArray[Any]]:
+def _no_contacts(frames: int, forces: bool, objects: bool) -> dict[str, NDArray[Any]]:
+    """What is written of the contacts of so many `frames` in which none can be found."""
+    out = {"drift": np.full(frames, np.nan)}
+    out |= _contacts([NO_GEOMETRY] * frames, [NO_CONTACT] * frames, forces)
+    out |= _pairs([(NO_CONTACT, NO_CONTACT)] * frames, forces)
+    return out | (_objects([NO_OBJECT] * frames) if objects else {})
+
+
+def _contacts(
+    there: list[LocalGeometry], contacts: list[Contact], forces: bool
+) -> dict[str, NDArray[Any]]:
     """The contact of each frame and the skin's geometry there; NaN where there is none.
 
     `contact` and `contact_sd` (T, 2) in m, `displacement` and `displacement_sd` (T,) in m,
@@ -271,7 +358,6 @@ def _contacts(fits: list[Fit], contacts: list[Contact], forces: bool) -> dict[st
     `forces` also `force` and `force_sd` (T,) in N. `single`, `near_rim` and, with `forces`,
     `force_is_lower_bound` (T,) say whether to trust them (`Contact`). All readings weigh the same.
     """
-    there = [contact_geometry(one, contact) for one, contact in zip(fits, contacts, strict=True)]
     names = ["displacement", "displacement_sd", "single", "near_rim"]
     names += ["load_radius", "load_radius_95"]
     names += ["force", "force_sd", "force_is_lower_bound"] if forces else []

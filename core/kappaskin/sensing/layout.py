@@ -1,12 +1,12 @@
-"""Sensor layout: where the elements are, and the curvature that their gages read."""
+"""Sensor layout: where the elements are, and what they read."""
 
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from kappaskin.bases import Basis, SineBasis, curvature_at, gauss, hoop_at
 from kappaskin.errors import Refusal
@@ -55,35 +55,56 @@ def mean_curvature_at(
     if not gage_length:
         return curvature(positions)
 
-    def along(x: float, y: float) -> Array:
-        if basis.patch.base_curvature:
-            return _over_points(curvature, positions, gage_length, x, y)
-        return _between_ends(basis, positions, gage_length, x, y)
-
-    rising, falling = along(_DIAGONAL, _DIAGONAL), along(_DIAGONAL, -_DIAGONAL)
-    return np.stack([along(1.0, 0.0), along(0.0, 1.0), (rising - falling) / 2])
+    along = partial(_along, basis, positions, gage_length, curvature)
+    return np.stack([along(_X), along(_Y), _twist(along)])
 
 
-def _between_ends(basis: Basis, positions: Array, L: float, x: float, y: float) -> Array:
-    """Mean curvature along (x, y), from the difference of slope between the ends of the gages.
+_X, _Y = np.eye(2)
 
-    Exact also for functions whose curvature jumps between triangles.
+
+def _along(basis: Basis, positions: Array, L: float, curvature: CurvatureAt, t: Array) -> Array:
+    """Curvature (P, N) along the unit vectors t (2,) or (P, 2), the mean along gages of length L.
+
+    On a flat skin it follows from the slopes at both ends of a gage, exactly also for functions
+    whose curvature jumps between triangles. On a bent skin it is not only a derivative.
     """
-    half = L / 2 * np.array([x, y])
+    if not L:
+        return _normal(curvature(positions), t)
+    if basis.patch.base_curvature:
+        return _over_gage(lambda places: _normal(curvature(places), t), positions, L, t)
+    half = L / 2 * t
+    return (_slope(basis, positions + half, t) - _slope(basis, positions - half, t)) / L
 
-    def slope(places: Array) -> Array:
-        return x * basis.at(places, 1, 0) + y * basis.at(places, 0, 1)
 
-    return (slope(positions + half) - slope(positions - half)) / L
+def _twist(along: CurvatureAt) -> Array:
+    """Twist by gages on both diagonals, from the curvature `along` a unit vector."""
+    return (along(_DIAGONAL * (_X + _Y)) - along(_DIAGONAL * (_X - _Y))) / 2
 
 
-def _over_points(curvature: CurvatureAt, positions: Array, L: float, x: float, y: float) -> Array:
-    """Mean curvature along (x, y) by quadrature: on a bent skin it is not only a derivative."""
+def _normal(K: Array, t: Array) -> Array:
+    """The normal curvature (P, N) along t = (c, s) of K (3, P, N): c^2 xx + 2 c s xy + s^2 yy."""
+    (xx, yy, xy), c, s = K, t[..., :1], t[..., 1:]
+    return c * c * xx + s * s * yy + 2 * c * s * xy
+
+
+def _slope(basis: Basis, places: Array, t: Array) -> Array:
+    """The derivative (P, N) of the functions along t (2,) or (P, 2)."""
+    return t[..., :1] * basis.at(places, 1, 0) + t[..., 1:] * basis.at(places, 0, 1)
+
+
+def _over_gage(values: CurvatureAt, positions: Array, L: float, t: Array) -> Array:
+    """The mean of `values` along gages of length L along t."""
     along, weights = gauss(L, _POINTS)
-    steps = np.multiply.outer(along - L / 2, (x, y))
-    xx, yy, xy = curvature((positions + steps[:, None]).reshape(-1, 2))
-    normal = (x * x * xx + y * y * yy + 2 * x * y * xy).reshape(_POINTS, len(positions), -1)
-    return np.einsum("q,qpn->pn", weights / L, normal)
+    steps = zip(along - L / 2, weights / L, strict=True)
+    return np.sum([w * values(positions + s * t) for s, w in steps], axis=0)
+
+
+def _over_cell(values: CurvatureAt, positions: Array, cell: tuple[float, float]) -> Array:
+    """The mean of `values` over rectangles of the sides `cell` in m; a side may be zero."""
+    for axis, side in zip((_X, _Y), cell, strict=True):
+        if side:
+            values = partial(_over_gage, values, L=side, t=axis)
+    return values(positions)
 
 
 _SHORTEST = 1e-6  # m: the mean over a shorter gage is lost in rounding
@@ -97,13 +118,98 @@ def _channels(patch: Patch, elements: int) -> Mask:
     return live
 
 
+QUANTITIES = {"height": "m", "slope": "m/m", "curvature": "1/m", "twist": "1/m"}
+"""What an element may read, with its unit."""
+_ALONG = ("slope", "curvature")  # have a direction
+_ALIKE = 9  # decimals of a direction in rad: those equal so far are one
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """What is read, R numbers in each frame: a `quantity` (R,) at an `element` (R,).
+
+    Each of `QUANTITIES` is linear in the displacement w, which is positive inward, as a height is.
+    A slope is dw/ds along `direction` (R,) in rad from x, a curvature that along it,
+    c^2 xx + 2 c s xy + s^2 yy with (c, s) along it, and the twist is xy. On a bent skin a slope is
+    by how much the tangent has turned, w_x + v/R along the arc with the displacement v along it.
+
+    The zero of the quantities in `free` is unknown: one offset in each frame for the heights, and
+    one for each direction of slopes or curvatures.
+    """
+
+    element: Indices
+    quantity: NDArray[np.str_]
+    direction: Array
+    free: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        R = self.element.shape
+        if self.element.dtype.kind not in "iu" or len(R) != 1 or not self.element.size:
+            raise Refusal(
+                f"expected element as whole numbers of shape (R,), R >= 1, one for each reading, "
+                f"got {self.element.dtype} of shape {R}"
+            )
+        if self.quantity.shape != R or self.direction.shape != R:
+            raise Refusal(
+                f"expected quantity and direction of shape {R} as element has, got "
+                f"{self.quantity.shape} and {self.direction.shape}"
+            )
+        names = ", ".join(QUANTITIES)
+        if unknown := set(self.quantity.tolist()) - set(QUANTITIES):
+            raise Refusal(f"expected each quantity among {names}, got {sorted(unknown)[0]!r}")
+        if unknown := set(self.free) - set(self.quantity.tolist()):
+            raise Refusal(
+                f"expected a datum only of quantities that are read, got {sorted(unknown)[0]!r}; "
+                f"use names among {', '.join(sorted(set(self.quantity.tolist())))}"
+            )
+        lost = np.isin(self.quantity, _ALONG) & ~np.isfinite(self.direction)
+        if lost.any():
+            k = int(np.argmax(lost))
+            raise Refusal(
+                f"expected a direction in rad from x for each {self.quantity[k]}, got "
+                f"{self.direction[k]} for reading {k}"
+            )
+
+    @cached_property
+    def along(self) -> Array:
+        """Unit vectors (R, 2) along the directions; exact along x and y."""
+        t = np.column_stack([np.cos(self.direction), np.sin(self.direction)])
+        t[np.abs(t) < np.finfo(float).eps] = 0.0
+        return t
+
+    @cached_property
+    def _kinds(self) -> tuple[list[tuple[str, float]], Indices]:
+        turned = np.isin(self.quantity, _ALONG)
+        angle = np.mod(np.where(turned, self.direction, 0.0), 2 * np.pi)
+        angle[np.round(angle, _ALIKE) >= np.round(2 * np.pi, _ALIKE)] = 0.0
+        number = np.zeros(len(angle))
+        for k, name in enumerate(QUANTITIES):
+            number[self.quantity == name] = k
+        key = 10 * number + np.round(angle, _ALIKE)
+        _, first, kind = np.unique(key, return_index=True, return_inverse=True)
+        return [(str(self.quantity[r]), float(angle[r])) for r in first], kind.reshape(-1)
+
+    @property
+    def kinds(self) -> list[tuple[str, float]]:
+        """The different quantities that are read, each with its direction in rad."""
+        return self._kinds[0]
+
+    @property
+    def kind(self) -> Indices:
+        """Which of `kinds` each reading (R,) is."""
+        return self._kinds[1]
+
+
 @dataclass(frozen=True, eq=False)
 class SensorLayout:
-    """P elements at `positions` (P, 2) in m; each senses the curvature xx, yy and xy.
+    """P elements at `positions` (P, 2) in m, and what they read.
 
-    `live` (3, P) is False for dead channels. `shape` is (m, n) for a regular grid, with element
-    p + m q in column p (along x) and row q (along y), and None otherwise. Each element reads the
-    mean over gages of `gage_length` in m along x, along y and along both diagonals.
+    That is the curvature xx, yy and xy of each (a curvature sensor), or the `reads`. `live` is
+    False for dead channels: (3, P) of a curvature sensor, (R,) of other readings. `shape` is
+    (m, n) for a regular grid, with element p + m q in column p (along x) and row q (along y), and
+    None otherwise. Curvature is the mean over gages of `gage_length` in m, along x, y or the
+    direction, the twist that along both diagonals. So are slopes; without gages they, and heights,
+    are the mean over a rectangle with the sides `cell` in m.
     """
 
     patch: Patch
@@ -111,13 +217,21 @@ class SensorLayout:
     live: Mask
     shape: tuple[int, int] | None = None
     gage_length: float = 0.0
+    reads: Readings | None = None
+    cell: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         P = self.positions
         if P.ndim != 2 or P.shape[1] != 2 or len(P) == 0:
             raise Refusal(f"expected positions of shape (P, 2) with P >= 1, got {P.shape}")
-        if self.live.shape != (3, len(P)):
-            raise Refusal(f"expected live of shape (3, {len(P)}), got {self.live.shape}")
+        live = self.reads.element.shape if self.reads else (3, len(P))
+        if self.live.shape != live:
+            raise Refusal(f"expected live of shape {live}, got {self.live.shape}")
+        if self.reads and not (np.min(e := self.reads.element) >= 0 and np.max(e) < len(P)):
+            raise Refusal(
+                f"expected each element from 0 to {len(P) - 1}, an index into the {len(P)} "
+                f"positions, got {int(np.min(e))} to {int(np.max(e))}; count from 0"
+            )
         if self.shape and self.shape[0] * self.shape[1] != len(P):
             raise Refusal(f"expected {self.shape[0]} x {self.shape[1]} elements, got {len(P)}")
         outside = np.flatnonzero(~self.patch.contains(P))  # NaN counts as outside
@@ -128,6 +242,7 @@ class SensorLayout:
                 f"{p} is at ({x:g}, {y:g}) m; positions are in metres from the corner x = y = 0"
             )
         self._check_gages()
+        self._check_cells()
 
     def _check_gages(self) -> None:
         L = self.gage_length
@@ -145,6 +260,20 @@ class SensorLayout:
                 f"gages of {L:g} m go over the rim of the {self.patch.name}: element {least} is "
                 f"{depth[least]:.4g} m inside; expected a gage length of at most "
                 f"{longest:.4g} m"
+            )
+
+    def _check_cells(self) -> None:
+        if not any(self.cell):
+            return
+        half = np.array(self.cell) / 2 * (1 - _ROUNDING)
+        if not (np.all(half >= 0) and np.all(half < np.inf)):
+            raise Refusal(f"expected two sides of a cell of at least 0 m, got {self.cell}")
+        corners = self.positions + half * np.array([[[1, 1]], [[1, -1]], [[-1, 1]], [[-1, -1]]])
+        inside = self.patch.contains(corners.reshape(-1, 2)).reshape(4, -1).all(axis=0)
+        if not inside.all():
+            raise Refusal(
+                f"cells of {self.cell[0]:g} x {self.cell[1]:g} m go over the rim of the "
+                f"{self.patch.name} at element {int(np.argmin(inside))}; use smaller ones"
             )
 
     @classmethod
@@ -170,18 +299,39 @@ class SensorLayout:
             raise Refusal(f"expected positions of shape (P, 2) in m, got {points.shape}")
         return cls(patch, points, _channels(patch, len(points)))
 
+    def reading(
+        self,
+        element: ArrayLike,
+        quantity: ArrayLike,
+        direction: ArrayLike = 0.0,
+        free: Iterable[str] = (),
+    ) -> "SensorLayout":
+        """The same elements with other readings (`Readings`): a `quantity` of an `element` each.
+
+        One quantity or direction, not (R,) of them, is that of all.
+        """
+        element = np.asarray(element)
+        names, along = np.array(quantity, str), np.array(direction, float)
+        names, along = (
+            np.broadcast_to(a, element.shape) if a.ndim == 0 else a for a in (names, along)
+        )
+        reads = Readings(element, names, along, tuple(free))
+        return replace(self, reads=reads, live=np.ones(element.shape, bool))
+
     def without(self, elements: Iterable[int]) -> "SensorLayout":
-        """The same layout with all three channels of `elements` dead."""
+        """The same layout with all channels of `elements` dead."""
         live = self.live.copy()
         dead = list(elements)
         if any(not 0 <= p < len(self) for p in dead):
             raise Refusal(f"expected dead elements between 0 and {len(self) - 1}, got {dead}")
-        live[:, dead] = False
+        live[np.isin(self.element, dead).reshape(live.shape)] = False
         return replace(self, live=live)
 
     @property
     def lacking(self) -> Mask:
-        """The dead channels (3, P), of those that this patch has."""
+        """The dead channels, of those that this patch has, as `live`."""
+        if self.reads:
+            return ~self.live
         return _channels(self.patch, len(self)) & ~self.live
 
     def __len__(self) -> int:
@@ -192,7 +342,7 @@ class SensorLayout:
 
     @property
     def frame_shape(self) -> tuple[int, ...]:
-        """The shape of the readings of a frame: (3, P)."""
+        """The shape of the readings of a frame: (3, P) of a curvature sensor, (R,) of others."""
         return self.live.shape
 
     @property
@@ -203,12 +353,61 @@ class SensorLayout:
     @property
     def element(self) -> Indices:
         """The element (R,) of each reading."""
-        return np.tile(np.arange(len(self)), 3)
+        return self.reads.element if self.reads else np.tile(np.arange(len(self)), 3)
+
+    @property
+    def kinds(self) -> list[tuple[str, float]]:
+        """The different quantities that are read, each with its direction in rad."""
+        return self.reads.kinds if self.reads else list(_CURVATURES)
 
     @property
     def kind(self) -> Indices:
-        """What each reading (R,) is of its element, as a number: xx, yy, xy."""
-        return np.repeat(np.arange(3), len(self))
+        """Which of `kinds` each reading (R,) is."""
+        return self.reads.kind if self.reads else np.repeat(np.arange(3), len(self))
+
+    @property
+    def senses_curvature_only(self) -> bool:
+        """Whether a movement without curvature changes no reading."""
+        return {name for name, _ in self.kinds} <= {"curvature", "twist"}
+
+    @property
+    def units(self) -> str:
+        """The units of the readings, in words."""
+        return " or ".join(dict.fromkeys(QUANTITIES[name] for name, _ in self.kinds))
+
+    def multipliers(self, sines: SineBasis) -> Array:
+        """Factors (k, Ni, Nj) of the k `kinds` of readings by their average over gages or cells.
+
+        For slopes and curvatures along x or y.
+        """
+        ki, kj = np.meshgrid(*sines.wavenumbers, indexing="ij")
+        over_cell, L = _sinc(ki * self.cell[0] / 2) * _sinc(kj * self.cell[1] / 2), self.gage_length
+        gages = gage_multipliers(sines, L)
+
+        def factors(name: str, direction: float) -> Array:
+            if name == "twist":
+                return gages[2]
+            along_y = int(abs(math.sin(direction)) > _DIAGONAL)
+            return over_cell if name == "height" or (name == "slope" and not L) else gages[along_y]
+
+        return np.stack([factors(*kind) for kind in self.kinds])
+
+    @cached_property
+    def offsets(self) -> Array:
+        """The readings (R, d) of each offset of 1 of a quantity whose zero is unknown."""
+        if not self.reads:
+            return np.empty((self.channels, 0))
+        free = [k for k, (name, _) in enumerate(self.kinds) if name in self.reads.free]
+        return np.equal.outer(self.kind, free).astype(float)
+
+    def check_curvature_sensor(self, purpose: str) -> None:
+        """Raise a `Refusal` where the elements do not read xx, yy and xy, as a `purpose` needs."""
+        if self.reads:
+            names = ", ".join(dict.fromkeys(name for name, _ in self.kinds))
+            raise Refusal(
+                f"expected a curvature sensor for {purpose}, xx, yy and xy of every element, got "
+                f"readings of {names}; such readings can only be reconstructed yet"
+            )
 
     def operator(self, basis: Basis, plate: Plate | None = None) -> Array:
         """M (R, N): `M @ coefficients.ravel()` is a frame's readings, flattened (Eqs. 2-5, 11).
@@ -218,8 +417,46 @@ class SensorLayout:
         if basis.patch != self.patch:
             raise Refusal(f"the layout is on {self.patch}, the basis on {basis.patch}; use one")
         curvature = plate.curvature(basis) if plate else None
+        if self.reads:
+            return self._read_by(
+                self.reads, basis, plate, curvature or partial(curvature_at, basis)
+            )
         K = mean_curvature_at(basis, self.positions, self.gage_length, curvature)
         return K.reshape(self.channels, basis.size)
+
+    def _read_by(
+        self, reads: Readings, basis: Basis, plate: Plate | None, curvature: CurvatureAt
+    ) -> Array:
+        """The operator (R, N), quantity by quantity."""
+        M, L, H = np.empty((self.channels, basis.size)), self.gage_length, self.patch.base_curvature
+        for name in dict.fromkeys(name for name, _ in self.kinds):
+            own = np.flatnonzero(reads.quantity == name)
+            at, t = self.positions[reads.element[own]], reads.along[own]
+
+            def slope(places: Array, t: Array = t) -> Array:
+                found = _slope(basis, places, t)
+                if H:
+                    v = (plate.hoop(basis, places) if plate else hoop_at(basis, places))[0]
+                    found += H * t[:, :1] * v
+                return found
+
+            if name == "height":
+                M[own] = _over_cell(basis.at, at, self.cell)
+            elif name == "slope" and not L:
+                M[own] = _over_cell(slope, at, self.cell)
+            elif name == "slope" and H:
+                M[own] = _over_gage(slope, at, L, t)
+            elif name == "slope":
+                M[own] = (basis.at(at + L / 2 * t) - basis.at(at - L / 2 * t)) / L
+            elif name == "curvature" or not L:
+                xy = name == "twist"
+                M[own] = curvature(at)[2] if xy else _along(basis, at, L, curvature, t)
+            else:
+                M[own] = _twist(partial(_along, basis, at, L, curvature))
+        return M
+
+
+_CURVATURES = (("curvature", 0.0), ("curvature", np.pi / 2), ("twist", 0.0))
 
 
 # The deflected skin is r = r0 - f n0 + v t. r0 is the skin at rest, of curvature H along x, t and e
@@ -351,6 +588,7 @@ class NormalCurvature:
         dtype: DTypeLike = np.float64,
         plate: Plate | None = None,
     ) -> None:
+        layout.check_curvature_sensor("finite slopes")
         places, H = layout.positions, basis.patch.base_curvature
         maps = [*layout.operator(basis, plate).reshape(3, len(layout), basis.size)]
         maps += [basis.at(places, 1, 0), basis.at(places, 0, 1)]

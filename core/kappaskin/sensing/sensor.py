@@ -80,6 +80,7 @@ class Sensor:
     channel_map: NDArray[np.intp] | None = None
 
     def __post_init__(self) -> None:
+        self.layout.check_curvature_sensor("scenes, the window and recordings")
         if self.plate.patch != self.layout.patch:
             raise Refusal(
                 f"the elements are on {self.layout.patch}, the plate on {self.plate.patch}; use one"

@@ -585,3 +585,196 @@ def test_every_method_reads_a_file(tmp_path, method: str) -> None:
 
     assert out["w"].max(axis=(1, 2)) * 1e3 == pytest.approx(4.70, abs=0.15)
     np.testing.assert_allclose(out["contact"], 0.05, atol=1e-3)
+
+
+# Other readings than curvature
+
+ELEMENT = np.concatenate([np.arange(P), np.arange(P), RNG.integers(0, P, 60)])
+QUANTITY = np.repeat(["height", "slope", "curvature", "twist"], [P, P, 30, 30])
+DIRECTION = RNG.uniform(-4, 8, len(ELEMENT))
+R = len(ELEMENT)
+SIGMA = np.select(
+    [QUANTITY == "height", QUANTITY == "slope"],
+    [RNG.uniform(1e-5, 5e-5, R), RNG.uniform(1e-3, 4e-3, R)],
+    RNG.uniform(0.1, 0.4, R),
+)
+
+
+def height(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Displacement (R, Ni Nj) at `x`, `y` (R,) of each function, written out from Eq. 1."""
+    columns = [
+        np.sin(i * np.pi * x / A) * np.sin(j * np.pi * y / B)
+        for i in range(1, NI + 1)
+        for j in range(1, NJ + 1)
+    ]
+    return np.column_stack(columns)
+
+
+def derivative(x: np.ndarray, y: np.ndarray, order: tuple[int, int]) -> np.ndarray:
+    """Its derivative of an `order` up to two, a sine shifted by a quarter wave for each."""
+    columns = []
+    for i in range(1, NI + 1):
+        for j in range(1, NJ + 1):
+            p, q = i * np.pi / A, j * np.pi / B
+            along_x = p ** order[0] * np.sin(p * x + order[0] * np.pi / 2)
+            along_y = q ** order[1] * np.sin(q * y + order[1] * np.pi / 2)
+            columns.append(along_x * along_y)
+    return np.column_stack(columns)
+
+
+def written_out() -> np.ndarray:
+    """The operator (R, Ni Nj) of all readings, row by row as the guide defines them."""
+    x, y = POSITIONS[ELEMENT].T
+    c, s = np.cos(DIRECTION)[:, None], np.sin(DIRECTION)[:, None]
+    xx, xy, yy = (derivative(x, y, order) for order in ((2, 0), (1, 1), (0, 2)))
+    by_name = {
+        "height": height(x, y),
+        "slope": c * derivative(x, y, (1, 0)) + s * derivative(x, y, (0, 1)),
+        "curvature": c**2 * xx + 2 * c * s * xy + s**2 * yy,
+        "twist": xy,
+    }
+    return np.array([by_name[q][r] for r, q in enumerate(QUANTITY)])
+
+
+OPERATOR = written_out()
+VALUES = TRUTH @ OPERATOR.T + RNG.normal(size=(T, R)) * SIGMA
+MIXED: dict[str, Any] = {
+    "curvature": None,
+    "values": VALUES,
+    "element": ELEMENT,
+    "quantity": QUANTITY,
+    "direction": DIRECTION,
+    "sigma": SIGMA,
+}
+
+
+def dense(frame: int, sigma: np.ndarray, values: np.ndarray, A: np.ndarray) -> Any:
+    """Coefficients and standard deviations by NumPy's least squares of weighted rows A."""
+    used = np.isfinite(values[frame])
+    rows = (A / sigma[:, None])[used]
+    answer = np.linalg.lstsq(rows, (values[frame] / sigma)[used])[0]
+    return answer, np.sqrt(np.diag(np.linalg.inv(rows.T @ rows)))
+
+
+def agrees(found: dict[str, np.ndarray], frame: int, expected: Any) -> bool:
+    answer, sd = expected
+    c, own = found["coefficients"][frame].ravel(), found["sd"][frame].ravel()
+    scale, N = np.abs(answer[: NI * NJ]).max(), NI * NJ
+    return np.allclose(c, answer[:N], rtol=0, atol=1e-9 * scale) and np.allclose(
+        own, sd[:N], rtol=1e-9
+    )
+
+
+def test_any_readings_give_the_shapes_of_dense_weighted_least_squares(saved) -> None:
+    missing = RNG.random((T, R)) < 0.1
+    values = np.where(missing, np.nan, VALUES)
+    found = reconstruct(saved(**MIXED | {"values": values}), (NI, NJ), (31, 21))
+    assert all(agrees(found, t, dense(t, SIGMA, values, OPERATOR)) for t in range(T))
+    assert shapes(found) == {
+        "coefficients": (T, NI, NJ),
+        "sd": (T, NI, NJ),
+        "residual": (T, R),
+        "grid_x": (31,),
+        "grid_y": (21,),
+        "w": (T, 21, 31),
+    }
+    left = values - found["coefficients"].reshape(T, -1) @ OPERATOR.T
+    assert np.allclose(found["residual"] / SIGMA, left / SIGMA, atol=1e-9, equal_nan=True)
+
+
+def test_each_frame_may_have_its_own_sigma_and_one_frame_no_axis(saved) -> None:
+    sigma = SIGMA * RNG.uniform(0.5, 2, (T, R))
+    found = reconstruct(saved(**MIXED | {"sigma": sigma}), (NI, NJ))
+    assert all(agrees(found, t, dense(t, sigma[t], VALUES, OPERATOR)) for t in range(T))
+    one = reconstruct(saved(**MIXED | {"values": VALUES[2]}), (NI, NJ))
+    assert agrees(one, 0, dense(2, SIGMA, VALUES, OPERATOR))
+
+
+def test_95_percent_intervals_hold_that_many_coefficients(saved) -> None:
+    frames = 400
+    truth = RNG.normal(0, 1e-3, (frames, NI * NJ))
+    values = truth @ OPERATOR.T + RNG.normal(size=(frames, R)) * SIGMA
+    values[:, QUANTITY == "height"] += RNG.normal(0, 1e-2, (frames, 1))
+    found = reconstruct(
+        saved(**MIXED | {"values": values, "datum": np.array(["height"])}), (NI, NJ)
+    )
+    off = np.abs(found["coefficients"].reshape(frames, -1) - truth)
+    assert 0.93 <= np.mean(off < 1.96 * found["sd"].reshape(frames, -1)) <= 0.97
+
+
+def test_a_free_datum_is_eliminated_as_one_more_column(saved) -> None:
+    own = (QUANTITY == "height").astype(float)
+    A, values = np.column_stack([OPERATOR, own]), VALUES + 0.02 * own
+    values[1, :7] = np.nan
+    path = saved(**MIXED | {"values": values, "datum": "height"})
+    found = reconstruct(path, (NI, NJ))
+    assert all(agrees(found, t, dense(t, SIGMA, values, A)) for t in range(T))
+    for t in range(T):
+        left = values[t] - A @ dense(t, SIGMA, values, A)[0]
+        assert np.allclose(found["residual"][t] / SIGMA, left / SIGMA, atol=1e-8, equal_nan=True)
+
+
+def test_heights_need_no_direction_and_without_sigma_no_sigma(saved) -> None:
+    own = QUANTITY == "height"
+    only = {name: MIXED[name][..., own] for name in ("values", "element", "quantity")}
+    found = reconstruct(saved(**MIXED | only | {"direction": None, "sigma": None}), (NI, NJ))
+    answer = np.linalg.lstsq(OPERATOR[own], VALUES[:, own].T)[0].T
+    assert np.allclose(found["coefficients"].reshape(T, -1), answer, rtol=0, atol=1e-12)
+
+
+def test_no_contact_is_found_from_other_readings_yet_and_that_is_said(saved) -> None:
+    said: list[str] = []
+    found = reconstruct(saved(**MIXED), (NI, NJ), objects=True, warn=said.append)
+    expected = reconstruct(saved(), (NI, NJ), objects=True)
+    assert shapes(found) == shapes(expected) | {"residual": (T, R)}
+    for name in ("contact", "contact_sd", "displacement", "normal", "contacts", "drift"):
+        assert np.isnan(found[name]).all()
+    assert not found["single"].any()
+    assert set(found["object"]) == {""}
+    assert "contacts are found from curvature sensors only" in said[-1]
+
+
+FEW = np.arange(5)
+BAD_VALUES: dict[str, tuple[dict[str, Any], str]] = {
+    "no element": ({"element": None}, "has no 'element'"),
+    "no quantity": ({"quantity": None}, "has no 'quantity'"),
+    "no direction": ({"direction": None}, "has no 'direction', which a curvature needs"),
+    "both kinds": ({"curvature": CURVATURE}, "got curvature and values, element"),
+    "another quantity": (
+        {"quantity": np.where(QUANTITY == "height", "depth", QUANTITY)},
+        "among height, slope, curvature, twist, got 'depth'",
+    ),
+    "quantities by number": ({"quantity": np.zeros(R)}, "quantity to be text, got float64"),
+    "an element beyond": ({"element": np.full(R, P)}, r"from 0 to 39, .*count from 0"),
+    "half an element": ({"element": np.full(R, 0.5)}, "whole numbers from 0"),
+    "an element of NaN": ({"element": np.full(R, np.nan)}, "whole numbers from 0"),
+    "elements too few": ({"element": ELEMENT[1:]}, r"of shape \(139,\) as element has"),
+    "a direction of NaN": ({"direction": np.full(R, np.nan)}, "direction in rad from x for each"),
+    "values too few": ({"values": VALUES[:, 1:]}, r"\(T, 140\) or \(140,\) .*got \(5, 139\)"),
+    "values too deep": ({"values": VALUES[None]}, r"got \(1, 5, 140\)"),
+    "sigma zero": ({"sigma": np.zeros(R)}, "sigma above zero in m or m/m or 1/m, got zero"),
+    "sigma of another shape": ({"sigma": np.ones(7)}, r"one number or \(140,\), got \(7,\)"),
+    "no sigma": ({"sigma": None}, "sigma of readings that differ in unit, m or m/m or 1/m"),
+    "a datum unread": ({"datum": ["tilt"]}, "only of quantities that are read, got 'tilt'"),
+    "a few heights": (
+        {
+            "values": VALUES[:, :5],
+            "element": FEW,
+            "quantity": np.full(5, "height"),
+            "direction": np.zeros(5),
+            "sigma": np.ones(5),
+        },
+        r"at most 5 functions for 5 readings.*no reading determines function [1-4] x [1-3]$",
+    ),
+    "a frame with few": (
+        {"values": np.where(np.arange(R) < 8, VALUES, np.nan)},
+        r"frame 0: .*with 8 readings .*no reading determines function [1-4] x [1-3]$",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD_VALUES)
+def test_values_that_cannot_be_used_are_refused_with_the_reason(saved, case: str) -> None:
+    changes, reason = BAD_VALUES[case]
+    with pytest.raises(Refusal, match=reason):
+        reconstruct(saved(**MIXED | changes), (NI, NJ))

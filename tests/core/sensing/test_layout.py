@@ -1,5 +1,8 @@
 """Where the elements are, and the operator from coefficients to their curvature."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -109,3 +112,156 @@ def test_functions_beyond_the_elements_are_not_orthogonal():
     scaled = M / np.linalg.norm(M, axis=0)
 
     assert np.abs(scaled.T @ scaled - np.eye(96)).max() > 0.1
+
+
+# Other readings than curvature
+
+ROUND = Patch(0.03, 0.02, 12.9e-3)
+
+
+def differences(layout, basis, c):
+    """What `layout` reads of a flat shape, by central differences of its displacement."""
+    reads, h = layout.reads, 1e-5
+    at = layout.positions[reads.element]
+    t = np.column_stack([np.cos(reads.direction), np.sin(reads.direction)])
+
+    def w(x=0.0, y=0.0, along=0.0):
+        return basis.at(at + h * (np.array([x, y]) + along * t)) @ c
+
+    found = {
+        "height": w(),
+        "slope": (w(along=1) - w(along=-1)) / (2 * h),
+        "curvature": (w(along=1) - 2 * w() + w(along=-1)) / h**2,
+        "twist": (w(1, 1) - w(1, -1) - w(-1, 1) + w(-1, -1)) / (4 * h**2),
+    }
+    return np.choose([list(found).index(q) for q in reads.quantity], list(found.values()))
+
+
+def any_readings(patch, count=200, **more):
+    rng = np.random.default_rng(0)
+    layout = replace(SensorLayout.regular(patch, 4, 3), **more)
+    quantity = rng.choice(["height", "slope", "curvature", "twist"], count)
+    return layout.reading(rng.integers(0, 12, count), quantity, rng.uniform(-7, 7, count))
+
+
+def test_any_reading_is_the_derivative_that_its_name_says():
+    basis, layout = SineBasis(PATCH, 3, 2), any_readings(PATCH)
+    c = np.random.default_rng(0).normal(size=basis.size)
+
+    read, expected = layout.operator(basis) @ c, differences(layout, basis, c)
+
+    for quantity, atol in {"height": 1e-12, "slope": 1e-3, "curvature": 0.1, "twist": 0.1}.items():
+        own = layout.reads.quantity == quantity
+        np.testing.assert_allclose(read[own], expected[own], rtol=0, atol=atol)
+        assert np.abs(read[own]).max() > 1e3 * atol
+
+
+@pytest.mark.parametrize("patch", [PATCH, ROUND], ids=["flat", "bent"])
+@pytest.mark.parametrize("length", [0.0, 4e-3])
+def test_a_curvature_sensors_readings_by_number_are_its_own(patch, length):
+    basis, layout = SineBasis(patch, 4, 3), SensorLayout.regular(patch, 4, 3)
+    layout = replace(layout, gage_length=length)
+    listed = layout.reading(
+        np.tile(np.arange(12), 3),
+        np.repeat(["curvature", "curvature", "twist"], 12),
+        np.repeat([0, np.pi / 2, 0], 12),
+    )
+
+    assert layout.frame_shape == (3, 12)
+    assert listed.frame_shape == (36,)
+    assert listed.kinds == layout.kinds
+    np.testing.assert_array_equal(listed.kind, layout.kind)
+    np.testing.assert_array_equal(listed.operator(basis), layout.operator(basis))
+
+
+@pytest.mark.parametrize("patch", [PATCH, ROUND], ids=["flat", "bent"])
+@pytest.mark.parametrize("more", [{"gage_length": 4e-3}, {"cell": (5e-3, 3e-3)}], ids=str)
+def test_what_is_averaged_is_the_mean_of_what_points_read(patch, more):
+    basis, averaged = SineBasis(patch, 3, 3), any_readings(patch, 60, **more)
+    points, count = any_readings(patch, 60), 21
+    steps = (np.arange(count) + 0.5) / count - 0.5
+
+    mean = np.zeros((60, basis.size))
+    for s in steps:
+        for r in steps if "cell" in more else [0.0]:
+            if "cell" in more:
+                shifts = np.tile([s * 5e-3, r * 3e-3], (60, 1))
+            else:
+                t = points.reads.direction
+                shifts = 4e-3 * s * np.column_stack([np.cos(t), np.sin(t)])
+            places = points.positions[points.reads.element] + shifts
+            there = SensorLayout.scattered(patch, places).reading(
+                np.arange(60), points.reads.quantity, points.reads.direction
+            )
+            mean += there.operator(basis)
+    mean /= count * (count if "cell" in more else 1)
+
+    which = ("height", "slope") if "cell" in more else ("slope", "curvature")
+    for quantity in which:
+        own = points.reads.quantity == quantity
+        scale = np.abs(mean[own]).max()
+        found = averaged.operator(basis)[own]
+        np.testing.assert_allclose(found, mean[own], rtol=0, atol=2e-4 * scale)
+        assert np.abs(found - points.operator(basis)[own]).max() > 1e-3 * scale
+
+
+def test_a_slope_on_a_bent_skin_is_how_far_its_tangent_has_turned():
+    """By the change of the tangent of the arc itself, f inward and v along it, v' = H f."""
+    basis, H = SineBasis(ROUND, 4, 3), ROUND.base_curvature
+    layout = SensorLayout.scattered(ROUND, [(0.008, 0.007), (0.021, 0.011)])
+    slopes = layout.reading([0, 1], "slope", 0.0).operator(basis)
+    c = 1e-7 * np.random.default_rng(1).normal(size=basis.size)
+
+    def turned(x, y):
+        fine = np.linspace(0, ROUND.a, 40001)
+        f = basis.at(np.column_stack([fine, np.full_like(fine, y)])) @ c
+        rise = np.concatenate([[0], np.cumsum((f[1:] + f[:-1]) / 2 * np.diff(fine))]) * H
+        v = rise - (rise[0] + rise[-1]) / 2
+        # The arc of radius 1/H, displaced by f towards its middle and by v along it.
+        angle = H * (fine - ROUND.a / 2)
+        radius = 1 / H - f
+        X = radius * np.sin(angle) + v * np.cos(angle)
+        Z = radius * np.cos(angle) - v * np.sin(angle)
+        k = int(np.argmin(np.abs(fine - x)))
+        direction = math.atan2(Z[k + 1] - Z[k - 1], X[k + 1] - X[k - 1])
+        return -angle[k] - direction
+
+    expected = [turned(x, y) for x, y in layout.positions]
+    np.testing.assert_allclose(slopes @ c, expected, rtol=0, atol=1e-4 * np.abs(expected).max())
+
+
+BAD_READINGS = {
+    "an element beyond": (([0, 12], "height"), r"element from 0 to 11.*got 0 to 12; count from 0"),
+    "an element below": (([-1, 2], "height"), "got -1 to 2"),
+    "an element of a half": (([0.5], "height"), "element as whole numbers"),
+    "no readings": ((np.zeros(0, int), "height"), r"R >= 1.*got int64 of shape \(0,\)"),
+    "another quantity": (([0], "depth"), "among height, slope, curvature, twist, got 'depth'"),
+    "too few quantities": (([0, 1], ["height"]), r"quantity and direction of shape \(2,\)"),
+    "a direction of NaN": (([0, 1], "slope", [0, np.nan]), "got nan for reading 1"),
+    "a datum of what is not read": (([0], "height", 0.0, ["slope"]), "only of quantities that are"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_READINGS)
+def test_readings_that_cannot_be_are_refused_with_what_was_expected(case):
+    arguments, reason = BAD_READINGS[case]
+    with pytest.raises(Refusal, match=reason):
+        SensorLayout.regular(PATCH, 4, 3).reading(*arguments)
+
+
+def test_a_height_needs_no_direction():
+    layout = SensorLayout.regular(PATCH, 4, 3).reading([0, 1], "height", np.nan)
+
+    assert np.isfinite(layout.operator(SineBasis(PATCH, 2, 2))).all()
+
+
+@pytest.mark.parametrize("cell", [(-1e-3, 1e-3), (np.nan, 1e-3), (26e-3, 1e-3)])
+def test_cells_beyond_the_rim_or_of_no_size_are_refused(cell):
+    with pytest.raises(Refusal, match=r"at least 0 m|over the rim"):
+        replace(SensorLayout.regular(PATCH, 4, 3), cell=cell)
+
+
+def test_all_readings_of_a_dead_element_are_dead():
+    layout = any_readings(PATCH).without([3])
+
+    np.testing.assert_array_equal(layout.live, layout.element != 3)
