@@ -178,30 +178,27 @@ def test_a_curvature_sensors_readings_by_number_are_its_own(patch, length):
 @pytest.mark.parametrize("more", [{"gage_length": 4e-3}, {"cell": (5e-3, 3e-3)}], ids=str)
 def test_what_is_averaged_is_the_mean_of_what_points_read(patch, more):
     basis, averaged = SineBasis(patch, 3, 3), any_readings(patch, 60, **more)
-    points, count = any_readings(patch, 60), 21
-    steps = (np.arange(count) + 0.5) / count - 0.5
+    points, cell = any_readings(patch, 60), "cell" in more
+    steps = np.linspace(-0.5, 0.5, 13)  # Simpson's rule
+    weights = np.array([1, *[4, 2] * 5, 4, 1]) / 36
+    t = points.reads.direction
+    along = np.column_stack([np.cos(t), np.sin(t)])
 
     mean = np.zeros((60, basis.size))
-    for s in steps:
-        for r in steps if "cell" in more else [0.0]:
-            if "cell" in more:
-                shifts = np.tile([s * 5e-3, r * 3e-3], (60, 1))
-            else:
-                t = points.reads.direction
-                shifts = 4e-3 * s * np.column_stack([np.cos(t), np.sin(t)])
-            places = points.positions[points.reads.element] + shifts
-            there = SensorLayout.scattered(patch, places).reading(
-                np.arange(60), points.reads.quantity, points.reads.direction
-            )
-            mean += there.operator(basis)
-    mean /= count * (count if "cell" in more else 1)
+    for s, u in zip(steps, weights, strict=True):
+        for r, v in zip(steps, weights, strict=True) if cell else [(0.0, 1.0)]:
+            shifts = np.tile([s * 5e-3, r * 3e-3], (60, 1)) if cell else 4e-3 * s * along
+            there = SensorLayout.scattered(
+                patch, points.positions[points.reads.element] + shifts
+            ).reading(np.arange(60), points.reads.quantity, points.reads.direction)
+            mean += u * v * there.operator(basis)
 
-    which = ("height", "slope") if "cell" in more else ("slope", "curvature")
+    which = ("height", "slope") if cell else ("slope", "curvature")
     for quantity in which:
         own = points.reads.quantity == quantity
         scale = np.abs(mean[own]).max()
         found = averaged.operator(basis)[own]
-        np.testing.assert_allclose(found, mean[own], rtol=0, atol=2e-4 * scale)
+        np.testing.assert_allclose(found, mean[own], rtol=0, atol=1e-5 * scale)
         assert np.abs(found - points.operator(basis)[own]).max() > 1e-3 * scale
 
 
