@@ -308,8 +308,10 @@ class Fit:
 
         It should not from 0.3 on, nor where the square of the slope exceeds the relative error bar:
         the standard deviation of the displacement over the displacement, by RMS over the skin.
+        Heights and slopes are what they are on any slope.
         """
-        if not self.estimator.linear:
+        names = {name for name, _ in self.estimator.layout.kinds}
+        if not self.estimator.linear or names <= {"height", "slope"}:
             return 0.0
         c, axes = self.coefficients, (-2, -1)
         slope = np.array([self.estimator.slope(one) for one in c.reshape(-1, *c.shape[-2:])])

@@ -171,6 +171,16 @@ def test_without_a_sigma_the_noise_is_estimated(name):
     assert np.mean(answer.noise) == pytest.approx(sigma[0], rel=0.05)
 
 
+@pytest.mark.parametrize("name", ["height", "slope", "curvature"])
+def test_only_readings_of_curvature_come_out_too_flat_on_slopes(name):
+    layout = LAYOUTS[name]
+
+    answer = estimator_for("least-squares", BASIS, layout)(layout.operator(BASIS) @ (20 * truth()))
+
+    assert answer.estimator.slope(answer.coefficients) > 0.3
+    assert bool(answer.warnings) == (name == "curvature")
+
+
 # A zero that is unknown
 
 
