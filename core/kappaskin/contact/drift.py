@@ -31,13 +31,14 @@ _MOST = 2_000  # functions: the uncertainty of a shape beside a drift takes thei
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FittedDrift:
-    """A drift of `size` in 1/m by RMS, and `contacts` and `fit` of the readings without it.
+    """A drift of `size` in 1/m by RMS; `readings` (3, P) without it, their `contacts` and `fit`.
 
     The fit is the original one, with the drift in its shape, of an estimator that has a memory, was
     given a sigma or has more than 2,000 functions.
     """
 
     size: float
+    readings: Array
     contacts: tuple[Contact, Contact]
     fit: Fit
 
@@ -103,14 +104,15 @@ class SmoothDrift:
             return None
         drift = along + Q @ np.where(used, curvature.ravel(), 0.0)
         size = math.sqrt(float(drift.dot(drift)) / used.sum())
-        estimator = fit.estimator
+        estimator, readings = fit.estimator, curvature - (drift @ Q).reshape(curvature.shape)
         if estimator.has_memory or estimator.sigma is not None or estimator.basis.size > _MOST:
-            return FittedDrift(size, (found, NO_CONTACT), fit)
+            return FittedDrift(size, readings, (found, NO_CONTACT), fit)
         rows = self._beside.linear if found.present else np.empty((0, len(used)))
-        beside = estimator(fit.readings - (drift @ Q).reshape(curvature.shape))
+        beside = estimator(readings)
         whole = _beside_drift(beside, Q, np.where(used, rows, 0.0))
         beside = replace(beside, uncertainty=whole, **judged)
-        return FittedDrift(size, (self._beside(curvature, beside), NO_CONTACT), beside)
+        contacts = self._beside(curvature, beside), NO_CONTACT
+        return FittedDrift(size, readings, contacts, beside)
 
     def _orthonormal(self, used: Mask) -> Array:
         return orthonormal(np.where(used, self._columns, 0.0))

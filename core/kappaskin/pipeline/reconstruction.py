@@ -320,13 +320,13 @@ def reconstruct(
     fitter = estimator_for(method, functions, layout)
     contacts_of, bounded = Contacts(plate, layout, edge), LowerBound(plate, edge)
     fits = [fitter(frame) for frame in frames]
-    pairs, drifts = list[tuple[Contact, Contact]](), list[float]()
+    read = [each.readings for each in fits]
+    pairs, drifts = list[tuple[Contact, Contact]](), np.zeros(len(fits))
     for frame, each in enumerate(fits):
         pairs.append(contacts_of(each.readings, each))
-        drift = contacts_of.drift
-        drifts.append(drift.size if drift else 0.0)
-        fits[frame] = drift.fit if drift else each
-    out["drift"] = np.array(drifts)
+        if (drift := contacts_of.drift) is not None:
+            fits[frame], read[frame], drifts[frame] = drift.fit, drift.readings, drift.size
+    out["drift"] = drifts
     contacts = [bounded(first) for first, _ in pairs]
     there = [contact_geometry(*each) for each in zip(fits, contacts, strict=True)]
     out |= _contacts(there, contacts, forces="rigidity" in found)
@@ -335,7 +335,7 @@ def reconstruct(
         find = ObjectFinder(plate, layout, edge)
         noises = [float(each.noise) for each in fits]
         whole = [as_one(*pair) for pair in pairs]
-        out |= _objects([find(*each) for each in zip(frames, noises, whole, strict=True)])
+        out |= _objects([find(*each) for each in zip(read, noises, whole, strict=True)])
     return out
 
 

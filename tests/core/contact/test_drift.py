@@ -77,6 +77,8 @@ def test_a_surface_by_a_method_with_memory_keeps_the_drift():
     CONTACTS(K, fit)
 
     assert CONTACTS.drift.fit is fit
+    off = CONTACTS.drift.readings - (K - warm(1.0))
+    assert np.sqrt(np.mean(off**2)) < 0.1
 
 
 def test_without_a_drift_none_is_told():

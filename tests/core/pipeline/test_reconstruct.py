@@ -538,6 +538,32 @@ def test_what_touches_the_skin_is_written_for_each_frame(saved) -> None:
     assert np.isnan(found["contact"][2]).all()
 
 
+@pytest.mark.parametrize("method", ["least-squares", "bayes", "robust"])
+def test_an_object_is_that_of_the_readings_less_their_drift(saved, method) -> None:
+    patch = Patch(0.1, 0.1)
+    layout, truth = SensorLayout.regular(patch, 10, 10), SineBasis(patch, 30, 30)
+    deflection = Plate(patch).deflection([DiscLoad(0.045, 0.05, 0.012, 0.2)], truth)
+    read = (layout.operator(truth) @ deflection.ravel()).reshape(3, 100)
+    read += np.random.default_rng(0).normal(0, 0.05, read.shape)
+    drift = 2 * np.outer([1.0, -0.6, 0.3], 1 + layout.positions[:, 0] / 0.1)
+
+    found, still = (
+        reconstruct(
+            saved(size=[0.1, 0.1], positions=layout.positions, curvature=curvature),
+            (8, 8),
+            method=method,
+            objects=True,
+        )
+        for curvature in (read + drift, read)
+    )
+
+    assert found["drift"][0] > 0
+    assert still["drift"][0] == 0
+    assert found["object"].tolist() == still["object"].tolist() == ["sphere"]
+    low, high = still["object_radius_95"][0]
+    assert low < found["object_radius"][0] < high
+
+
 def test_a_disk_and_a_polygon_are_read_by_their_outline(saved) -> None:
     disk = Disk(0.05)
     layout, basis = SensorLayout.regular(disk, 10, 10), basis_for(disk, "clamped", 4, 4)
