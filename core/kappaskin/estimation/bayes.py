@@ -99,9 +99,9 @@ class MarginalLikelihood:
         self.s2 = np.zeros(len(Vt))
         self.s2[:k] = s**2
         self._k, self._sigma_known = k, sigma_known
-        self._readings = max(
-            len(A) - spent - 2 * _AWAY, 1.0
-        )  # less what the density of sigma takes
+        self._count = len(A) - spent
+        # Less what the density of sigma takes.
+        self._readings = max(self._count - 2 * _AWAY, 1.0)
         self._top = math.log(self.s2[0]) if s[0] > 0 else 0.0
         self._floor = floor  # of the readings' own power: what their rounding leaves
         d = 1 + np.exp(_GRID - self._top)[:, None] * self.s2[:k]
@@ -119,7 +119,7 @@ class MarginalLikelihood:
     def expected(self, K: Array, noise: float) -> float:
         """gamma of the readings K (R,) with `noise` on them: that of their mean squares."""
         _, y2, left = self._squares(K[None])
-        return float(self._scale(y2 + noise**2, left + noise**2 * (len(K) - self._k))[0])
+        return float(self._scale(y2 + noise**2, left + noise**2 * (self._count - self._k))[0])
 
     def _squares(self, K: Array) -> tuple[Array, Array, Array]:
         """y (T, k), their squares, and those of what is orthogonal to U (T,)."""
@@ -224,19 +224,20 @@ class Bayes(Estimator):
     # Repeated readings of one load scatter by the noise alone: with c = B diag(gamma s / d) y each
     # y_k has the variance of the noise. What readings leave open, which is in error bars, is alike
     # in all of them.
-    def scatter(self, noise: float, curvature: Array | None = None) -> Uncertainty:
-        if curvature is None:
+    def scatter(self, noise: float, readings: Array | None = None) -> Uncertainty:
+        if readings is None:
             raise Refusal(
-                "expected the curvature of a load as well, since the prior's scale follows from "
-                "it; got none; give the readings (3, P) of the load without noise"
+                "expected the readings of a load as well, since the prior's scale follows from "
+                "them; got none; give those of the load without noise"
             )
-        self._of_one_frame(curvature)
-        flat = curvature.ravel()
+        self._of_one_frame(readings)
+        flat = readings.ravel()
         used = self._there(flat)
         if not used.any():
             raise self.refusal(0, 0)
         solver = self._solvers(used, self._made)
-        gamma = solver.likelihood.expected(flat[used] * self.weight[used], noise)
+        K = flat[used] * self.weight[used]
+        gamma = solver.likelihood.expected(K - solver.Q @ (solver.Q.T @ K), noise)
         s2 = solver.likelihood.s2
         return PosteriorUncertainty(solver.B, gamma**2 * s2 / (1 + gamma * s2) ** 2)
 

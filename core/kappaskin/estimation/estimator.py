@@ -308,13 +308,13 @@ class Estimator(ABC):
         """The fit to a skin at rest, without the readings `missing` (3, P)."""
         return self(self._rest(missing))
 
-    def scatter(self, noise: float, curvature: Array | None = None) -> Uncertainty:
+    def scatter(self, noise: float, readings: Array | None = None) -> Uncertainty:
         """How estimates of repeated readings of one load differ, per unit of their noise.
 
-        `noise` in 1/m, in units of sigma where that was given; `curvature` (3, P) in 1/m are the
-        readings of the load without noise, those of a skin at rest when None.
+        `noise` in 1/m, in units of sigma where that was given; `readings` (3, P) in 1/m are those
+        of the load without noise, of a skin at rest when None.
         """
-        fit = self.at_rest() if curvature is None else self(curvature)
+        fit = self.at_rest() if readings is None else self(readings)
         return cast("Uncertainty", fit.uncertainty)
 
     def _rest(self, missing: Mask | None) -> Array:

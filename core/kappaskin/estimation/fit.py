@@ -335,10 +335,10 @@ class Fit:
             np.atleast_2d(estimator.flattened(each.astype(float))) * weight
             for each in (self.residual, self.readings)
         )
-        bend = np.zeros((len(read), len(layout)))
-        np.add.at(bend, (slice(None), layout.element), np.nan_to_num(read - residual) ** 2)
+        squares = np.nan_to_num(read - residual) ** 2
+        bend = [np.bincount(layout.element, each, len(layout)) for each in squares]
         spare = np.broadcast_to(np.asarray(self.spare, float), len(read))
-        return sigma_ratio(residual, bend, layout, spare, estimator.has_prior)
+        return sigma_ratio(residual, np.array(bend, float), layout, spare, estimator.has_prior)
 
     @property
     def warnings(self) -> tuple[str, ...]:

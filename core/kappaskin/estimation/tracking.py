@@ -121,7 +121,7 @@ class Tracking(Estimator, Stateful):
         fresh.restart()
         return fresh(self._rest(missing))
 
-    def scatter(self, noise: float, curvature: Array | None = None) -> Uncertainty:
+    def scatter(self, noise: float, readings: Array | None = None) -> Uncertainty:
         raise Refusal(
             "expected an estimator without memory to predict the scatter of, got tracking, whose "
             "estimates depend on the frames before; simulate them"

@@ -128,7 +128,7 @@ def test_the_residual_and_the_noise_are_those_of_least_squares(setup):
 
 
 @every_setup
-def test_what_is_predicted_is_the_curvature_operator_times_the_coefficients(setup):
+def test_what_is_predicted_is_the_operator_times_the_coefficients(setup):
     c = np.random.default_rng(0).normal(size=(3, *setup[0].shape)) / lengths(*setup)
 
     predicted = Fast(*setup).predicted(c)

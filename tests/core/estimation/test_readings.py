@@ -230,6 +230,36 @@ def test_a_free_datum_is_one_more_column_of_dense_least_squares():
     assert answer.spare == np.sum(there) - 33
 
 
+@pytest.mark.parametrize("name", ["height", "mixed"])
+def test_bayes_scatters_as_predicted_whatever_the_offset(name):
+    layout = free(name, "height")
+    K, sigma = read(layout, seed=7, frames=400)
+    fit = estimator_for("bayes", BASIS, layout, sigma)
+
+    predicted = fit.scatter(1.0, read(layout)[0] + 7e-3 * layout.offsets[:, 0]).sd
+
+    measured = fit(K).coefficients.reshape(400, -1).std(axis=0, ddof=1)
+    assert np.linalg.norm(predicted) == pytest.approx(np.linalg.norm(measured), rel=0.05)
+
+
+@pytest.mark.parametrize("frames", [None, 5])
+@pytest.mark.parametrize("method", ["least-squares", "bayes"])
+@pytest.mark.parametrize("name", ["height", "mixed", "scattered"])
+def test_a_wrong_sigma_is_told_of_any_readings(name, method, frames):
+    layout = LAYOUTS[name]
+    K, sigma = read(layout, seed=8, frames=frames)
+    K[..., 3] = np.nan
+
+    small, right, large = (
+        estimator_for(method, BASIS, layout, factor * sigma)(K).sigma_ratio
+        for factor in (0.3, 1.0, 3.0)
+    )
+
+    assert right == 1
+    assert small == pytest.approx(1 / 0.3, rel=0.2)
+    assert 0.8 / 3 < large < 0.5  # a prior takes some of the noise for the shape's
+
+
 def test_offsets_without_readings_cost_nothing():
     layout = free("mixed", "height", "slope")
     K, sigma = read(layout, seed=7)
