@@ -514,9 +514,10 @@ class _SuspectHistory(Stateful):
     def restore(self, state: Mapping[str, NDArray[np.float64]], prefix: str = "") -> None:
         saved = state.get(f"{prefix}frames", np.empty((0, *self._shape)))
         if saved.shape[1:] != self._shape:
+            shape = ", ".join(map(str, self._shape))
             raise Refusal(
-                f"expected {prefix}frames of shape (T, {str(self._shape)[1:]} to go on from, got "
-                f"shape {saved.shape}"
+                f"expected {prefix}frames of shape (T, {shape}) to go on from, got shape "
+                f"{saved.shape}"
             )
         P, R = self._elements.count, len(self._elements.of)
         self._frames.clear()

@@ -39,30 +39,14 @@ def _sinc(t: Array) -> Array:
     return np.sinc(t / np.pi)
 
 
-CurvatureAt = Callable[[Array], Array]
-"""From positions (P, 2) in m to curvature xx, yy, xy (3, P, N) in 1/m per m of each function."""
-
-
-def mean_curvature_at(
-    basis: Basis, positions: Array, gage_length: float, curvature: CurvatureAt | None = None
-) -> Array:
-    """Mean curvature xx, yy, xy (3, P, N) in 1/m per m of each function along the gages.
-
-    The middles of the gages, `gage_length` in m, are at `positions` (P, 2) in m. Without a length
-    it is the `curvature` of the functions, unless given that of `curvature_at`.
-    """
-    curvature = curvature or partial(curvature_at, basis)
-    if not gage_length:
-        return curvature(positions)
-
-    along = partial(_along, basis, positions, gage_length, curvature)
-    return np.stack([along(_X), along(_Y), _twist(along)])
+ValuesAt = Callable[[Array], Array]
+"""From positions (P, 2) in m to a quantity (..., P, N) per m of each function there."""
 
 
 _X, _Y = np.eye(2)
 
 
-def _along(basis: Basis, positions: Array, L: float, curvature: CurvatureAt, t: Array) -> Array:
+def _along(basis: Basis, positions: Array, L: float, curvature: ValuesAt, t: Array) -> Array:
     """Curvature (P, N) along the unit vectors t (2,) or (P, 2), the mean along gages of length L.
 
     On a flat skin it follows from the slopes at both ends of a gage, exactly also for functions
@@ -76,7 +60,7 @@ def _along(basis: Basis, positions: Array, L: float, curvature: CurvatureAt, t: 
     return (_slope(basis, positions + half, t) - _slope(basis, positions - half, t)) / L
 
 
-def _twist(along: CurvatureAt) -> Array:
+def _twist(along: ValuesAt) -> Array:
     """Twist by gages on both diagonals, from the curvature `along` a unit vector."""
     return (along(_DIAGONAL * (_X + _Y)) - along(_DIAGONAL * (_X - _Y))) / 2
 
@@ -92,14 +76,14 @@ def _slope(basis: Basis, places: Array, t: Array) -> Array:
     return t[..., :1] * basis.at(places, 1, 0) + t[..., 1:] * basis.at(places, 0, 1)
 
 
-def _over_gage(values: CurvatureAt, positions: Array, L: float, t: Array) -> Array:
+def _over_gage(values: ValuesAt, positions: Array, L: float, t: Array) -> Array:
     """The mean of `values` along gages of length L along t."""
     along, weights = gauss(L, _POINTS)
     steps = zip(along - L / 2, weights / L, strict=True)
     return np.sum([w * values(positions + s * t) for s, w in steps], axis=0)
 
 
-def _over_cell(values: CurvatureAt, positions: Array, cell: tuple[float, float]) -> Array:
+def _over_cell(values: ValuesAt, positions: Array, cell: tuple[float, float]) -> Array:
     """The mean of `values` over rectangles of the sides `cell` in m; a side may be zero."""
     for axis, side in zip((_X, _Y), cell, strict=True):
         if side:
@@ -179,14 +163,10 @@ class Readings:
 
     @cached_property
     def _kinds(self) -> tuple[list[tuple[str, float]], Indices]:
-        turned = np.isin(self.quantity, _ALONG)
-        angle = np.mod(np.where(turned, self.direction, 0.0), 2 * np.pi)
-        angle[np.round(angle, _ALIKE) >= np.round(2 * np.pi, _ALIKE)] = 0.0
-        number = np.zeros(len(angle))
-        for k, name in enumerate(QUANTITIES):
-            number[self.quantity == name] = k
-        key = 10 * number + np.round(angle, _ALIKE)
-        _, first, kind = np.unique(key, return_index=True, return_inverse=True)
+        angle = np.where(np.isin(self.quantity, _ALONG), self.direction, 0.0) % (2 * np.pi)
+        angle[np.round(angle - 2 * np.pi, _ALIKE) == 0] = 0.0
+        each = np.rec.fromarrays([self.quantity, np.round(angle, _ALIKE)])
+        _, first, kind = np.unique(each, return_index=True, return_inverse=True)
         return [(str(self.quantity[r]), float(angle[r])) for r in first], kind.reshape(-1)
 
     @property
@@ -373,7 +353,8 @@ class SensorLayout:
     @property
     def units(self) -> str:
         """The units of the readings, in words."""
-        return " or ".join(dict.fromkeys(QUANTITIES[name] for name, _ in self.kinds))
+        read = {name for name, _ in self.kinds}
+        return " or ".join(dict.fromkeys(QUANTITIES[name] for name in QUANTITIES if name in read))
 
     def multipliers(self, sines: SineBasis) -> Array:
         """Factors (k, Ni, Nj) of the k `kinds` of readings by their average over gages or cells.
@@ -416,16 +397,16 @@ class SensorLayout:
         """
         if basis.patch != self.patch:
             raise Refusal(f"the layout is on {self.patch}, the basis on {basis.patch}; use one")
-        curvature = plate.curvature(basis) if plate else None
+        curvature = plate.curvature(basis) if plate else partial(curvature_at, basis)
         if self.reads:
-            return self._read_by(
-                self.reads, basis, plate, curvature or partial(curvature_at, basis)
-            )
-        K = mean_curvature_at(basis, self.positions, self.gage_length, curvature)
-        return K.reshape(self.channels, basis.size)
+            return self._read_by(self.reads, basis, plate, curvature)
+        if not self.gage_length:
+            return curvature(self.positions).reshape(self.channels, basis.size)
+        along = partial(_along, basis, self.positions, self.gage_length, curvature)
+        return np.concatenate([along(_X), along(_Y), _twist(along)])
 
     def _read_by(
-        self, reads: Readings, basis: Basis, plate: Plate | None, curvature: CurvatureAt
+        self, reads: Readings, basis: Basis, plate: Plate | None, curvature: ValuesAt
     ) -> Array:
         """The operator (R, N), quantity by quantity."""
         M, L, H = np.empty((self.channels, basis.size)), self.gage_length, self.patch.base_curvature
