@@ -42,7 +42,7 @@ def test_bayes_needs_the_readings_of_a_load():
         "bayes", basis_for(PATCH, "hinged", 8, 8), SensorLayout.regular(PATCH, 6, 6)
     )
 
-    with pytest.raises(Refusal, match="expected the curvature of a load as well"):
+    with pytest.raises(Refusal, match="expected the readings of a load as well"):
         predicted_sd(fit, 0.2, np.array([[0.05, 0.05]]))
 
 
