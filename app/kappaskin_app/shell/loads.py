@@ -54,8 +54,9 @@ class Cache(Generic[_Arguments, _Result]):
             del self._results[next(iter(self._results))]
 
 
-REFERENCE = (15, 15)
-"""Basis functions of the true shape, as in Table 1."""
+_REFERENCE = 15  # basis functions of the true shape along a side, as in Table 1
+# So many are seen by elements near a load on a small area: with Table 1's no object fits it.
+_RESOLVED, _RESOLVED_MIXED = 40, 20  # on a flat rectangle: of waves that mix, what a file may ask
 _MARGIN = 0.03  # of the patch along each edge, where no load can be dragged
 _HIGHEST_CURVATURE = 27.0  # 1/m, under the load: a moving one reaches more, and 38 saturates
 _LEAST_COMPLIANCE = 1e-12  # m/N, of a skin where it is free to move
@@ -79,14 +80,20 @@ def free_loads(settings: Settings) -> tuple[Load, ...]:
     return (PointLoad(s.x, s.y, s.force),)
 
 
-def reference_on(patch: Patch) -> tuple[int, int]:
-    """Basis functions of the true shape of `patch`; a strip is uniform along y."""
-    return (REFERENCE[0], 1) if patch.strip else REFERENCE
+def reference_on(plate: Plate, edge: str) -> tuple[int, int]:
+    """Basis functions of the true shape of `plate`; a strip is uniform along y."""
+    patch = plate.patch
+    if patch.strip:
+        return _REFERENCE, 1
+    if type(patch) is not Patch or patch.base_curvature or plate.stretches:
+        return _REFERENCE, _REFERENCE
+    count = _RESOLVED if edge == "hinged" else _RESOLVED_MIXED
+    return count, count
 
 
 def _compliance_or_refusal(plate: Plate, edge: str) -> Compliance | Refusal:
     try:
-        return plate.compliance(basis_for(plate.patch, edge, *reference_on(plate.patch)))
+        return plate.compliance(basis_for(plate.patch, edge, *reference_on(plate, edge)))
     except Refusal as refusal:
         return refusal
 
@@ -107,7 +114,7 @@ def compliance_of(plate: Plate, edge: str) -> Compliance:
 def middle_compliance(plate: Plate, edge: str) -> float:
     """Displacement in m of the middle of the skin under a point load of 1 N there."""
     patch = plate.patch
-    basis = basis_for(patch, edge, *reference_on(patch))
+    basis = basis_for(patch, edge, *reference_on(plate, edge))
     return abs(_moved(PointLoad(patch.a / 2, patch.b / 2), basis, compliance_of(plate, edge)))
 
 
@@ -138,13 +145,11 @@ def load_case_stimuli(case: str, plate: Plate, edge: str) -> tuple[Stimulus, ...
     """
     paper = load_scene(case)
     compliance, patch = compliance_of(plate, edge), plate.patch
-    if (plate, edge) == (paper.plate, paper.edge):
-        return paper.stimuli
     was = paper.plate.patch
     size = min(patch.a / was.a, patch.b / was.b)
-    moved = _moved(paper.loads[0], paper.basis, compliance_of(paper.plate, paper.edge))
+    moved = _moved(paper.loads[0], paper.basis, paper.plate.compliance(paper.basis))
     load = _placed(paper.loads[0], was, patch)
-    basis = basis_for(patch, edge, *reference_on(patch))
+    basis = basis_for(patch, edge, *reference_on(plate, edge))
     gives = abs(_moved(load, basis, compliance))
     if not gives > _LEAST_COMPLIANCE:
         raise Refusal(
@@ -152,6 +157,8 @@ def load_case_stimuli(case: str, plate: Plate, edge: str) -> tuple[Stimulus, ...
             "further inside; select a free load and drag it there"
         )
     load = load.scaled(size * moved / gives)
+    if (plate, edge) == (paper.plate, paper.edge):
+        return (replace(paper.stimuli[0], what=load),)
     bent = SensorLayout.regular(patch, 21, 21).operator(basis, plate)
     most = float(np.abs(bent @ compliance(load.modal(basis)).ravel()).max())
     motion = paper.stimuli[0].motion
