@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from kappaskin import LeastSquares, Patch, RankDeficient, SensorLayout, SineBasis, basis_for
-from kappaskin.estimation import METHODS, AsPrinted, singular_values
+from kappaskin.estimation import METHODS, AsPrinted, Fit, singular_values
 from kappaskin.estimation.fit import DenseUncertainty
 from kappaskin.studies import run_stability
 from kappaskin.studies.stability import rows_of
@@ -352,6 +352,23 @@ def test_double_double_knows_what_the_edges_decide():
     with mpmath.workdps(80):
         product = mpmath.matrix(A.tolist()) * mpmath.matrix(W.tolist())
     assert off_by(found, product, b) < 1e-25
+
+
+def test_a_wrong_sigma_is_wrong_unless_the_answer_says_so(monkeypatch):
+    case = CASES["sigma half the noise"]
+    methods = {name: METHODS[name] for name in ("least-squares", "fast", "bayes", "robust")}
+
+    assert {row["verdict"] for row in rows_of(case, methods)} == {"degraded"}
+    monkeypatch.setattr(Fit, "sigma_ratio", 1.0)
+    assert {row["verdict"] for row in rows_of(case, methods)} == {"wrong"}
+
+
+def test_a_drift_that_is_left_in_the_readings_is_found_out(monkeypatch):
+    only = {"least-squares": LeastSquares}
+
+    assert {row["verdict"] for row in rows_of(CASES["drift"], only)} == {"exact"}
+    monkeypatch.setattr("kappaskin.studies.stability._WithoutDrift", lambda estimator: estimator)
+    assert {row["verdict"] for row in rows_of(CASES["drift"], only)} == {"wrong"}
 
 
 def test_there_is_no_reference_where_the_readings_decide_nothing():

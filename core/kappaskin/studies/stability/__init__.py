@@ -10,7 +10,8 @@ The verdicts, in the order in which they are found:
 - `exact`: covered, every coefficient is determined, no frame is flagged, and the coefficients are
   as near to the reference as rounding allows; see `Reference.allowed`. A bound that leaves less
   than two digits allows nothing, or it could not fail.
-- `degraded`: covered, or flagged by the method itself, but not exact.
+- `degraded`: covered, or flagged by the method itself, but not exact. An answer is flagged too
+  where it says that the sigma it was given is wrong.
 
 Eq. 6 as printed `breaks` where another method would be wrong. Methods that do not seek the
 least-squares answer have no digits to lose: the truth and the error bar judge them, and in float32
@@ -33,9 +34,11 @@ import scipy
 from numpy.typing import NDArray
 
 from kappaskin._processes import process_context
+from kappaskin.contact import Contacts
 from kappaskin.errors import Refusal
 from kappaskin.estimation import METHODS, Estimator, Fit
 from kappaskin.frames import Array
+from kappaskin.mechanics import Plate
 from kappaskin.studies.accuracy import root_mean_square
 from kappaskin.studies.stability.gallery import CaseKind, HardCase, gallery
 from kappaskin.studies.stability.reference import Reference, reference_of
@@ -73,7 +76,8 @@ class MethodAnswer:
         bar = (
             _reach(fit)[:, None] * fit.surface_sd(places) if known else np.full_like(error, np.nan)
         )
-        flagged = ~np.broadcast_to(np.asarray(fit.converged, bool), (len(frames),))
+        sure = np.asarray(fit.converged, bool) & (fit.sigma_ratio == 1)
+        flagged = ~np.broadcast_to(sure, (len(frames),))
         return cls(c[0], error, bar, flagged)
 
     @property
@@ -102,6 +106,23 @@ class Restartable(Protocol):
         ...
 
 
+class _WithoutDrift:
+    """The fits of an estimator, and of what the readings are without the drift told of them."""
+
+    def __init__(self, estimator: Estimator) -> None:
+        layout = estimator.layout
+        self._estimator, self._contacts = estimator, Contacts(Plate(layout.patch), layout)
+
+    def __call__(self, curvature: Array) -> Fit:
+        return Fit.stacked([self._fitted(frame) for frame in curvature])
+
+    def _fitted(self, frame: Array) -> Fit:
+        fit = self._estimator(frame)
+        self._contacts(frame, fit)
+        drift = self._contacts.drift
+        return fit if drift is None else drift.fit
+
+
 def answer_of(case: HardCase, make: Callable[[], Estimator]) -> MethodAnswer | Refusal:
     """The answer of an estimator, or the reason for its refusal.
 
@@ -112,12 +133,13 @@ def answer_of(case: HardCase, make: Callable[[], Estimator]) -> MethodAnswer | R
         estimator = make()
         if isinstance(estimator, Restartable) and case.kind is not CaseKind.SEQUENCE:
             return _joined(list(_after_another(case, estimator, estimator.restart)))
-        return _joined(list(_in_blocks(case, estimator)))
+        fitted = _WithoutDrift(estimator) if case.kind is CaseKind.DRIFT else estimator
+        return _joined(list(_in_blocks(case, fitted)))
     except Refusal as refusal:
         return refusal
 
 
-def _in_blocks(case: HardCase, estimator: Estimator) -> Iterator[MethodAnswer]:
+def _in_blocks(case: HardCase, estimator: Callable[[Array], Fit]) -> Iterator[MethodAnswer]:
     """One block of frames after the other."""
     every = max(1, len(case.curvature) // _BLOCK)
     for start in range(0, len(case.curvature), _BLOCK):
@@ -155,7 +177,8 @@ def verdict_on(
     if covered is not None and not (at_truth or covered >= COVERED):
         return "wrong", f"the 95 % bar covers {100 * covered:.0f} % of the truth"
     if flagged := int(answer.flagged.sum()):
-        return "degraded", f"{flagged} of {len(answer.flagged)} frames are flagged: not converged"
+        why = "not converged" if case.sigma is None else "the sigma is contradicted"
+        return "degraded", f"{flagged} of {len(answer.flagged)} frames are flagged: {why}"
     if not np.isfinite(reference.condition):
         return "degraded", "some coefficients are undetermined; the bar covers the truth"
     if peer is not None and not reference.near(answer.coefficients, peer, eps):
@@ -174,10 +197,11 @@ def _at_truth(case: HardCase, reference: Reference, answer: MethodAnswer, eps: f
 
 _USUAL = frozenset({CaseKind.ANY, CaseKind.LINEAR, CaseKind.DENSE})
 _CLAIMS: Mapping[str, frozenset[CaseKind]] = {
-    "least-squares": _USUAL | {CaseKind.SEQUENCE},
-    "fast": _USUAL | {CaseKind.SEQUENCE, CaseKind.LARGE},
+    "least-squares": _USUAL | {CaseKind.SEQUENCE, CaseKind.GIVEN, CaseKind.DRIFT},
+    "bayes": _USUAL | {CaseKind.GIVEN},
+    "fast": _USUAL | {CaseKind.SEQUENCE, CaseKind.LARGE, CaseKind.GIVEN},
     "finite-slope": frozenset({CaseKind.ANY, CaseKind.SLOPES}),
-    "robust": _USUAL - {CaseKind.DENSE} | {CaseKind.OUTLIERS},
+    "robust": _USUAL - {CaseKind.DENSE} | {CaseKind.OUTLIERS, CaseKind.GIVEN},
     "tracking": _USUAL - {CaseKind.DENSE} | {CaseKind.SEQUENCE},
 }
 """Which cases a method claims; any other claims the usual ones."""
@@ -225,14 +249,18 @@ def rows_of(
         return []
     reference, rows = reference_of(case), list[dict[str, Any]]()
     for method in claiming:
-        peer = reference.answer if method in _SEEK_LEAST_SQUARES else None
+        peer = reference.answer if _seeks_least_squares(method, case) else None
         for precision in _PRECISIONS:
-            make = partial(methods[method], case.basis, case.layout, dtype=precision)
+            make = partial(methods[method], case.basis, case.layout, case.sigma, dtype=precision)
             answer = answer_of(case, make)
             rows.append(_row(case, reference, method, precision, answer, peer))
             if peer is None and isinstance(answer, MethodAnswer):
                 peer = answer.coefficients
     return rows
+
+
+def _seeks_least_squares(method: str, case: HardCase) -> bool:
+    return method in _SEEK_LEAST_SQUARES and case.kind is not CaseKind.DRIFT
 
 
 def _row(
@@ -263,7 +291,7 @@ def _row(
     if isinstance(answer, Refusal):
         return row | {"verdict": "refused", "reason": str(answer)}
     found, why = verdict_on(case, reference, answer, eps, peer)
-    if method in _SEEK_LEAST_SQUARES:
+    if _seeks_least_squares(method, case):
         row["digits_lost"] = reference.digits_lost(answer.coefficients, eps)
     return row | {
         "error_mm": _number(1e3 * root_mean_square(answer.error)),

@@ -38,6 +38,8 @@ class CaseKind(Enum):
     DENSE = "as many functions as dense algebra does quickly, but nothing slower"
     OUTLIERS = "so many bad readings that only a method which excludes them is asked for a shape"
     LARGE = "more functions than a dense matrix is made for"
+    GIVEN = "a sigma that the readings contradict, which the answer must say"
+    DRIFT = "readings that drift, of which the live estimate takes the drift out"
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +48,7 @@ class HardCase:
 
     `truth` is (Ri, Rj), or (T, Ri, Rj) of a shape that moves, of the functions of `true_basis`.
     `hard` is one sentence on what is hard; `announced` why an answer may be less than exact, or
-    none; empty where nothing excuses it.
+    none; empty where nothing excuses it. `sigma` in 1/m is the noise that is given, if any.
     """
 
     name: str
@@ -58,6 +60,7 @@ class HardCase:
     curvature: Array
     announced: str = ""
     kind: CaseKind = CaseKind.ANY
+    sigma: float | None = None
 
     @property
     def in_reach(self) -> bool:
@@ -78,6 +81,7 @@ def case_of(
     true_basis: Basis | None = None,
     truth: Array | None = None,
     spoilt: Callable[[Array], Array] = lambda K: K,
+    sigma: float | None = None,
 ) -> HardCase:
     """A case of `functions` on a `layout`; `spoilt` makes of clean, noisy readings what comes."""
     rng = np.random.default_rng(SEED)
@@ -88,7 +92,7 @@ def case_of(
     clean = np.dot(c.reshape(-1, true_basis.size), M.T).reshape(-1, 3, len(layout))
     frames = (FRAMES if len(clean) == 1 else len(clean)) if noise else 1
     K = clean + rng.normal(0.0, noise, (frames, 3, len(layout)))
-    return HardCase(name, hard, basis, layout, true_basis, c, spoilt(K), announced, kind)
+    return HardCase(name, hard, basis, layout, true_basis, c, spoilt(K), announced, kind, sigma)
 
 
 def _even(basis: Basis, M: Array, rng: np.random.Generator) -> Array:
@@ -375,11 +379,28 @@ def _readings() -> Iterator[HardCase]:
                       spoilt=_with_offsets(share),
                       announced="an offset is no noise: too many may be told as such",
                       kind=CaseKind.OUTLIERS)  # fmt: skip
+    yield case_of("sigma half the noise", "with the sigma that is given, bars would be half as "
+                  "wide as they should be", _TENS, (8, 8), sigma=TABLE_1_NOISE / 2,
+                  announced="the residuals contradict the sigma", kind=CaseKind.GIVEN)  # fmt: skip
+    finest = SineBasis(_SQUARE, 60, 60)
+    load = scaled_to(Plate(_SQUARE), PointLoad(0.031, 0.052), 1e-3, finest)
+    yield case_of("drift", "all readings drift by four times the noise, evenly over the skin, "
+                  "beside a point load", _TENS, (8, 8), true_basis=finest,
+                  truth=Plate(_SQUARE).deflection([load], finest), spoilt=_drifted,
+                  announced="the drift is estimated too", kind=CaseKind.DRIFT)  # fmt: skip
     dent = _dent(8)
     signal = _TENS.operator(SineBasis(_SQUARE, 8, 8)) @ dent.ravel()
     noise = 10 * root_mean_square(signal)
     yield case_of("noise 10 times the signal", "readings hold more noise than shape",
                   _TENS, (8, 8), truth=dent, noise=noise)  # fmt: skip
+
+
+def _drifted(K: Array) -> Array:
+    """Readings with a level and slopes along x and y of their own in each channel."""
+    u, v = (_TENS.positions / (_SQUARE.a, _SQUARE.b) - 0.5).T
+    drift = np.array([[1.0, 1.6, -1.2], [-0.8, 0.9, 1.5], [0.6, -1.1, 1.3]])
+    drift = drift @ np.stack([np.ones_like(u), u, v])
+    return K + 4 * TABLE_1_NOISE * drift / root_mean_square(drift)
 
 
 def _with_offsets(share: float) -> Callable[[Array], Array]:
