@@ -25,7 +25,13 @@ from kappaskin.scenes import Indenter, Orbit, Scene, Stimulus, load_scene
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.settings.scene import FREE_CASES, LOAD_CASES, SPREAD_CASES, TWO_ENDED
+from kappaskin_app.shell.settings.scene import (
+    FREE_CASES,
+    LOAD_CASES,
+    READY_CASES,
+    SPREAD_CASES,
+    TWO_ENDED,
+)
 
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
@@ -80,9 +86,15 @@ def free_loads(settings: Settings) -> tuple[Load, ...]:
     return (PointLoad(s.x, s.y, s.force),)
 
 
-def reference_on(plate: Plate, edge: str) -> tuple[int, int]:
-    """Basis functions of the true shape of `plate`; a strip is uniform along y."""
-    patch = plate.patch
+@lru_cache(len(LOAD_CASES) * _CACHED)
+def reference_on(plate: Plate, edge: str, case: str = "") -> tuple[int, int]:
+    """Basis functions of the true shape of `plate`; a strip is uniform along y.
+
+    Of a load `case` on its own skin they are those of the ready scene.
+    """
+    patch, ready = plate.patch, load_scene(case) if case in READY_CASES else None
+    if ready and (plate, edge) == (ready.plate, ready.edge):
+        return ready.reference
     if patch.strip:
         return _REFERENCE, 1
     if type(patch) is not Patch or patch.base_curvature or plate.stretches:
@@ -144,6 +156,8 @@ def load_case_stimuli(case: str, plate: Plate, edge: str) -> tuple[Stimulus, ...
     has the same slopes. It is smaller where elements would saturate.
     """
     paper = load_scene(case)
+    if (plate, edge) == (paper.plate, paper.edge):
+        return paper.stimuli
     compliance, patch = compliance_of(plate, edge), plate.patch
     was = paper.plate.patch
     size = min(patch.a / was.a, patch.b / was.b)
@@ -157,8 +171,6 @@ def load_case_stimuli(case: str, plate: Plate, edge: str) -> tuple[Stimulus, ...
             "further inside; select a free load and drag it there"
         )
     load = load.scaled(size * moved / gives)
-    if (plate, edge) == (paper.plate, paper.edge):
-        return (replace(paper.stimuli[0], what=load),)
     bent = SensorLayout.regular(patch, 21, 21).operator(basis, plate)
     most = float(np.abs(bent @ compliance(load.modal(basis)).ravel()).max())
     motion = paper.stimuli[0].motion

@@ -155,7 +155,7 @@ def scene_of(settings: Settings) -> Scene:
         _effects(settings),
         _transduction(settings),
         seed=settings.noise_seed,
-        reference=reference_on(plate, settings.edge),
+        reference=reference_on(plate, settings.edge, settings.load_case),
         edge=settings.edge,
     )
     fastest = math.floor(1 / scene.transduction.scan_time(3 * len(layout)))
@@ -196,7 +196,7 @@ def scene_of_sensor(sensor: Sensor, noise: float) -> Scene:
         effects=(GaussianNoise(noise),),
         transduction=sensor.transduction,
         rate=sensor.rate,
-        reference=reference_on(plate, edge),
+        reference=reference_on(plate, edge, "centre"),
         edge=edge,
     )
 

@@ -10,13 +10,14 @@ from kappaskin_app.widgets.lettering import LEFT
 class Line(QWidget):
     """A line of text drawn in place; a QLabel would lay out the whole window again.
 
-    Where the text does not fit, its head is left out; where the rest does not fit either, the
-    tooltip begins with the text.
+    Where the text does not fit, spare beginnings or ends are left out, the first ones first; where
+    the rest does not fit either, the tooltip begins with the text.
     """
 
     def __init__(self, text: str = "", parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._text, self._head = text, ""
+        self._text = text
+        self._spare: tuple[str, ...] = ()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
     def sizeHint(self) -> QSize:
@@ -28,10 +29,10 @@ class Line(QWidget):
     def text(self) -> str:
         return self._text
 
-    def show_text(self, text: str, head: str = "") -> None:
-        """Show `text`, which may do without its `head` where room is short."""
+    def show_text(self, text: str, *spare: str) -> None:
+        """Show `text`, which may do without `spare` beginnings or ends where room is short."""
         if text != self._text:
-            self._text, self._head = text, head
+            self._text, self._spare = text, spare
             self.update()
 
     def _fits(self, text: str) -> bool:
@@ -40,7 +41,12 @@ class Line(QWidget):
     @property
     def shown(self) -> str:
         """What of the text there is room for, before what lacks room is cut off."""
-        return self._text if self._fits(self._text) else self._text.removeprefix(self._head)
+        text = self._text
+        for spare in self._spare:
+            if self._fits(text):
+                break
+            text = text.removeprefix(spare).removesuffix(spare)
+        return text
 
     @property
     def whole(self) -> bool:

@@ -204,7 +204,7 @@ class Simulator:
 
 
 def _linear(layout: SensorLayout, basis: Basis, plate: Plate) -> Callable[[Array], Array]:
-    """Coefficients (Ni, Nj) to curvature (3 P,) at the elements; on a grid by sums along x and y."""
+    """Coefficients (Ni, Nj) to curvature (3 P,) at the elements; on a grid along x, then y."""
     product = isinstance(basis, ProductBasis) and not basis.patch.base_curvature
     averaged = layout.gage_length or any(layout.cell)
     if product and layout.shape and not (layout.reads or averaged):

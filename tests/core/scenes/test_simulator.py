@@ -242,3 +242,14 @@ def test_frames_at_once_are_those_one_after_the_other(name):
     for truth, (expected, _) in zip(truths, each, strict=False):
         if expected is not None:
             np.testing.assert_array_equal(truth.coefficients, expected.coefficients)
+
+
+def test_frames_tell_the_first_functions_of_a_finely_summed_shape_and_elements_read_all():
+    fine = replace(QUIET, reference=(40, 40))
+
+    truth, read = Simulator(fine).reading(fine.sensor().scan(), 0.0)
+
+    c = fine.plate.deflection(fine.loads, fine.basis)
+    np.testing.assert_array_equal(truth.coefficients, c[:24, :24])
+    expected = fine.layout.operator(fine.basis) @ c.ravel()
+    np.testing.assert_allclose(read, expected, rtol=0, atol=1e-12 * np.abs(expected).max())

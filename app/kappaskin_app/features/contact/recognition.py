@@ -11,10 +11,11 @@ from kappaskin.sensing import Sensor
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.widgets.parts import with_error
 
-_NOTHING_FITS = (
-    "no object fits, {} is nearest: it may bear at several places or on part of its rim; press it "
-    "straight and at one place"
+_UNKNOWN = (
+    "unknown object, nearest {}: press it straight at one place; it may bear at several or on its "
+    "rim"
 )
+_AS_ONE = "as one object: "  # of two contacts
 _DRIFTING = "no object is named while readings drift: tare at rest"
 _PREPARING = "computing the model readings of objects on this skin\N{HORIZONTAL ELLIPSIS}"
 
@@ -31,11 +32,11 @@ def curvature_text(estimate: Estimate) -> str:
 class ObjectRecognition(QObject):
     """Recognises the object in contact in the background, one estimate at a time.
 
-    `described` emits the text, `found` the object and the estimate that it was recognised in.
-    Estimates that arrive meanwhile are skipped.
+    `described` emits the text, and the two ends of it that it may do without; `found` the object
+    and the estimate that it was recognised in. Estimates that arrive meanwhile are skipped.
     """
 
-    described = Signal(str)
+    described = Signal(str, str, str)
     found = Signal(ContactObject, Estimate)
 
     def __init__(self, tasks: Tasks, parent: QObject | None = None) -> None:
@@ -51,12 +52,12 @@ class ObjectRecognition(QObject):
         sensor = status.sensor
         if estimate is None or sensor is None:
             self._recognition.stop()
-            self.described.emit("")
+            self.described.emit("", "", "")
         elif self._key != (key := (status.connections, *_skin(sensor, status.setup))):
             self._key = key
             self._preparation.run(ObjectFinder, key[1], sensor.layout, key[2])
         elif self._preparation.running:
-            self.described.emit(_PREPARING)
+            self.described.emit(_PREPARING, "", "")
         elif estimate.generation == status.generation and not self._recognition.running:
             self._recognition.run(_recognise, self._finder, estimate)
 
@@ -64,9 +65,10 @@ class ObjectRecognition(QObject):
         """Store the finder, or the reason why there is none."""
         self._finder = str(finder) if isinstance(finder, Exception) else finder
 
-    def _finish(self, described: tuple[str, ContactObject, Estimate]) -> None:
-        words, *found = described
-        self.described.emit(words)
+    def _finish(self, recognised: tuple[str, str, ContactObject, Estimate]) -> None:
+        what, curvatures, *found = recognised
+        more = "".join(what.partition("; ")[1:])  # the second guess, or a cause
+        self.described.emit(what + curvatures, curvatures, more)
         self.found.emit(*found)
 
 
@@ -78,7 +80,7 @@ def _skin(sensor: Sensor, setup: Setup) -> tuple[Plate, str]:
 
 def _recognise(
     finder: ObjectFinder | str, estimate: Estimate
-) -> tuple[str, ContactObject, Estimate]:
+) -> tuple[str, str, ContactObject, Estimate]:
     if isinstance(finder, str):
         found, what = NO_OBJECT, finder
     elif estimate.drift:  # which is in the readings still
@@ -86,7 +88,8 @@ def _recognise(
     else:
         whole = as_one(estimate.contact, estimate.second)
         found = finder(estimate.curvature, estimate.noise, whole)
-        what = found.describe() if found.fits else _NOTHING_FITS.format(found.ranked[0][0])
+        what = found.describe() if found.fits else _UNKNOWN.format(found.ranked[0][0])
         if estimate.second.present:
-            what = f"if one object makes both contacts: {what}"
-    return "; ".join(filter(None, [what, curvature_text(estimate)])), found, estimate
+            what = _AS_ONE + what
+    curvatures = curvature_text(estimate)
+    return what, f"; {curvatures}" if what and curvatures else curvatures, found, estimate

@@ -47,7 +47,7 @@ def scene_of(settings: Settings) -> Scene:
         (GaussianNoise(s.design_noise),),
         electronics,
         rate=min(SHAPES[s.design_shape].rate, fastest if fastest < 1 else math.floor(fastest)),
-        reference=reference_on(plate, edge),
+        reference=reference_on(plate, edge, "centre"),
         edge=edge,
         title="A design",
         text="A design made in the panel Design, with a point load in the middle.",

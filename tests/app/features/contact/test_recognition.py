@@ -9,6 +9,9 @@ import pytest
 from kappaskin import ObjectFinder, Pipeline, PointLoad, Setup, Simulator, load_scene
 from kappaskin_app.features.contact import recognition
 from kappaskin_app.features.contact.recognition import curvature_text
+from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.simulation import scene_of
+from kappaskin_app.widgets.line import Line
 
 
 def _estimate(*loads):
@@ -34,7 +37,7 @@ def test_the_window_describes_the_object_in_contact(window, until):
     assert len(window.session.scene.loads) == 2
 
     # Its ends are two contacts, which the blade makes if it is one object.
-    said = "if one object makes both contacts: edge, 20 mm long, axis "
+    said = "as one object: edge, 20 mm long, axis "
     until(lambda: window.display.status_bar.object.text().startswith(said))
     assert "principal curvatures" in window.display.status_bar.object.text()
 
@@ -48,21 +51,52 @@ def test_what_fits_no_object_is_said_with_its_cause_and_what_to_do():
     estimate = _estimate(*corners)
     finder = ObjectFinder(scene.sensor().plate, scene.sensor().layout)
 
-    words, found, _ = recognition._recognise(finder, estimate)  # noqa: SLF001
+    words, _, found, _ = recognition._recognise(finder, estimate)  # noqa: SLF001
 
     assert not found.fits
     assert not found.kind
-    assert "no object fits, " in words
-    assert "it may bear at several places or on part of its rim; press it straight" in words
+    assert "unknown object, nearest " in words
+    assert "press it straight at one place; it may bear at several or on its rim" in words
+
+
+def test_simulated_point_loads_are_those_of_the_plate_that_objects_are_recognised_on():
+    places = [(0.044, 0.056), (0.053, 0.045), (0.036, 0.064), (0.025, 0.075)]
+    described = set()
+    for x, y in places:
+        scene = scene_of(Settings(load_case="point", x=x, y=y, force=0.4))
+        estimate = Pipeline(scene.sensor(), Setup())(Simulator(scene).frame(0, time.monotonic))
+        words, *_ = recognition._recognise(  # noqa: SLF001
+            ObjectFinder(scene.plate, scene.layout), estimate
+        )
+        described.add(words.partition(",")[0])
+
+    assert described == {"sphere"}
+
+
+def test_the_line_does_without_what_is_spare_where_room_is_short(qapp):
+    line, of = Line(), "sphere, radius below 30 mm"
+    line.show_text(
+        f"{of}; second guess edge 4 %; curvatures 7", "; curvatures 7", "; second guess edge 4 %"
+    )
+
+    def room(text):
+        line.resize(line.fontMetrics().horizontalAdvance(text), line.height())
+        return line.shown, line.whole
+
+    assert room(line.text()) == (line.text(), True)
+    assert room(f"{of}; second guess edge 4 %") == (f"{of}; second guess edge 4 %", True)
+    assert room(of) == (of, True)
+    assert room("sphere") == (of, False)
 
 
 def test_no_object_is_named_while_readings_drift():
     estimate = replace(_estimate(PointLoad(0.05, 0.05, 0.15)), drift=0.5)
 
-    words, found, _ = recognition._recognise(None, estimate)  # noqa: SLF001
+    words, curvatures, found, _ = recognition._recognise(None, estimate)  # noqa: SLF001
 
     assert found.probability == {}
-    assert words.startswith("no object is named while readings drift: tare at rest; principal")
+    assert words == "no object is named while readings drift: tare at rest"
+    assert curvatures.startswith("; principal")
 
 
 def test_a_new_skin_shows_that_the_finder_is_being_computed(window, until, monkeypatch):
