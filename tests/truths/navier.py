@@ -5,7 +5,7 @@ the plain second derivatives f_xx, f_yy and f_xy.
 """
 
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from scipy.special import j1
@@ -74,8 +74,7 @@ class HingedPlate:
 
     def surface(self, c, places):
         """Displacement (G,) of the modes `c` (modes, modes), both in m."""
-        (k, l), (x, y) = self.waves(), places.T
-        return _sums(np.sin(np.outer(x, k)), np.sin(np.outer(y, l)))(c)
+        return _surface(self, places.tobytes())(c)
 
     def curvature(self, c, elements, gage_length=0.0):
         """Readings (3, P) of the modes `c` (modes, modes) in m."""
@@ -98,9 +97,16 @@ def _stiffness(plate):
     return plate.a * plate.b / 4 * plate.rigidity * _squares(plate) ** 2
 
 
-@cache
+@lru_cache(64)  # half a megabyte each: loads of random widths would fill the memory
 def _mean(plate, load):
     return load.mean(np.sqrt(_squares(plate)))
+
+
+@lru_cache(8)
+def _surface(plate, places):
+    """The map from modes to displacements, for the bytes of `places` (G, 2)."""
+    (k, l), (x, y) = plate.waves(), np.frombuffer(places).reshape(-1, 2).T
+    return _sums(np.sin(np.outer(x, k)), np.sin(np.outer(y, l)))
 
 
 # The mean of a wave k over a length L is sinc(k L / 2) times its middle. Along a diagonal, x and y

@@ -7,13 +7,15 @@ sine of y, for u a cosine, times Legendre polynomials of x.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.polynomial.hermite_e import hermegauss
 from numpy.polynomial.legendre import legder, leggauss, legvander
 
 from navier import Load
+
+leggauss = cache(leggauss)  # a load asks for it each time
 
 # P_k - c P_(k+2) vanishes at both ends with c = 1, where it is an integral of P_(k+1), and its
 # slope does with c = k (k + 1) / ((k + 2) (k + 3)).

@@ -394,14 +394,15 @@ class Press:
 
 def told(press, frames, seed=0) -> Told:
     """What is told of `frames` presses at random places, each with its own noise."""
-    case = FLAT[0]
+    case, plate = FLAT[0], HingedPlate()
     rng, layout = np.random.default_rng(seed), case.layout
-    read, contacts = case.truth(layout), Contacts(case.skin, layout)
+    contacts = Contacts(case.skin, layout)
     fit = LeastSquares(basis_for(case.skin.patch, "hinged", 8, 8), layout)
     two, single, covered = 0, 0, [np.empty((0, 3), bool)]
     for _ in range(frames):
         loads = press.made(rng)
-        curvature = sum(map(read, loads)) + rng.uniform(-case.noise, case.noise, (3, 100))
+        exact = plate.curvature(sum(map(plate.coefficients, loads)), layout.positions)
+        curvature = exact + rng.uniform(-case.noise, case.noise, (3, 100))
         both = contacts(curvature, fit(curvature))
         single += both[0].single
         two += both[1].present
@@ -708,7 +709,7 @@ def promised(setting, radius, force, noise, frames, places=8, seed=0) -> np.ndar
     basis = basis_for(PATCH, "hinged", *functions)
     fit = estimator_for(setting.method, basis, layout)
     grid = np.stack(np.meshgrid(*2 * [np.linspace(0, 0.1, 41)]), axis=-1).reshape(-1, 2)
-    said, true = [], []
+    on_grid, said, true = basis.at(grid), [], []
     for number, (x, y) in enumerate(rng.uniform(0.02, 0.08, (places, 2))):
         disc = DiscLoad(x, y, radius, force) if radius else PointLoad(x, y, force)
         pressed = replace(
@@ -720,7 +721,7 @@ def promised(setting, radius, force, noise, frames, places=8, seed=0) -> np.ndar
         exact, w = _NAVIER.curvature(c, layout.positions), _NAVIER.surface(c, grid)
         spread = sqrt(3) * noise * rng.uniform(-1, 1, (frames // places, *exact.shape))
         read = np.concatenate([exact[None], exact + spread])
-        off = fit(read).coefficients.reshape(len(read), -1) @ basis.at(grid).T - w
+        off = fit(read).coefficients.reshape(len(read), -1) @ on_grid.T - w
         rms = np.sqrt(np.mean(off**2, axis=1))
         true.append((rms[0], rms[1:].mean()))
     return np.mean(said, axis=0) / np.mean(true, axis=0)

@@ -57,6 +57,15 @@ def test_the_scatter_of_an_estimator_with_memory_is_not_predicted():
 # What `cost --within` and Table 1 promise of small contacts
 
 
+# Each load once, each setting twice.
+@pytest.mark.cases(
+    "least-squares-10-(0.0, 0.15, 0.2",
+    "least-squares-10-(0.001, 0.005, 0.2",
+    "bayes-10-(0.001, 0.15, 0.2",
+    "bayes-10-(0.001, 0.15, 0.03",
+    "least-squares-16-(0.003, 0.15, 0.2",
+    "least-squares-16-(0.003, 0.15, 0.03",
+)
 @pytest.mark.parametrize("load", SMALL, ids=str)
 @pytest.mark.parametrize("setting", SETTINGS, ids=lambda one: f"{one.method}-{one.elements[0]}")
 @frames

@@ -1,5 +1,6 @@
 """Error bars of a contact cover truths that share nothing with the estimator."""
 
+from dataclasses import replace
 from functools import cache
 from math import sqrt
 
@@ -69,14 +70,16 @@ def test_the_place_on_a_flat_skin_is_near_the_cramer_rao_bound(case, frames):
 
 # A bent skin that stretches, pressed by a disc
 
+UNBOUND = [replace(case, bound=False) for case in BENT]  # no test asks for the bound
 
-@each(BENT)
+
+@each(UNBOUND)
 @frames
 def test_the_force_on_a_bent_skin_is_right(case, frames):
     assert abs(figures(case, frames).bias) < 0.03
 
 
-@each(BENT)
+@each(UNBOUND)
 @frames
 def test_intervals_on_a_bent_skin_cover_the_truth(case, frames):
     found, least = figures(case, frames), 0.90 - slack(frames)
@@ -130,6 +133,7 @@ by_grid = pytest.mark.parametrize("grid", GRIDS, ids=lambda grid: "{} elements, 
 draws = pytest.mark.parametrize("draws", [SOME, pytest.param(MORE, marks=pytest.mark.full)])
 
 
+@pytest.mark.cases("-0.1-", "-0.25-")  # the fewest bad elements, and the most
 @by_grid
 @pytest.mark.parametrize("share", SHARES)
 @pytest.mark.parametrize("equal", [True, False])

@@ -65,7 +65,7 @@ class StretchingPlate:
         c = np.zeros_like(forces)
         energy, gradient, hessian = self._at(c, forces)
         for _ in range(60):
-            step, _ = cg(hessian, -gradient.ravel(), rtol=1e-6, M=self._inverse_stiffness)
+            step, _ = cg(hessian, -gradient.ravel(), rtol=1e-3, M=self._inverse_stiffness)
             step = step.reshape(c.shape)
             short = 1.0
             most = energy + 1e-10 * abs(energy)  # of rounding
@@ -87,7 +87,8 @@ class StretchingPlate:
     @cached_property
     def _inverse_stiffness(self):
         inverse = 1 / self._sines.stiffness.ravel()
-        return LinearOperator((inverse.size,) * 2, matvec=lambda r: inverse * r.ravel())
+        shape = (inverse.size,) * 2
+        return LinearOperator(shape, matvec=lambda r: inverse * r.ravel(), dtype=float)
 
     def energy(self, c, forces):
         """Energy in J of the deflection `c` in m under `forces` in N."""
@@ -109,7 +110,8 @@ class StretchingPlate:
             p_work = self._work(N, px, py) + self._work(self._forces_of(more), wx, wy)
             return (bending * p.reshape(c.shape) + p_work).ravel()
 
-        return energy, gradient, LinearOperator((c.size, c.size), matvec=product)
+        # Without its type it would be multiplied once to see it.
+        return energy, gradient, LinearOperator((c.size, c.size), matvec=product, dtype=float)
 
     def _forces_of(self, strain):
         """Membrane forces xx, yy, xy in N/m of strains xx, yy and shear."""
