@@ -90,13 +90,15 @@ def test_an_engine_that_is_killed_is_told_and_what_it_recorded_is_completed(tmp_
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="no process can be stopped")
 def test_an_engine_that_hangs_is_ended_and_what_it_recorded_is_completed(tmp_path) -> None:
     path = tmp_path / "a.mcap"
-    patched = "import sys; from kappaskin.cli import main, record; record._BEGIN = 2.0; "
+    # No less: it is also how long a busy machine may take until the first reading.
+    patched = "import sys; from kappaskin.cli import main, record; record._BEGIN = 6.0; "
     patched += f"sys.exit(main(['record', 'sim:circle', {str(path)!r}]))"
     with subprocess.Popen(
         [sys.executable, "-c", patched], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
         part = part_of(path)
-        begun = lambda: part.exists() and part.stat().st_size > 50_000  # noqa: E731
+        # Long after the first reading, which the command has seen then too.
+        begun = lambda: part.exists() and part.stat().st_size > 400_000  # noqa: E731
         engine_of(process, begun).suspend()
         told, why = process.communicate(timeout=60)
     assert (process.returncode, told) == (1, "")
