@@ -95,7 +95,7 @@ class Contact:
 
     @property
     def present(self) -> bool:
-        return math.isfinite(self.force)
+        return math.isfinite(self.position.item(0))
 
     @property
     def position_95(self) -> Array:

@@ -44,11 +44,15 @@ class FittedDrift:
 
 
 def level_and_slopes(layout: SensorLayout) -> Array:
-    """A level, and slopes along x and along y, of the readings of each component, (9, 3 P)."""
+    """A level, and slopes along x and y, of the readings of each of k kinds, (3 k, R).
+
+    Of a curvature sensor that is of each component, (9, 3 P).
+    """
     patch = layout.patch
     centred = (layout.positions - [patch.a / 2, patch.b / 2]) / [patch.a, patch.b]
-    each = np.column_stack([np.ones(len(layout)), centred])
-    return np.kron(np.eye(3), each).T.astype(np.float64)
+    each = np.column_stack([np.ones(len(layout)), centred])[layout.element].T
+    own = np.equal.outer(np.arange(len(layout.kinds)), layout.kind)
+    return (own[:, None] * each).reshape(-1, layout.channels)
 
 
 class SmoothDrift:

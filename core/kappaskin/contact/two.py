@@ -9,10 +9,11 @@ import numpy as np
 
 from kappaskin.bases import basis_for
 from kappaskin.contact.drift import FittedDrift, SmoothDrift
+from kappaskin.contact.geometry import contact_geometry
 from kappaskin.contact.influence import influence_of
 from kappaskin.contact.point import NO_CONTACT, PointContact, left_by_chance
 from kappaskin.estimation import Fit, PatternCache
-from kappaskin.frames import Array, Contact, Mask
+from kappaskin.frames import Array, Contact, LocalGeometry, Mask
 from kappaskin.mechanics import Plate
 from kappaskin.sensing import SensorLayout
 
@@ -74,6 +75,10 @@ class Contacts:
             left = self._pairs.left * float(fit.noise) ** 2
         self.drift = self._drift(curvature, fit, found, rest, left)
         return self.drift.contacts if self.drift else found
+
+    def geometry(self, fit: Fit, contact: Contact) -> LocalGeometry:
+        """Geometry of the skin at a contact; NaN where there is none."""
+        return contact_geometry(fit, contact)
 
     def _pressed(self, curvature: Array, fit: Fit) -> tuple[Contact, Contact]:
         """The contacts where nothing drifts."""

@@ -1,0 +1,307 @@
+"""Contacts without mechanics: from the shape of a skin whose material is unknown."""
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+
+from kappaskin.bases import Basis
+from kappaskin.contact.drift import FittedDrift, level_and_slopes
+from kappaskin.contact.geometry import CurvatureFormMap, contact_geometry, local_geometry
+from kappaskin.contact.objects import KINDS, NO_OBJECT, ContactObject
+from kappaskin.contact.point import NO_CONTACT, orthonormal
+from kappaskin.contact.two import Contacts
+from kappaskin.estimation import Fit, PatternCache
+from kappaskin.frames import Array, Contact, LocalGeometry, Mask
+from kappaskin.mechanics import Plate
+from kappaskin.sensing import SensorLayout
+
+CHANCE = 1e-6
+"""Share of frames without a contact in which one is found by chance."""
+
+_POINTS, _MOST = 3, 121  # of the map for each function along a side, and at most
+_PART = 0.5  # of the mean concavity of a dent: where it is less, the dent ends
+_ROUNDS = 8  # in which the dent's edge settles
+_DEEP = 3.0  # standard deviations: a dent is deeper
+_SINGLE = 0.8  # of all dents, by depth times concavity: so much the deepest one has
+_DOUBT = 1.5  # times what another measure differs by: standard deviation of what none resolves
+_COARSE = 2 / 3  # of the functions along each side: another measure of the depth
+_RIM = 1 / 15  # of a side: within it, a skin hardly moves
+
+
+# Where the skin is most concave lies in the contact, whatever the skin is made of: M = -D lap w of
+# a plate obeys lap M = -q for the pressure q, so that M has no peak where nothing presses; that of
+# a membrane is the pressure; and an elastomer follows the object, and turns over at the rim. Where
+# a peak is sharp, as on a plate, powers of the concavity come near it; where it is flat, as under a
+# ball in an elastomer, they have its middle. By how much two powers differ is what is not resolved.
+class Imprints:
+    """The contact on a skin, by its shape alone; without a force.
+
+    A contact is found where the shape explains more of the readings than noise does in one frame of
+    a million, and more than a level and slopes of each quantity do. It is the dent that is deepest
+    and most concave, m = -(K_xx + K_yy) / 2 with the curvature form K of the deflected skin. It
+    lies in the mean of places weighted by m^4, in the region where m is at least half of its mean;
+    its area is that of an even ellipse of the same mean squares, and the curvature form at the
+    contact the mean over it. Standard deviations have besides the noise what m^2, an ellipse of
+    half the area and two thirds of the functions differ by.
+
+    Where a plate of any rigidity under one load or two explains the readings of a curvature sensor
+    to the noise, it tells place, depth and size better, and they are its.
+    """
+
+    def __init__(self, plate: Plate, layout: SensorLayout, basis: Basis, edge: str) -> None:
+        patch, (Ni, Nj) = plate.patch, basis.shape
+        self._basis, self._layout = basis, layout
+        self._plate = None if layout.reads else Contacts(plate, layout, edge)
+        x, y = patch.grid(*(min(_POINTS * count + 1, _MOST) for count in (Ni, Nj)))
+        self._form, self._depth = CurvatureFormMap(basis, x, y), basis.on_grid(x, y)
+        self._places = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
+        self._half_wave = patch.a / Ni if patch.strip else math.sqrt(patch.a * patch.b / (Ni * Nj))
+        self._cell = math.sqrt((x[1] - x[0]) * (y[1] - y[0]))
+        self._coarse = np.zeros(basis.shape)
+        self._coarse[: math.ceil(_COARSE * Ni), : math.ceil(_COARSE * Nj)] = 1.0
+        self._smooth = PatternCache[Array]()
+        self._there: LocalGeometry | None = None
+        self.drift: FittedDrift | None = None
+        """The drift beside the last contacts; None where there is none."""
+        self.chance = 1.0
+        """Probability that noise alone explains as much of the last readings."""
+        self.loads: tuple[Contact, Contact] | None = None
+        """The last contacts with forces by the plate's nominal rigidity, where a plate fits."""
+
+    def __call__(self, readings: Array, fit: Fit) -> tuple[Contact, Contact]:
+        """The contacts for the `readings` of one frame, NaN where missing, and the `fit` to them.
+
+        The second one is there only where a plate fits.
+        """
+        self._there = self.drift = self.loads = None
+        if self._plate is not None:
+            found = self._plate(readings, fit)
+            self.drift = self._plate.drift
+            if self.drift or found[0].single or found[1].present:
+                self.loads = found
+                return without_force(found[0]), without_force(found[1])
+        self.chance = self._by_chance(readings, fit)
+        if not self.chance < CHANCE:
+            return NO_CONTACT, NO_CONTACT
+        form = self._form(fit.coefficients)
+        if (dent := self._dent(form, self._depth(fit.coefficients))) is None:
+            return NO_CONTACT, NO_CONTACT
+        self._there, contact = self._measured(dent, form, fit)
+        return contact, NO_CONTACT
+
+    def geometry(self, fit: Fit, contact: Contact) -> LocalGeometry:
+        """Geometry of the skin at the last first contact; NaN where there is none."""
+        if self._there is None or not contact.present:
+            return contact_geometry(fit, contact)
+        return self._there
+
+    def _by_chance(self, readings: Array, fit: Fit) -> float:
+        """Probability that noise explains as much of the readings as the shape does, by F."""
+        weight = (fit.estimator.weight if fit.weights is None else fit.weights).ravel()
+        used = np.isfinite(readings.ravel())
+        Q = self._smooth(used, lambda used: self._spread(used, weight))
+        K = np.where(used, readings.ravel() * weight, 0.0)
+        along, left = Q @ K, np.nan_to_num(fit.residual.ravel()) * weight
+        explained = float(K.dot(K) - along.dot(along) - left.dot(left))
+        unknowns, spare = float(used.sum() - fit.spare), float(fit.spare)
+        if not explained > 0 or not unknowns > 0:
+            return 1.0
+        if not (variance := float(fit.noise) ** 2):
+            return 0.0
+        if fit.estimator.sigma is not None:
+            return float(scipy.special.chdtrc(unknowns, explained / variance))
+        return float(scipy.special.fdtrc(unknowns, spare, explained / unknowns / variance))
+
+    def _spread(self, used: Mask, weight: Array) -> Array:
+        """Orthonormal directions (d, R) of weighted readings that a level and slopes may have."""
+        return orthonormal(np.where(used, weight * level_and_slopes(self._layout), 0.0))
+
+    def _dent(self, form: Array, depth: Array) -> "_Dent | None":
+        """The dent that is deepest and most concave; None where the skin is nowhere concave.
+
+        By the curvature `form` (3, ny, nx) in 1/m and the `depth` (ny, nx) in m.
+        """
+        m = (self._basis.patch.base_curvature - form[0] - form[1]) / 2
+        inward = (depth > 0) & (m > 0)
+        if not inward.any():
+            return None
+        size, level = np.where(inward, m * depth, 0.0), _PART * float(m[inward].max())
+        for _ in range(_ROUNDS):
+            dents, count = scipy.ndimage.label(inward & (m > level))
+            share = np.bincount(dents.ravel(), size.ravel(), count + 1)[1:]
+            region = dents == 1 + int(share.argmax())
+            level = _PART * float(m[region].mean())
+        place, size, away = self._centred(m, region, 4)
+        other, coarse, _ = self._centred(m, region, 2)
+        single = bool(share.max() >= _SINGLE * share.sum())
+        return _Dent(place, size, away, math.dist(place, other), abs(size - coarse), single)
+
+    def _centred(self, m: Array, region: Mask, power: int) -> tuple[Array, float, Array]:
+        """Place, squared radius and distances by `power` of the concavity m in 1/m (`_Dent`)."""
+        inside = region.ravel()
+        share = (m[region] / m[region].max()) ** power
+        share /= share.sum()
+        place = share @ self._places[inside]
+        off = self._places - place
+        if self._basis.patch.strip:
+            off = off[:, :1]
+        squares = (off[inside] * share[:, None]).T @ off[inside]
+        squares += self._cell**2 / 12 * np.eye(len(squares))
+        away = np.vecdot(off @ np.linalg.inv(squares), off) / 4
+        return place, 4 * float(np.linalg.det(squares)) ** (1 / len(squares)), away
+
+    def _form_over(self, form: Array, away: Array) -> tuple[Array, float]:
+        """Mean (3,) of the curvature `form` (3, ny, nx) where `away` (G,) is below 1; its scatter.
+
+        Places near the rim weigh less. The scatter, of xx and yy by RMS, is that about the mean.
+        """
+        of_all = form.reshape(3, -1)
+        share = np.maximum(1 - away, 0.0)
+        share[np.isnan(of_all[0])] = 0.0
+        inside = np.flatnonzero(share)
+        share, inner = share[inside] / share[inside].sum(), of_all[:, inside]
+        mean = inner @ share
+        squares = np.square(inner[:2] - mean[:2, None]) @ share
+        return mean, math.sqrt(float(squares.mean()))
+
+    def _measured(self, dent: "_Dent", form: Array, fit: Fit) -> tuple[LocalGeometry, Contact]:
+        patch, strip = self._basis.patch, self._basis.patch.strip
+        K, scatter = self._form_over(form, dent.away)
+        smaller, _ = self._form_over(form, 2 * dent.away)
+        fewer, _ = self._form_over(self._form(self._coarse * fit.coefficients), dent.away)
+        across = math.sqrt(dent.size) / self._half_wave
+        cells = max(2 * across if strip else math.pi * across**2, 1.0)
+        there = local_geometry(fit, dent.place)
+        # Errors of a curvature are alike whichever way x points: that of xy has half the variance.
+        unresolved = float(np.mean((K - smaller) ** 2) + np.mean((K - fewer) ** 2))
+        unresolved = _DOUBT**2 * unresolved + scatter**2 / cells
+        covariance = there.covariance / cells + unresolved * np.diag([1.0, 1.0, 0.5])
+        K_xx, K_yy, K_xy = K.tolist()
+        there = replace(
+            there,
+            curvature_form=np.array([[K_xx, K_xy], [K_xy, K_yy]]),
+            covariance=covariance,
+        )
+        # By m^4, an error dm moves the place by the mean of 4 dm / m times the distance from it.
+        concave = max((patch.base_curvature - K_xx - K_yy) / 2, math.ulp(0.0))
+        noise = 2 * there.mean_sd / concave * math.sqrt(dent.size / cells)
+        place_sd = math.hypot(noise, _DOUBT * dent.moved)
+        x, y = dent.place.tolist()
+        (w, *slopes), covariance = fit.jet(x, y)[0][:3].tolist(), fit.jet(x, y)[1]
+        fine = w - self._basis.value(x, y, self._coarse * fit.coefficients)
+        w_sd = math.sqrt(max(covariance[0, 0], 0.0))
+        contact = Contact(
+            dent.place,
+            np.array([place_sd, 0.0 if strip else place_sd]),
+            math.nan,
+            math.nan,
+            w,
+            math.hypot(w_sd, fine, math.hypot(*slopes) * place_sd),
+            int(fit.spare),
+            dent.single,
+            bool(patch.near_rim(x, y, _RIM)),
+            dent.size,
+            math.hypot(_DOUBT * dent.resized, math.sqrt(dent.size) * self._half_wave),
+        )
+        return there, contact if w > _DEEP * w_sd else NO_CONTACT
+
+
+class _Dent(NamedTuple):
+    """A dent around `place` (2,) in m, of the squared radius `size` in m^2.
+
+    It is an even ellipse with the mean squares of the dent about its middle: `away` (G,) from it
+    are places of the map, by the square, 1 at its rim. By another power of the concavity the place
+    is `moved` in m and the size `resized` in m^2. `single` says that no other dent is as deep.
+    """
+
+    place: Array
+    size: float
+    away: Array
+    moved: float
+    resized: float
+    single: bool
+
+
+def without_force(contact: Contact) -> Contact:
+    """A contact on a skin whose material is unknown."""
+    return replace(contact, force=math.nan, force_sd=math.nan)
+
+
+_SURE = 0.9  # probability below which no kind is named
+_LEVEL = 0.01  # probability that an object of the kind differs as much from the shape
+_STEPS, _TURNS = 400, 64  # of the curvatures and axes tried
+_ROUNDEST, _FLATTEST = 0.1, 100.0  # radii tried, in radii of the contact
+_REACH = 1.96
+
+
+def imprinted_object(contact: Contact, geometry: LocalGeometry) -> ContactObject:
+    """The object that a skin of unknown material follows, by the curvature form at a contact.
+
+    A sphere, a cylinder or a plane: -K is its own curvature in the contact, and its errors are
+    Gaussian with the `covariance`. Named is one nine times as likely as the others together, from
+    which K does not differ by more than its errors, where the contact's size is resolved: how a
+    smaller object looks is the skin's doing. An edge is never named.
+    """
+    if not contact.present or not np.isfinite(geometry.covariance).all():
+        return NO_OBJECT
+    (xx, xy), (_, yy) = -geometry.curvature_form
+    C = geometry.covariance
+    radius = contact.load_radius
+    curvatures = np.geomspace(1 / (_FLATTEST * radius), 1 / (_ROUNDEST * radius), _STEPS)
+    turns = np.arange(_TURNS) * math.pi / _TURNS
+    c, s = np.cos(turns), np.sin(turns)
+    # Across a cylinder's axis along (c, s) the curvature is k, along it zero.
+    shapes = {
+        "plane": np.zeros((1, 3)),
+        "sphere": np.multiply.outer(curvatures, [1.0, 1.0, 0.0]),
+        "cylinder": np.multiply.outer(curvatures, np.stack([s * s, c * c, -c * s], -1)),
+    }
+    off = {kind: _squares(np.array([xx, yy, xy]) - shape, C) for kind, shape in shapes.items()}
+    likelihood = {kind: float(np.exp(-each / 2).mean()) for kind, each in off.items()}
+    total = sum(likelihood.values())
+    probability = {
+        kind: likelihood.get(kind, 0.0) / total if total else 1 / len(KINDS) for kind in KINDS
+    }
+    kind = max(probability, key=probability.__getitem__)
+    free = {"plane": 3, "sphere": 2, "cylinder": 1}[kind]
+    fits = float(scipy.special.chdtrc(free, off[kind].min())) >= _LEVEL
+    resolved = bool(contact.load_radius_95[0] > 0)
+    sure = resolved and fits and probability[kind] >= _SURE
+    found = replace(
+        NO_OBJECT,
+        kind=kind if sure else "",
+        probability=probability,
+        position=contact.position,
+        position_95=contact.position_95,
+        fits=fits,
+    )
+    if kind == "plane":
+        return found
+    direction = np.array([1.0, 1.0, 0.0])
+    if kind == "cylinder":
+        best = int(off[kind].min(axis=0).argmin())
+        direction = shapes[kind][0, best] / curvatures[0]
+        found = replace(found, axis=float(turns[best]), axis_95=_REACH * _turn_sd(xx, yy, xy, C))
+    weighted = np.linalg.solve(C, direction)
+    k = float(weighted @ [xx, yy, xy] / (weighted @ direction))
+    reach = _REACH / math.sqrt(float(weighted @ direction))
+    return replace(found, radius=_inverse(k), radius_95=(_inverse(k + reach), _inverse(k - reach)))
+
+
+def _squares(rest: Array, C: Array) -> Array:
+    """Squares (...) of `rest` (..., 3), in units of its covariance `C` (3, 3)."""
+    return np.vecdot(rest @ np.linalg.inv(C), rest)
+
+
+def _turn_sd(xx: float, yy: float, xy: float, C: Array) -> float:
+    """Standard deviation in rad of the axes of a curvature form."""
+    d = (xx - yy) / 2
+    gradient = np.array([-xy / 2, xy / 2, d])
+    return math.sqrt(float(gradient @ C @ gradient)) / (2 * (d * d + xy * xy))
+
+
+def _inverse(k: float) -> float:
+    return 1 / k if k > 0 else math.inf
