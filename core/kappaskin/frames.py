@@ -76,8 +76,9 @@ class Contact:
     reliable position and force.
     `size` and `size_sd` in m^2 are the squared radius of the disc that the load is spread over;
     NaN where the skin does not tell it. `force_is_lower_bound` says that the skin may stretch, by
-    which the force would change by more than its error bar (`kappaskin.contact.LowerBound`). Every
-    number is NaN when the readings hold no contact that stands out of the noise.
+    which the force would change by more than its error bar (`kappaskin.contact.LowerBound`). The
+    force is NaN where the skin's material is unknown; the size is then that of the contact's area.
+    Every number is NaN when the readings hold no contact that stands out of the noise.
     """
 
     position: Array

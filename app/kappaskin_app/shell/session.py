@@ -384,7 +384,7 @@ class Session(QObject):
         if region.around == "off" or estimate is None or sensor is None:
             return None
         found = estimate.contact
-        if not (found.present and math.isfinite(estimate.noise)):
+        if not (math.isfinite(found.force) and math.isfinite(estimate.noise)):
             return None
         try:
             x, y = (float(place) for place in found.position)

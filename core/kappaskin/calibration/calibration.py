@@ -112,6 +112,7 @@ class KnownWeights:
             axial_stiffness=plate.axial_stiffness and ratio * plate.axial_stiffness,
             rim_stiffness=self.rim_stiffness or ratio * plate.rim_stiffness,
             thickness=self.thickness or plate.thickness,
+            unknown_material=False,
         )
 
     def lines(self) -> list[str]:

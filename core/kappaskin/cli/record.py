@@ -363,7 +363,8 @@ def reconstruct(
     curvature or twist, its `direction` (R,) in rad from x, its `sigma` (R,) or (T, R), and in
     `datum` the quantities of an unknown zero. A `size` (1,) with `positions` (P, 1) is a strip, for
     which only curvature xx is used. An `outline` in m is a polygon (V, 2) or the radius of a disk.
-    With a `rigidity` in N m, forces are computed too; a `thickness` in m, `poisson` and `inplane`
+    With a `rigidity` in N m, forces are computed from curvature too; without it contacts are found
+    by the shape alone, as they are from `values`. A `thickness` in m, `poisson` and `inplane`
     (held, diaphragm, free; hoop of a bent skin) say how the skin stretches.
 
     Example: `kappaskin reconstruct in.npz --basis 8x8 --out out.npz --grid 101x101`
@@ -384,7 +385,7 @@ def reconstruct(
         The estimator: least-squares, as-printed, direct, fast, bayes, finite-slope, tracking or
         robust.
     contact
-        Write the contact of each frame too, and the skin's geometry there; NaN of `values`.
+        Write the contact of each frame too, and the skin's geometry there.
     objects
         Write the contact and the object: plane, cylinder, sphere or edge; some 50 ms a frame.
     """

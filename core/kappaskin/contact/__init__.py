@@ -5,8 +5,9 @@ from kappaskin.contact.geometry import CurvatureFormMap as CurvatureFormMap
 from kappaskin.contact.geometry import contact_geometry as contact_geometry
 from kappaskin.contact.geometry import local_geometry as local_geometry
 from kappaskin.contact.geometry import surface_geometry as surface_geometry
-from kappaskin.contact.imprint import Imprints as Imprints
-from kappaskin.contact.imprint import imprinted_object as imprinted_object
+from kappaskin.contact.imprint import ImprintObjects as ImprintObjects
+from kappaskin.contact.imprint import contacts_of as contacts_of
+from kappaskin.contact.imprint import object_finder as object_finder
 from kappaskin.contact.intrinsic import ForceTorqueSensor as ForceTorqueSensor
 from kappaskin.contact.intrinsic import IntrinsicContact as IntrinsicContact
 from kappaskin.contact.intrinsic import Wrench as Wrench

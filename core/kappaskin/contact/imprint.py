@@ -10,10 +10,11 @@ import scipy
 from kappaskin.bases import Basis
 from kappaskin.contact.drift import FittedDrift, level_and_slopes
 from kappaskin.contact.geometry import CurvatureFormMap, contact_geometry, local_geometry
-from kappaskin.contact.objects import KINDS, NO_OBJECT, ContactObject
+from kappaskin.contact.objects import KINDS, NO_OBJECT, ContactObject, ObjectFinder
 from kappaskin.contact.point import NO_CONTACT, orthonormal
-from kappaskin.contact.two import Contacts
-from kappaskin.estimation import Fit, PatternCache
+from kappaskin.contact.two import Contacts, as_one
+from kappaskin.errors import Refusal
+from kappaskin.estimation import Estimator, Fit, LeastSquares, PatternCache
 from kappaskin.frames import Array, Contact, LocalGeometry, Mask
 from kappaskin.mechanics import Plate
 from kappaskin.sensing import SensorLayout
@@ -23,10 +24,10 @@ CHANCE = 1e-6
 
 _POINTS, _MOST = 3, 121  # of the map for each function along a side, and at most
 _PART = 0.5  # of the mean concavity of a dent: where it is less, the dent ends
-_ROUNDS = 8  # in which the dent's edge settles
+_ROUNDS, _SETTLED = 8, 0.01  # in which the dent's edge settles, and how far
 _DEEP = 3.0  # standard deviations: a dent is deeper
 _SINGLE = 0.8  # of all dents, by depth times concavity: so much the deepest one has
-_DOUBT = 1.5  # times what another measure differs by: standard deviation of what none resolves
+_OUTSIDE = 1.5, 3.0  # times the squared radius: around the rim
 _COARSE = 2 / 3  # of the functions along each side: another measure of the depth
 _RIM = 1 / 15  # of a side: within it, a skin hardly moves
 
@@ -44,8 +45,8 @@ class Imprints:
     and most concave, m = -(K_xx + K_yy) / 2 with the curvature form K of the deflected skin. It
     lies in the mean of places weighted by m^4, in the region where m is at least half of its mean;
     its area is that of an even ellipse of the same mean squares, and the curvature form at the
-    contact the mean over it. Standard deviations have besides the noise what m^2, an ellipse of
-    half the area and two thirds of the functions differ by.
+    contact the mean over it. Standard deviations have besides the noise what weights of m, an
+    ellipse of half the area and two thirds of the functions differ by.
 
     Where a plate of any rigidity under one load or two explains the readings of a curvature sensor
     to the noise, it tells place, depth and size better, and they are its.
@@ -62,7 +63,7 @@ class Imprints:
         self._cell = math.sqrt((x[1] - x[0]) * (y[1] - y[0]))
         self._coarse = np.zeros(basis.shape)
         self._coarse[: math.ceil(_COARSE * Ni), : math.ceil(_COARSE * Nj)] = 1.0
-        self._smooth = PatternCache[Array]()
+        self._smooth, self._weight = PatternCache[Array](), np.empty(0)
         self._there: LocalGeometry | None = None
         self.drift: FittedDrift | None = None
         """The drift beside the last contacts; None where there is none."""
@@ -100,8 +101,9 @@ class Imprints:
 
     def _by_chance(self, readings: Array, fit: Fit) -> float:
         """Probability that noise explains as much of the readings as the shape does, by F."""
-        weight = (fit.estimator.weight if fit.weights is None else fit.weights).ravel()
-        used = np.isfinite(readings.ravel())
+        weight, used = fit.estimator.weight, np.isfinite(readings.ravel())
+        if weight is not self._weight:
+            self._smooth, self._weight = PatternCache[Array](), weight
         Q = self._smooth(used, lambda used: self._spread(used, weight))
         K = np.where(used, readings.ravel() * weight, 0.0)
         along, left = Q @ K, np.nan_to_num(fit.residual.ravel()) * weight
@@ -133,11 +135,15 @@ class Imprints:
             dents, count = scipy.ndimage.label(inward & (m > level))
             share = np.bincount(dents.ravel(), size.ravel(), count + 1)[1:]
             region = dents == 1 + int(share.argmax())
-            level = _PART * float(m[region].mean())
+            before, level = level, _PART * float(m[region].mean())
+            if math.isclose(level, before, rel_tol=_SETTLED):
+                break
         place, size, away = self._centred(m, region, 4)
-        other, coarse, _ = self._centred(m, region, 2)
+        other, coarse, _ = self._centred(m, region, 1)
         single = bool(share.max() >= _SINGLE * share.sum())
-        return _Dent(place, size, away, math.dist(place, other), abs(size - coarse), single)
+        outside = m.ravel()[(away > _OUTSIDE[0]) & (away < _OUTSIDE[1])]
+        turns = bool(np.nanmean(outside) < 0) if np.isfinite(outside).any() else False
+        return _Dent(place, size, away, math.dist(place, other), abs(size - coarse), turns, single)
 
     def _centred(self, m: Array, region: Mask, power: int) -> tuple[Array, float, Array]:
         """Place, squared radius and distances by `power` of the concavity m in 1/m (`_Dent`)."""
@@ -169,16 +175,23 @@ class Imprints:
 
     def _measured(self, dent: "_Dent", form: Array, fit: Fit) -> tuple[LocalGeometry, Contact]:
         patch, strip = self._basis.patch, self._basis.patch.strip
-        K, scatter = self._form_over(form, dent.away)
-        smaller, _ = self._form_over(form, 2 * dent.away)
+        there = local_geometry(fit, dent.place)
+        mean, scatter = self._form_over(form, dent.away)
+        other, _ = self._form_over(form, 2 * dent.away)
+        K = mean
+        if not dent.turns:
+            K, other = there.curvature_form[[0, 1, 0], [0, 1, 1]], mean
         fewer, _ = self._form_over(self._form(self._coarse * fit.coefficients), dent.away)
         across = math.sqrt(dent.size) / self._half_wave
         cells = max(2 * across if strip else math.pi * across**2, 1.0)
-        there = local_geometry(fit, dent.place)
         # Errors of a curvature are alike whichever way x points: that of xy has half the variance.
-        unresolved = float(np.mean((K - smaller) ** 2) + np.mean((K - fewer) ** 2))
-        unresolved = _DOUBT**2 * unresolved + scatter**2 / cells
-        covariance = there.covariance / cells + unresolved * np.diag([1.0, 1.0, 0.5])
+        unresolved = float(np.mean((K - other) ** 2) + np.mean((mean - fewer) ** 2))
+        unresolved += scatter**2 / cells
+        # A dent no wider than a wave of the functions has the curvature that these give it.
+        unresolved += np.mean(K**2) * (min(1.0, 1 / across**2) ** 2 / 2) ** 2
+        covariance = there.covariance / (cells if dent.turns else 1) + unresolved * np.diag(
+            [1.0, 1.0, 0.5]
+        )
         K_xx, K_yy, K_xy = K.tolist()
         there = replace(
             there,
@@ -188,7 +201,7 @@ class Imprints:
         # By m^4, an error dm moves the place by the mean of 4 dm / m times the distance from it.
         concave = max((patch.base_curvature - K_xx - K_yy) / 2, math.ulp(0.0))
         noise = 2 * there.mean_sd / concave * math.sqrt(dent.size / cells)
-        place_sd = math.hypot(noise, _DOUBT * dent.moved)
+        place_sd = math.hypot(noise, dent.moved)
         x, y = dent.place.tolist()
         (w, *slopes), covariance = fit.jet(x, y)[0][:3].tolist(), fit.jet(x, y)[1]
         fine = w - self._basis.value(x, y, self._coarse * fit.coefficients)
@@ -199,14 +212,65 @@ class Imprints:
             math.nan,
             math.nan,
             w,
-            math.hypot(w_sd, fine, math.hypot(*slopes) * place_sd),
+            math.hypot(w_sd, fine, math.hypot(*slopes) * math.sqrt(2) * place_sd),
             int(fit.spare),
             dent.single,
             bool(patch.near_rim(x, y, _RIM)),
             dent.size,
-            math.hypot(_DOUBT * dent.resized, math.sqrt(dent.size) * self._half_wave),
+            math.hypot(
+                dent.resized if dent.turns else dent.size, math.sqrt(dent.size) * self._half_wave
+            ),
         )
         return there, contact if w > _DEEP * w_sd else NO_CONTACT
+
+
+def contacts_of(plate: Plate, layout: SensorLayout, basis: Basis, edge: str) -> Contacts | Imprints:
+    """What finds the contacts on a skin: by its mechanics, if its material is known.
+
+    Those of readings other than a curvature sensor's are found by the shape too.
+    """
+    if plate.unknown_material or layout.reads:
+        return Imprints(plate, layout, basis, edge)
+    return Contacts(plate, layout, edge)
+
+
+def object_finder(
+    plate: Plate, layout: SensorLayout, edge: str, estimator: Estimator
+) -> "ObjectFinder | ImprintObjects":
+    """What recognises the object on a skin, as `contacts_of` finds the contacts."""
+    if plate.unknown_material or layout.reads:
+        return ImprintObjects(plate, estimator, edge)
+    return ObjectFinder(plate, layout, edge)
+
+
+class ImprintObjects:
+    """Recognises the object on a skin whose material is unknown, as `ObjectFinder` does on others.
+
+    Where a plate of any rigidity explains the contact, by that plate; else by the shape alone. Both
+    without a force. The shape is that of the `estimator`.
+    """
+
+    def __init__(self, plate: Plate, estimator: Estimator, edge: str) -> None:
+        layout = estimator.layout
+        self._fit, self._plate = estimator, None
+        if estimator.has_memory:
+            self._fit = LeastSquares(estimator.basis, layout)
+        if not layout.reads:
+            self._plate = ObjectFinder(plate, layout, edge)
+        elif plate.patch.strip:
+            raise Refusal("object recognition needs a 2-D skin; this one is a strip")
+        self._imprints = Imprints(plate, layout, estimator.basis, edge)
+
+    def __call__(self, readings: Array, noise: float, contact: Contact) -> ContactObject:
+        """The object for the `readings` of one frame, NaN where missing, and the contact."""
+        if not contact.present:
+            return NO_OBJECT
+        fit = self._fit(readings)
+        found, _ = self._imprints(readings, fit)
+        if self._plate is not None and (loads := self._imprints.loads) is not None:
+            what = self._plate(readings, noise, as_one(*loads))
+            return replace(what, force=math.nan, force_95=math.nan)
+        return imprinted_object(found, self._imprints.geometry(fit, found))
 
 
 class _Dent(NamedTuple):
@@ -214,7 +278,8 @@ class _Dent(NamedTuple):
 
     It is an even ellipse with the mean squares of the dent about its middle: `away` (G,) from it
     are places of the map, by the square, 1 at its rim. By another power of the concavity the place
-    is `moved` in m and the size `resized` in m^2. `single` says that no other dent is as deep.
+    is `moved` in m and the size `resized` in m^2. It `turns` over around its rim, and is `single`
+    if no other dent is as deep.
     """
 
     place: Array
@@ -222,6 +287,7 @@ class _Dent(NamedTuple):
     away: Array
     moved: float
     resized: float
+    turns: bool
     single: bool
 
 

@@ -97,12 +97,12 @@ class Contacts:
 def as_one(first: Contact, second: Contact) -> Contact:
     """One contact in place of two, as an object has that touches in two places.
 
-    It lies between them and has the force of both.
+    It lies between them and has the force of both; in the middle where forces are unknown.
     """
     if not second.present:
         return first
     force = first.force + second.force
-    share = first.force / force
+    share = first.force / force if math.isfinite(force) else 0.5
     return replace(
         first,
         position=share * first.position + (1 - share) * second.position,

@@ -83,7 +83,8 @@ class Plate:
     of 0.1 x 0.1 m in by 5 mm. `thickness` h in m of a uniform sheet: a flat skin that was given
     none does not stretch, a bent one is 0.25 mm thick, or as its `axial_stiffness` E h in N/m has
     it, unless that is zero. `inplane` is how its edge is held in its plane, one of `INPLANE`; empty
-    means `held`, of a bent skin `hoop`.
+    means `held`, of a bent skin `hoop`. Of an `unknown_material` no force is told; a simulation
+    bends it like any other.
     """
 
     patch: Patch
@@ -96,6 +97,7 @@ class Plate:
     rim_stiffness: float = 2e3
     thickness: float | None = None
     inplane: str = ""
+    unknown_material: bool = False
 
     def __post_init__(self) -> None:
         for value, expected in (

@@ -16,10 +16,9 @@ from kappaskin.bases import Basis, ValueMap, basis_for
 from kappaskin.calibration import Calibration, Corrector, DriftMonitor, Rest, Tare
 from kappaskin.contact import (
     NO_CONTACT,
-    Contacts,
     LoadDetector,
     LowerBound,
-    contact_geometry,
+    contacts_of,
 )
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation import METHODS, Fit, check_method, estimator_for
@@ -132,7 +131,7 @@ class Pipeline:
         self._surface = self.basis.on_grid(self._x, self._y)
         known = setup.calibration and setup.calibration.weights
         plate = known.plate(sensor.plate) if known else sensor.plate
-        self._contacts = Contacts(plate, sensor.layout, edge)
+        self._contacts = contacts_of(plate, sensor.layout, self.basis, edge)
         self._bounded = LowerBound(plate, edge, known.deepest if known else 0.0)
         self.left_out = Exclusion.none(sensor, self._whole, self._ideal())
         self._no_shape = np.full(self.basis.shape, np.nan)
@@ -266,7 +265,7 @@ class Pipeline:
             drift,
             contact,
             second,
-            contact_geometry(fit, contact),
+            self._contacts.geometry(fit, contact),
             *self._compared(surface, fit.coefficients, frame.truth),
         )
 

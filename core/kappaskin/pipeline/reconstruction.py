@@ -16,15 +16,11 @@ from kappaskin._files import Budget, check_memory, open_file
 from kappaskin.bases import Basis, basis_for
 from kappaskin.contact import (
     KINDS,
-    NO_CONTACT,
-    NO_GEOMETRY,
-    NO_OBJECT,
     ContactObject,
-    Contacts,
     LowerBound,
-    ObjectFinder,
     as_one,
-    contact_geometry,
+    contacts_of,
+    object_finder,
 )
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation import (
@@ -147,11 +143,12 @@ def _read(path: Path) -> tuple[dict[str, Array], dict[str, NDArray[np.str_]]]:
 
 
 def _plate(patch: Patch, found: dict[str, Array], inplane: str) -> Plate:
-    """The skin by the numbers in the file; without a rigidity of 1 N m."""
+    """The skin by the numbers in the file; without a rigidity its material is unknown."""
     for name in _SKIN:
         if name in found and found[name].size != 1:
             raise Refusal(f"expected one {name}, got shape {found[name].shape}")
     told: dict[str, Any] = {"rigidity": 1.0, "inplane": inplane}
+    told["unknown_material"] = "rigidity" not in found
     told |= {name: float(found[name].item()) for name in _SKIN if name in found}
     return Plate(patch, **told)
 
@@ -283,8 +280,9 @@ def reconstruct(
     their units, less their offset where its datum is free; with a `grid` of nx x ny
     points also `grid_x` (nx,), `grid_y` (ny,) and `w` (T, ny, nx) in m. `edge` is one of `EDGES`,
     `method` one of `METHODS`. With `contact` also what `_contacts` and `_pairs` give, with
-    `objects` what `_objects` gives besides: all NaN of `values`, from which no contact is found
-    yet. What the shapes neglect goes to `warn`, in words.
+    `objects` what `_objects` gives besides. Without a rigidity, and of `values`, contacts and
+    objects are found by the shape, without a force. What the shapes neglect goes to `warn`, in
+    words.
     """
     found, texts = _read(readings)
     name, sigma = "values" if "values" in found else "curvature", found.get("sigma")
@@ -313,38 +311,55 @@ def reconstruct(
         out |= {"grid_x": x, "grid_y": y, "w": functions.on_grid(x, y)(out["coefficients"])}
     if not (contact or objects):
         return out
-    if layout.reads:
-        warn("contacts are found from curvature sensors only yet: those written are NaN")
-        return out | _no_contacts(len(frames), "rigidity" in found, objects)
     plate = _plate(patch, found, str(texts.get("inplane", np.array("")).item()))
-    fitter = estimator_for(method, functions, layout)
-    contacts_of, bounded = Contacts(plate, layout, edge), LowerBound(plate, edge)
-    fits = [fitter(frame) for frame in frames]
+    contacts_in, bounded = contacts_of(plate, layout, functions, edge), LowerBound(plate, edge)
+    fits = _fits(method, functions, layout, frames, sigma if layout.reads else None)
     read = [each.readings for each in fits]
     pairs, drifts = list[tuple[Contact, Contact]](), np.zeros(len(fits))
+    contacts, there = list[Contact](), list[LocalGeometry]()
     for frame, each in enumerate(fits):
-        pairs.append(contacts_of(each.readings, each))
-        if (drift := contacts_of.drift) is not None:
+        pairs.append(contacts_in(each.readings, each))
+        if (drift := contacts_in.drift) is not None:
             fits[frame], read[frame], drifts[frame] = drift.fit, drift.readings, drift.size
+        contacts.append(bounded(pairs[-1][0]))
+        there.append(contacts_in.geometry(fits[frame], contacts[-1]))
     out["drift"] = drifts
-    contacts = [bounded(first) for first, _ in pairs]
-    there = [contact_geometry(*each) for each in zip(fits, contacts, strict=True)]
     out |= _contacts(there, contacts, forces="rigidity" in found)
     out |= _pairs(pairs, forces="rigidity" in found)
     if objects:
-        find = ObjectFinder(plate, layout, edge)
-        noises = [float(each.noise) for each in fits]
         whole = [as_one(*pair) for pair in pairs]
-        out |= _objects([find(*each) for each in zip(read, noises, whole, strict=True)])
+        out |= _objects(_found_objects(plate, layout, edge, fits, read, whole))
     return out
 
 
-def _no_contacts(frames: int, forces: bool, objects: bool) -> dict[str, NDArray[Any]]:
-    """What is written of the contacts of so many `frames` in which none can be found."""
-    out = {"drift": np.full(frames, np.nan)}
-    out |= _contacts([NO_GEOMETRY] * frames, [NO_CONTACT] * frames, forces)
-    out |= _pairs([(NO_CONTACT, NO_CONTACT)] * frames, forces)
-    return out | (_objects([NO_OBJECT] * frames) if objects else {})
+def _fits(
+    method: str, basis: Basis, layout: SensorLayout, readings: Array, sigma: Array | None
+) -> list[Fit]:
+    """The fit of each frame by itself; `sigma` may be of each of them."""
+    if sigma is None or sigma.ndim <= len(layout.frame_shape):
+        fitter = estimator_for(method, basis, layout, sigma)
+        return [fitter(frame) for frame in readings]
+    each = zip(sigma, readings, strict=True)
+    return [estimator_for(method, basis, layout, own)(frame) for own, frame in each]
+
+
+def _found_objects(
+    plate: Plate,
+    layout: SensorLayout,
+    edge: str,
+    fits: list[Fit],
+    read: list[Array],
+    contacts: list[Contact],
+) -> list[ContactObject]:
+    """The object in each frame, by the fit of its readings and the contact in it."""
+    makers = {id(fit.estimator): fit.estimator for fit in fits}
+    finders = {
+        key: object_finder(plate, layout, edge, estimator) for key, estimator in makers.items()
+    }
+    return [
+        finders[id(fit.estimator)](readings, float(fit.noise), contact)
+        for fit, readings, contact in zip(fits, read, contacts, strict=True)
+    ]
 
 
 def _contacts(

@@ -125,6 +125,12 @@ SKIN = Part(
             Unit.same("N m"),
             limits=Within(1e-12, 1e6, "N m", or_zero=True),
         ),
+        "unknown_material": Key(
+            "Material unknown",
+            "The sensor does not state what the skin is made of: contacts are found by its shape, "
+            "without a force. The rigidity is that of the simulation.",
+            example=True,
+        ),
         "tension": Key(
             "Tension",
             "Tension of the skin, as of a drum head; 7 N/m double the stiffness of Table 1's "

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from kappaskin._schema import Key, Part, Unit, Within, fields_of
-from kappaskin._toml import REQUIRED, TomlTable, json_table
+from kappaskin._toml import TomlTable, json_table
 from kappaskin.bases import check_edge
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.mechanics import Plate
@@ -33,7 +33,12 @@ SENSOR = Part(
             Unit.same("frames/s"),
             kind=float,
         ),
-        "rigidity": replace(_SKIN.key("rigidity"), default=REQUIRED),
+        "rigidity": replace(
+            _SKIN.key("rigidity"),
+            tip="Bending stiffness of the skin. Without it its material is unknown, and so are "
+            "forces.",
+            default=None,
+        ),
         "size": _SKIN.key("size"),
         "base_curvature": Key(
             "Base curvature",
@@ -103,6 +108,7 @@ def sensor_to_json(sensor: Sensor) -> str:
         "dead_channels": np.flatnonzero(~layout.live.ravel()).tolist(),
         "channel_map": None if wired is None else wired.tolist(),
         "inplane": sensor.plate.inplane or None,
+        "rigidity": None if sensor.plate.unknown_material else sensor.plate.rigidity,
     }
     values |= {name: asdict(getattr(sensor.transduction, name)) for name in _CHAIN}
     written = {name: values[name] for name in SENSOR.keys if values[name] is not None}
@@ -132,7 +138,10 @@ def _sensor(table: TomlTable) -> Sensor:
     patch = _patch(values)
     check_sides(patch)
     check_edge(patch, values["edge"])
-    plate = Plate(patch, **{name: values[name] for name in fields_of(Plate).keys() & values.keys()})
+    known = {name: values[name] for name in fields_of(Plate).keys() & values.keys()}
+    if unknown := known["rigidity"] is None:
+        del known["rigidity"]
+    plate = Plate(patch, **known, unknown_material=unknown)
     wired = values["channel_map"]
     names = [  # half a pair of surrogates, which JSON may have, could be written to no file
         values[name].encode(errors="backslashreplace").decode()

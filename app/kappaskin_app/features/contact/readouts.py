@@ -81,6 +81,8 @@ def _contact(contact: Contact, second: Contact) -> str:
 def _forces(contact: Contact, second: Contact) -> str:
     """The forces of two contacts, without error bars, for which there is no room."""
     forces = 1e3 * contact.force, 1e3 * second.force
+    if not math.isfinite(forces[0]):
+        return NONE
     if abs(forces[0]) >= 1e3:
         return "{:.2f}, {:.2f} N".format(*(1e-3 * force for force in forces))
     return "{:.0f}, {:.0f} mN".format(*forces)

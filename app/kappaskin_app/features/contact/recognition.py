@@ -2,12 +2,21 @@
 
 from PySide6.QtCore import QObject, Signal
 
-from kappaskin.contact import NO_OBJECT, ContactObject, ObjectFinder, as_one
+from kappaskin.bases import basis_for
+from kappaskin.contact import (
+    NO_OBJECT,
+    ContactObject,
+    ImprintObjects,
+    ObjectFinder,
+    as_one,
+    object_finder,
+)
+from kappaskin.estimation import estimator_for
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
 from kappaskin.mechanics import Plate
 from kappaskin.pipeline import Setup
-from kappaskin.sensing import Sensor
+from kappaskin.sensing import Sensor, SensorLayout
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.widgets.parts import with_error
 
@@ -44,8 +53,8 @@ class ObjectRecognition(QObject):
         words = "Computing the readings of objects"
         self._preparation = BackgroundTask(tasks, words, self._set_finder, self._set_finder)
         self._recognition = BackgroundTask(tasks, "", self._finish)
-        self._key: tuple[int, Plate, str] | None = None
-        self._finder: ObjectFinder | str = ""
+        self._key: tuple[int, Plate, str, str, tuple[int, int]] | None = None
+        self._finder: ObjectFinder | ImprintObjects | str = ""
 
     def start(self, status: Status, estimate: Estimate | None) -> None:
         """Recognise the object of an estimate, once the readings of objects are computed."""
@@ -55,13 +64,13 @@ class ObjectRecognition(QObject):
             self.described.emit("", "", "")
         elif self._key != (key := (status.connections, *_skin(sensor, status.setup))):
             self._key = key
-            self._preparation.run(ObjectFinder, key[1], sensor.layout, key[2])
+            self._preparation.run(_finder, sensor.layout, *key[1:])
         elif self._preparation.running:
             self.described.emit(_PREPARING, "", "")
         elif estimate.generation == status.generation and not self._recognition.running:
             self._recognition.run(_recognise, self._finder, estimate)
 
-    def _set_finder(self, finder: ObjectFinder | Exception) -> None:
+    def _set_finder(self, finder: ObjectFinder | ImprintObjects | Exception) -> None:
         """Store the finder, or the reason why there is none."""
         self._finder = str(finder) if isinstance(finder, Exception) else finder
 
@@ -72,14 +81,23 @@ class ObjectRecognition(QObject):
         self.found.emit(*found)
 
 
-def _skin(sensor: Sensor, setup: Setup) -> tuple[Plate, str]:
-    """The skin and its edge, as the setup has them."""
+def _skin(sensor: Sensor, setup: Setup) -> tuple[Plate, str, str, tuple[int, int]]:
+    """The skin, its edge, the estimator and its functions, as the setup has them."""
     known = setup.calibration
-    return known.plate(sensor.plate) if known else sensor.plate, setup.edge or sensor.edge
+    plate = known.plate(sensor.plate) if known else sensor.plate
+    across = 1 if plate.patch.strip else setup.Nj
+    return plate, setup.edge or sensor.edge, setup.method, (setup.Ni, across)
+
+
+def _finder(
+    layout: SensorLayout, plate: Plate, edge: str, method: str, functions: tuple[int, int]
+) -> ObjectFinder | ImprintObjects:
+    basis = basis_for(plate.patch, edge, *functions)
+    return object_finder(plate, layout, edge, estimator_for(method, basis, layout))
 
 
 def _recognise(
-    finder: ObjectFinder | str, estimate: Estimate
+    finder: ObjectFinder | ImprintObjects | str, estimate: Estimate
 ) -> tuple[str, str, ContactObject, Estimate]:
     if isinstance(finder, str):
         found, what = NO_OBJECT, finder

@@ -101,8 +101,8 @@ def test_no_object_is_named_while_readings_drift():
 
 def test_a_new_skin_shows_that_the_finder_is_being_computed(window, until, monkeypatch):
     until(lambda: "curvatures" in window.display.status_bar.object.text())
-    made, seen = recognition.ObjectFinder, threading.Event()
-    monkeypatch.setattr(recognition, "ObjectFinder", lambda *of: seen.wait(60) and made(*of))
+    made, seen = recognition.object_finder, threading.Event()
+    monkeypatch.setattr(recognition, "object_finder", lambda *of: seen.wait(60) and made(*of))
     window.requests.set("shape", "cylinder")
     until(
         lambda: "computing the model readings of objects" in window.display.status_bar.object.text()
