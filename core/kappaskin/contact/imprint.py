@@ -9,7 +9,12 @@ import scipy
 
 from kappaskin.bases import Basis
 from kappaskin.contact.drift import FittedDrift, level_and_slopes
-from kappaskin.contact.geometry import CurvatureFormMap, contact_geometry, local_geometry
+from kappaskin.contact.geometry import (
+    CurvatureFormMap,
+    contact_geometry,
+    local_geometry,
+    surface_geometry,
+)
 from kappaskin.contact.objects import KINDS, NO_OBJECT, ContactObject, ObjectFinder
 from kappaskin.contact.point import NO_CONTACT, orthonormal
 from kappaskin.contact.two import Contacts, as_one
@@ -23,12 +28,14 @@ CHANCE = 1e-6
 """Share of frames without a contact in which one is found by chance."""
 
 _POINTS, _MOST = 3, 121  # of the map for each function along a side, and at most
+_SHALLOW = 1 / 3  # of the depth at a dent's peak: where it is less, another one begins
 _PART = 0.5  # of the mean concavity of a dent: where it is less, the dent ends
 _ROUNDS, _SETTLED = 8, 0.01  # in which the dent's edge settles, and how far
 _DEEP = 3.0  # standard deviations: a dent is deeper
-_SINGLE = 0.8  # of all dents, by depth times concavity: so much the deepest one has
+_SECOND = 0.3  # of depth times concavity: a dent that has as much is another one
 _OUTSIDE = 1.5, 3.0  # times the squared radius: around the rim
-_COARSE = 2 / 3  # of the functions along each side: another measure of the depth
+_COARSE = 2 / 3  # of the functions along each side: another measure
+_ISOTROPIC = np.diag([1.0, 1.0, 0.5])  # variances of xx, yy and xy whichever way x points
 _RIM = 1 / 15  # of a side: within it, a skin hardly moves
 
 
@@ -95,9 +102,17 @@ class Imprints:
 
     def geometry(self, fit: Fit, contact: Contact) -> LocalGeometry:
         """Geometry of the skin at the last first contact; NaN where there is none."""
-        if self._there is None or not contact.present:
-            return contact_geometry(fit, contact)
-        return self._there
+        if self._there is not None or not contact.present:
+            return self._there or contact_geometry(fit, contact)
+        there = local_geometry(fit, contact.position)
+        c = self._coarse * fit.coefficients
+        fewer = surface_geometry(self._basis, c, contact.position, fit.covariance_of)
+        K = there.curvature_form
+        away = np.square(self._places - contact.position).sum(axis=1) / self._half_wave**2
+        around, _ = self._form_over(self._form(fit.coefficients), away)
+        unresolved = np.mean((K - fewer.curvature_form) ** 2)
+        unresolved += np.mean((K[[0, 1, 0], [0, 1, 1]] - around) ** 2)
+        return replace(there, covariance=there.covariance + unresolved * _ISOTROPIC)
 
     def _by_chance(self, readings: Array, fit: Fit) -> float:
         """Probability that noise explains as much of the readings as the shape does, by F."""
@@ -130,20 +145,26 @@ class Imprints:
         inward = (depth > 0) & (m > 0)
         if not inward.any():
             return None
-        size, level = np.where(inward, m * depth, 0.0), _PART * float(m[inward].max())
+        pressed = np.where(inward, m * depth, 0.0)
+        peak = int(pressed.argmax())
+        dents, _ = scipy.ndimage.label(depth > _SHALLOW * depth.flat[peak])
+        inward &= dents == dents.flat[peak]
+        level = _PART * float(m.flat[peak])
         for _ in range(_ROUNDS):
-            dents, count = scipy.ndimage.label(inward & (m > level))
-            share = np.bincount(dents.ravel(), size.ravel(), count + 1)[1:]
-            region = dents == 1 + int(share.argmax())
+            region = inward & (m > level)
             before, level = level, _PART * float(m[region].mean())
             if math.isclose(level, before, rel_tol=_SETTLED):
                 break
         place, size, away = self._centred(m, region, 4)
         other, coarse, _ = self._centred(m, region, 1)
-        single = bool(share.max() >= _SINGLE * share.sum())
+        others = pressed.ravel()[~inward.ravel() & (away > 1)].max(initial=0.0)
+        single = bool(others < _SECOND * pressed.flat[peak])
+        xx, yy, _ = self._form_over(form, 2 * away)[0].tolist()
+        single = single and (self._basis.patch.base_curvature - xx - yy) / 2 > level
         outside = m.ravel()[(away > _OUTSIDE[0]) & (away < _OUTSIDE[1])]
         turns = bool(np.nanmean(outside) < 0) if np.isfinite(outside).any() else False
-        return _Dent(place, size, away, math.dist(place, other), abs(size - coarse), turns, single)
+        concave, moved = float(m[region].mean()), math.dist(place, other)
+        return _Dent(place, size, away, concave, moved, abs(size - coarse), turns, single)
 
     def _centred(self, m: Array, region: Mask, power: int) -> tuple[Array, float, Array]:
         """Place, squared radius and distances by `power` of the concavity m in 1/m (`_Dent`)."""
@@ -184,14 +205,11 @@ class Imprints:
         fewer, _ = self._form_over(self._form(self._coarse * fit.coefficients), dent.away)
         across = math.sqrt(dent.size) / self._half_wave
         cells = max(2 * across if strip else math.pi * across**2, 1.0)
-        # Errors of a curvature are alike whichever way x points: that of xy has half the variance.
         unresolved = float(np.mean((K - other) ** 2) + np.mean((mean - fewer) ** 2))
         unresolved += scatter**2 / cells
         # A dent no wider than a wave of the functions has the curvature that these give it.
         unresolved += np.mean(K**2) * (min(1.0, 1 / across**2) ** 2 / 2) ** 2
-        covariance = there.covariance / (cells if dent.turns else 1) + unresolved * np.diag(
-            [1.0, 1.0, 0.5]
-        )
+        covariance = there.covariance / (cells if dent.turns else 1) + unresolved * _ISOTROPIC
         K_xx, K_yy, K_xy = K.tolist()
         there = replace(
             there,
@@ -199,12 +217,14 @@ class Imprints:
             covariance=covariance,
         )
         # By m^4, an error dm moves the place by the mean of 4 dm / m times the distance from it.
-        concave = max((patch.base_curvature - K_xx - K_yy) / 2, math.ulp(0.0))
-        noise = 2 * there.mean_sd / concave * math.sqrt(dent.size / cells)
+        noise = 2 * there.mean_sd / dent.concave * math.sqrt(dent.size / cells)
         place_sd = math.hypot(noise, dent.moved)
         x, y = dent.place.tolist()
         (w, *slopes), covariance = fit.jet(x, y)[0][:3].tolist(), fit.jet(x, y)[1]
-        fine = w - self._basis.value(x, y, self._coarse * fit.coefficients)
+        fine = self._depth((1 - self._coarse) * fit.coefficients).ravel()[dent.away < 1]
+        fine_sd = math.sqrt(float(np.nanmean(fine**2)))
+        # So much a wave just too short for the functions would add to a dent of this curvature.
+        fine_sd = math.hypot(fine_sd, abs(K_xx + K_yy) / 2 * (self._half_wave / math.pi) ** 2)
         w_sd = math.sqrt(max(covariance[0, 0], 0.0))
         contact = Contact(
             dent.place,
@@ -212,7 +232,7 @@ class Imprints:
             math.nan,
             math.nan,
             w,
-            math.hypot(w_sd, fine, math.hypot(*slopes) * math.sqrt(2) * place_sd),
+            math.hypot(w_sd, fine_sd, math.hypot(*slopes) * math.sqrt(2) * place_sd),
             int(fit.spare),
             dent.single,
             bool(patch.near_rim(x, y, _RIM)),
@@ -277,14 +297,15 @@ class _Dent(NamedTuple):
     """A dent around `place` (2,) in m, of the squared radius `size` in m^2.
 
     It is an even ellipse with the mean squares of the dent about its middle: `away` (G,) from it
-    are places of the map, by the square, 1 at its rim. By another power of the concavity the place
-    is `moved` in m and the size `resized` in m^2. It `turns` over around its rim, and is `single`
-    if no other dent is as deep.
+    are places of the map, by the square, 1 at its rim. It is `concave` in 1/m in the mean. By
+    another power of the concavity the place is `moved` in m and the size `resized` in m^2. It
+    `turns` over around its rim, and is `single` if it is filled and no other dent is as deep.
     """
 
     place: Array
     size: float
     away: Array
+    concave: float
     moved: float
     resized: float
     turns: bool
