@@ -137,7 +137,7 @@ class Imprints:
         return orthonormal(np.where(used, weight * level_and_slopes(self._layout), 0.0))
 
     def _dent(self, form: Array, depth: Array) -> "_Dent | None":
-        """The dent that is deepest and most concave; None where the skin is nowhere concave.
+        """The dent that is deepest and most concave; None where the skin bulges more.
 
         By the curvature `form` (3, ny, nx) in 1/m and the `depth` (ny, nx) in m.
         """
@@ -147,6 +147,8 @@ class Imprints:
             return None
         pressed = np.where(inward, m * depth, 0.0)
         peak = int(pressed.argmax())
+        if not depth.flat[peak] > -np.nanmin(depth):
+            return None
         dents, _ = scipy.ndimage.label(depth > _SHALLOW * depth.flat[peak])
         inward &= dents == dents.flat[peak]
         level = _PART * float(m.flat[peak])
@@ -320,6 +322,7 @@ def without_force(contact: Contact) -> Contact:
 _SURE = 0.9  # probability below which no kind is named
 _LEVEL = 0.01  # probability that an object of the kind differs as much from the shape
 _STEPS, _TURNS = 400, 64  # of the curvatures and axes tried
+_OVALS = 0.25, 0.5, 0.75  # of its larger curvature: the smaller one of an oval
 _ROUNDEST, _FLATTEST = 0.1, 100.0  # radii tried, in radii of the contact
 _REACH = 1.96
 
@@ -344,9 +347,9 @@ def imprinted_object(contact: Contact, geometry: LocalGeometry) -> ContactObject
     shapes = {
         "plane": np.zeros((1, 3)),
         "sphere": np.multiply.outer(curvatures, [1.0, 1.0, 0.0]),
-        "cylinder": np.multiply.outer(curvatures, np.stack([s * s, c * c, -c * s], -1)),
+        "cylinder": np.multiply.outer(curvatures, _along(-s, c)),
     }
-    off = {kind: _squares(np.array([xx, yy, xy]) - shape, C) for kind, shape in shapes.items()}
+    off = {kind: _squares([xx, yy, xy] - shape, C) for kind, shape in shapes.items()}
     likelihood = {kind: float(np.exp(-each / 2).mean()) for kind, each in off.items()}
     total = sum(likelihood.values())
     probability = {
@@ -354,9 +357,14 @@ def imprinted_object(contact: Contact, geometry: LocalGeometry) -> ContactObject
     }
     kind = max(probability, key=probability.__getitem__)
     free = {"plane": 3, "sphere": 2, "cylinder": 1}[kind]
+    # An oval curves less along than across; it is none of these, and is not named.
+    oval = _along(-s, c) + np.multiply.outer(_OVALS, _along(c, s))
+    oval = np.multiply.outer(curvatures, oval)
+    others = float(np.exp(-_squares([xx, yy, xy] - oval, C) / 2).mean())
     fits = float(scipy.special.chdtrc(free, off[kind].min())) >= _LEVEL
+    fits = fits and likelihood[kind] >= others
     resolved = bool(contact.load_radius_95[0] > 0)
-    sure = resolved and fits and probability[kind] >= _SURE
+    sure = resolved and fits and likelihood[kind] >= _SURE * (total + others)
     found = replace(
         NO_OBJECT,
         kind=kind if sure else "",
@@ -376,6 +384,11 @@ def imprinted_object(contact: Contact, geometry: LocalGeometry) -> ContactObject
     k = float(weighted @ [xx, yy, xy] / (weighted @ direction))
     reach = _REACH / math.sqrt(float(weighted @ direction))
     return replace(found, radius=_inverse(k), radius_95=(_inverse(k + reach), _inverse(k - reach)))
+
+
+def _along(c: Array, s: Array) -> Array:
+    """xx, yy and xy (n, 3) of what curves by 1 along (c, s) (n,) alone."""
+    return np.stack([c * c, s * s, c * s], -1)
 
 
 def _squares(rest: Array, C: Array) -> Array:

@@ -96,7 +96,8 @@ class ContactObject:
         if self.kind in ("cylinder", "sphere"):
             parts.append(self._radius())
         if self.kind in ("cylinder", "edge"):
-            parts.append(f"{1e3 * self.length:.0f} mm long, axis {math.degrees(self.axis):.0f} deg")
+            long = f"{1e3 * self.length:.0f} mm long, " if math.isfinite(self.length) else ""
+            parts.append(f"{long}axis {math.degrees(self.axis):.0f} deg")
         parts += self._alike()
         return f"{', '.join(parts)}; second guess {second} {100 * chance:.0f} %"
 

@@ -748,16 +748,20 @@ def test_heights_need_no_direction_and_without_sigma_no_sigma(saved) -> None:
     assert np.allclose(found["coefficients"].reshape(T, -1), answer, rtol=0, atol=1e-12)
 
 
-def test_no_contact_is_found_from_other_readings_yet_and_that_is_said(saved) -> None:
-    said: list[str] = []
-    found = reconstruct(saved(**MIXED), (NI, NJ), objects=True, warn=said.append)
-    expected = reconstruct(saved(), (NI, NJ), objects=True)
+def test_contacts_of_other_readings_are_those_of_the_shape_without_a_force(saved) -> None:
+    found = reconstruct(saved(**MIXED, rigidity=5e-3), (NI, NJ), objects=True)
+    expected = reconstruct(saved(rigidity=5e-3), (NI, NJ), objects=True)
     assert shapes(found) == shapes(expected) | {"residual": (T, R)}
-    for name in ("contact", "contact_sd", "displacement", "normal", "contacts", "drift"):
-        assert np.isnan(found[name]).all()
-    assert not found["single"].any()
-    assert set(found["object"]) == {""}
-    assert "contacts are found from curvature sensors only" in said[-1]
+    there = np.isfinite(found["contact"]).all(axis=1)
+    assert there.any()
+    assert np.isfinite(found["displacement"][there]).all()
+    assert np.isfinite(found["load_radius_95"][there]).all()
+    assert np.isfinite(found["principal"][there]).all()
+    assert np.isnan(found["force"]).all()
+    assert np.isnan(found["forces"]).all()
+    without = reconstruct(saved(**MIXED), (NI, NJ), contact=True)
+    assert "force" not in without
+    np.testing.assert_array_equal(without["contact"], found["contact"])
 
 
 FEW = np.arange(5)
