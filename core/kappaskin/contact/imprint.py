@@ -331,9 +331,9 @@ def imprinted_object(contact: Contact, geometry: LocalGeometry) -> ContactObject
     """The object that a skin of unknown material follows, by the curvature form at a contact.
 
     A sphere, a cylinder or a plane: -K is its own curvature in the contact, and its errors are
-    Gaussian with the `covariance`. Named is one nine times as likely as the others together, from
-    which K does not differ by more than its errors, where the contact's size is resolved: how a
-    smaller object looks is the skin's doing. An edge is never named.
+    Gaussian with the `covariance`. Named is one nine times as likely as the others together, and no
+    less than an oval, from which K does not differ by more than its errors, where the contact's
+    size is resolved: how a smaller object looks is the skin's doing. An edge is never named.
     """
     if not contact.present or not np.isfinite(geometry.covariance).all():
         return NO_OBJECT
@@ -364,7 +364,7 @@ def imprinted_object(contact: Contact, geometry: LocalGeometry) -> ContactObject
     fits = float(scipy.special.chdtrc(free, off[kind].min())) >= _LEVEL
     fits = fits and likelihood[kind] >= others
     resolved = bool(contact.load_radius_95[0] > 0)
-    sure = resolved and fits and likelihood[kind] >= _SURE * (total + others)
+    sure = resolved and fits and probability[kind] >= _SURE
     found = replace(
         NO_OBJECT,
         kind=kind if sure else "",

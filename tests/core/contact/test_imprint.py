@@ -239,8 +239,8 @@ def test_a_cylinder_is_named_with_its_radius_and_axis(turn):
 
     assert found.kind == "cylinder"
     assert found.radius_95[0] <= 1 / 100 <= found.radius_95[1]
-    # `turn` brings what curves most from x to there, clockwise, and the axis lies across.
-    off = abs(np.remainder(found.axis + turn, np.pi) - np.pi / 2)
+    # The axis lies across what curves most.
+    off = abs(np.remainder(found.axis - turn, np.pi) - np.pi / 2)
     assert off <= found.axis_95 < 0.3
     assert "nan" not in found.describe()
 

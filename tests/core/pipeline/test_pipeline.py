@@ -296,3 +296,27 @@ def test_the_force_follows_the_rigidity_of_the_skin():
     assert stiff_touch.force == pytest.approx(2 * soft_touch.force, rel=1e-6)
     assert isinstance(stiff, Scene)
     assert isinstance(stiff.loads[0], PointLoad)
+
+
+def unknown(scene):
+    return replace(scene, plate=replace(scene.plate, unknown_material=True))
+
+
+def test_a_skin_of_unknown_material_has_all_of_a_contact_but_its_force():
+    frame = frame_of(load_scene("off-centre"), n=3)
+    known = pipeline_of(load_scene("off-centre"))(frame)
+
+    found = pipeline_of(unknown(load_scene("off-centre")))(frame)
+
+    assert found.contact.present
+    assert np.isnan([found.contact.force, found.contact.force_sd]).all()
+    np.testing.assert_array_equal(found.contact.position, known.contact.position)
+    assert found.contact.displacement == known.contact.displacement
+    np.testing.assert_array_equal(found.geometry.curvature_form, known.geometry.curvature_form)
+    assert (found.geometry.principal_sd > known.geometry.principal_sd).all()
+
+
+def test_no_contact_is_found_on_a_skin_of_unknown_material_at_rest():
+    scene = unknown(replace(load_scene("off-centre").touched_by(), effects=()))
+
+    assert not pipeline_of(scene)(frame_of(scene)).contact.present

@@ -279,3 +279,15 @@ def test_the_figures_in_the_guide_are_those_of_the_code() -> None:
     ):
         assert words in text, words
     assert publishing.SHAPES == 1 / 100  # a hundred times a second
+
+
+def test_a_force_that_is_unknown_is_null_beside_the_place(messages_of) -> None:
+    plate = replace(PRESSED.plate, unknown_material=True)
+    (made,) = messages_of(replace(PRESSED, plate=plate))
+    told = read(made.contact)
+    assert told["present"] is True
+    assert told["force_N"] is None
+    assert told["force_sd_N"] is None
+    assert isinstance(told["x_m"], float)
+    assert isinstance(told["displacement_m"], float)
+    assert "nan" not in made.contact.decode().lower()

@@ -312,6 +312,7 @@ def scenes(draw) -> Scene:
         axial_stiffness=draw(st.none() | numbers),
         thickness=draw(st.sampled_from([None, 0.2e-3, 1e-3])),
         inplane=draw(st.sampled_from(["", "held", "free"])),
+        unknown_material=draw(st.booleans()),
     )
     scene = Scene(
         "a scene",

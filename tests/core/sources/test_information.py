@@ -379,3 +379,13 @@ def test_any_value_of_any_key_is_understood_or_refused(key: str, value: Any) -> 
 def test_any_json_is_refused(value: Any) -> None:
     with pytest.raises(SourceError):
         sensor_from_json(json.dumps(value))
+
+
+def test_a_sensor_without_a_rigidity_has_an_unknown_material() -> None:
+    layout = SensorLayout.regular(PATCH, 4, 3)
+    plate = Plate(PATCH, unknown_material=True)
+    text = sensor_to_json(sensor_on(layout, plate=plate))
+
+    assert "rigidity" not in json.loads(text)
+    assert sensor_from_json(text).plate == plate
+    assert not sensor_from_json(sensor_to_json(sensor_on(layout))).plate.unknown_material

@@ -118,8 +118,9 @@ class PresenterView(QWidget):
             self.radius.show_figure(NONE, name=_RADIUS)
             return
         least = "\N{GREATER-THAN OR EQUAL TO} " if feedback.force_is_lower_bound else ""
+        force = f"{least}{number(feedback.force, '.3f')} N"
         self.force.show_figure(
-            f"{least}{number(feedback.force, '.3f')} N", _off(feedback.force_95, 3, "N")
+            force if math.isfinite(feedback.force) else "unknown", _off(feedback.force_95, 3, "N")
         )
         off = _off(1e3 * feedback.displacement_95, 2, "mm") or "largest on the skin"
         self.displacement.show_figure(f"{number(1e3 * feedback.displacement, '.2f')} mm", off)

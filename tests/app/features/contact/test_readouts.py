@@ -57,3 +57,17 @@ def test_a_force_that_leaves_out_a_stretch_is_shown_as_a_lower_bound(readouts: R
     readouts.show_estimate(estimate)
 
     assert readouts.text("force") == f"\N{GREATER-THAN OR EQUAL TO} {plain}"
+
+
+def test_an_unknown_force_is_a_dash_and_never_nan(readouts: Readouts) -> None:
+    scene = load_scene("centre")
+    scene = replace(scene, plate=replace(scene.plate, unknown_material=True))
+    estimate = Pipeline(scene.sensor(), Setup())(Simulator(scene).frame(0, lambda: 0.0))
+    assert estimate.contact.present
+
+    readouts.show_estimate(estimate)
+
+    assert readouts.text("force") == "\N{EN DASH}"
+    assert "mm" in readouts.text("contact")
+    readouts.show_estimate(replace(estimate, second=estimate.contact))
+    assert readouts.text("force") == "\N{EN DASH}"

@@ -138,3 +138,14 @@ def test_a_recording_has_no_hint_to_press_harder() -> None:
 def test_an_edge_has_a_length_and_no_radius() -> None:
     feedback = replace(feedback_of(_estimate(0.3)), kind="edge", length=0.04, radius=None)
     assert radius_in_words(feedback) == ("edge", "40 mm long", "Object")
+
+
+def test_feedback_of_an_unknown_force_has_the_rest() -> None:
+    estimate = _estimate()
+    contact = replace(estimate.contact, force=math.nan, force_sd=math.nan)
+
+    feedback = feedback_of(replace(estimate, contact=contact), _recognised(estimate))
+
+    assert math.isnan(feedback.force)
+    assert feedback.position == tuple(contact.position)
+    assert math.isfinite(feedback.displacement)
