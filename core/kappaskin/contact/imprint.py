@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 import scipy
@@ -30,7 +30,7 @@ CHANCE = 1e-6
 _POINTS, _MOST = 3, 121  # of the map for each function along a side, and at most
 _SHALLOW = 1 / 3  # of the depth at a dent's peak: where it is less, another one begins
 _PART = 0.5  # of the mean concavity of a dent: where it is less, the dent ends
-_ROUNDS, _SETTLED = 8, 0.01  # in which the dent's edge settles, and how far
+_SETTLED = 0.01  # of that level: so far it settles
 _DEEP = 3.0  # standard deviations: a dent is deeper
 _SECOND = 0.3  # of depth times concavity: a dent that has as much is another one
 _OUTSIDE = 1.5, 3.0  # times the squared radius: around the rim
@@ -123,7 +123,8 @@ class Imprints:
         K = np.where(used, readings.ravel() * weight, 0.0)
         along, left = Q @ K, np.nan_to_num(fit.residual.ravel()) * weight
         explained = float(K.dot(K) - along.dot(along) - left.dot(left))
-        unknowns, spare = float(used.sum() - fit.spare), float(fit.spare)
+        spare = float(cast("float", fit.spare))
+        unknowns = float(used.sum()) - spare
         if not explained > 0 or not unknowns > 0:
             return 1.0
         if not (variance := float(fit.noise) ** 2):
@@ -149,14 +150,13 @@ class Imprints:
         peak = int(pressed.argmax())
         if not depth.flat[peak] > -np.nanmin(depth):
             return None
-        dents, _ = scipy.ndimage.label(depth > _SHALLOW * depth.flat[peak])
+        dents = cast("Array", scipy.ndimage.label(depth > _SHALLOW * depth.flat[peak])[0])
         inward &= dents == dents.flat[peak]
-        level = _PART * float(m.flat[peak])
-        for _ in range(_ROUNDS):
-            region = inward & (m > level)
+        before, level = math.inf, _PART * float(m.flat[peak])
+        region = inward & (m > level)
+        while not math.isclose(level, before, rel_tol=_SETTLED):
             before, level = level, _PART * float(m[region].mean())
-            if math.isclose(level, before, rel_tol=_SETTLED):
-                break
+            region = inward & (m > level)
         place, size, away = self._centred(m, region, 4)
         other, coarse, _ = self._centred(m, region, 1)
         others = pressed.ravel()[~inward.ravel() & (away > 1)].max(initial=0.0)
@@ -164,7 +164,7 @@ class Imprints:
         xx, yy, _ = self._form_over(form, 2 * away)[0].tolist()
         single = single and (self._basis.patch.base_curvature - xx - yy) / 2 > level
         outside = m.ravel()[(away > _OUTSIDE[0]) & (away < _OUTSIDE[1])]
-        turns = bool(np.nanmean(outside) < 0) if np.isfinite(outside).any() else False
+        turns = float(np.nansum(outside)) < 0
         concave, moved = float(m[region].mean()), math.dist(place, other)
         return _Dent(place, size, away, concave, moved, abs(size - coarse), turns, single)
 
@@ -180,7 +180,8 @@ class Imprints:
         squares = (off[inside] * share[:, None]).T @ off[inside]
         squares += self._cell**2 / 12 * np.eye(len(squares))
         away = np.vecdot(off @ np.linalg.inv(squares), off) / 4
-        return place, 4 * float(np.linalg.det(squares)) ** (1 / len(squares)), away
+        det: Array = np.linalg.det(squares)
+        return place, 4 * det.item() ** (1 / len(squares)), away
 
     def _form_over(self, form: Array, away: Array) -> tuple[Array, float]:
         """Mean (3,) of the curvature `form` (3, ny, nx) where `away` (G,) is below 1; its scatter.
@@ -201,9 +202,8 @@ class Imprints:
         there = local_geometry(fit, dent.place)
         mean, scatter = self._form_over(form, dent.away)
         other, _ = self._form_over(form, 2 * dent.away)
-        K = mean
-        if not dent.turns:
-            K, other = there.curvature_form[[0, 1, 0], [0, 1, 1]], mean
+        point = there.curvature_form[[0, 1, 0], [0, 1, 1]]
+        K, other = (mean, other) if dent.turns else (point, mean)
         fewer, _ = self._form_over(self._form(self._coarse * fit.coefficients), dent.away)
         across = math.sqrt(dent.size) / self._half_wave
         cells = max(2 * across if strip else math.pi * across**2, 1.0)
@@ -235,7 +235,7 @@ class Imprints:
             math.nan,
             w,
             math.hypot(w_sd, fine_sd, math.hypot(*slopes) * math.sqrt(2) * place_sd),
-            int(fit.spare),
+            int(cast("float", fit.spare)),
             dent.single,
             bool(patch.near_rim(x, y, _RIM)),
             dent.size,
@@ -361,7 +361,8 @@ def imprinted_object(contact: Contact, geometry: LocalGeometry) -> ContactObject
     oval = _along(-s, c) + np.multiply.outer(_OVALS, _along(c, s))
     oval = np.multiply.outer(curvatures, oval)
     others = float(np.exp(-_squares([xx, yy, xy] - oval, C) / 2).mean())
-    fits = float(scipy.special.chdtrc(free, off[kind].min())) >= _LEVEL
+    least = float(off[kind].min())
+    fits = bool(cast("float", scipy.special.chdtrc(free, least)) >= _LEVEL)
     fits = fits and likelihood[kind] >= others
     resolved = bool(contact.load_radius_95[0] > 0)
     sure = resolved and fits and probability[kind] >= _SURE
