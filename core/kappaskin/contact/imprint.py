@@ -179,7 +179,8 @@ class Imprints:
             off = off[:, :1]
         squares = (off[inside] * share[:, None]).T @ off[inside]
         squares += self._cell**2 / 12 * np.eye(len(squares))
-        away = np.vecdot(off @ np.linalg.inv(squares), off) / 4
+        scaled = cast("Array", off @ np.linalg.inv(squares))
+        away = np.vecdot(scaled, off) / 4
         det: Array = np.linalg.det(squares)
         return place, 4 * det.item() ** (1 / len(squares)), away
 
