@@ -11,6 +11,7 @@ from cyclopts import Parameter
 
 from kappaskin.cli.common import (
     FAILED,
+    Described,
     Limit,
     Pair,
     ProgressLine,
@@ -19,6 +20,7 @@ from kappaskin.cli.common import (
     check_output,
     check_time,
     lined,
+    of_sensor,
     pair,
     print_result,
     result_of,
@@ -30,6 +32,7 @@ from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
     from kappaskin.live import Engine, Status
+    from kappaskin.pipeline import Setup
     from kappaskin.recording import Recording
     from kappaskin.sensing import Sensor
 
@@ -37,7 +40,14 @@ _POLL = 0.05  # s
 _BEGIN = 10.0  # s within which something must come
 
 
-def record(source: str, out: Path, *, seconds: float = math.inf, trust: Switch = False) -> int:
+def record(
+    source: str,
+    out: Path,
+    *,
+    seconds: float = math.inf,
+    sensor: Described = None,
+    trust: Switch = False,
+) -> int:
     """Record a source to a file, until stopped (Ctrl+C).
 
     Records every byte received and every estimate computed from it, to an MCAP file that Foxglove,
@@ -63,6 +73,7 @@ def record(source: str, out: Path, *, seconds: float = math.inf, trust: Switch =
     from kappaskin.recording import ReplayedSource
 
     check_time(seconds, "record")
+    source = of_sensor(source, sensor)
     if source.startswith(ReplayedSource.SCHEME):
         raise Refusal(f"expected a live source to record, got {source}; copy its file")
     stopped = stops()
@@ -109,6 +120,7 @@ def _recorded(
 
     began = recording = time.monotonic()
     known, slope = 0, 0.0  # connections whose tare is in use
+    usual: Setup | None = None
     while True:
         status, now = engine.status(), time.monotonic()
         slope = max(slope, status.slope)
@@ -119,8 +131,12 @@ def _recorded(
         if written.trouble and not written.seconds:
             raise Refusal(written.trouble)
         if status.connections != known and status.sensor is not None:
-            known = status.connections
-            _use_tare(engine, status.sensor)
+            known, usual = status.connections, _usual_setup(status.sensor)
+            if not status.sensor.simulated:
+                engine.set_up(usual)
+        if usual and status.refusal and _has_fewer_functions(status.setup, usual):
+            engine.set_up(status.setup)  # as many as the elements determine: nobody asked for more
+            usual = None
         over = max(written.seconds, now - recording) >= seconds
         if stopped or written.trouble or over:
             return slope
@@ -153,13 +169,20 @@ def _broken_off(out: Path, ended: str) -> int:
     return FAILED
 
 
-def _use_tare(engine: "Engine", sensor: "Sensor") -> None:
+def _has_fewer_functions(setup: "Setup", usual: "Setup") -> bool:
+    """Whether nothing else of a `setup` is different."""
+    return setup == replace(usual, Ni=setup.Ni, Nj=setup.Nj) != usual
+
+
+def _usual_setup(sensor: "Sensor") -> "Setup":
+    """The default setup with the tare of a real `sensor`."""
     from kappaskin.calibration import TareStore
     from kappaskin.pipeline import Setup
 
-    if not sensor.simulated:
-        tare = TareStore(TareStore.user_folder()).load(sensor.serial_number).fit_for(sensor)
-        engine.set_up(replace(Setup(), tare=tare))
+    if sensor.simulated:
+        return Setup()
+    tare = TareStore(TareStore.user_folder()).load(sensor.serial_number).fit_for(sensor)
+    return replace(Setup(), tare=tare)
 
 
 def _line(status: "Status") -> str:
