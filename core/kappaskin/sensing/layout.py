@@ -373,7 +373,7 @@ class SensorLayout:
 
         return np.stack([factors(*kind) for kind in self.kinds])
 
-    @cached_property
+    @property
     def offsets(self) -> Array:
         """The readings (R, d) of each offset of 1 of a quantity whose zero is unknown."""
         if not self.reads:
