@@ -6,11 +6,11 @@ from kappaskin.sources.clock import RecordedClock as RecordedClock
 from kappaskin.sources.commands import SCAN_LISTS_PER_SECOND as SCAN_LISTS_PER_SECOND
 from kappaskin.sources.decoder import Accounting as Accounting
 from kappaskin.sources.decoder import Decoder as Decoder
-from kappaskin.sources.decoder import Interpreter as Interpreter
 from kappaskin.sources.diagnosis import Diagnosis as Diagnosis
 from kappaskin.sources.diagnosis import WireMonitor as WireMonitor
 from kappaskin.sources.information import sensor_from_json as sensor_from_json
 from kappaskin.sources.information import sensor_to_json as sensor_to_json
+from kappaskin.sources.interpreter import Interpreter as Interpreter
 from kappaskin.sources.ports import BAUD_RATES as BAUD_RATES
 from kappaskin.sources.ports import Port as Port
 from kappaskin.sources.ports import SerialConnection as SerialConnection

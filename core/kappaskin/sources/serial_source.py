@@ -11,7 +11,8 @@ from kappaskin.frames import Event, Frame
 from kappaskin.sensing import Sensor
 from kappaskin.sources.clock import ClockMap, ClockState
 from kappaskin.sources.commands import DeviceCommands, ScanControl
-from kappaskin.sources.decoder import Accounting, Decoder, Interpreter, SequenceCounter
+from kappaskin.sources.decoder import Accounting, Decoder, SequenceCounter
+from kappaskin.sources.interpreter import Interpreter
 from kappaskin.sources.ports import (
     BaudRateSearch,
     Port,
