@@ -16,7 +16,6 @@ from kappaskin.sources.wire import (
     LONGEST,
     MAGIC,
     VERSION,
-    Information,
     Message,
     MessageKind,
     Samples,
