@@ -10,10 +10,12 @@ from typing import Any, get_args, get_origin
 from kappaskin._schema import Key, Part
 from kappaskin.pipeline import SETUP
 from kappaskin.scenes import PARTS
+from kappaskin.sources.description import LINE, READINGS, TOP
 from kappaskin.sources.information import SENSOR
 
 _PAGES = Path(__file__).parents[1] / "resources" / "kappaskin_resources"
 PAGE = _PAGES / "guide" / "scenes.md"
+OWN = _PAGES / "guide" / "own-sensor.md"
 OTHERS = {_PAGES / "recording" / "recording.md": SETUP, _PAGES / "wire" / "wire.md": SENSOR}
 """Pages that have one table, with what it is of."""
 HEADING = "## Every key"
@@ -36,6 +38,14 @@ _PLACES = {
     "cylinders": "`[cylinders]`",
     "effects": "`[effects]`",
 }
+_OWN_OPENING = """
+`[skin]` and `[elements]` have the keys of a [scene](scenes.md#every-key).
+"""
+_OWN_PLACES = {
+    "At the top": TOP,
+    "`[line]`": LINE,
+    "`[readings]`, or `[readings.xx]` ...": READINGS,
+}
 _WORDS = {float: "number", int: "whole number", str: "text", bool: "true or false"}
 
 
@@ -48,6 +58,12 @@ def told() -> str:
             named = _table(PARTS[part], of_kinds=True)
             tables.append(f"### `[effects.NAME]`, by its name\n\n{named}")
     return "\n".join(tables)
+
+
+def told_of_own() -> str:
+    """The last section of the page on sensors of one's own."""
+    tables = [f"### {place}\n\n{_table(part)}" for place, part in _OWN_PLACES.items()]
+    return "\n".join([f"{HEADING}\n{_OWN_OPENING}", *tables])
 
 
 def told_of(page: Path) -> str:
@@ -145,7 +161,8 @@ def _line(cells: tuple[str, ...]) -> str:
 
 
 if __name__ == "__main__":
-    page = PAGE.read_text(encoding="utf-8").partition(HEADING)[0].rstrip()
-    PAGE.write_text(f"{page}\n\n{told()}", encoding="utf-8", newline="\n")
+    for page, section in ((PAGE, told()), (OWN, told_of_own())):
+        text = page.read_text(encoding="utf-8").partition(HEADING)[0].rstrip()
+        page.write_text(f"{text}\n\n{section}", encoding="utf-8", newline="\n")
     for other in OTHERS:
         other.write_text(told_of(other), encoding="utf-8", newline="\n")

@@ -121,7 +121,8 @@ class Shell:
     def _beside(self, words: list[str]) -> str:
         """What a command that goes on beside the next ones prints first."""
         printed = self.stack.enter_context(_process(*words)).stdout.readline()
-        if words[0] == "device":
+        if words[0] == "device":  # which takes the place of the one before
+            self.said_as = {here: there for here, there in self.said_as.items() if there != SENSOR}
             self.said_as[json.loads(printed)["port"]] = SENSOR
         return self._said(printed)
 

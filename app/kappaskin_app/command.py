@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cyclopts import App
 
-from kappaskin.cli import Limit, Switch, allow, check_output
+from kappaskin.cli import Described, Limit, Switch, allow, check_output, of_sensor
 from kappaskin.errors import Refusal, lacking
 
 app = App(name="app", help_format="markdown")
@@ -55,6 +55,7 @@ def run(
     seconds: float | None = None,
     screenshot: Path | None = None,
     limit: Limit = "",
+    sensor: Described = None,
     trust: Switch = False,
 ) -> None:
     """Open the desktop app on a source of readings, or on a file.
@@ -77,7 +78,7 @@ def run(
     allow(limit)
     if file is not None and not file.is_file():
         raise Refusal(f"{file}: no such file; check its name")
-    _open(source, seconds, screenshot, file=file, trust=trust)
+    _open(of_sensor(source, sensor), seconds, screenshot, file=file, trust=trust)
 
 
 @demo.default

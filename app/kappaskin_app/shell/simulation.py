@@ -31,6 +31,7 @@ from kappaskin.scenes.effects import (
 from kappaskin.sensing import (
     FIRST_GENERATION,
     SECOND_GENERATION,
+    DigitalReadings,
     Sensor,
     SensorLayout,
     Transduction,
@@ -187,15 +188,17 @@ planned_scene = Cache(planned, _CACHED)
 
 def scene_of_sensor(sensor: Sensor, noise: float) -> Scene:
     """A scene on a real `sensor` with a point load in its middle and its `noise` in 1/m."""
-    plate, edge = sensor.plate, sensor.edge
+    plate, edge, chain = sensor.plate, sensor.edge, sensor.transduction
+    if isinstance(chain, DigitalReadings):
+        chain = Transduction()
     return Scene(
         sensor.name,
         plate,
         sensor.layout,
         load_case_stimuli("centre", plate, edge),
         effects=(GaussianNoise(noise),),
-        transduction=sensor.transduction,
-        rate=sensor.rate,
+        transduction=chain,
+        rate=min(sensor.rate, 1 / chain.scan_time(sensor.channels)),
         reference=reference_on(plate, edge, "centre"),
         edge=edge,
     )

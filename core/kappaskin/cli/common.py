@@ -36,6 +36,12 @@ Limit = Annotated[
 ]
 """An option for `allow`."""
 
+Described = Annotated[
+    Path | None,
+    Parameter(help="TOML file that describes a sensor with a line format of its own."),
+]
+"""An option for `of_sensor`."""
+
 _UNITS = {"kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12}
 
 
@@ -73,6 +79,16 @@ def allow(limit: str) -> None:
     if not (unit in _UNITS and re.fullmatch(r"\d{1,6}(\.\d{1,6})?", number)):
         raise Refusal(f"expected a limit such as 500MB or 2GB, got {limit!r}")
     os.environ[LIMIT] = str(round(float(number) * _UNITS[unit]))
+
+
+def of_sensor(source: str, sensor: Path | None) -> str:
+    """The name of `source` where it has the description in the file `sensor`, if there is one."""
+    if sensor is None:
+        return source
+    from kappaskin.sources import described_source, load_description
+
+    load_description(sensor)  # or refused here
+    return described_source(sensor, source)
 
 
 def stops() -> list[int]:

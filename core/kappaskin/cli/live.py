@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from kappaskin.cli.common import FAILED, Switch, Whole, check_time, print_json, show, stops
+from kappaskin.cli.common import (
+    FAILED,
+    Described,
+    Switch,
+    Whole,
+    check_time,
+    of_sensor,
+    print_json,
+    show,
+    stops,
+)
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
@@ -30,6 +40,7 @@ def publish(
     foxglove: Perhaps = None,
     allow_origin: Many = None,
     seconds: float = math.inf,
+    sensor: Described = None,
     trust: Switch = False,
 ) -> int:
     """Publish contact, shape and error bars of every estimate, until stopped (Ctrl+C).
@@ -66,6 +77,7 @@ def publish(
     from kappaskin.sources import SimulatedSource
 
     check_time(seconds, "publish")
+    source = of_sensor(source, sensor)
     places = foxglove if foxglove != [] else [""]
     targets = [f"udp://{place}" for place in udp or ()]
     targets += [f"foxglove://{place}" for place in places or ()]

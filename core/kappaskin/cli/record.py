@@ -11,6 +11,7 @@ from cyclopts import Parameter
 
 from kappaskin.cli.common import (
     FAILED,
+    Described,
     Limit,
     Pair,
     ProgressLine,
@@ -19,6 +20,7 @@ from kappaskin.cli.common import (
     check_output,
     check_time,
     lined,
+    of_sensor,
     pair,
     print_result,
     result_of,
@@ -37,7 +39,14 @@ _POLL = 0.05  # s
 _BEGIN = 10.0  # s within which something must come
 
 
-def record(source: str, out: Path, *, seconds: float = math.inf, trust: Switch = False) -> int:
+def record(
+    source: str,
+    out: Path,
+    *,
+    seconds: float = math.inf,
+    sensor: Described = None,
+    trust: Switch = False,
+) -> int:
     """Record a source to a file, until stopped (Ctrl+C).
 
     Records every byte received and every estimate computed from it, to an MCAP file that Foxglove,
@@ -63,6 +72,7 @@ def record(source: str, out: Path, *, seconds: float = math.inf, trust: Switch =
     from kappaskin.recording import ReplayedSource
 
     check_time(seconds, "record")
+    source = of_sensor(source, sensor)
     if source.startswith(ReplayedSource.SCHEME):
         raise Refusal(f"expected a live source to record, got {source}; copy its file")
     stopped = stops()
@@ -118,9 +128,9 @@ def _recorded(
             return slope
         if written.trouble and not written.seconds:
             raise Refusal(written.trouble)
-        if status.connections != known and status.sensor is not None:
+        if status.connections != known and status.sensor is not None and not status.computing:
             known = status.connections
-            _use_tare(engine, status.sensor)
+            _settle(engine, status.sensor, status)
         over = max(written.seconds, now - recording) >= seconds
         if stopped or written.trouble or over:
             return slope
@@ -153,13 +163,15 @@ def _broken_off(out: Path, ended: str) -> int:
     return FAILED
 
 
-def _use_tare(engine: "Engine", sensor: "Sensor") -> None:
+def _settle(engine: "Engine", sensor: "Sensor", status: "Status") -> None:
+    """Use the tare of a real `sensor`, and as many functions as its elements determine."""
     from kappaskin.calibration import TareStore
-    from kappaskin.pipeline import Setup
 
+    tare = None
     if not sensor.simulated:
         tare = TareStore(TareStore.user_folder()).load(sensor.serial_number).fit_for(sensor)
-        engine.set_up(replace(Setup(), tare=tare))
+    if tare is not None or status.refusal:
+        engine.set_up(replace(status.setup, tare=tare))
 
 
 def _line(status: "Status") -> str:

@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING
 
 from kappaskin.cli.common import (
     FAILED,
+    Described,
     Switch,
     check_output,
     check_time,
     lined,
+    of_sensor,
     print_result,
     show,
     stops,
@@ -67,6 +69,7 @@ def calibrate(
     seconds: float = 1.0,
     hold: float = 0.0,
     dwell: float | None = None,
+    sensor: Described = None,
     trust: Switch = False,
     json: Switch = False,
 ) -> int:
@@ -110,7 +113,8 @@ def calibrate(
     from kappaskin.calibration import calibrate as calibrated
     from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
 
-    check_output(out, source.removeprefix("sim:"))
+    check_output(out, source.removeprefix("sim:"), *filter(None, [sensor]))
+    source = of_sensor(source, sensor)
     Calibration.check_writable(out)
     if weights is not None:
         if radii is not None or hold or dwell is not None:
@@ -119,7 +123,7 @@ def calibrate(
     if calibration is not None:
         raise Refusal("expected --calibration together with --weights")
     try:
-        sensor, sweep = take_sweep(
+        swept, sweep = take_sweep(
             source,
             None if radii is None else _millimetres(radii),
             _answer_to,
@@ -129,7 +133,7 @@ def calibrate(
             dwell=dwell,
             trust=trust,
         )
-        report = calibrated(sweep, sensor, datetime.now(UTC))
+        report = calibrated(sweep, swept, datetime.now(UTC))
         report.calibration.save(out)
     except KeyboardInterrupt:
         show("", error=True)
@@ -168,7 +172,9 @@ def _weigh(
 _READ = 0.05  # s that one read may wait
 
 
-def tare(source: str, *, undo: Switch = False, trust: Switch = False) -> None:
+def tare(
+    source: str, *, undo: Switch = False, sensor: Described = None, trust: Switch = False
+) -> None:
     """Tare a sensor: take its readings at rest as its zero.
 
     Refused, with the reason, while the skin is loaded or moves. The tare is saved under the
@@ -192,23 +198,23 @@ def tare(source: str, *, undo: Switch = False, trust: Switch = False) -> None:
     from kappaskin.sources import open_source
 
     tares = TareStore(TareStore.user_folder())
-    with closing(open_source(source, trust)) as opened:
-        sensor = _answering(opened)
+    with closing(open_source(of_sensor(source, sensor), trust)) as opened:
+        found = _answering(opened)
         if undo:
-            tares.use(sensor.serial_number, None)
-            show(f"{sensor.name} {sensor.serial_number}: no tare is in use")
+            tares.use(found.serial_number, None)
+            show(f"{found.name} {found.serial_number}: no tare is in use")
             return
-        used = None if sensor.simulated else tares.load(sensor.serial_number).fit_for(sensor)
-        taring = TareMeasurement(sensor, time.monotonic())
-        _take_readings(opened, sensor, taring)
+        used = None if found.simulated else tares.load(found.serial_number).fit_for(found)
+        taring = TareMeasurement(found, time.monotonic())
+        _take_readings(opened, found, taring)
         now = datetime.now().astimezone()
-        taken = taring.tare(LoadDetector(sensor), _rest(sensor, used), now, opened.temperature)
+        taken = taring.tare(LoadDetector(found), _rest(found, used), now, opened.temperature)
     _print_tare(taken, used)
-    if sensor.simulated:
+    if found.simulated:
         show("not saved: the sensor is simulated")
     else:
         tares.add(taken)
-        show(f"saved in {tares.path(sensor.serial_number)}")
+        show(f"saved in {tares.path(found.serial_number)}")
 
 
 def _answering(source: "Source") -> "Sensor":
@@ -350,6 +356,7 @@ def device(
     *,
     rate: float | None = None,
     dwell: float | None = None,
+    sensor: Described = None,
     trust: Switch = False,
 ) -> None:
     """Run a simulated sensor on a pseudo-terminal, like a real one on a serial port.
@@ -371,8 +378,9 @@ def device(
         Let the scene name files outside its folder.
     """
     from kappaskin.scenes import load_scene
-    from kappaskin.sources import PseudoDevice
+    from kappaskin.sources import PseudoDevice, load_description
 
+    described = None if sensor is None else load_description(sensor)
     played = load_scene(scene, trust)
     if dwell is not None:
         if played.laid is None:
@@ -380,7 +388,8 @@ def device(
                 f"the scene {played.name} has no cylinders to dwell on; leave --dwell out"
             )
         played = replace(played, laid=replace(played.laid, dwell=dwell))
-    server = PseudoDevice(played if rate is None else replace(played, rate=rate))
+    played = played if rate is None else replace(played, rate=rate)
+    server = PseudoDevice(played, description=described)
     stopped = stops()
     show(json.dumps({"port": server.port, "rate": server.rate}))
     server.serve(lambda: bool(stopped))

@@ -30,7 +30,16 @@ from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import decode
 from kappaskin.recording.reading import RecordedMessage, Recording, made_by
 from kappaskin.sensing import Sensor
-from kappaskin.sources import Accounting, ClockState, Decoder, Interpreter, RecordedClock, wire
+from kappaskin.sources import (
+    Accounting,
+    ClockState,
+    Decoder,
+    Interpreter,
+    LineDecoder,
+    RecordedClock,
+    decoder_of,
+    wire,
+)
 
 _UNREAD = 2**16  # messages buffered until the device's information is read
 _FUNCTIONS = 128  # of a truth along one side, at most
@@ -44,7 +53,7 @@ class RecordedFrames:
     """
 
     def __init__(self, name: str, made: dict[str, Sensor] | None = None) -> None:
-        self._decoder = Decoder()
+        self._decoder: Decoder | LineDecoder = Decoder()
         self._times = RecordedClock()
         self._means = Interpreter(name, made)
         self._means.begin(self._times)
@@ -68,7 +77,15 @@ class RecordedFrames:
         if message.topic == m.CLOCKS.name:
             self._map(decode(m.CLOCK, message.data) | {"since": math.nan})
         else:
-            self._means.learn(decode(m.STRING, message.data)["data"])
+            self._learn(decode(m.STRING, message.data)["data"])
+
+    def _learn(self, text: str) -> None:
+        """Take the device's information, and read its bytes as that says from now on."""
+        before = self.sensor
+        self._means.learn(text)
+        after = self.sensor
+        if after is not before and after and (after.description or (before and before.description)):
+            self._decoder = decoder_of(after)
 
     def __call__(self, message: RecordedMessage) -> Iterator[Frame]:
         """The frames that came with one message, each of the `sensor` that there is then.
@@ -82,7 +99,7 @@ class RecordedFrames:
             elif not sent:
                 self._ended()
         elif message.topic == m.DEVICE.name:
-            self._means.learn(decode(m.STRING, message.data)["data"])
+            self._learn(decode(m.STRING, message.data)["data"])
         elif message.topic == m.CLOCKS.name:
             self._map(decode(m.CLOCK, message.data))
         elif message.topic == m.TRUTHS.name:

@@ -11,8 +11,10 @@ from kappaskin.scenes.read import check_elements as check_elements
 from kappaskin.scenes.read import check_sides as check_sides
 from kappaskin.scenes.read import load_scene as load_scene
 from kappaskin.scenes.read import named_file as named_file
+from kappaskin.scenes.read import read_elements as read_elements
 from kappaskin.scenes.read import read_scene as read_scene
 from kappaskin.scenes.read import read_scene_text as read_scene_text
+from kappaskin.scenes.read import read_skin as read_skin
 from kappaskin.scenes.read import scene_file as scene_file
 from kappaskin.scenes.read import scene_of as scene_of
 from kappaskin.scenes.scene import AppliedLoads as AppliedLoads

@@ -191,7 +191,7 @@ def check_strain(steps: tuple[CylinderStep, ...], sensor: Sensor) -> None:
     least = 1 / sensor.transduction.strain_limit_curvature
     for step in steps:
         if step.radius < least * (1 - 1e-9):
-            strain = float(sensor.transduction.bridge.strain(1 / step.radius))
+            strain = sensor.transduction.strain(1 / step.radius)
             raise Refusal(
                 f"step {step.number}: a cylinder of radius {1e3 * step.radius:g} mm strains the "
                 f"gages of {sensor.name} by {100 * strain:.2f} %, beyond their elastic limit; use "

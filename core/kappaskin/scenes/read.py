@@ -151,8 +151,8 @@ def scene_of(top: TomlTable, file: Path, trust: Trust = False) -> Scene:
             else f"expected format = {FORMAT}, got {version}",
             "format",
         )
-    plate, edge = _skin(top.table("skin"))
-    layout = _elements(top.table("elements"), plate.patch)
+    plate, edge = read_skin(top.table("skin"))
+    layout = read_elements(top.table("elements"), plate.patch)
     reference = SCENE.value(top, "reference", default=usual_reference(plate.patch))
     basis = partial(basis_for, plate.patch, edge, *reference)
     with top.blamed("reference"):
@@ -202,7 +202,8 @@ def scene_of(top: TomlTable, file: Path, trust: Trust = False) -> Scene:
     return scene
 
 
-def _skin(table: TomlTable) -> tuple[Plate, str]:
+def read_skin(table: TomlTable) -> tuple[Plate, str]:
+    """The skin in the table [skin] of a file, and its boundary condition."""
     shape = SKIN.value(table, "shape")
     with table.blamed():
         patch = _patch(table, shape)
@@ -222,7 +223,8 @@ def _patch(table: TomlTable, shape: str) -> Patch:
     return Patch(a, b, SKIN.value(table, "radius"), shape == "strip")
 
 
-def _elements(table: TomlTable, patch: Patch) -> SensorLayout:
+def read_elements(table: TomlTable, patch: Patch) -> SensorLayout:
+    """The elements in the table [elements] of a file."""
     with table.blamed():
         if "positions" in table:
             layout = SensorLayout.scattered(patch, ELEMENTS.value(table, "positions"))

@@ -12,6 +12,7 @@ from kappaskin.sensing.transduction import FIRST_GENERATION as FIRST_GENERATION
 from kappaskin.sensing.transduction import SECOND_GENERATION as SECOND_GENERATION
 from kappaskin.sensing.transduction import Amplifier as Amplifier
 from kappaskin.sensing.transduction import Converter as Converter
+from kappaskin.sensing.transduction import DigitalReadings as DigitalReadings
 from kappaskin.sensing.transduction import HalfBridge as HalfBridge
 from kappaskin.sensing.transduction import Multiplexer as Multiplexer
 from kappaskin.sensing.transduction import Transduction as Transduction

@@ -10,7 +10,7 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Frame, Mask
 from kappaskin.mechanics import Plate
 from kappaskin.sensing.layout import SensorLayout
-from kappaskin.sensing.transduction import Transduction
+from kappaskin.sensing.transduction import DigitalReadings, Transduction
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +64,13 @@ class Scan:
 class Sensor:
     """A sensor, real or simulated: skin, boundary condition `edge`, elements and electronics.
 
-    `rate` in frames/s. Channel c of the device is number `channel_map[c]` of the flattened (3, P)
-    array, a permutation (3 P,); None means the same order.
+    `rate` in frames/s, infinite where the device decides it. One with a line format of its own has
+    the text of its `description`. Channel c of the device is number `channel_map[c]` of the
+    flattened (3, P) array, a permutation (3 P,); None means the same order.
     """
 
     layout: SensorLayout
-    transduction: Transduction
+    transduction: Transduction | DigitalReadings
     plate: Plate
     edge: str
     rate: float
@@ -78,6 +79,7 @@ class Sensor:
     firmware: str
     simulated: bool
     channel_map: NDArray[np.intp] | None = None
+    description: str = ""
 
     def __post_init__(self) -> None:
         self.layout.check_curvature_sensor("scenes, the window and recordings")
@@ -92,7 +94,7 @@ class Sensor:
                 f"once, got {len(wired)} numbers"
             )
         scan_time = self.transduction.scan_time(self.channels)
-        if not 0 < self.rate <= 1 / scan_time * (1 + 1e-9):
+        if scan_time and not 0 < self.rate <= 1 / scan_time * (1 + 1e-9):
             raise Refusal(
                 f"{self.channels} channels at {self.transduction.channel_time * 1e6:g} us take "
                 f"{scan_time * 1e3:.3g} ms: expected a rate of at most {1 / scan_time:.1f} "
@@ -115,8 +117,8 @@ class Sensor:
         electronics = self.transduction
         return Scan(
             chosen.astype(np.intp),
-            electronics.multiplexer.settling_time,
-            electronics.converter.conversion_time,
+            electronics.settling_time,
+            electronics.conversion_time,
         )
 
     @cached_property

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import cast
+from typing import ClassVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -237,6 +237,10 @@ class Transduction:
             min(high, round((offset + rail) / self._step)),
         )
 
+    def strain(self, curvature: float) -> float:
+        """Strain of a gage at `curvature` in 1/m."""
+        return float(self.bridge.strain(curvature))
+
     @property
     def strain_limit_curvature(self) -> float:
         """Curvature in 1/m that strains a gage by 1 %, the elastic limit of metal foil."""
@@ -279,13 +283,69 @@ class Transduction:
         return (counts <= low) | (counts >= high)
 
     @property
+    def settling_time(self) -> float:
+        """Time in s from the switch of the multiplexer to the conversion of a channel."""
+        return self.multiplexer.settling_time
+
+    @property
+    def conversion_time(self) -> float:
+        """Time in s that the converter takes for a channel."""
+        return self.converter.conversion_time
+
+    @property
     def channel_time(self) -> float:
         """Time in s for one channel: settling and conversion."""
-        return self.multiplexer.settling_time + self.converter.conversion_time
+        return self.settling_time + self.conversion_time
 
     def scan_time(self, channels: int) -> float:
         """Time in s for a scan of `channels`, which limits the frame rate."""
         return channels * self.channel_time
+
+
+@dataclass(frozen=True)
+class DigitalReadings:
+    """Readings that a device sends as numbers, all at once: its electronics are not known.
+
+    A frame holds them in counts of `resolution`, in 1/m; the lowest one stands for no reading.
+    """
+
+    resolution: float = 1e-6
+    limits: ClassVar[tuple[int, int]] = -(2**31), 2**31 - 1
+    settling_time: ClassVar[float] = 0.0
+    conversion_time: ClassVar[float] = 0.0
+    channel_time: ClassVar[float] = 0.0
+    strain_limit_curvature: ClassVar[float] = math.inf
+
+    def counts(self, curvature: Array) -> Counts:
+        """Counts for `curvature` in 1/m; the lowest for NaN and for what is out of range."""
+        counts = np.rint(curvature / self.resolution)
+        low, high = self.limits
+        known = (counts > low) & (counts < high)
+        return np.where(known, counts, low).astype(np.int32)
+
+    def curvature(self, counts: Counts) -> Array:
+        """Curvature in 1/m for `counts`; NaN where there was none."""
+        curvature = cast("Array", counts * self.resolution)
+        curvature[self.saturated(counts)] = np.nan
+        return curvature
+
+    def saturated(self, counts: Counts) -> Mask:
+        """Which counts stand for no reading."""
+        low, high = self.limits
+        return (counts <= low) | (counts >= high)
+
+    def strain(self, curvature: float) -> float:
+        """Strain of a gage at `curvature` in 1/m: not known."""
+        return math.nan
+
+    def overstrained(self, curvature: ArrayLike) -> Mask:
+        """Which elements (..., P) are over their strain limit: none, as it is not known."""
+        K = np.asarray(curvature, float)
+        return np.zeros((*K.shape[:-2], K.shape[-1]), bool)
+
+    def scan_time(self, channels: int) -> float:
+        """Time in s for a scan: none that is known."""
+        return 0.0
 
 
 # The paper gives neither excitation, gain, gage nor converter: the defaults above, 12 bits, and

@@ -15,6 +15,7 @@ from kappaskin.mechanics import Plate
 from kappaskin.scenes import PARTS, check_elements, check_sides
 from kappaskin.sensing import Sensor, SensorLayout, Transduction
 from kappaskin.skin import Disk, Patch, Polygon
+from kappaskin.sources.description import described_sensor, described_text
 
 _SKIN, _ELEMENTS = PARTS["skin"], PARTS["elements"]
 _CHAIN = ("bridge", "multiplexer", "amplifier", "converter")
@@ -89,7 +90,12 @@ _READS = Within(1e-3, 1e9, "1/m")
 
 
 def sensor_to_json(sensor: Sensor) -> str:
-    """The information text of `sensor`: SI units, channels counted component by component."""
+    """The information text of `sensor`: SI units, channels counted component by component.
+
+    Of one with a description of its own, that.
+    """
+    if sensor.description:
+        return described_text(sensor)
     layout, patch, wired = sensor.layout, sensor.layout.patch, sensor.channel_map
     owners = (layout, patch, sensor.plate, sensor)
     values = {
@@ -119,7 +125,8 @@ def _outline(patch: Patch) -> Any:
 def sensor_from_json(text: str) -> Sensor:
     """The sensor that `text` describes; a `SourceError` where it cannot be understood."""
     try:
-        return _sensor(json_table(text, floats_may_be_whole=True))
+        table = json_table(text, floats_may_be_whole=True)
+        return described_sensor(table) if "description" in table else _sensor(table)
     except (ValueError, ArithmeticError) as error:
         raise SourceError(
             f"the device's information cannot be used: {error}; its firmware must send what "

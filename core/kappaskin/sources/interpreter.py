@@ -1,5 +1,7 @@
 """Interpreter of messages: those of a device to frames."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +13,7 @@ from kappaskin.sources.clock import ClockMap
 from kappaskin.sources.wire import FromDevice, Information, Samples
 
 _SENSORS = 8  # that are cached
+_GRAIN = 1e-6  # s between two records that arrived together
 
 
 class Interpreter:
@@ -33,6 +36,7 @@ class Interpreter:
     def begin(self, clock_map: ClockMap) -> None:
         """A connection begins, to a device whose clock is mapped by `clock_map`."""
         self.clock_map, self.known, self.unusable = clock_map, False, ""
+        self._last = -math.inf
 
     def learn(self, text: str) -> bool:
         """Take the device's information; whether it can be used, and is new."""
@@ -77,7 +81,10 @@ class Interpreter:
                 f"{sensor.channels}; its firmware and its information disagree"
             )
             return None
-        clock_map, began = self.clock_map, self.clock_map.unwrap(message.time)
+        # A device that tells no time: its record began when it arrived, each after the one before.
+        time = message.time if math.isfinite(message.time) else max(now, self._last + _GRAIN)
+        clock_map, began = self.clock_map, self.clock_map.unwrap(time)
+        self._last = began
         clock_map.heard(began, now)
         channels = message.channels
         if sensor.channel_map is not None:

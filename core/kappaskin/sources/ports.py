@@ -95,7 +95,7 @@ class Port:
         return next((port for port in Port.found() if port.port == url), Port(url))
 
 
-def open_port(url: str) -> serial.SerialBase:
+def open_port(url: str, baud_rate: int = BAUD_RATE) -> serial.SerialBase:
     """The port or URL, open; raises a `SourceError` that says why it cannot be.
 
     DTR and RTS are left as the system sets them on opening, and stay so when the port is closed:
@@ -103,7 +103,7 @@ def open_port(url: str) -> serial.SerialBase:
     """
     try:
         port = serial.serial_for_url(
-            url, baudrate=BAUD_RATE, timeout=0.1, write_timeout=_SENT, exclusive=True
+            url, baudrate=baud_rate, timeout=0.1, write_timeout=_SENT, exclusive=True
         )
     except (serial.SerialException, OSError, ValueError, LookupError, re.error) as error:
         raise SourceError(_why_not(url, error)) from error
@@ -222,11 +222,16 @@ class SerialConnection:
     too many waited to be taken.
     """
 
-    def __init__(self, url: str, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        url: str,
+        clock: Callable[[], float] = time.monotonic,
+        baud_rate: int = BAUD_RATE,
+    ) -> None:
         self.url, self._clock = url, clock
         self._port: serial.SerialBase | None = None
         self.refusal: SourceError | None = None
-        self.baud_rate = BAUD_RATE
+        self.baud_rate = baud_rate
         self.overrun = 0
         self._put = self._taken = (
             0  # bytes: each counted by one thread only, so that none is locked
@@ -256,7 +261,7 @@ class SerialConnection:
     def _serve(self) -> None:
         """Open the port, and read it until the connection is lost."""
         try:
-            self._port = port = open_port(self.url)
+            self._port = port = open_port(self.url, self.baud_rate)
         except SourceError as error:
             self.refusal = error
             self._lost.set()

@@ -9,11 +9,15 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 
+import numpy as np
+
 from kappaskin.errors import Refusal
+from kappaskin.frames import Frame
 from kappaskin.scenes import Scene, Simulator
 from kappaskin.scenes.effects import CorruptedFrames, DroppedFrames
 from kappaskin.sources import information
 from kappaskin.sources.decoder import FROM_HOST, Decoder
+from kappaskin.sources.description import Description
 from kappaskin.sources.wire import (
     RATE_UNIT,
     UNKNOWN_TEMPERATURE,
@@ -45,11 +49,21 @@ class _RefusedCommand(Exception):
 class PseudoDevice:
     """A scene that speaks the wire format on `port`; spends a sequence number on every message.
 
+    With a `description` it is a device with that line format instead, and takes no commands.
+
     It is quiet until someone opens the port, and again after they close it. `unsent` counts the
     messages that found the outbox full or were in it at the end, `spent` counts all of them.
     """
 
-    def __init__(self, scene: Scene, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        clock: Callable[[], float] = time.monotonic,
+        description: Description | None = None,
+    ) -> None:
+        if description is not None:
+            _check_same_elements(scene, description)
+        self._lines = None if description is None else description.decoder()
         self._scene, self._simulator, self._clock = scene, Simulator(scene), clock
         self._sensor = scene.sensor()
         self._information = information.sensor_to_json(self._sensor)
@@ -127,13 +141,13 @@ class PseudoDevice:
             select.select([self._master], ready, [], max(0.0, min(wait, 0.05)))
 
     def _send_information(self) -> None:
-        self._send(encode_information(self.spent, self._now(), self._information))
+        if self._lines is None:
+            self._send(encode_information(self.spent, self._now(), self._information))
 
     def _send_samples(self) -> None:
         frame = self._simulator.scanned(self._scan, self.samples, self._due(), self._clock)
         self.samples += 1
-        width = 2 if self._scene.transduction.converter.bits <= 16 else 4
-        message = encode_samples(self.spent, frame.device_time, frame.channels, frame.counts, width)
+        message = self._message(frame)
         match self._simulator.failure(self.samples - 1):
             case DroppedFrames.name:
                 self.spent += 1
@@ -141,6 +155,15 @@ class PseudoDevice:
                 self._send(_corrupted(message))
             case _:
                 self._send(message)
+
+    def _message(self, frame: Frame) -> bytes:
+        """The bytes that say what was read in a frame."""
+        chain = self._scene.transduction
+        if self._lines is not None:
+            curvature = chain.curvature(frame.counts)[np.argsort(frame.channels)]
+            return self._lines.encoded(self.spent, frame.device_time, curvature)
+        width = 2 if chain.converter.bits <= 16 else 4
+        return encode_samples(self.spent, frame.device_time, frame.channels, frame.counts, width)
 
     def _send(self, message: bytes) -> None:
         if self._held + len(message) > _OUTBOX:
@@ -172,7 +195,7 @@ class PseudoDevice:
         """Carry out the commands of the host."""
         with suppress(OSError):  # nothing came, or nobody is there any more
             for command in self._decoder.feed(os.read(self._master, 4096)):
-                if isinstance(command, Command):
+                if isinstance(command, Command) and self._lines is None:
                     self._answer(command, self._now())
 
     def _answer(self, command: Command, received: float) -> None:
@@ -272,6 +295,15 @@ class PseudoDevice:
                 read = now
             time.sleep(0.01)
         os.close(slave)
+
+
+def _check_same_elements(scene: Scene, description: Description) -> None:
+    own, described = scene.layout.positions, description.sensor.layout.positions
+    if own.shape != described.shape or not np.allclose(own, described):
+        raise Refusal(
+            f"expected a scene with the elements of the description ({description.sensor.layout}), "
+            f"got {scene.layout}, or others at other places; give both the same [elements] and size"
+        )
 
 
 def _numbers(form: str, arguments: bytes) -> tuple[int, ...]:

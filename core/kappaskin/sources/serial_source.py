@@ -4,6 +4,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
+from pathlib import Path
 
 from kappaskin.errors import SourceError
 from kappaskin.estimation import Scanner
@@ -12,8 +13,18 @@ from kappaskin.sensing import Sensor
 from kappaskin.sources.clock import ClockMap, ClockState
 from kappaskin.sources.commands import DeviceCommands, ScanControl
 from kappaskin.sources.decoder import Accounting, Decoder, SequenceCounter
+from kappaskin.sources.description import (
+    SCHEME,
+    SUFFIX,
+    Description,
+    described_text,
+    load_description,
+    parts_of,
+)
 from kappaskin.sources.interpreter import Interpreter
+from kappaskin.sources.lines import LineDecoder
 from kappaskin.sources.ports import (
+    BAUD_RATE,
     BaudRateSearch,
     Port,
     SerialConnection,
@@ -47,13 +58,20 @@ class SerialSource:
     """Frames from the device on a port; reconnects when it was unplugged, on whichever port it is.
 
     Opening raises a `SourceError` where it cannot be; thereafter `trouble` says why no frames come.
-    A thread of its own reads, so that no byte waits for arithmetic.
+    A thread of its own reads, so that no byte waits for arithmetic. A device with a line format of
+    its own has a `description` in place of its information, and is sent nothing.
     """
 
-    def __init__(self, url: str, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        url: str,
+        clock: Callable[[], float] = time.monotonic,
+        description: Description | None = None,
+    ) -> None:
         self.url, self._clock = url, clock
         self._plug = Port.named(url)
-        self._decoder = Decoder()
+        self._description = description
+        self._decoder = Decoder() if description is None else description.decoder()
         self._interpreter = Interpreter(url)
         self._events = _EventQueue(self._decoder.sequence, clock)
         self._scan_control = ScanControl()
@@ -65,7 +83,7 @@ class SerialSource:
         self._lost_at: float | None = None  # when the connection was lost, until the device is back
         self._next_try, self._changed_at = 0.0, -math.inf
         self._connection: SerialConnection | None = None
-        self._connect(SerialConnection(url, clock))
+        self._connect(self._new_connection(url))
 
     @property
     def sensor(self) -> Sensor | None:
@@ -78,6 +96,10 @@ class SerialSource:
 
     # The connection: opened, lost, opened again.
 
+    def _new_connection(self, url: str) -> SerialConnection:
+        described = self._description
+        return SerialConnection(url, self._clock, described.baud_rate if described else BAUD_RATE)
+
     def _connect(self, connection: SerialConnection) -> None:
         """Read from `connection`, and ask the device for its information."""
         now = self._clock()
@@ -85,10 +107,13 @@ class SerialSource:
         self._opened = self._received_at = self._good_at = self._tuned_at = now
         self._bytes_before = self._decoder.accounting().bytes_in
         self._holders: list[str] = []
-        self._rates = BaudRateSearch(connection.baud_rate)
         clock_map = ClockMap()
         self._interpreter.begin(clock_map)
         self._commands = DeviceCommands(self._send, clock_map)
+        if self._description is not None:
+            self._identify(described_text(self._description.sensor))
+            return
+        self._rates = BaudRateSearch(connection.baud_rate)
         self._commands.greet(now)
         self._scan_control.begin()
 
@@ -119,7 +144,7 @@ class SerialSource:
             return
         self._next_try = now + _RETRY
         try:
-            self._connect(SerialConnection(self._present_url(), self._clock))
+            self._connect(self._new_connection(self._present_url()))
         except SourceError as error:
             self._disconnected = f"{error}; retrying"
 
@@ -157,7 +182,7 @@ class SerialSource:
             self._pending += [(now, got) for got in messages if not isinstance(got, Command)]
             if messages:
                 self._good_at = now
-                if self._rates.good(connection.baud_rate):
+                if self._description is None and self._rates.good(connection.baud_rate):
                     self._events.add("rate", f"the device sends at {connection.baud_rate} baud")
         if not self._interpreter.known:
             self._find_information()
@@ -231,7 +256,7 @@ class SerialSource:
         One that shows more than had passed here as the port was opened went on too: this machine
         was asleep, or busy, then or since.
         """
-        if self._last is None:
+        if self._last is None or not self._pending:
             return False
         device = self._pending[0][1].time - self._last[0]
         host = self._opened - self._last[1]
@@ -281,6 +306,8 @@ class SerialSource:
 
     def _maintain(self, connection: SerialConnection) -> None:
         """Send pings and scan lists; try other baud rates on unreadable bytes."""
+        if self._description is not None:
+            return
         now, known = self._clock(), self._interpreter.known
         if known and self._interpreter.sensor is not None:
             self._scan_control.attend(now, self._interpreter.sensor, self._commands.send)
@@ -343,6 +370,12 @@ class SerialSource:
             return (
                 f"{self.url}: silent for more than {_PATIENCE:g} s; check the power, and that this "
                 "is its port"
+            )
+        if isinstance(self._decoder, LineDecoder):
+            last = self._decoder.last and f"; the last one discarded: {self._decoder.last}"
+            return (
+                f"{self.url}: {arrived} bytes came but no record as described; check columns, "
+                f"separator and baud rate in the sensor's description{last}"
             )
         if self._good_at > self._opened and not known:
             return (
@@ -500,3 +533,18 @@ class _RecordingTap:
 
 
 register_scheme("", lambda name, _: SerialSource(name))
+
+
+def _described(name: str) -> SerialSource:
+    """The source of a name as `described_source` makes it, without its scheme."""
+    file, url = parts_of(f"{SCHEME}{name}")
+    if not url:
+        raise SourceError(
+            f"expected {SCHEME}FILE{SUFFIX}:PORT, a sensor's description and where it is "
+            f"connected; got {SCHEME}{name}"
+        )
+    description = load_description(Path(file), Port.named(url).serial_number)
+    return SerialSource(url, description=description)
+
+
+register_scheme(SCHEME, lambda name, _: _described(name))

@@ -108,8 +108,9 @@ def test_numbers_beyond_the_limits_declared_are_refused_with_them(part, name):
 
 
 def test_the_guide_tells_every_key_as_it_is_declared():
-    page = GUIDE["PAGE"].read_text(encoding="utf-8")
-    assert page.endswith(GUIDE["told"]()), "run python tests/guide_keys.py"
+    for page, section in ((GUIDE["PAGE"], GUIDE["told"]()), (GUIDE["OWN"], GUIDE["told_of_own"]())):
+        text = page.read_text(encoding="utf-8")
+        assert text.endswith(section), "run python tests/guide_keys.py"
 
 
 @pytest.mark.parametrize("page", GUIDE["OTHERS"], ids=lambda page: page.stem)

@@ -1,15 +1,24 @@
 """Connection: selection of the source of readings."""
 
+from pathlib import Path
+
+from PySide6.QtWidgets import QFileDialog
+
 from kappaskin.live import ResumeInfo
+from kappaskin.sources import described_source, is_description, load_description
 from kappaskin_app.features.connection.panel import ConnectionPanel, PortSearch
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.opening import Kind
 from kappaskin_app.shell.pages import LIVE
-from kappaskin_app.shell.parts import SOURCE
+from kappaskin_app.shell.parts import FILE, SOURCE
 from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.widgets.parts import ELLIPSIS
 
 _SIMULATE = "Connect the simulated skin that the panels define"
 _CONNECT = "Connect the source selected under Connection"
 _DISCONNECT = "Close the source; the last readings stay visible, marked as lost"
+_OPEN = "Connect a sensor with a line format of its own, described in a file (.toml)"
+_FILES = "Sensor description (*.toml)"
 _PORTS = "Search for serial ports; the list is also updated every second"
 
 
@@ -17,7 +26,8 @@ class ConnectionFeature:
     name = "connection"
 
     def install(self, shell: MainWindow) -> None:
-        self._session = session = shell.session
+        self._shell, self._session = shell, shell.session
+        session = self._session
         add = shell.actions_by_name.add
         self.connection = shell.panels.add(LIVE, ConnectionPanel())
         self.port_search = PortSearch(self.connection.sources, shell.tasks, shell)
@@ -30,11 +40,15 @@ class ConnectionFeature:
         add("connect", SOURCE, "&Connect", self._connect, "Ctrl+Return", _CONNECT)
         add("disconnect", SOURCE, "&Disconnect", session.disconnect_from, "Ctrl+D", _DISCONNECT)
         add("ports", SOURCE, "Re&fresh ports", self.port_search.refresh, "F5", _PORTS)
+        add("open-sensor", FILE, f"Open &sensor{ELLIPSIS}", self._open, "", _OPEN)
+        shell.opening.add(
+            Kind("sensor description", (".toml",), self._connect_described, is_description)
+        )
         shell.menus.welcome.add(
             2,
             "Connec&t a sensor",
             "Select the port of a sensor under Connection, then connect it.",
-            lambda: self._show(shell),
+            self._show,
         )
         shell.begun.connect(guarded(self._begin))
 
@@ -46,8 +60,25 @@ class ConnectionFeature:
     def _connect(self) -> None:
         self._session.request_source(self.connection.source())
 
-    def _show(self, shell: MainWindow) -> None:
+    def _open(self) -> None:
+        file, _ = QFileDialog.getOpenFileName(self._shell, "Open a sensor description", "", _FILES)
+        if file:
+            self._shell.opening.open(Path(file))
+
+    def _connect_described(self, file: Path) -> None:
+        """Connect the sensor described in a file, at the selected port or the only one there."""
+        load_description(file)  # or refused here
+        self._shell.opening.note(file)
+        port = self.connection.port()
+        self.connection.show_source(described_source(file.absolute(), port))
+        if port:
+            self._connect()
+        else:
+            self._show()
+            self._shell.notify("Type the port of this sensor behind its description, then connect")
+
+    def _show(self) -> None:
         """Show the panel with the focus on the list of sources."""
-        shell.docks.reveal("settings")
-        shell.panels.reveal(self.connection)
+        self._shell.docks.reveal("settings")
+        self._shell.panels.reveal(self.connection)
         self.connection.sources.setFocus()

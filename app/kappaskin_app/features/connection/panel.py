@@ -1,5 +1,6 @@
 """Connection panel: selection of the source, and search for serial ports."""
 
+import math
 import time
 
 from PySide6.QtCore import QObject, QSignalBlocker, Qt, QTimer, Signal
@@ -16,7 +17,7 @@ from kappaskin._text import printable
 from kappaskin.calibration import Calibration
 from kappaskin.live import Status
 from kappaskin.sensing import Sensor
-from kappaskin.sources import Port
+from kappaskin.sources import Port, parts_of
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.form import pass_window_keys
@@ -52,6 +53,7 @@ class PortSearch(QObject):
 
 
 _SIMULATED = ("sim:", "Simulated skin")
+_NO_PORTS = ("sim:", "replay:", "sensor:")
 _TIP = (
     "The simulated skin, a serial port found on this machine, or a port or URL typed here, such as "
     "/dev/ttyACM0, COM3 or socket://host:port."
@@ -124,6 +126,13 @@ class ConnectionPanel(Panel):
         text = self.sources.currentText().strip()
         index = self.sources.findText(text)
         return str(self.sources.itemData(index)) if index >= 0 else text
+
+    def port(self) -> str:
+        """The port or URL that is selected or typed, else the only one found; empty without."""
+        chosen = parts_of(self.source())[1] or self.source()
+        if not chosen.startswith(_NO_PORTS):
+            return chosen
+        return self._ports[0].port if len(self._ports) == 1 else ""
 
     def _note_selection(self) -> None:
         """Store the selected port, to recognise its device under another name."""
@@ -230,7 +239,7 @@ def _sensor_text(sensor: Sensor, calibration: Calibration | None) -> str:
     health = f"\n{dead} of {sensing.size} channels dead" if dead else ""
     name = printable(f"{sensor.name} ({sensor.serial_number})")
     calibrated = f"\n{calibration_text(calibration)}" if calibration else ""
+    rate = f", up to {sensor.rate:g} frames/s" if math.isfinite(sensor.rate) else ""
     return (
-        f"{name}\n{sensor.layout}, {sensor.edge}{health}\n"
-        f"{a:g} x {b:g} mm{bent}, up to {sensor.rate:g} frames/s{calibrated}"
+        f"{name}\n{sensor.layout}, {sensor.edge}{health}\n{a:g} x {b:g} mm{bent}{rate}{calibrated}"
     )

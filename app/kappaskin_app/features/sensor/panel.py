@@ -8,7 +8,7 @@ from kappaskin.errors import Refusal
 from kappaskin.estimation import ScanTradeoff
 from kappaskin.live import Status
 from kappaskin.mechanics import INPLANE
-from kappaskin.sensing import Sensor
+from kappaskin.sensing import DigitalReadings, Sensor
 from kappaskin_app.shell.badge import in_use
 from kappaskin_app.shell.form import Form, SimulationForm
 from kappaskin_app.shell.settings import Settings
@@ -122,6 +122,8 @@ _SELECT = "Click elements on a heatmap to select them."
 def _facts(sensor: Sensor) -> tuple[str, str, str]:
     """Frame rate, resolution and range, and strain limit of the electronics."""
     chain = sensor.transduction
+    if isinstance(chain, DigitalReadings):
+        return f"{sensor.channels} channels, at the device's rate", "not known", "not known"
     most = min(abs(limit) for limit in chain.limits) * chain.resolution
     return (
         f"{sensor.channels} channels, {1 / chain.scan_time(sensor.channels):.0f}/s",

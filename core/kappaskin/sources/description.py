@@ -1,0 +1,361 @@
+"""Sensor description: a TOML file on a device that has a line format of its own."""
+
+import hashlib
+import json
+import math
+import re
+import tomllib
+from collections import Counter
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import chain
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+
+from kappaskin._files import read_file
+from kappaskin._schema import Key, Part, Unit, Within
+from kappaskin._toml import TomlTable, parsed
+from kappaskin.errors import Refusal
+from kappaskin.frames import COMPONENTS
+from kappaskin.scenes import read_elements, read_skin
+from kappaskin.sensing import DigitalReadings, Sensor
+from kappaskin.sources.decoder import Decoder
+from kappaskin.sources.lines import (
+    CHECKSUMS,
+    TIMES,
+    BinaryDecoder,
+    Columns,
+    JsonDecoder,
+    LineDecoder,
+    TextDecoder,
+)
+
+FORMAT = 1
+SUFFIX = ".toml"
+_LARGEST = 2**20  # bytes
+_MOST_COLUMNS = 2**16
+_SEQUENCE = "sequence"
+_READING = re.compile(rf"({'|'.join(COMPONENTS)}):(\d{{1,6}})(?:\.\.(\d{{1,6}}))?")
+_BAUD = Within(50, 2**24, "baud", whole=True)
+_FACTOR = Within(-1e12, 1e12)
+
+TOP = Part(
+    "Sensor description",
+    {
+        "format": Key("Format", "The format of the file: 1.", kind=int),
+        "title": Key("Title", "Name of the sensor; the file's name if omitted.", kind=str),
+    },
+)
+LINE = Part(
+    "Line",
+    {
+        "kind": Key(
+            "Kind",
+            "Format of a record: a line of `text` with numbers, a line with a `json` object, or a "
+            "`binary` record.",
+            kind=str,
+            choices=(("text", "Text"), ("json", "JSON"), ("binary", "Binary")),
+        ),
+        "separator": Key(
+            "Separator",
+            "Text between two numbers of a line; a space is any number of spaces and tabs. "
+            "Recognised if omitted. Numbers have a decimal point.",
+            kind=str,
+            default="",
+        ),
+        "columns": Key(
+            "Columns",
+            "What the numbers of a record are, in order: `time` (s), `time_ms`, `time_us`, "
+            "`sequence`, an empty text for one that is ignored, or readings such as `xx:4` or "
+            "`xx:0..35` of elements 4, and 0 to 35.",
+            kind=tuple[str, ...],
+            default=(),
+        ),
+        "fields": Key(
+            "Fields",
+            "For JSON instead of columns: the key of each value, such as `skin.k` for k in skin, "
+            "and its columns. A value is a number or a list of them.",
+        ),
+        "struct": Key(
+            "Struct",
+            "For binary: the format of a record, as of Python's struct, without sync bytes and "
+            "checksum: `<H36h` is little-endian, a 16-bit number, then 36 with sign.",
+            kind=str,
+            default="",
+        ),
+        "sync": Key(
+            "Sync", "For binary: the first bytes of a record, in hex.", kind=str, default=""
+        ),
+        "checksum": Key(
+            "Checksum",
+            "For binary: what follows a record, in its byte order, over all of the struct.",
+            kind=str,
+            default="none",
+            choices=tuple((name, name) for name in CHECKSUMS),
+        ),
+        "baud": Key(
+            "Baud rate",
+            "Rate of the serial port; USB ports ignore it.",
+            Unit.same("baud"),
+            kind=int,
+            default=115_200,
+            limits=_BAUD,
+        ),
+        "id": Key(
+            "Identifier",
+            "Key of the sensor's tare and calibration; the serial number of the USB port if "
+            "omitted, else a number made from this file.",
+            kind=str,
+            default="",
+        ),
+    },
+)
+READINGS = Part(
+    "Readings",
+    {
+        "scale": Key(
+            "Scale",
+            "Reading per unit of the device's number.",
+            Unit.same("1/m"),
+            kind=float,
+            default=1.0,
+            limits=_FACTOR,
+        ),
+        "offset": Key(
+            "Offset",
+            "Reading where the device sends 0.",
+            Unit.same("1/m"),
+            kind=float,
+            default=0.0,
+            limits=_FACTOR,
+        ),
+    },
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Description:
+    """A sensor as its description's `text` has it, and the format of its lines."""
+
+    text: str
+    sensor: Sensor
+    baud_rate: int
+    columns: Columns
+    kind: str
+    separator: str
+    paths: tuple[tuple[tuple[str, ...], int], ...]
+    struct: str
+    sync: bytes
+    checksum: str
+
+    def decoder(self, whole: bool = False) -> LineDecoder:
+        """A decoder of its lines; `whole` where the bytes begin with the beginning of one."""
+        if self.kind == "text":
+            return TextDecoder(self.columns, self.separator, whole)
+        if self.kind == "json":
+            return JsonDecoder(self.columns, self.paths, whole)
+        return BinaryDecoder(self.columns, self.struct, self.sync, self.checksum)
+
+
+SCHEME = "sensor:"
+"""Prefix of the names of sources of described sensors."""
+
+
+def described_source(file: Path, source: str) -> str:
+    """The name of a `source` of a sensor with the description in a `file`, for `open_source`."""
+    return f"{SCHEME}{file}:{source}"
+
+
+def parts_of(name: str) -> tuple[str, str]:
+    """The file and the port or URL in the name of a source of a described sensor.
+
+    Both are empty where that is none.
+    """
+    file, found, url = name.removeprefix(SCHEME).partition(f"{SUFFIX}:")
+    named = name.startswith(SCHEME) and found and url
+    return (f"{file}{SUFFIX}", url) if named else ("", "")
+
+
+def is_description(file: Path) -> bool:
+    """Whether a TOML file describes a sensor's lines: it has a table [line]."""
+    try:
+        return "line" in tomllib.loads(read_file(file, _LARGEST).decode("utf-8-sig"))
+    except (OSError, ValueError, RecursionError):
+        return False
+
+
+def load_description(file: Path, serial_number: str = "") -> Description:
+    """The description in a TOML `file`; raises a `Refusal` with the line at fault.
+
+    `serial_number` as of `description_of`.
+    """
+    try:
+        text = read_file(file, _LARGEST).decode("utf-8-sig")
+    except (OSError, ValueError) as error:
+        raise Refusal(f"{file}: cannot be read as a sensor's description ({error})") from error
+    return description_of(text.replace("\r\n", "\n"), str(file), serial_number)
+
+
+@lru_cache(8)
+def description_of(text: str, name: str, serial_number: str = "") -> Description:
+    """The description with this `text`, of the file `name`.
+
+    `serial_number` is that of the sensor where the text has no `id`.
+    """
+    top = TomlTable(parsed(text, Path(name)), text, name)
+    if (version := TOP.value(top, "format")) != FORMAT:
+        raise top.refusal(f"expected format = {FORMAT}, got {version}", "format")
+    plate, edge = read_skin(top.table("skin"))
+    layout = read_elements(top.table("elements"), plate.patch)
+    line = top.table("line")
+    kind = LINE.value(line, "kind")
+    names, paths = _names(line, kind)
+    with line.blamed("fields" if kind == "json" else "columns"):
+        columns = _columns(names, _numbers_of(len(layout), layout.shape), top.table("readings"))
+    own = LINE.value(line, "id") or serial_number or hashlib.sha256(text.encode()).hexdigest()[:12]
+    title = TOP.value(top, "title", default=Path(name).name.removesuffix(SUFFIX))
+    live = layout.live & np.isin(np.arange(layout.live.size), columns.channels).reshape(3, -1)
+    sensor = Sensor(
+        replace(layout, live=live),
+        DigitalReadings(),
+        plate,
+        edge,
+        rate=math.inf,
+        name=title,
+        serial_number=own,
+        firmware=f"{kind} lines",
+        simulated=False,
+        description=text,
+    )
+    settings = {key: LINE.value(line, key) for key in ("separator", "struct", "checksum")}
+    try:
+        sync = bytes.fromhex(LINE.value(line, "sync"))
+    except ValueError as error:
+        raise line.refusal(f"expected bytes in hex such as aa55: {error}", "sync") from error
+    baud = LINE.value(line, "baud")
+    line.done()
+    top.done()
+    found = Description(text, sensor, baud, columns, kind, paths=paths, sync=sync, **settings)
+    with line.blamed("struct" if kind == "binary" else "kind"):
+        found.decoder()
+    return found
+
+
+def _names(
+    line: TomlTable, kind: str
+) -> tuple[tuple[str, ...], tuple[tuple[tuple[str, ...], int], ...]]:
+    """The columns of all numbers of a record, and of JSON the path to each group of them."""
+    if kind != "json":
+        names = cast("tuple[str, ...]", LINE.value(line, "columns"))
+        if not names:
+            raise line.refusal('expected columns = ["time_ms", "xx:0..35", ...], got none')
+        return _expanded(line, "columns", names), ()
+    fields = line.table("fields")
+    if not len([*fields]):
+        raise line.refusal('expected fields = { "skin.k" = "xx:0..35" }, got none')
+    groups = {path: _expanded(fields, path, (fields.get(path, str),)) for path in fields}
+    paths = tuple((tuple(path.split(".")), len(names)) for path, names in groups.items())
+    return tuple(chain.from_iterable(groups.values())), paths
+
+
+def _expanded(table: TomlTable, key: str, names: tuple[str, ...]) -> tuple[str, ...]:
+    """The names of single columns: a range of elements stands for one column each."""
+    found: list[str] = []
+    for name in names:
+        if name in ("", _SEQUENCE, *TIMES):
+            found.append(name)
+            continue
+        if not (match := _READING.fullmatch(name)):
+            raise table.refusal(
+                f"expected {', '.join((*TIMES, _SEQUENCE))}, an empty text, or a reading such as "
+                f"xx:4 or {COMPONENTS[0]}:0..35 ({', '.join(COMPONENTS)}), got {name!r:.60}",
+                key,
+            )
+        component, first, last = match[1], int(match[2]), int(match[3] or match[2])
+        if last < first:
+            raise table.refusal(f"expected a range that goes up, got {name!r}", key)
+        if len(found) + last - first >= _MOST_COLUMNS:
+            raise table.refusal(f"expected at most {_MOST_COLUMNS} columns, got {name!r}", key)
+        found += [f"{component}:{k}" for k in range(first, last + 1)]
+    return tuple(found)
+
+
+def _numbers_of(elements: int, shape: tuple[int, int] | None) -> list[int]:
+    """The number in a layout of each element k = i_x n + i_y of m x n, or of one of a list."""
+    if shape is None:
+        return list(range(elements))
+    return np.arange(elements).reshape(shape[1], shape[0]).T.ravel().tolist()
+
+
+def _columns(names: tuple[str, ...], elements: list[int], readings: TomlTable) -> Columns:
+    for single in (_SEQUENCE, *TIMES):
+        if names.count(single) > 1:
+            raise Refusal(f"expected one column {single}, got {names.count(single)}")
+    times = [name for name in TIMES if name in names]
+    if len(times) > 1:
+        raise Refusal(f"expected one column of time, got {' and '.join(times)}")
+    read = [(place, *name.split(":")) for place, name in enumerate(names) if ":" in name]
+    if not read:
+        raise Refusal("expected columns with readings such as xx:0..35, got none")
+    channels: list[int] = []
+    for _, component, number in read:
+        if int(number) >= len(elements):
+            raise Refusal(
+                f"expected elements from 0 to {len(elements) - 1}, got {component}:{number}"
+            )
+        channels.append(COMPONENTS.index(component) * len(elements) + elements[int(number)])
+    if len(set(channels)) < len(channels):
+        [(twice, _)] = Counter(names[place] for place, *_ in read).most_common(1)
+        raise Refusal(f"expected each reading once, got {twice} twice")
+    scale, offset = np.array([_factors(readings, component) for _, component, _ in read]).T
+    readings.done(*COMPONENTS)
+    return Columns(
+        names,
+        np.array([place for place, *_ in read], np.intp),
+        np.array(channels, np.intp),
+        scale,
+        offset,
+        names.index(times[0]) if times else -1,
+        TIMES[times[0]] if times else 1.0,
+        names.index(_SEQUENCE) if _SEQUENCE in names else -1,
+    )
+
+
+def _factors(readings: TomlTable, component: str) -> tuple[float, float]:
+    """Scale and offset of a component: of its own table, else those of all."""
+    table = readings.table(component)
+    scale, offset = (
+        READINGS.value(table, key, default=READINGS.value(readings, key))
+        for key in ("scale", "offset")
+    )
+    table.done()
+    if not scale:
+        raise table.refusal("expected a scale other than 0", "scale")
+    return scale, offset
+
+
+# Between the description and what is recorded of a sensor
+
+
+_TEXT = ("description", "name", "serial_number")
+
+
+def described_text(sensor: Sensor) -> str:
+    """The information text of a described `sensor`, as recordings have it."""
+    return json.dumps({key: getattr(sensor, key) for key in _TEXT}, separators=(",", ":"))
+
+
+def described_sensor(table: TomlTable) -> Sensor:
+    """The sensor of an information text that `described_text` made."""
+    text, name, serial_number = (table.get(key, str) for key in _TEXT)
+    table.done()
+    return description_of(text, name, serial_number).sensor
+
+
+def decoder_of(sensor: Sensor) -> Decoder | LineDecoder:
+    """The decoder of what a sensor sends."""
+    if not sensor.description:
+        return Decoder()
+    return description_of(sensor.description, sensor.name, sensor.serial_number).decoder()

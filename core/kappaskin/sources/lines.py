@@ -1,0 +1,374 @@
+"""Lines of devices with formats of their own: text, JSON and binary records to samples."""
+
+import binascii
+import json
+import math
+import re
+import struct
+import zlib
+from abc import ABC, abstractmethod
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from types import NoneType
+from typing import Any, cast
+
+import numpy as np
+
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array, Indices
+from kappaskin.sensing import DigitalReadings
+from kappaskin.sources.decoder import Accounting, SequenceCounter
+from kappaskin.sources.wire import Message, Samples
+
+TIMES = {"time": 1.0, "time_ms": 1e-3, "time_us": 1e-6}
+"""Columns of time, with their unit in s."""
+
+SEPARATORS = (",", ";", "\t", " ")
+"""Separators that are recognised, in this order; a space stands for any number of them."""
+
+_LONGEST = 2**16  # bytes of a line
+_SHOWN = 60  # characters of a line that was discarded
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """What the numbers of a record are: each of `names`, and the readings among them.
+
+    The number at `places` (n,) is the reading of `channels` (n,), scale times it plus offset, in
+    1/m. `time` and `sequence` are the places of these, -1 without; a time is in `time_unit` s.
+    """
+
+    names: tuple[str, ...]
+    places: Indices
+    channels: Indices
+    scale: Array
+    offset: Array
+    time: int = -1
+    time_unit: float = 1.0
+    sequence: int = -1
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def numbers(self, sequence: int, time: float, curvature: Array) -> Array:
+        """The numbers of a record at `time` in s, of `curvature` (3 P,) in 1/m; 0 if ignored."""
+        numbers = np.zeros(len(self))
+        numbers[self.places] = (curvature[self.channels] - self.offset) / self.scale
+        if self.time >= 0:
+            numbers[self.time] = time / self.time_unit
+        if self.sequence >= 0:
+            numbers[self.sequence] = sequence
+        return numbers
+
+
+class LineDecoder(ABC):
+    """Finds records in bytes as they arrive, as `Decoder` does messages of our own; never raises.
+
+    Bytes before the first whole record, of a wrong number of columns, that are no numbers, or that
+    fail their checksum are discarded and counted by reason; `last` is the last one discarded.
+    """
+
+    def __init__(self, columns: Columns) -> None:
+        self.sequence = SequenceCounter()
+        self.last = ""
+        self._columns, self._readings = columns, DigitalReadings()
+        self._bytes_in = self._bytes_good = self._number = 0
+        self._discarded: Counter[str] = Counter()
+        self._buffer = b""
+
+    def feed(self, data: bytes) -> list[Message]:
+        """The new frames in order, duplicates left out."""
+        self._bytes_in += len(data)
+        self._buffer += data
+        return [samples for samples in self._records() if self.sequence.take(samples.sequence)]
+
+    @abstractmethod
+    def encoded(self, sequence: int, time: float, curvature: Array) -> bytes:
+        """The record that a device would send at `time` in s, of `curvature` (3 P,) in 1/m."""
+
+    @abstractmethod
+    def _records(self) -> Iterator[Samples]:
+        """The records in the buffer, which are taken off it."""
+
+    @property
+    def held(self) -> bytes:
+        """The bytes that another decoder needs to go on from here."""
+        return self._buffer
+
+    def line_ended(self) -> None:
+        """Count what is buffered as cut off: the rest of it will not arrive."""
+        self._discard("cut off", self._buffer, tell=False)
+        self._buffer = b""
+
+    def accounting(self, overrun: int = 0) -> Accounting:
+        """The balance so far, with `overrun` bytes that came but were never fed."""
+        counts, discarded = self.sequence, self._discarded + Counter(overrun=overrun)
+        return Accounting(
+            self._bytes_in + overrun,
+            self._bytes_good,
+            tuple(discarded.items()),
+            len(self._buffer),
+            counts.good,
+            counts.accepted,
+            counts.duplicate,
+            counts.lost,
+            counts.span,
+            counts.restarts,
+        )
+
+    def _discard(self, reason: str, data: bytes, tell: bool = True) -> None:
+        if data:
+            self._discarded[reason] += len(data)
+            if tell:
+                self.last = f"{reason}: {data[:_SHOWN].decode(errors='replace').strip()!r}"
+
+    def _samples(self, numbers: Array, size: int) -> Samples:
+        """The samples of a record of `size` bytes with these `numbers`, one for each column."""
+        columns, self._bytes_good = self._columns, self._bytes_good + size
+        time = math.nan if columns.time < 0 else float(numbers[columns.time]) * columns.time_unit
+        if columns.sequence < 0:
+            sequence, self._number = self._number, self._number + 1
+        else:
+            sequence = int(numbers[columns.sequence])
+        values = columns.scale * numbers[columns.places] + columns.offset
+        return Samples(sequence, time, columns.channels, self._readings.counts(values))
+
+    def _usable(self, numbers: Array) -> bool:
+        """Whether time and sequence are numbers that a frame may have."""
+        columns = self._columns
+        needed = [place for place in (columns.time, columns.sequence) if place >= 0]
+        return bool(np.all((numbers[needed] >= 0) & (numbers[needed] < 2.0**63)))
+
+
+class _Lines(LineDecoder):
+    """Records that are lines of text."""
+
+    def __init__(self, columns: Columns, whole: bool = False) -> None:
+        super().__init__(columns)
+        # Of the first line the beginning may be missing, and what is left of it look like a line.
+        self._whole = whole
+
+    @abstractmethod
+    def _numbers(self, line: bytes) -> Array | str:
+        """The numbers of a `line`, NaN for a missing one; or why there are none."""
+
+    def _records(self) -> Iterator[Samples]:
+        *lines, self._buffer = self._buffer.split(b"\n")
+        if len(self._buffer) > _LONGEST:
+            self._discard("too long", self._buffer)
+            self._buffer, self._whole = b"", False
+        for line in lines:
+            size = len(line) + 1
+            if not self._whole:
+                self._whole = True
+                self._discard("half a line", line + b"\n", tell=False)
+                continue
+            found = self._numbers(line)
+            if isinstance(found, str):
+                self._discard(found, line + b"\n")
+            elif not self._usable(found):
+                self._discard("time or sequence", line + b"\n")
+            else:
+                yield self._samples(found, size)
+
+    @property
+    def held(self) -> bytes:
+        return b"\n" + self._buffer if self._whole else self._buffer
+
+    def line_ended(self) -> None:
+        super().line_ended()
+        self._whole = False
+
+
+class TextDecoder(_Lines):
+    """Lines of numbers with a `separator` between them; without one it is recognised."""
+
+    def __init__(self, columns: Columns, separator: str = "", whole: bool = False) -> None:
+        super().__init__(columns, whole)
+        self._separator = separator
+
+    def _numbers(self, line: bytes) -> Array | str:
+        text = line.strip()
+        if not self._separator:
+            self._separator = self._recognised(text)
+        if not self._separator:
+            return "no separator"
+        parts = _split(text, self._separator)
+        if len(parts) != len(self._columns):
+            return "wrong number of columns"
+        try:
+            return np.array([float(part or "nan") for part in parts])
+        except ValueError:
+            return "no number"
+
+    def encoded(self, sequence: int, time: float, curvature: Array) -> bytes:
+        numbers = self._columns.numbers(sequence, time, curvature)
+        separator = self._separator or SEPARATORS[0]
+        return f"{separator.join(f'{number:.12g}' for number in numbers.tolist())}\r\n".encode()
+
+    def _recognised(self, text: bytes) -> str:
+        """The separator by which `text` has a number, or nothing, for each column; or none."""
+        for separator in SEPARATORS:
+            parts = _split(text, separator)
+            if len(parts) == len(self._columns) and all(map(_is_number_or_missing, parts)):
+                return separator
+        return ""
+
+
+def _split(text: bytes, separator: str) -> list[bytes]:
+    """The parts of a line; any number of spaces and tabs is one space."""
+    return text.split() if separator == " " else text.split(separator.encode())
+
+
+def _is_number_or_missing(part: bytes) -> bool:
+    try:
+        float(part or "nan")
+    except ValueError:
+        return False
+    return True
+
+
+class JsonDecoder(_Lines):
+    """Lines of JSON, one object each; `paths` are the keys to the numbers of each group of columns.
+
+    The value there is a number, or a list of as many as the group has.
+    """
+
+    def __init__(
+        self, columns: Columns, paths: Sequence[tuple[tuple[str, ...], int]], whole: bool = False
+    ) -> None:
+        super().__init__(columns, whole)
+        self._paths = paths
+
+    def _numbers(self, line: bytes) -> Array | str:
+        try:
+            found: Any = json.loads(line)
+        except (ValueError, RecursionError):
+            return "no JSON"
+        numbers: list[float] = []
+        for path, count in self._paths:
+            value = found
+            for key in path:
+                if not isinstance(value, dict) or key not in value:
+                    return f"no {'.'.join(path)}"
+                value = value[key]  # pyright: ignore[reportUnknownVariableType]
+            values: list[Any] = [value]
+            if isinstance(value, list):
+                values = cast("list[Any]", value)
+            if len(values) != count:
+                return "wrong number of columns"
+            if any(type(each) not in (int, float, NoneType) for each in values):
+                return "no number"
+            numbers += [math.nan if each is None else float(each) for each in values]
+        return np.array(numbers)
+
+    def encoded(self, sequence: int, time: float, curvature: Array) -> bytes:
+        values: list[float | None] = [
+            None if math.isnan(number) else float(f"{number:.12g}")
+            for number in self._columns.numbers(sequence, time, curvature).tolist()
+        ]
+        record, at = dict[str, Any](), 0
+        for path, count in self._paths:
+            *outer, last = path
+            inside = record
+            for key in outer:
+                inside = inside.setdefault(key, {})
+            inside[last] = values[at] if count == 1 else values[at : at + count]
+            at += count
+        return f"{json.dumps(record)}\n".encode()
+
+
+def _sum8(data: bytes) -> int:
+    return sum(data) & 0xFF
+
+
+def _crc16(data: bytes) -> int:
+    return binascii.crc_hqx(data, 0xFFFF)
+
+
+CHECKSUMS: dict[str, tuple[str, Callable[[bytes], int]]] = {
+    "none": ("", lambda data: 0),
+    "sum8": ("B", _sum8),
+    "crc16-ccitt": ("H", _crc16),
+    "crc32": ("I", zlib.crc32),
+}
+"""Checksums of binary records: the type that holds one, and its function.
+
+`sum8` is the sum of the bytes modulo 256, `crc16-ccitt` has the polynomial 0x1021 and begins with
+0xFFFF, `crc32` is that of Ethernet and zip.
+"""
+
+
+def _as(code: str, number: float, order: str, wraps: bool) -> int | float:
+    """A number as the type `code` of a struct holds it: the nearest, or what a counter shows."""
+    if code in "efd":
+        return number
+    bits = 8 * struct.calcsize(order + code)
+    low = -(2 ** (bits - 1)) if code.islower() else 0
+    if wraps:
+        return (round(number) - low) % 2**bits + low
+    return low if math.isnan(number) else min(max(round(number), low), low + 2**bits - 1)
+
+
+_STRUCT = "expected the format of a struct of Python such as '<H36h'"
+
+
+class BinaryDecoder(LineDecoder):
+    """Binary records: `sync` bytes, a `layout` of `struct`, and a checksum of it.
+
+    Without sync bytes or a checksum nothing tells where a record begins.
+    """
+
+    def __init__(self, columns: Columns, layout: str, sync: bytes, checksum: str) -> None:
+        super().__init__(columns)
+        kind, self._sum = CHECKSUMS[checksum]
+        try:
+            self._body = struct.Struct(layout)
+            values = self._body.unpack(bytes(self._body.size))
+        except struct.error as error:
+            raise Refusal(f"{_STRUCT}, got {layout!r}: {error}") from error
+        if layout[:1] not in ("<", ">") or not all(type(v) in (int, float) for v in values):
+            raise Refusal(f"{_STRUCT}, < or > first and then numbers only; got {layout!r}")
+        if len(values) != len(columns):
+            raise Refusal(
+                f"expected columns for the {len(values)} values of the struct {layout!r}, got "
+                f"{len(columns)}"
+            )
+        self._check = struct.Struct(f"{layout[0]}{kind}" if kind else "")
+        counted = re.findall(r"(\d*)([a-zA-Z?])", layout)
+        self._codes = "".join(code * int(count or 1) for count, code in counted if code != "x")
+        self._sync, self._size = sync, len(sync) + self._body.size + self._check.size
+
+    def encoded(self, sequence: int, time: float, curvature: Array) -> bytes:
+        columns = self._columns
+        numbers = columns.numbers(sequence, time, curvature).tolist()
+        counters = {columns.time, columns.sequence}
+        values = [
+            _as(code, number, self._body.format[0], wraps=place in counters)
+            for place, (code, number) in enumerate(zip(self._codes, numbers, strict=True))
+        ]
+        body = self._body.pack(*values)
+        check = self._check.pack(self._sum(body)) if self._check.size else b""
+        return self._sync + body + check
+
+    def _records(self) -> Iterator[Samples]:
+        data, at, sync = self._buffer, 0, self._sync
+        while len(data) - at >= self._size:
+            found = data.find(sync, at)
+            if found != at:  # up to where the next record may begin
+                found = found if found >= 0 else max(at, len(data) - len(sync) + 1)
+                self._discard("between records", data[at:found])
+                at = found
+                continue
+            body = data[at + len(sync) : at + len(sync) + self._body.size]
+            check = data[at + len(sync) + self._body.size : at + self._size]
+            numbers = np.array(self._body.unpack(body), float)
+            right = not check or self._check.unpack(check)[0] == self._sum(body)
+            if right and self._usable(numbers):
+                yield self._samples(numbers, self._size)
+                at += self._size
+            else:
+                self._discard("checksum" if not right else "time or sequence", data[at : at + 1])
+                at += 1
+        self._buffer = data[at:]

@@ -1,0 +1,167 @@
+"""A device with a line format of its own, on a pseudo-terminal, to frames and recordings."""
+
+import os
+import threading
+import time
+import tty
+from contextlib import closing, contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kappaskin import Pipeline, Refusal, Setup, load_scene
+from kappaskin.errors import SourceError
+from kappaskin.sensing import SensorLayout
+from kappaskin.skin import Patch
+from kappaskin.sources import PseudoDevice, described_source, load_description, open_source
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs pseudo-terminals"),
+]
+HEAD = """
+format = 1
+title = "A board"
+[skin]
+size = [0.1, 0.1]
+rigidity = 3.7e-3
+[elements]
+grid = [6, 6]
+"""
+LINES = {
+    "text": """
+[line]
+kind = "text"
+columns = ["time_ms", "xx:0..35", "yy:0..35", "xy:0..35"]
+""",
+    "json": """
+[line]
+kind = "json"
+fields = { "skin.t" = "time", xx = "xx:0..35", yy = "yy:0..35", xy = "xy:0..35" }
+""",
+    "binary": """
+[line]
+kind = "binary"
+struct = "<HI108f"
+sync = "aa55"
+checksum = "crc16-ccitt"
+columns = ["sequence", "time_us", "xx:0..35", "yy:0..35", "xy:0..35"]
+""",
+}
+SCENE = load_scene("off-centre")
+SCENE = replace(SCENE, layout=SensorLayout.regular(Patch(0.1, 0.1), 6, 6), rate=200.0)
+
+
+def written(folder: Path, kind: str) -> Path:
+    file = folder / f"{kind}.toml"
+    file.write_text(HEAD + LINES[kind])
+    return file
+
+
+@contextmanager
+def board(file, scene=SCENE):
+    """The port of a board that plays the scene."""
+    device, stopped = PseudoDevice(scene, description=load_description(file)), threading.Event()
+    thread = threading.Thread(target=device.serve, args=(stopped.is_set,), daemon=True)
+    thread.start()
+    try:
+        yield device.port
+    finally:
+        stopped.set()
+        thread.join()
+        device.close()
+
+
+def frames_of(source, count, seconds=20.0):
+    found, end = [], time.monotonic() + seconds
+    while len(found) < count and time.monotonic() < end:
+        found += source.read(0.05)
+    return found
+
+
+@pytest.mark.parametrize("kind", LINES)
+def test_a_board_is_told_like_a_sensor_of_ours(tmp_path, kind):
+    file = written(tmp_path, kind)
+    with board(file) as port, closing(open_source(described_source(file, port))) as source:
+        frames = frames_of(source, 20)
+        pipeline = Pipeline(source.sensor, Setup(Ni=6, Nj=6))
+        contacts = [pipeline(frame).contact for frame in frames]
+        told = source.accounting()
+
+    assert len(frames) >= 20
+    assert told.balanced
+    assert source.sensor.name == "A board"
+    np.testing.assert_allclose(contacts[-1].position, [0.02, 0.08], atol=1.5e-3)
+    device_times = [frame.device_time for frame in frames]
+    assert np.all(np.diff(device_times) > 0)
+
+
+def test_a_device_without_times_gets_those_of_arrival(tmp_path):
+    file = tmp_path / "plain.toml"
+    file.write_text(HEAD + '[line]\nkind = "text"\ncolumns = ["xx:0..35", "yy:0..35", "xy:0..35"]')
+    with board(file) as port, closing(open_source(described_source(file, port))) as source:
+        frames = frames_of(source, 20)
+
+    times = [frame.device_time for frame in frames]
+    assert np.all(np.diff(times) > 0)
+    assert all(abs(frame.host_time - frame.device_time) < 0.5 for frame in frames)
+    assert all(np.isinf(frame.taken_sd) for frame in frames)
+
+
+def test_a_board_of_other_numbers_is_said_to_be(tmp_path):
+    file = written(tmp_path, "text")
+    other = tmp_path / "other.toml"
+    other.write_text((HEAD + LINES["text"]).replace('"time_ms"', '"time_ms", ""'))
+    with board(file) as port, closing(open_source(described_source(other, port))) as source:
+        end = time.monotonic() + 20
+        while not source.trouble and time.monotonic() < end:
+            assert source.read(0.05) == []
+
+    assert "no record as described" in source.trouble
+    assert "no separator" in source.trouble
+
+
+def test_an_unplugged_board_is_back_when_it_is_plugged_in(tmp_path):
+    file, master_slave = written(tmp_path, "text"), os.openpty()
+    tty.setraw(master_slave[1])
+    port = tmp_path / "port"
+    port.symlink_to(os.ttyname(master_slave[1]))
+    lines = load_description(file).decoder()
+    line = lines.encoded(0, 1.0, np.zeros(108))
+    with closing(open_source(described_source(file, str(port)))) as source:
+        os.write(master_slave[0], line * 3)
+        assert len(frames_of(source, 2)) == 2
+        for end in master_slave:
+            os.close(end)
+        end = time.monotonic() + 20
+        while "connection lost" not in source.trouble and time.monotonic() < end:
+            source.read(0.05)
+        master, slave = os.openpty()
+        tty.setraw(slave)
+        port.unlink()
+        port.symlink_to(os.ttyname(slave))
+        while source.trouble and time.monotonic() < end:
+            source.read(0.05)
+        os.write(master, line * 3)
+        found = frames_of(source, 2)
+        events = [event.kind for event in source.events()]
+        os.close(master)
+        os.close(slave)
+
+    assert len(found) == 2
+    assert {"met", "gone", "back"} <= set(events)
+    assert source.accounting().balanced
+
+
+def test_a_scene_with_other_elements_is_refused(tmp_path):
+    with pytest.raises(Refusal, match="the elements of the description"):
+        PseudoDevice(
+            load_scene("off-centre"), description=load_description(written(tmp_path, "text"))
+        )
+
+
+def test_a_name_without_a_port_is_refused(tmp_path):
+    with pytest.raises(SourceError, match="sensor:FILE"):
+        open_source(f"sensor:{written(tmp_path, 'text')}")

@@ -1,0 +1,362 @@
+"""Lines of other formats: bytes in, frames out, every byte accounted for."""
+
+import json
+import math
+import struct
+import zlib
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kappaskin import Refusal
+from kappaskin.sources import load_description
+from kappaskin.sources.description import description_of
+from kappaskin.sources.wire import Samples
+
+SKIN = """
+format = 1
+[skin]
+size = [0.06, 0.04]
+[elements]
+grid = [3, 2]
+"""
+TEXT = """
+[line]
+kind = "text"
+columns = ["time_ms", "", "xx:0..5", "xy:2"]
+[readings]
+scale = 0.5
+offset = 1.0
+"""
+JSON = """
+[line]
+kind = "json"
+fields = { t = "time", n = "sequence", "skin.k" = "xx:0..5" }
+"""
+BINARY = """
+[line]
+kind = "binary"
+struct = ">HI6h"
+sync = "aa55"
+checksum = "crc32"
+columns = ["sequence", "time_us", "yy:0..5"]
+[readings]
+scale = 0.01
+"""
+KINDS = {"text": TEXT, "json": JSON, "binary": BINARY}
+LINE = b"1500,7,2,4,6,8,10,12,-2\r\n"
+
+
+def described(line):
+    return description_of(SKIN + line, "board.toml")
+
+
+def decoder(line=TEXT, whole=True):
+    return described(line).decoder(whole)
+
+
+def curvature(samples):
+    """The readings (18,) in 1/m by channel; NaN where none was sent."""
+    flat = np.full(18, np.nan)
+    flat[samples.channels] = described(TEXT).sensor.transduction.curvature(samples.counts)
+    return flat
+
+
+def test_a_line_is_a_frame():
+    (samples,) = decoder().feed(LINE)
+
+    assert samples.time == 1.5
+    # Element k is i_x * 2 + i_y; in the layout x runs fastest: 0, 2, 4 and then 1, 3, 5.
+    np.testing.assert_allclose(curvature(samples)[:6], [2.0, 4.0, 6.0, 3.0, 5.0, 7.0])
+    np.testing.assert_allclose(curvature(samples)[12 + 1], 0.0)  # element 2 is i_x = 1, i_y = 0
+    assert np.isnan(curvature(samples)[6:12]).all()
+
+
+def test_channels_that_no_column_has_are_dead():
+    live = described(TEXT).sensor.layout.live
+
+    assert live.tolist() == [[True] * 6, [False] * 6, [False, True, False, False, False, False]]
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", " ", "  "])
+def test_the_separator_is_recognised(separator):
+    line = LINE.replace(b",", separator.encode())
+
+    (samples,) = decoder().feed(line)
+
+    assert samples.time == 1.5
+
+
+def test_a_decimal_comma_is_no_number():
+    lines = decoder(TEXT.replace("[line]", '[line]\nseparator = ";"'))
+
+    assert lines.feed(b"1500;7;2,5;4;6;8;10;12;-2\n") == []
+    assert dict(lines.accounting().discarded) == {"no number": 26}
+    assert "2,5" in lines.last
+
+
+def test_the_first_line_may_be_half_a_line_and_is_no_frame():
+    lines = decoder(whole=False)
+
+    assert lines.feed(LINE[2:]) == []
+    assert len(lines.feed(LINE)) == 1
+    assert dict(lines.accounting().discarded) == {"half a line": len(LINE) - 2}
+
+
+@pytest.mark.parametrize(
+    ("bad", "reason"),
+    [
+        (b"Booting v1.2\r\n", "no separator"),
+        (b"1500,7,2,4,6\n", "wrong number of columns"),
+        (b"1500,7,2,4,6,8,10,12,x\n", "no number"),
+        (b"nan,7,2,4,6,8,10,12,1\n", "time or sequence"),
+        (b"-3,7,2,4,6,8,10,12,1\n", "time or sequence"),
+        (b"\xff\xfe\x00\n", "no separator"),
+        (b"\n", "no separator"),
+    ],
+)
+def test_what_is_no_record_is_counted_by_its_reason(bad, reason):
+    lines = decoder()
+    if reason != "no separator":  # it is known after a good line
+        assert len(lines.feed(LINE)) == 1
+
+    assert lines.feed(bad) == []
+    assert dict(lines.accounting().discarded) == {reason: len(bad)}
+    assert len(lines.feed(LINE)) == 1
+    assert lines.accounting().balanced
+
+
+def test_missing_and_infinite_readings_are_missing_in_the_frame():
+    (samples,) = decoder().feed(b"1500,7,nan,,inf,8,10,12,-2\n")
+
+    np.testing.assert_array_equal(np.isnan(curvature(samples)[:6]), [1, 1, 0, 1, 0, 0])
+
+
+def test_a_line_without_end_takes_no_memory():
+    lines = decoder()
+    for _ in range(100):
+        lines.feed(b"1" * 10_000)
+
+    assert len(lines.held) < 2**17
+    assert lines.accounting().balanced
+
+
+def test_sequence_numbers_tell_losses_and_duplicates():
+    lines = decoder(JSON)
+
+    def send(n):
+        return lines.feed(json.dumps({"t": n, "n": n, "skin": {"k": [0.0] * 6}}).encode() + b"\n")
+
+    assert [len(send(n)) for n in (0, 1, 1, 4)] == [1, 1, 0, 1]
+    found = lines.accounting()
+    assert (found.lost, found.duplicate, found.balanced) == (2, 1, True)
+
+
+@pytest.mark.parametrize(
+    ("bad", "reason"),
+    [
+        (b"{", "no JSON"),
+        (b"[" * 5000, "no JSON"),
+        (b'{"t": 1, "n": 1}', "no skin.k"),
+        (b'{"t": 1, "n": 1, "skin": 3}', "no skin.k"),
+        (b'{"t": 1, "n": 1, "skin": {"k": [1, 2]}}', "wrong number of columns"),
+        (b'{"t": 1, "n": 1, "skin": {"k": [1, 2, 3, 4, 5, "6"]}}', "no number"),
+        (b'{"t": 1, "n": 1, "skin": {"k": [1, 2, 3, 4, 5, true]}}', "no number"),
+        (b'{"t": 1, "n": 1e30, "skin": {"k": [1, 2, 3, 4, 5, 6]}}', "time or sequence"),
+        (b'{"t": Infinity, "n": 1, "skin": {"k": [1, 2, 3, 4, 5, 6]}}', "time or sequence"),
+    ],
+)
+def test_json_that_is_no_record_is_counted_by_its_reason(bad, reason):
+    lines = decoder(JSON)
+
+    assert lines.feed(bad + b"\n") == []
+    assert dict(lines.accounting().discarded) == {reason: len(bad) + 1}
+
+
+def test_a_json_null_is_a_missing_reading():
+    (samples,) = decoder(JSON).feed(b'{"t": 1, "n": 1, "skin": {"k": [1, null, 3, 4, 5, 6]}}\n')
+
+    assert np.isnan(curvature(samples)[:6]).tolist() == [False] * 3 + [True] + [False] * 2
+
+
+def binary(sequence, values, time=1_500_000):
+    body = struct.pack(">HI6h", sequence, time, *values)
+    return b"\xaa\x55" + body + struct.pack(">I", zlib.crc32(body))
+
+
+def test_binary_records_are_found_between_other_bytes():
+    lines = decoder(BINARY)
+    first, second = binary(1, range(6)), binary(2, [0xAA55 - 2**16] * 6)
+
+    found = lines.feed(b"noise\xaa" + first + b"\xaa\x55" + second[:9])
+    found += lines.feed(second[9:] + b"\x00" * 30)
+
+    assert [samples.sequence for samples in found] == [1, 2]
+    assert found[0].time == 1.5
+    assert lines.accounting().balanced
+
+
+def test_a_record_with_a_wrong_checksum_is_no_frame():
+    lines, spoilt = decoder(BINARY), bytearray(binary(1, range(6)))
+    spoilt[12] ^= 1
+
+    assert lines.feed(bytes(spoilt) + binary(2, range(6)))[0].sequence == 2
+    assert "checksum" in dict(lines.accounting().discarded)
+
+
+@pytest.mark.parametrize("checksum", ["none", "sum8", "crc16-ccitt", "crc32"])
+@pytest.mark.parametrize("order", "<>")
+def test_every_checksum_is_read_as_it_is_written(checksum, order):
+    line = BINARY.replace("crc32", checksum).replace('">', f'"{order}')
+    lines = decoder(line)
+
+    (samples,) = decoder(line).feed(lines.encoded(7, 2.5, np.arange(18.0)))
+
+    assert (samples.sequence, samples.time) == (7, 2.5)
+    np.testing.assert_allclose(curvature(samples)[6:12], np.arange(6.0, 12.0))
+
+
+def test_the_crc_is_that_of_the_catalogue():
+    """Of "123456789", as the catalogue of CRC algorithms has it: CRC-16/IBM-3740."""
+    from kappaskin.sources.lines import CHECKSUMS
+
+    assert CHECKSUMS["crc16-ccitt"][1](b"123456789") == 0x29B1
+    assert CHECKSUMS["crc32"][1](b"123456789") == 0xCBF43926
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_a_device_would_send_is_what_is_read(kind):
+    K = np.round(np.random.default_rng(1).normal(0, 5, 18), 2)
+
+    (samples,) = decoder(KINDS[kind]).feed(decoder(KINDS[kind]).encoded(12, 3.25, K))
+
+    assert samples.time == 3.25
+    read = np.isfinite(curvature(samples))
+    assert read.sum() == len(samples.channels)
+    np.testing.assert_allclose(curvature(samples)[read], K[read], atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@given(data=st.lists(st.binary(max_size=60), max_size=8))
+def test_any_bytes_are_accounted_for(kind, data):
+    lines = decoder(KINDS[kind], whole=False)
+    valid = lines.encoded(3, 1.0, np.zeros(18))
+
+    for part in [*data, valid, *data]:
+        for samples in lines.feed(part):
+            assert isinstance(samples, Samples)
+    lines.line_ended()
+
+    assert lines.accounting().balanced
+    assert lines.accounting().buffered == 0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@given(cut=st.integers(0, 200))
+def test_where_the_bytes_are_cut_changes_nothing(kind, cut):
+    whole, parts = decoder(KINDS[kind]), decoder(KINDS[kind])
+    data = b"".join(whole.encoded(n, n / 8, np.full(18, n / 4)) for n in range(5))
+
+    expected = whole.feed(data)
+    found = parts.feed(data[:cut]) + parts.feed(data[cut:])
+
+    assert [s.time for s in found] == [s.time for s in expected] == [0, 0.125, 0.25, 0.375, 0.5]
+    assert all(np.array_equal(a.counts, b.counts) for a, b in zip(found, expected, strict=True))
+
+
+def test_another_decoder_goes_on_from_the_bytes_held():
+    lines = decoder(whole=False)
+    lines.feed(b"half\n" + LINE + LINE[:10])
+
+    other = decoder(whole=False)
+    found = other.feed(lines.held) + other.feed(LINE[10:])
+
+    assert len(found) == 1
+
+
+# Descriptions
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("format = 1", "format = 2", "format = 1"),
+        ('kind = "text"', 'kind = "csv"', "text, json, binary"),
+        ('"xx:0..5"', '"xx:0..6"', "elements from 0 to 5"),
+        ('"xx:0..5"', '"xx:5..0"', "goes up"),
+        ('"xx:0..5"', '"xz:0..5"', "expected time"),
+        ('"xx:0..5"', '"height:0"', "expected time"),
+        ('"xx:0..5"', '"xx:0..5", "xx:3"', "xx:3 twice"),
+        ('"time_ms"', '"time_ms", "time"', "one column of time"),
+        ('"time_ms"', '"sequence", "sequence"', "one column sequence"),
+        ('"xx:0..5", "xy:2"', '"sequence"', "with readings"),
+        ("scale = 0.5", "scale = 0", "other than 0"),
+        ("scale = 0.5", "scale = nan", "expected"),
+        ("scale = 0.5", "noise = 0.5", "no such key"),
+        ('columns = ["time_ms", "", "xx:0..5", "xy:2"]', "", "columns"),
+        ("[line]", "[line]\nbaud = 12.5", "whole number"),
+        ("[line]", "[lines]", "kind"),
+    ],
+)
+def test_a_wrong_description_is_refused_with_what_was_expected(old, new, words):
+    assert old in SKIN + TEXT
+    with pytest.raises(Refusal, match=words):
+        description_of((SKIN + TEXT).replace(old, new), "board.toml")
+
+
+@pytest.mark.parametrize(
+    ("layout", "words"),
+    [
+        ("HI6h", "< or >"),
+        (">HI5h", "7 values"),
+        (">HI6s", "3 values|numbers only"),
+        (">HIq?", "numbers only"),
+        (">what", "expected the format of a struct"),
+        ("", "expected the format of a struct|< or >"),
+    ],
+)
+def test_a_wrong_struct_is_refused(layout, words):
+    with pytest.raises(Refusal, match=words):
+        described(BINARY.replace(">HI6h", layout))
+
+
+def test_sync_bytes_are_in_hex():
+    with pytest.raises(Refusal, match="hex"):
+        described(BINARY.replace("aa55", "xy"))
+
+
+def test_a_description_that_cannot_be_read_is_refused(tmp_path):
+    with pytest.raises(Refusal, match="cannot be read"):
+        load_description(tmp_path / "none.toml")
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe")
+    with pytest.raises(Refusal, match="cannot be read"):
+        load_description(tmp_path / "binary.toml")
+
+
+def test_a_component_may_have_a_scale_of_its_own():
+    line = TEXT + "[readings.xy]\nscale = 2.0\n"
+    (samples,) = decoder(line).feed(LINE)
+
+    assert curvature(samples)[0] == pytest.approx(2.0)
+    assert curvature(samples)[13] == pytest.approx(-3.0)
+
+
+def test_elements_by_position_count_as_they_are_listed():
+    skin = SKIN.replace("grid = [3, 2]", "positions = [[0.01, 0.01], [0.05, 0.03], [0.03, 0.02]]")
+    line = TEXT.replace('"xx:0..5", "xy:2"', '"xx:2", "xx:0..1"')
+    (samples,) = description_of(skin + line, "x.toml").decoder(whole=True).feed(b"0,0,1,2,3\n")
+
+    assert samples.channels.tolist() == [2, 0, 1]
+
+
+def test_the_identifier_is_the_given_one_else_the_ports_else_of_the_text():
+    text = SKIN + TEXT
+    named = text.replace("[line]", '[line]\nid = "bench"')
+
+    assert description_of(named, "x", "USB7").sensor.serial_number == "bench"
+    assert description_of(text, "x", "USB7").sensor.serial_number == "USB7"
+    first, second = (description_of(t, "x").sensor.serial_number for t in (text, text + "# a\n"))
+    assert first != second
+    assert math.isfinite(int(first, 16))
