@@ -204,6 +204,7 @@ def _keep(block: Block) -> None:
     "validation",
     "connect",
     "numbers",
+    "own-sensor",
     "paper",
     "studies",
     "trouble",

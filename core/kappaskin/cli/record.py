@@ -32,6 +32,7 @@ from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
     from kappaskin.live import Engine, Status
+    from kappaskin.pipeline import Setup
     from kappaskin.recording import Recording
     from kappaskin.sensing import Sensor
 
@@ -119,6 +120,7 @@ def _recorded(
 
     began = recording = time.monotonic()
     known, slope = 0, 0.0  # connections whose tare is in use
+    usual: Setup | None = None
     while True:
         status, now = engine.status(), time.monotonic()
         slope = max(slope, status.slope)
@@ -128,9 +130,13 @@ def _recorded(
             return slope
         if written.trouble and not written.seconds:
             raise Refusal(written.trouble)
-        if status.connections != known and status.sensor is not None and not status.computing:
-            known = status.connections
-            _settle(engine, status.sensor, status)
+        if status.connections != known and status.sensor is not None:
+            known, usual = status.connections, _usual_setup(status.sensor)
+            if not status.sensor.simulated:
+                engine.set_up(usual)
+        if usual and status.refusal and _has_fewer_functions(status.setup, usual):
+            engine.set_up(status.setup)  # as many as the elements determine: nobody asked for more
+            usual = None
         over = max(written.seconds, now - recording) >= seconds
         if stopped or written.trouble or over:
             return slope
@@ -163,15 +169,20 @@ def _broken_off(out: Path, ended: str) -> int:
     return FAILED
 
 
-def _settle(engine: "Engine", sensor: "Sensor", status: "Status") -> None:
-    """Use the tare of a real `sensor`, and as many functions as its elements determine."""
-    from kappaskin.calibration import TareStore
+def _has_fewer_functions(setup: "Setup", usual: "Setup") -> bool:
+    """Whether nothing else of a `setup` is different."""
+    return setup == replace(usual, Ni=setup.Ni, Nj=setup.Nj) != usual
 
-    tare = None
-    if not sensor.simulated:
-        tare = TareStore(TareStore.user_folder()).load(sensor.serial_number).fit_for(sensor)
-    if tare is not None or status.refusal:
-        engine.set_up(replace(status.setup, tare=tare))
+
+def _usual_setup(sensor: "Sensor") -> "Setup":
+    """The default setup with the tare of a real `sensor`."""
+    from kappaskin.calibration import TareStore
+    from kappaskin.pipeline import Setup
+
+    if sensor.simulated:
+        return Setup()
+    tare = TareStore(TareStore.user_folder()).load(sensor.serial_number).fit_for(sensor)
+    return replace(Setup(), tare=tare)
 
 
 def _line(status: "Status") -> str:

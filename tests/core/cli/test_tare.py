@@ -13,7 +13,7 @@ from kappaskin.calibration import TareStore
 from kappaskin.cli import main
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
-from kappaskin.sources import PseudoDevice
+from kappaskin.sources import PseudoDevice, load_description
 
 
 class RealScene(Scene):
@@ -102,3 +102,52 @@ def test_a_simulated_sensor_s_is_only_told(folder, capsys):
 def test_a_source_that_cannot_be_opened_is_refused(folder, capsys):
     assert main(["tare", "/dev/no-such-port"]) == 2
     assert "there is no such port" in capsys.readouterr().err
+
+
+BOARD = """
+format = 1
+title = "Bench"
+[skin]
+size = [0.1, 0.1]
+[elements]
+grid = [10, 10]
+[line]
+kind = "text"
+columns = ["time_ms", "xx:0..99", "yy:0..99", "xy:0..99"]
+id = "bench-1"
+"""
+
+
+@pytest.mark.slow
+def test_a_described_sensor_keeps_its_tare_by_its_identifier(run, folder, tmp_path):
+    file = tmp_path / "board.toml"
+    file.write_text(BOARD)
+    device, stopped = PseudoDevice(AT_REST, description=load_description(file)), threading.Event()
+    thread = threading.Thread(target=device.serve, args=(stopped.is_set,))
+    thread.start()
+    try:
+        code, printed, _ = run("tare", device.port, "--sensor", file)
+    finally:
+        stopped.set()
+        thread.join()
+        device.close()
+
+    assert code == 0
+    assert printed.startswith("Bench bench-1: 300 of 300 channels tared")
+    assert TareStore(folder).load("bench-1").used is not None
+
+
+@pytest.mark.parametrize("command", ["tare", "record", "calibrate", "publish"])
+def test_a_wrong_description_is_refused_before_anything_is_opened(run, tmp_path, command):
+    file = tmp_path / "board.toml"
+    file.write_text(BOARD.replace("xx:0..99", "xx:0..100"))
+    more = {
+        "record": [tmp_path / "r.mcap"],
+        "calibrate": ["--out", tmp_path / "c.toml"],
+        "publish": ["--udp", "127.0.0.1:9"],
+    }
+
+    code, _, said = run(command, "/dev/none", *more.get(command, []), "--sensor", file)
+
+    assert code == 2
+    assert "line 10: line.columns: expected elements from 0 to 99, got xx:100" in said
