@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from kappaskin.sources import Decoder
+from kappaskin.sources.description import description_of
 from kappaskin.sources.wire import encode_samples
 
 _LOADING = Path(__file__).with_name("loading.py")
@@ -109,3 +110,29 @@ def test_a_message_is_decoded_in_three_times_its_checksum_and_copy(
     )
     ratio(f"decoder of {channels} channels, of the 20 MB/s asked", rate / 20, at_least=1)
     ratio(f"decoder of {channels} channels, against zlib and NumPy", ours / theirs, at_most=3)
+
+
+_BOARD = """
+format = 1
+[skin]
+size = [0.06, 0.06]
+[elements]
+grid = [6, 6]
+[line]
+kind = "text"
+columns = ["time_ms", "xx:0..35", "yy:0..35", "xy:0..35"]
+"""
+
+
+def test_1000_lines_a_second_of_108_numbers_take_a_part_of_a_core(quickest, figure, ratio) -> None:
+    described, rng = description_of(_BOARD, "board.toml"), np.random.default_rng(0)
+    writer = described.decoder()
+    lines = [writer.encoded(n, n / 1e3, rng.normal(0, 1, 108).round(2)) for n in range(1000)]
+
+    def read() -> None:
+        decoder = described.decoder(whole=True)
+        assert sum(len(decoder.feed(line)) for line in lines) == 1000
+
+    (taken,) = quickest(read, turns=10)
+    figure(f"text, 108 numbers in a line: 1,000 lines/s take {taken:.3f} of a core")
+    ratio("share of a core for 1,000 lines/s of 108 numbers as text", taken, at_most=0.3)
