@@ -10,6 +10,7 @@ from kappaskin.frames import Frame
 from kappaskin.sensing import Sensor
 from kappaskin.sources import information
 from kappaskin.sources.clock import ClockMap
+from kappaskin.sources.decoder import SEQUENCES
 from kappaskin.sources.wire import FromDevice, Information, Samples
 
 _SENSORS = 8  # that are cached
@@ -85,9 +86,11 @@ class Interpreter:
         time = message.time if math.isfinite(message.time) else max(now, self._last + _GRAIN)
         clock_map, began = self.clock_map, self.clock_map.unwrap(time)
         self._last = began
+        # One that does not number them: by its time, the same wherever a recording is read from.
+        sequence = message.sequence if message.sequence >= 0 else round(began * 1e6) % SEQUENCES
         clock_map.heard(began, now)
         channels = message.channels
         if sensor.channel_map is not None:
             channels = sensor.channel_map[channels]
         taken = clock_map.taken(began), clock_map.sd(began)
-        return Frame(message.sequence, began, now, channels, message.counts, None, *taken)
+        return Frame(sequence, began, now, channels, message.counts, None, *taken)

@@ -18,7 +18,7 @@ import numpy as np
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Indices
 from kappaskin.sensing import DigitalReadings
-from kappaskin.sources.decoder import Accounting, SequenceCounter
+from kappaskin.sources.decoder import SEQUENCES, Accounting, SequenceCounter
 from kappaskin.sources.wire import Message, Samples
 
 TIMES = {"time": 1.0, "time_ms": 1e-3, "time_us": 1e-6}
@@ -74,6 +74,7 @@ class LineDecoder(ABC):
         self.last = ""
         self._columns, self._readings = columns, DigitalReadings()
         self._bytes_in = self._bytes_good = self._number = 0
+        self._sequences = SEQUENCES  # numbers after which the device's begin again
         self._discarded: Counter[str] = Counter()
         self._buffer = b""
 
@@ -81,7 +82,11 @@ class LineDecoder(ABC):
         """The new frames in order, duplicates left out."""
         self._bytes_in += len(data)
         self._buffer += data
-        return [samples for samples in self._records() if self.sequence.take(samples.sequence)]
+        return [samples for samples in self._records() if self._is_new(samples.sequence)]
+
+    def _is_new(self, sequence: int) -> bool:
+        """Count a record; whether it is no duplicate. All are new of a device without numbers."""
+        return self.sequence.take(self.sequence.good if sequence < 0 else sequence)
 
     @abstractmethod
     def encoded(self, sequence: int, time: float, curvature: Array) -> bytes:
@@ -127,12 +132,17 @@ class LineDecoder(ABC):
         """The samples of a record of `size` bytes with these `numbers`, one for each column."""
         columns, self._bytes_good = self._columns, self._bytes_good + size
         time = math.nan if columns.time < 0 else float(numbers[columns.time]) * columns.time_unit
-        if columns.sequence < 0:
-            sequence, self._number = self._number, self._number + 1
-        else:
-            sequence = int(numbers[columns.sequence])
+        sequence = -1 if columns.sequence < 0 else self._unwrapped(int(numbers[columns.sequence]))
         values = columns.scale * numbers[columns.places] + columns.offset
         return Samples(sequence, time, columns.channels, self._readings.counts(values))
+
+    def _unwrapped(self, number: int) -> int:
+        """A sequence number of 32 bits, which goes on where the device's begins again."""
+        if self.sequence.good:
+            half = self._sequences // 2
+            number = self._number + (number - self._number + half) % self._sequences - half
+        self._number = number
+        return number % SEQUENCES
 
     def _usable(self, numbers: Array) -> bool:
         """Whether time and sequence are numbers that a frame may have."""
@@ -197,6 +207,8 @@ class TextDecoder(_Lines):
         parts = _split(text, self._separator)
         if len(parts) != len(self._columns):
             return "wrong number of columns"
+        if b"_" in text:  # which Python reads between digits
+            return "no number"
         try:
             return np.array([float(part or "nan") for part in parts])
         except ValueError:
@@ -243,7 +255,7 @@ class JsonDecoder(_Lines):
 
     def _numbers(self, line: bytes) -> Array | str:
         try:
-            found: Any = json.loads(line)
+            found: Any = json.loads(line, parse_int=float)
         except (ValueError, RecursionError):
             return "no JSON"
         numbers: list[float] = []
@@ -338,6 +350,9 @@ class BinaryDecoder(LineDecoder):
         self._check = struct.Struct(f"{layout[0]}{kind}" if kind else "")
         counted = re.findall(r"(\d*)([a-zA-Z?])", layout)
         self._codes = "".join(code * int(count or 1) for count, code in counted if code != "x")
+        if columns.sequence >= 0:
+            bits = 8 * struct.calcsize(layout[0] + self._codes[columns.sequence])
+            self._sequences = min(2**bits, SEQUENCES)
         self._sync, self._size = sync, len(sync) + self._body.size + self._check.size
 
     def encoded(self, sequence: int, time: float, curvature: Array) -> bytes:

@@ -13,6 +13,8 @@ import pytest
 
 from kappaskin import Pipeline, Refusal, Setup, load_scene
 from kappaskin.errors import SourceError
+from kappaskin.live import Engine
+from kappaskin.recording import Verification
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
 from kappaskin.sources import PseudoDevice, described_source, load_description, open_source
@@ -108,6 +110,27 @@ def test_a_device_without_times_gets_those_of_arrival(tmp_path):
     assert np.all(np.diff(times) > 0)
     assert all(abs(frame.host_time - frame.device_time) < 0.5 for frame in frames)
     assert all(np.isinf(frame.taken_sd) for frame in frames)
+
+
+@pytest.mark.parametrize("columns", ['"xx:0..35"', '"time_ms", "xx:0..35"'])
+def test_a_recording_begun_amid_unnumbered_lines_verifies(tmp_path, columns):
+    file, recording = tmp_path / "plain.toml", tmp_path / "plain.mcap"
+    file.write_text(f'{HEAD}[line]\nkind = "text"\ncolumns = [{columns}, "yy:0..35", "xy:0..35"]')
+    with board(file) as port, Engine() as engine:
+        engine.set_up(Setup(Ni=6, Nj=6))
+        engine.connect(described_source(file, port))
+        for begun, path in ((False, recording), (True, None)):
+            before, end = engine.latest(engine.status()), time.monotonic() + 20
+            while engine.latest(engine.status()) is before and time.monotonic() < end:
+                time.sleep(0.05)
+            time.sleep(0.5)
+            engine.record(path)
+            while engine.status().recording.active == begun and time.monotonic() < end:
+                time.sleep(0.05)
+
+    *_, verdict = Verification.steps(recording)
+    assert verdict.compared > 0
+    assert not verdict.missing
 
 
 def test_a_board_of_other_numbers_is_said_to_be(tmp_path):

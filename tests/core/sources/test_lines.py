@@ -111,6 +111,7 @@ def test_the_first_line_may_be_half_a_line_and_is_no_frame():
         (b"Booting v1.2\r\n", "no separator"),
         (b"1500,7,2,4,6\n", "wrong number of columns"),
         (b"1500,7,2,4,6,8,10,12,x\n", "no number"),
+        (b"1_500,7,2,4,6,8,10,12,1\n", "no number"),
         (b"nan,7,2,4,6,8,10,12,1\n", "time or sequence"),
         (b"-3,7,2,4,6,8,10,12,1\n", "time or sequence"),
         (b"\xff\xfe\x00\n", "no separator"),
@@ -154,6 +155,22 @@ def test_sequence_numbers_tell_losses_and_duplicates():
     assert (found.lost, found.duplicate, found.balanced) == (2, 1, True)
 
 
+@pytest.mark.parametrize(("code", "count"), [("B", 2**8), ("H", 2**16), ("I", 2**32)])
+def test_numbers_of_any_size_go_on_where_they_begin_again(code, count):
+    lines = decoder(BINARY.replace(">HI6h", f">{code}I6h"))
+
+    def send(n):
+        body = struct.pack(f">{code}I6h", n % count, n % count, *range(6))
+        return lines.feed(b"\xaa\x55" + body + struct.pack(">I", zlib.crc32(body)))
+
+    first = count - 3
+    found = [samples.sequence for n in (0, 1, 2, 3, 3, 6) for samples in send(first + n)]
+
+    assert found == [(first + n) % 2**32 for n in (0, 1, 2, 3, 6)]
+    told = lines.accounting()
+    assert (told.lost, told.duplicate, told.restarts) == (2, 1, 0)
+
+
 @pytest.mark.parametrize(
     ("bad", "reason"),
     [
@@ -166,6 +183,10 @@ def test_sequence_numbers_tell_losses_and_duplicates():
         (b'{"t": 1, "n": 1, "skin": {"k": [1, 2, 3, 4, 5, true]}}', "no number"),
         (b'{"t": 1, "n": 1e30, "skin": {"k": [1, 2, 3, 4, 5, 6]}}', "time or sequence"),
         (b'{"t": Infinity, "n": 1, "skin": {"k": [1, 2, 3, 4, 5, 6]}}', "time or sequence"),
+        (
+            b'{"t": %s, "n": 1, "skin": {"k": [1, 2, 3, 4, 5, 6]}}' % (b"9" * 400),
+            "time or sequence",
+        ),
     ],
 )
 def test_json_that_is_no_record_is_counted_by_its_reason(bad, reason):
