@@ -87,6 +87,8 @@ def of_sensor(source: str, sensor: Path | None) -> str:
         return source
     from kappaskin.sources import described_source, load_description
 
+    if source.startswith(("sim:", "replay:")):
+        raise Refusal(f"expected a port or URL with --sensor, got {source}")
     load_description(sensor)  # or refused here
     return described_source(sensor, source)
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from kappaskin import Pipeline, Refusal, Setup, load_scene
+from kappaskin.cli import of_sensor
 from kappaskin.errors import SourceError
 from kappaskin.live import Engine
 from kappaskin.recording import Verification
@@ -183,6 +184,11 @@ def test_a_scene_with_other_elements_is_refused(tmp_path):
         PseudoDevice(
             load_scene("off-centre"), description=load_description(written(tmp_path, "text"))
         )
+
+
+def test_a_simulated_skin_has_no_description(tmp_path):
+    with pytest.raises(Refusal, match="a port or URL with --sensor, got sim:"):
+        of_sensor("sim:", written(tmp_path, "text"))
 
 
 def test_a_name_without_a_port_is_refused(tmp_path):
