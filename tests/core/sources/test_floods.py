@@ -228,7 +228,7 @@ def test_no_read_of_a_flood_takes_long_or_leaves_more_than_a_backlog(
 ) -> None:
     monkeypatch.setattr(ports, "_BACKLOG", 2**20)
     port = FakePort(endless(SENT[sent], described(0)))
-    monkeypatch.setattr(ports, "open_port", lambda _: port)
+    monkeypatch.setattr(ports, "open_port", lambda *_: port)
     spent, events = list[float](), 0
     tracemalloc.start()
     with closing(SerialSource("a port")) as source:
@@ -252,7 +252,7 @@ def test_no_read_of_a_flood_takes_long_or_leaves_more_than_a_backlog(
 def test_descriptions_that_change_all_the_time_are_taken_twice_a_second(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(ports, "open_port", lambda _: FakePort(endless(described)))
+    monkeypatch.setattr(ports, "open_port", lambda *_: FakePort(endless(described)))
     seen = set[int]()
     with closing(SerialSource("a port")) as source:
         end = time.monotonic() + 1.3
@@ -271,7 +271,7 @@ def door(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
     door = threading.Event()
     door.refusal = ""  # pyright: ignore[reportAttributeAccessIssue]
 
-    def opened(_: str) -> FakePort:
+    def opened(*_: object) -> FakePort:
         door.wait(20.0)
         if door.refusal:  # pyright: ignore[reportAttributeAccessIssue]
             raise SourceError(door.refusal)  # pyright: ignore[reportAttributeAccessIssue]

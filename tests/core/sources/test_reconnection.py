@@ -522,11 +522,11 @@ def test_a_port_taken_meanwhile_is_waited_for(streaming, plug, monkeypatch):
     pull(device, reader)
     real, refused = serial_source.SerialConnection, []
 
-    def busy(url, clock):
+    def busy(url, *others):
         if len(refused) < 3:
             refused.append(url)
             raise SourceError(f"{url}: busy, opened by another program; close that program")
-        return real(url, clock)
+        return real(url, *others)
 
     monkeypatch.setattr(serial_source, "SerialConnection", busy)
     back = plug()
