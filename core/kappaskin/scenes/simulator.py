@@ -36,13 +36,13 @@ class Simulator:
 
     Only the effects that the scene calls for are there. With skew, each channel is read at its own
     instant of the scan, on a skin that moves meanwhile; the truth that comes with a frame is that
-    of its start, on a flat, hinged skin without functions beyond 24 x 24. Every effect draws from a
-    random stream of its own.
+    of its start. On a flat, hinged skin `frame` and `scanned` tell at most 24 x 24 functions of it,
+    so that recordings stay small. Every effect draws from a random stream of its own.
     """
 
     def __init__(self, scene: Scene, playing: Playback = _FROM_THE_BEGINNING) -> None:
         self.scene, self.playing = scene, playing
-        self._still: tuple[Truth, Array] | None = None
+        self._still: Truth | None = None
         self._kept = kept_effects(scene)
         self._take_skin()
         self._start_effects()
@@ -115,24 +115,22 @@ class Simulator:
         flat = isinstance(self._basis, SineBasis) and not self._basis.patch.base_curvature
         self._told = (slice(_TOLD), slice(_TOLD)) if flat else ()
 
-    def _shape(self, time: float) -> tuple[Truth, Array]:
-        """The truth that is told, and the coefficients (Ri, Rj) in m of the whole shape."""
+    def _truth(self, time: float) -> Truth:
         if self._still is not None:
             return self._still
         pressed = self._pressed(time)
-        c = self._deflection(pressed.force)
-        shape = Truth(c[self._told], pressed.contact, self.scene.edge), c
+        truth = Truth(self._deflection(pressed.force), pressed.contact, self.scene.edge)
         if not self.scene.moves:
-            self._still = shape
-        return shape
+            self._still = truth
+        return truth
 
     def loads(self, time: float) -> tuple[Load, ...]:
         """The loads at device `time` in s; a rigid object as its contact points."""
         return self._pressed(time).loads
 
-    def _read(self, scan: Scan, time: float, coefficients: Array) -> Array:
+    def _read(self, scan: Scan, time: float, truth: Truth) -> Array:
         """Curvature (3 P,) of a scan begun at `time`; channels outside it as at the start."""
-        scene, first = self.scene, self._sensed(coefficients)
+        scene, first = self.scene, self._sensed(truth.coefficients)
         if not (scene.moves and self._skewed):
             return first
         # The parabola through start, middle and end, at the share s of the scan.
@@ -149,8 +147,8 @@ class Simulator:
         if self.scene.laid is not None:
             laid = self.scene.laid.curvature(self.playing.time(time))
             return None, np.repeat(laid, len(self.scene.layout))
-        truth, coefficients = self._shape(time)
-        return truth, self._read(scan, time, coefficients)
+        truth = self._truth(time)
+        return truth, self._read(scan, time, truth)
 
     def reading(self, scan: Scan, time: float) -> tuple[Truth | None, Array]:
         """The truth, and the curvature (3 P,) in 1/m that is read; dead channels read nothing."""
@@ -200,6 +198,8 @@ class Simulator:
         """Frame `n` of what `scan` reads, begun at device `time`."""
         truth, curvature = self.reading(scan, time)
         counts = self.scene.transduction.counts(curvature[scan.channels])
+        if truth is not None:
+            truth = replace(truth, coefficients=truth.coefficients[self._told])
         return Frame(n & 0xFFFFFFFF, time, clock(), scan.channels, counts, truth)
 
 
