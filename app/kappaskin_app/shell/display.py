@@ -170,7 +170,7 @@ class Display(QObject):
         on_rail, layout = kinds == FAULTS.index("saturated"), self._layout(estimate)
         if layout is not None and status.region.around == "off":
             # Every channel was scanned: a live one without a reading is saturated.
-            missing = np.isnan(estimate.nominal) & layout.live
+            missing = (np.isnan(estimate.nominal) & layout.live).astype(float)
             on_rail |= (layout.by_kind(missing) == 1) & (kinds == 0)
         return on_rail
 

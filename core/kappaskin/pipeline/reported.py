@@ -302,7 +302,8 @@ class ReportedQuantity:
         """The unit of each reading of a `layout`, of what is in those; else none."""
         if not (layout.reads and self.unit and self.of_readings):
             return ()
-        return tuple(layout.kind_units[k] for k in layout.kind.tolist())
+        kinds: list[int] = layout.kind.tolist()
+        return tuple(layout.kind_units[k] for k in kinds)
 
     def labels(self, lengths: Axes) -> tuple[str, ...]:
         """What is appended to the name for each number, flattened, by the `lengths` of axes.
