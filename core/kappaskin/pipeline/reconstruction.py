@@ -17,9 +17,9 @@ from kappaskin.bases import Basis, basis_for
 from kappaskin.contact import (
     KINDS,
     ContactObject,
+    Imprints,
     LowerBound,
     as_one,
-    Imprints,
     contacts_of,
     object_finder,
 )
