@@ -27,6 +27,7 @@ _PLACES = {
     "scene": "At the top",
     "skin": "`[skin]`",
     "elements": "`[elements]`",
+    "readings": "`[readings]`, or `[readings.height]` ...",
     "electronics": "`[electronics]`",
     "bridge": "`[electronics.bridge]`",
     "multiplexer": "`[electronics.multiplexer]`",

@@ -26,7 +26,8 @@ LIMITS = {
     # Readings: heights, slopes, curvatures along any direction, from an unknown zero.
     # Contacts by the shape alone.
     # Sensors with a line format of their own: its decoders and encoders, and their description.
-    "statements": 39_480,
+    # Scenes, the live path and the window with heights, slopes and any curvature.
+    "statements": 39_950,
     # _files: one way to read and write files; _text: text from outside. For all rooms and the app.
     "loose modules of core": 10,
     "loose modules of the app": 8,

@@ -76,6 +76,29 @@ class HingedPlate:
         """Displacement (G,) of the modes `c` (modes, modes), both in m."""
         return _surface(self, places.tobytes())(c)
 
+    def slope(self, c, places, direction):
+        """Slope (G,) along a `direction` in rad from x of the modes `c` (modes, modes) in m."""
+        (k, l), (x, y) = self.waves(), places.T
+        kx, ly = np.outer(x, k), np.outer(y, l)
+        along_x = _sums(k * np.cos(kx), np.sin(ly))(c)
+        return np.cos(direction) * along_x + np.sin(direction) * _sums(np.sin(kx), l * np.cos(ly))(
+            c
+        )
+
+    def read(self, c, places, name):
+        """The reading (G,) of a `name`: height, slope@30, curvature@45 (in degrees from x), twist.
+
+        The curvature along t = (cos, sin) is cos^2 xx + 2 cos sin xy + sin^2 yy.
+        """
+        quantity, _, degrees = name.partition("@")
+        direction = np.radians(float(degrees or 0))
+        if quantity == "height":
+            return self.surface(c, places)
+        if quantity == "slope":
+            return self.slope(c, places, direction)
+        (xx, yy, xy), cos, sin = self.curvature(c, places), np.cos(direction), np.sin(direction)
+        return xy if quantity == "twist" else cos**2 * xx + 2 * cos * sin * xy + sin**2 * yy
+
     def curvature(self, c, elements, gage_length=0.0):
         """Readings (3, P) of the modes `c` (modes, modes) in m."""
         return _gages(self, elements.tobytes(), gage_length)(c)

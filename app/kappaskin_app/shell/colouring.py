@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from kappaskin.estimation import FAULTS, Estimator, estimator_for
 from kappaskin.frames import Array, Estimate
 from kappaskin.live import Status
 from kappaskin.pipeline import ErrorBars, Quantities, SkinColour, skin_colours
+from kappaskin.sensing import Sensor, SensorLayout
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.theme import DIVERGING, PULLED, SEQUENTIAL
@@ -19,7 +21,16 @@ from kappaskin_app.widgets.text import round_up
 from kappaskin_app.widgets.tint import Tint, rgb_of
 
 _UNITS = {"m": (1e3, "mm"), "1/m": (1.0, "1/m"), "1/m^2": (1.0, "1/m\u00b2"), "": (1.0, "")}
-_DIGITS = {"mm": ".3f", "1/m": ".2f", "1/m\u00b2": ".3g"}
+READING_UNITS = {"m": (1e6, "\N{MICRO SIGN}m"), "m/m": (1e3, "mrad"), "1/m": (1.0, "1/m")}
+"""Scale and unit on the screen of each unit that is read."""
+_LEAST_READ = {"m": 10.0, "m/m": 1.0, "1/m": 0.5}  # of a range, on the screen's scale
+_DIGITS = {
+    "mm": ".3f",
+    "1/m": ".2f",
+    "1/m\u00b2": ".3g",
+    "\N{MICRO SIGN}m": ".1f",
+    "mrad": ".2f",
+}
 
 HEALTH_WORDS = ("OK", *FAULTS[1:])
 
@@ -68,6 +79,36 @@ class Shade(SkinColour):
 
 SHADES = {name: Shade(**vars(colour)) for name, colour in skin_colours().items()}
 
+READ = tuple(name for name, shade in SHADES.items() if shade.row >= 0 and shade.on_surface)
+"""The quantities that a curvature sensor reads, by name: xx, yy and xy."""
+
+
+class ReadingShade(Shade):
+    """A quantity that elements read, in the finer units of readings."""
+
+    @property
+    def scale(self) -> float:
+        return READING_UNITS[self.unit][0]
+
+    @property
+    def unit_shown(self) -> str:
+        return READING_UNITS[self.unit][1]
+
+
+def reading_shades(layout: SensorLayout) -> dict[str, ReadingShade]:
+    """A shade for each quantity and direction that is read other than xx, yy and xy, by name."""
+    if not layout.reads:
+        return {}
+    found: dict[str, ReadingShade] = {}
+    for row, (name, unit) in enumerate(zip(layout.kind_names, layout.kind_units, strict=True)):
+        quantity, at, degrees = name.partition("@")
+        words = quantity.capitalize() + (f" {degrees}\N{DEGREE SIGN}" if at else "")
+        key, tip = f"reading_{row}", f"{words} of the skin, as elements read it."
+        found[key] = ReadingShade(
+            key, words, words, tip, least=_LEAST_READ[unit], unit=unit, row=row
+        )
+    return found
+
 
 _CLEARLY = 1.5  # times as far out as in, or in as out, before the colours change sides
 _PATIENCE = 2.0  # s that the values must stay small before the range narrows
@@ -95,11 +136,15 @@ class SteadyRange:
 class Ranges:
     """The colour limit of each quantity: locked by a setting, or following what is shown."""
 
-    def __init__(self, side: float = 100.0) -> None:
-        """`side` in mm is the skin's longer one: what moves less than a thousandth is at rest."""
+    def __init__(self, side: float = 100.0, shades: Mapping[str, Shade] = SHADES) -> None:
+        """`side` in mm is the skin's longer one: what moves less than a thousandth is at rest.
+
+        `shades` are those of all quantities, by name.
+        """
+        self._shades = shades
         self._steady = {
-            name: SteadyRange(shade.least * (side if shade.unit == "m" else 1.0))
-            for name, shade in SHADES.items()
+            name: SteadyRange(shade.least * (side if shade.unit_shown == "mm" else 1.0))
+            for name, shade in shades.items()
         }
         self._pulled = False
 
@@ -125,7 +170,7 @@ class Ranges:
         """
         largest = float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
         self._steady[name].follow(largest, now)
-        alike, group = [name], SHADES[name].group
+        alike, group = [name], self._shades[name].group
         if settings.one_range and group:
             shown = {*settings.maps, settings.colour_by}
             alike += [other for other in shown if SHADES[other].group == group]
@@ -134,7 +179,8 @@ class Ranges:
 
 def locked_at(name: str, settings: Settings) -> float:
     """What the range of the quantity `name` is locked to on the screen's scale, zero when not."""
-    return getattr(settings, f"range_{name}", 0.0) * SHADES[name].scale
+    locked = getattr(settings, f"range_{name}", 0.0)
+    return locked * SHADES[name].scale if locked else 0.0
 
 
 _AGAIN = 0.5  # s after which error bars that depend on the readings are updated
@@ -153,6 +199,9 @@ class Colouring:
 
     def __init__(self, tasks: Tasks) -> None:
         self._status = Status()
+        self._sensor: Sensor | None = None
+        self.shades: dict[str, Shade] = dict(SHADES)
+        """What may be shown of the sensor, by name: also what its elements read."""
         self._key: tuple[object, ...] = ()
         self._quantities: Quantities | None = None
         self._task = BackgroundTask(tasks, "", self._take)
@@ -161,12 +210,15 @@ class Colouring:
 
     def follow(self, status: Status) -> None:
         """Take the sensor and setup of the next estimates."""
+        if status.sensor is not None and status.sensor is not self._sensor:
+            self._sensor = status.sensor
+            self.shades = SHADES | reading_shades(status.sensor.layout)
         self._status = status
 
     def quantities(self, estimate: Estimate) -> Quantities | None:
         """The quantities of `estimate`; None while it is of another sensor."""
         sensor, setup = self._status.sensor, self._status.setup
-        if sensor is None or estimate.curvature.shape[1] != len(sensor.layout):
+        if sensor is None or estimate.curvature.shape != sensor.layout.frame_shape:
             return None
         shapes = estimate.coefficients.shape, estimate.surface.shape
         key = (self._status.connections, estimate.generation, *shapes)
@@ -187,13 +239,18 @@ class Colouring:
         """The values (P,) of a quantity."""
         found = self._asked(name, estimate)
         if found is None:
-            return np.full(estimate.curvature.shape[1], np.nan)
-        return SHADES[name].scale * found.of_elements(name, estimate)
+            return np.full(len(estimate.suspect), np.nan)
+        shade = self.shades[name]
+        if isinstance(shade, ReadingShade):
+            return shade.scale * found.layout.by_kind(estimate.curvature)[shade.row]
+        return shade.scale * found.of_elements(name, estimate)
 
     def at_rest(self, name: str, estimate: Estimate) -> float:
         """The value of a quantity of a skin at rest."""
         found = self.quantities(estimate)
-        return 0.0 if found is None else SHADES[name].scale * found.at_rest(name)
+        if found is None or name not in SHADES:
+            return 0.0
+        return SHADES[name].scale * found.at_rest(name)
 
     def _asked(self, name: str, estimate: Estimate) -> Quantities | None:
         found = self.quantities(estimate)
@@ -223,7 +280,8 @@ class Colouring:
         setup = status.setup
         if self._estimator is None or self._estimator[0] is not found:
             layout = found.layout
-            how = estimator_for(setup.method, found.basis, layout, rim_sd=setup.rim_sd)
+            sigma = status.sensor.sigma if status.sensor else None
+            how = estimator_for(setup.method, found.basis, layout, sigma, setup.rim_sd)
             self._estimator = found, how
         try:
             bars = ErrorBars(self._estimator[1], readings, *found.grid)

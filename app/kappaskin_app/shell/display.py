@@ -15,11 +15,12 @@ from kappaskin.contact import ContactObject
 from kappaskin.estimation import FAULTS
 from kappaskin.frames import COMPONENTS, Array, Estimate, Mask
 from kappaskin.live import Status
+from kappaskin.sensing import SensorLayout
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.badge import GAP, LOST, OFF, STALE, WAITING, Badge, Header
 from kappaskin_app.shell.centre import Centre
-from kappaskin_app.shell.colouring import SHADES, Colouring, Ranges
+from kappaskin_app.shell.colouring import Colouring, Ranges
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.status_bar import Notice, StatusBar, SteadySlope, warnings
@@ -40,12 +41,12 @@ class Shown:
 
     @cached_property
     def kinds(self) -> Kinds:
-        """Why each channel (3, P) is excluded, as an index of `FAULTS`; 0 where it is not."""
+        """Why each channel (k, P) is excluded, as an index of `FAULTS`; 0 where it is not."""
         return self._display.kinds(self.estimate)
 
     @cached_property
     def railed(self) -> Mask:
-        """Which readings (3, P) are saturated, as far as that is known."""
+        """Which readings (k, P) are saturated, as far as that is known."""
         return self._display.railed(self.estimate, self.kinds)
 
 
@@ -108,9 +109,8 @@ class Display(QObject):
         self.colouring.follow(status)
         if status.sensor is not None and status.connections != self._connection:
             self._connection = status.connections
-            self.ranges = Ranges(
-                1e3 * max(status.sensor.layout.patch.a, status.sensor.layout.patch.b)
-            )
+            patch = status.sensor.layout.patch
+            self.ranges = Ranges(1e3 * max(patch.a, patch.b), self.colouring.shades)
             self.restarted.emit(status)
         state = self._session.badge()
         self.badge.show_state(state, status.recording.active)
@@ -155,7 +155,7 @@ class Display(QObject):
         return self.colouring.of_elements(name, estimate)
 
     def tint(self, name: str, estimate: Estimate, values: Array, now: float) -> Tint:
-        shade, at_rest = SHADES[name], self.colouring.at_rest(name, estimate)
+        shade, at_rest = self.colouring.shades[name], self.colouring.at_rest(name, estimate)
         if shade.row >= 0:  # one range for the skin and the map
             values = self.colouring.of_elements(name, estimate)
         elif name == "displacement":
@@ -165,39 +165,54 @@ class Display(QObject):
         return shade.tint(limit, at_rest, pulled)
 
     def railed(self, estimate: Estimate, kinds: Kinds) -> Mask:
-        """Which readings (3, P) are saturated, as far as that is known."""
+        """Which readings (k, P) are saturated, as far as that is known."""
         status = self._session.status
-        on_rail = kinds == FAULTS.index("saturated")
-        if status.sensor is not None and status.region.around == "off":
+        on_rail, layout = kinds == FAULTS.index("saturated"), self._layout(estimate)
+        if layout is not None and status.region.around == "off":
             # Every channel was scanned: a live one without a reading is saturated.
-            on_rail |= np.isnan(estimate.nominal) & status.sensor.layout.live & (kinds == 0)
+            missing = (np.isnan(estimate.nominal) & layout.live).astype(float)
+            on_rail |= (layout.by_kind(missing) == 1) & (kinds == 0)
         return on_rail
 
+    def _layout(self, estimate: Estimate) -> SensorLayout | None:
+        """The layout of the sensor; None where the estimate is of another one."""
+        sensor = self._session.status.sensor
+        same = sensor is not None and sensor.layout.frame_shape == estimate.curvature.shape
+        return sensor.layout if sensor is not None and same else None
+
     def kinds(self, estimate: Estimate) -> Kinds:
-        """Why each channel (3, P) is excluded, as an index of `FAULTS`; 0 where it is not."""
-        found = np.zeros(estimate.curvature.shape, np.uint8)
+        """Why each channel (k, P) is excluded, as an index of `FAULTS`; 0 where it is not."""
+        layout = self._layout(estimate)
+        names = layout.kind_names if layout else [*COMPONENTS]
+        found = np.zeros((len(names), len(estimate.suspect)), np.uint8)
         for finding in self._session.status.health.findings:
-            if finding.element < len(estimate.suspect):  # else it is of another skin
-                row = COMPONENTS.index(finding.component)
+            if finding.element < len(estimate.suspect) and finding.component in names:
+                row = names.index(finding.component)  # else it is of another skin
                 found[row, finding.element] = FAULTS.index(finding.kind)
         # The fit excludes whole elements.
         whole = np.where(found.any(axis=0), 0, estimate.suspect)
         return np.maximum(found, whole)
 
     def marks(self, curvature: Array) -> tuple[Mask, Mask]:
-        """Which elements exceed their strain limit, and which are selected to scan."""
+        """Which elements exceed their strain limit, and which are selected to scan.
+
+        The limit is known of xx, yy and xy, (3, P); other readings are (R,).
+        """
         sensor, settings = self._session.status.sensor, self.settings
-        none = np.zeros(curvature.shape[1], bool)
-        crossed = none if sensor is None else sensor.transduction.overstrained(curvature)
+        read = curvature.ndim == 2
+        count = curvature.shape[1] if read else len(sensor.layout) if sensor else 0
+        crossed = none = np.zeros(count, bool)
+        if sensor is not None and read:
+            crossed = sensor.transduction.overstrained(curvature)
         dotted = none.copy()
         if settings.region == "elements":
             dotted[[p for p in settings.region_elements if p < len(none)]] = True
         return crossed, dotted
 
 
-def of_row(name: str, of_channels: NDArray[Any]) -> NDArray[Any]:
-    """Values of elements (P,) from those of channels (3, P).
+def of_row(row: int, of_channels: NDArray[Any]) -> NDArray[Any]:
+    """Values of elements (P,) from those of channels (k, P).
 
-    Those of the component that a quantity is computed from, or the largest of the three.
+    Those of the `row` that a quantity is computed from, or the largest of all where that is -1.
     """
-    return of_channels[row] if (row := SHADES[name].row) >= 0 else of_channels.max(axis=0)
+    return of_channels[row] if 0 <= row < len(of_channels) else of_channels.max(axis=0)

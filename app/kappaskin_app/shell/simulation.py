@@ -67,6 +67,7 @@ _OFFSET = 10.0  # 1/m of offset for a gain that is off by 1
 OWN = Path("own.scene.toml")
 """The file name of a scene written from the panels."""
 _LARGEST = 1_000_000  # bytes of a scene: a longer text would block the editor
+_RATE = 100.0  # frames/s
 _CACHED = 64  # scenes, so that undo is quick
 
 _Effect = UniformNoise | GaussianNoise | Hysteresis | Creep | Tolerance
@@ -190,7 +191,8 @@ def scene_of_sensor(sensor: Sensor, noise: float) -> Scene:
     """A scene on a real `sensor` with a point load in its middle and its `noise` in 1/m."""
     plate, edge, chain = sensor.plate, sensor.edge, sensor.transduction
     if isinstance(chain, DigitalReadings):
-        chain = Transduction()
+        digital = replace(chain, noise=())
+        chain = Transduction() if sensor.layout.senses_curvature_only else digital
     return Scene(
         sensor.name,
         plate,
@@ -198,10 +200,16 @@ def scene_of_sensor(sensor: Sensor, noise: float) -> Scene:
         load_case_stimuli("centre", plate, edge),
         effects=(GaussianNoise(noise),),
         transduction=chain,
-        rate=min(sensor.rate, 1 / chain.scan_time(sensor.channels)),
+        rate=min(sensor.rate, _rate_of(chain, sensor.channels)),
         reference=reference_on(plate, edge, "centre"),
         edge=edge,
     )
+
+
+def _rate_of(chain: Transduction | DigitalReadings, channels: int) -> float:
+    """The fastest rate in frames/s; that of a scene where the electronics set none."""
+    taken = chain.scan_time(channels)
+    return 1 / taken if taken else _RATE
 
 
 def _check_on(loads: tuple[Load, ...], plate: Plate) -> None:

@@ -79,9 +79,8 @@ def warnings(estimate: Estimate, strained: int, method: str, slope: float = 0.0)
     if strained:
         parts.append(f"{strained} element{'s' if strained > 1 else ''} over 1 % strain")
     if estimate.drift:
-        parts.append(
-            f"readings drifted by {estimate.drift:.2g} 1/m, by warmth or a bent mount: tare at rest"
-        )
+        by = f"{estimate.drift:.2g}{' 1/m' * (estimate.curvature.ndim == 2)}"
+        parts.append(f"readings drifted by {by}, by warmth or a bent mount: tare at rest")
     if estimate.contact.near_rim:
         parts.append("contact near the rim: unreliable")
     if slope:

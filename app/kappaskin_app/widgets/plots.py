@@ -97,6 +97,13 @@ class CurvePlot(QWidget):
         self.setAccessibleName(title)
         self.setToolTip(tip)
 
+    def show_title(self, title: str, unit: str, tip: str) -> None:
+        """Show another quantity from now on."""
+        self._title, self._unit, self.curves = title, unit, ()
+        self.setAccessibleName(title)
+        self.setToolTip(tip)
+        self.update()
+
     def sizeHint(self) -> QSize:
         return QSize(260, 130)
 

@@ -28,22 +28,30 @@ class Table(QTableWidget):
         right: Collection[int] = (),
         stretched: Collection[int] = (),
     ) -> None:
-        super().__init__(0, len(columns))
-        self._right = right
+        super().__init__()
         self.setObjectName(name)
         self.setAccessibleName(title)
-        self.setHorizontalHeaderLabels(list(columns))
         header = self.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self.show_head(columns, right, stretched)
         for column, tip in enumerate(tips):
             header.model().setHeaderData(
                 column, header.orientation(), tip, Qt.ItemDataRole.ToolTipRole
             )
-        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        for column in stretched:
-            header.setSectionResizeMode(column, QHeaderView.ResizeMode.Stretch)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setTabKeyNavigation(False)  # Tab leaves the table, the arrow keys move in it
         self.verticalHeader().hide()
+
+    def show_head(
+        self, columns: Sequence[str], right: Collection[int], stretched: Collection[int]
+    ) -> None:
+        """Have these columns, empty, aligned and stretched as those of a new table."""
+        self.setRowCount(0)
+        self.setColumnCount(len(columns))
+        self.setHorizontalHeaderLabels(list(columns))
+        self._right = right
+        for column in stretched:
+            self.horizontalHeader().setSectionResizeMode(column, QHeaderView.ResizeMode.Stretch)
 
     def fit_rows(self, count: int) -> None:
         """Have `count` rows, each as high as a line of the present font."""

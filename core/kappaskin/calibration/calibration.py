@@ -62,11 +62,16 @@ _AGAIN = "calibrate again, or restore the file from a copy"
 def fingerprint(layout: SensorLayout) -> str:
     """A hash of the skin's sides and of where its elements are, to a nanometre.
 
-    Not of its radius: a skin is calibrated flat, and then mounted (paper, section 5).
+    Not of its radius: a skin is calibrated flat, and then mounted (paper, section 5). Of a sensor
+    that reads other than xx, yy and xy, of what it reads too.
     """
     sides = (layout.patch.a, layout.patch.b)
     where = np.rint(np.array([sides, *layout.positions]) * 1e9).astype("<i8")
-    return hashlib.sha256(where.tobytes()).hexdigest()
+    found = hashlib.sha256(where.tobytes())
+    if layout.reads:
+        each = zip(layout.element.tolist(), layout.kind.tolist(), strict=True)
+        found.update(repr((layout.kinds, *each)).encode())
+    return found.hexdigest()
 
 
 @dataclass(frozen=True)

@@ -147,6 +147,7 @@ class PressTest:
     """
 
     def __init__(self, sensor: Sensor, elements: tuple[int, ...]) -> None:
+        sensor.layout.check_curvature_sensor("a test of the channel map")
         P = len(sensor.layout)
         if not elements or any(not 0 <= p < P for p in elements):
             raise Refusal(f"expected elements from 0 to {P - 1} to press, got {elements!s:.80}")

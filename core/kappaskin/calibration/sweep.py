@@ -112,6 +112,7 @@ class Procedure:
     """A calibration in progress: the next step, and the readings of those before it."""
 
     def __init__(self, sensor: Sensor, steps: tuple[CylinderStep, ...]) -> None:
+        sensor.layout.check_curvature_sensor("a calibration with cylinders")
         check_strain(steps, sensor)
         check_readable(steps, sensor)
         self.sensor, self.steps = sensor, steps

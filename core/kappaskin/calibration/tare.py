@@ -16,7 +16,7 @@ import numpy as np
 from kappaskin.calibration.calibration import FARTHEST, digest, fingerprint
 from kappaskin.contact import LoadDetector
 from kappaskin.errors import Refusal
-from kappaskin.frames import COMPONENTS, OVERTAKEN, Array
+from kappaskin.frames import OVERTAKEN, Array
 from kappaskin.sensing import Sensor
 
 _MOST_CHANNELS = 2**16  # whose numbers the engine can send with every status
@@ -166,6 +166,11 @@ class TareMeasurement:
 
     def tare(self, seeker: LoadDetector, rest: Rest, date: datetime, temperature: float) -> Tare:
         """The tare, or a `Refusal` that says why there is none; temperature NaN if not known."""
+        if len(set(self.sensor.layout.kind_units)) > 1:
+            raise Refusal(
+                "expected readings of one unit, whose noise tells a load from offsets, got "
+                f"{self.sensor.layout.units}; such a sensor has no tare"
+            )
         n = len(self._times)
         if n < _FEWEST:
             raise Refusal(
@@ -244,15 +249,16 @@ def _check_still(
         channel = int(np.nanargmax(np.abs(part)))
         raise Refusal(
             f"the readings move: {_named(sensor, channel)} was off its mean by "
-            f"{abs(part[channel]):.2g} 1/m for {SECONDS / len(off):.2g} s, where noise causes "
+            f"{abs(part[channel]):.2g} {sensor.layout.units} for {SECONDS / len(off):.2g} s, where "
+            "noise causes "
             f"{by_noise:.2g}; let the skin come to rest, then tare again"
         )
 
 
 def _named(sensor: Sensor, channel: int) -> str:
-    component, element = divmod(channel, len(sensor.layout))
-    x, y = 1e3 * sensor.layout.positions[element]
-    return f"{COMPONENTS[component]} of element {element} at ({x:.0f}, {y:.0f}) mm"
+    layout = sensor.layout
+    x, y = 1e3 * layout.positions[layout.element[channel]]
+    return f"{layout.reading_name(channel)} at ({x:.0f}, {y:.0f}) mm"
 
 
 def _check_unloaded(sensor: Sensor, seeker: LoadDetector, found: _Found, rest: Rest) -> None:

@@ -53,6 +53,7 @@ class WeightFit:
     """Finds the skin that tells known weights right, from what the elements read under each."""
 
     def __init__(self, sensor: Sensor, edge: str = "") -> None:
+        sensor.layout.check_curvature_sensor("a calibration with known weights")
         self.sensor, self.edge = sensor, edge or sensor.edge
         if not sensor.plate.rigidity:
             raise Refusal(

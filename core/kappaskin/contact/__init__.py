@@ -6,6 +6,7 @@ from kappaskin.contact.geometry import contact_geometry as contact_geometry
 from kappaskin.contact.geometry import local_geometry as local_geometry
 from kappaskin.contact.geometry import surface_geometry as surface_geometry
 from kappaskin.contact.imprint import ImprintObjects as ImprintObjects
+from kappaskin.contact.imprint import Imprints as Imprints
 from kappaskin.contact.imprint import contacts_of as contacts_of
 from kappaskin.contact.imprint import object_finder as object_finder
 from kappaskin.contact.intrinsic import ForceTorqueSensor as ForceTorqueSensor

@@ -66,6 +66,7 @@ class SmoothDrift:
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str = "hinged") -> None:
         self._columns, self._live = level_and_slopes(layout), layout.live.ravel()
+        self._frame_shape = layout.frame_shape
         self._beside = PointContact(plate, layout, edge, self._columns)
         self._directions = PatternCache[Array]()
         self._reference: tuple[Estimator, Estimator] | None = None
@@ -153,7 +154,8 @@ class SmoothDrift:
 
     def _left_of_columns(self, estimator: Estimator, used: Mask) -> Array:
         """Directions (r, C) of what a fit leaves of the drift's columns."""
-        columns = np.where(used, self._columns, np.nan).reshape(-1, 3, len(used) // 3)
+        columns = np.where(used, self._columns, np.nan)
+        columns = columns.reshape(-1, *self._frame_shape)
         return orthonormal(np.nan_to_num(estimator(columns).residual.reshape(len(columns), -1)))
 
 

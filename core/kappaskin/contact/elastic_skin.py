@@ -147,7 +147,7 @@ class ElasticSkin:
             raise Refusal("object recognition needs a 2-D skin; this one is a strip")
         if not plate.rigidity:
             raise Refusal("object recognition needs a rigidity above zero; this skin has none")
-        layout.check_curvature_sensor("contacts and objects")
+        layout.check_curvature_sensor("objects")
         if len(layout) > _MOST:
             raise Refusal(f"object recognition takes at most {_MOST} elements, got {len(layout)}")
         self.patch, self.side, self._layout = patch, min(patch.a, patch.b), layout

@@ -247,14 +247,16 @@ class Imprints:
         return there, contact if w > _DEEP * w_sd else NO_CONTACT
 
 
-def contacts_of(plate: Plate, layout: SensorLayout, basis: Basis, edge: str) -> Contacts | Imprints:
+def contacts_of(
+    plate: Plate, layout: SensorLayout, basis: Basis, edge: str, sigma: Array | None = None
+) -> Contacts | Imprints:
     """What finds the contacts on a skin: by its mechanics, if its material is known.
 
-    Those of readings other than a curvature sensor's are found by the shape too.
+    Readings that differ in unit are weighed by their `sigma` (R,).
     """
-    if plate.unknown_material or layout.reads:
+    if plate.unknown_material:
         return Imprints(plate, layout, basis, edge)
-    return Contacts(plate, layout, edge)
+    return Contacts(plate, layout, edge, sigma)
 
 
 def object_finder(

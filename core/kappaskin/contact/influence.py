@@ -11,7 +11,7 @@ import scipy
 from kappaskin.bases import ProductBasis, SineBasis, basis_for
 from kappaskin.frames import Array
 from kappaskin.mechanics import Compliance, Plate, Shell
-from kappaskin.sensing import SensorLayout
+from kappaskin.sensing import Readings, SensorLayout
 from kappaskin.skin import Patch
 
 
@@ -48,17 +48,29 @@ def influence_of(
 ) -> Influence:
     """The influence of loads, converged where the skin is a plate or a shell on a rectangle.
 
-    On strips, disks, polygons and drum heads it is that of a basis of so many `functions` each way.
+    On strips, disks, polygons and drum heads it is that of a basis of so many `functions` each way;
+    that of heights and slopes, which are bounded under a load, is one of more.
     """
     if type(plate.patch) is not Patch or plate.patch.strip or not _is_stiff(plate):
         return _OfFunctions(plate, layout, edge, functions, out)
+    if layout.reads and layout.senses_curvature_only and not layout.gage_length:
+        return _OfDirections(plate, layout, edge, out)
+    if layout.reads:
+        return _OfFunctions(plate, layout, edge, _FINE, out)
     return _OfPlate(plate, layout, edge, out)
 
 
-class _OfFunctions:
-    """As the functions of a basis follow it."""
+_FINE = 32  # functions each way that heights and slopes are followed by
 
-    unit, sized = 1.0, False
+
+class _OfFunctions:
+    """As the functions of a basis follow it.
+
+    Heights and slopes depend on the size of a load where the functions are sines: the mean of one
+    of the wave number k over a disc of radius r is its value in the middle times 2 J1(k r) / (k r).
+    """
+
+    unit = 1.0
 
     def __init__(
         self, plate: Plate, layout: SensorLayout, edge: str, functions: int, out: Array
@@ -67,9 +79,19 @@ class _OfFunctions:
         compliance = plate.compliance(self._basis)
         self._readings = compliance.after(layout.operator(self._basis, plate)).T.copy()
         self._C, self._out = compliance.after(np.eye(self._basis.size)), out
+        self.sized, self._k = False, np.zeros(self._basis.size)
+        if layout.reads and isinstance(self._basis, SineBasis) and not plate.patch.strip:
+            self.sized = True
+            self._k = np.hypot(*np.meshgrid(*self._basis.wavenumbers, indexing="ij")).ravel()
 
     def at(self, x: float, y: float, s: float) -> None:
-        np.dot(self._basis.jet(x, y)[:3], self._readings, self._out[:3])
+        felt = self._basis.jet(x, y)[:4].copy()  # which is cached
+        if self.sized:
+            z = self._k * math.sqrt(s)
+            felt[3] = felt[0] * (-(self._k**2) * scipy.special.jv(2, z) / z**2)
+            felt[:3] *= 2 * scipy.special.jv(1, z) / z
+        rows = 4 if self.sized else 3
+        np.dot(felt[:rows], self._readings, self._out[:rows])
 
     def trust(self, s: float, share: float) -> Array | None:
         return None
@@ -303,6 +325,33 @@ class _OfPlate:
         i, j, u, v = self._among_nodes(x, y)
         of_x, of_y = np.dot(((1.0, u, u * u, u * u * u), (1.0, v, v * v, v * v * v)), _CUBICS)
         return float(of_y.dot(self._gives[j : j + 4, i : i + 4]).dot(of_x))
+
+
+class _OfDirections:
+    """That of curvatures along any direction, from xx, yy and xy: c^2 xx + 2 c s xy + s^2 yy."""
+
+    sized = True
+
+    def __init__(self, plate: Plate, layout: SensorLayout, edge: str, out: Array) -> None:
+        self._rows, self._out = np.zeros((4, 3 * len(layout))), out
+        self._of = _OfPlate(plate, layout.of_curvature, edge, self._rows)
+        self.unit = self._of.unit
+        reads, P = cast("Readings", layout.reads), len(layout)
+        c, s = reads.along.T
+        twist = reads.quantity == "twist"
+        self._parts = np.where(twist, 0.0, [c * c, s * s, 2 * c * s])
+        self._parts[2, twist] = 1.0
+        self._channels = layout.element + P * np.arange(3)[:, None]
+
+    def at(self, x: float, y: float, s: float) -> None:
+        self._of.at(x, y, s)
+        np.einsum("cr,ncr->nr", self._parts, self._rows[:, self._channels], out=self._out)
+
+    def trust(self, s: float, share: float) -> Array | None:
+        return self._of.trust(s, share)
+
+    def gives(self, x: float, y: float) -> float:
+        return self._of.gives(x, y)
 
 
 @lru_cache(4)

@@ -53,7 +53,7 @@ _SECOND = (2, 0), (0, 2), (1, 1)  # orders of the derivatives that flat skins re
 _ROUNDING = 1e-15  # of the largest: a part as small is none
 
 ModalProjection = Callable[[Array], Array]
-"""From readings K (3 P,) in 1/m, zero where missing, to M'K (N,)."""
+"""From readings K (C,) in 1/m, zero where missing, to M'K (N,)."""
 
 
 def modal_projection(
@@ -65,7 +65,7 @@ def modal_projection(
     for each component a matrix for x times one for y: a hundredth of the numbers.
     """
     unmixed = compliance.values.ndim == 1 and compliance.volume is None
-    if isinstance(basis, SineBasis) and unmixed and _is_grid(layout):
+    if isinstance(basis, SineBasis) and unmixed and not layout.reads and _is_grid(layout):
         return _OnGrid(layout, basis, compliance.values)
     return lambda K: K @ M
 
@@ -185,7 +185,6 @@ class PointContact:
         edge: str = "hinged",
         free: Array | None = None,
     ) -> None:
-        layout.check_curvature_sensor("contacts and objects")
         self.patch, strip = plate.patch, plate.patch.strip
         self.basis = basis_for(self.patch, edge, _FUNCTIONS, 1 if strip else _FUNCTIONS)
         compliance = plate.compliance(self.basis)
@@ -198,7 +197,7 @@ class PointContact:
         self._influence = influence_of(plate, layout, edge, _FUNCTIONS, self._rows[:4])
         self._unknowns = 4 if self._influence.sized else 3
         self._stretched = StretchedSkin(plate, layout, edge) if plate.stretches else None
-        self._live = layout.live.ravel()
+        self._live, self._element = layout.live.ravel(), layout.element
         self._readings = np.zeros(len(self._M))
         x, y = self.patch.grid(_SEARCHED + 2, 3 if strip else _SEARCHED + 2)
         self._x, self._y = x[1:-1], y[1:-1]
@@ -347,7 +346,7 @@ class PointContact:
         trust = self._influence.trust(s, share) if share else None
         if trust is None:
             return tables.weights
-        of_all = np.concatenate((trust, trust, trust))
+        of_all = trust[self._element]
         return of_all if tables.weights is None else of_all * tables.weights
 
     def _contact(

@@ -54,11 +54,21 @@ class Contacts:
     `single`. Where one is told or none, a `drift` of all readings may be told beside it
     (`SmoothDrift`). No two are told on a flat skin of known thickness, whose readings are no sums
     of those of its loads.
+
+    Readings that differ in unit are weighed by their `sigma` (R,); no drift is told of those.
     """
 
-    def __init__(self, plate: Plate, layout: SensorLayout, edge: str = "hinged") -> None:
+    def __init__(
+        self,
+        plate: Plate,
+        layout: SensorLayout,
+        edge: str = "hinged",
+        sigma: Array | None = None,
+    ) -> None:
+        self._scale = None if sigma is None else 1 / sigma
+        layout = replace(layout, scale=self._scale)
         self._one = PointContact(plate, layout, edge)
-        self._drift = SmoothDrift(plate, layout, edge)
+        self._drift = None if self._scale is not None else SmoothDrift(plate, layout, edge)
         self.drift: FittedDrift | None = None
         """The drift beside the last contacts; None where there is none."""
         self._pairs = None if plate.stretches else _Pairs(plate, layout, edge)
@@ -68,7 +78,11 @@ class Contacts:
 
         For `curvature` (3, P) in 1/m, NaN where missing, and the `fit` to it.
         """
+        if self._scale is not None:
+            curvature = curvature * self._scale
         found = self._pressed(curvature, fit)
+        if self._drift is None:
+            return found
         rest = self._one.rest
         left = float(rest.dot(rest))
         if found[1].present and self._pairs is not None:
@@ -172,7 +186,7 @@ class _Loads:
     """What the elements of a skin read of several loads, and of one along a line."""
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str) -> None:
-        self.patch, C = plate.patch, layout.live.size
+        self.patch, C, self._element = plate.patch, layout.channels, layout.element
         self._rows = np.zeros((4, C))
         self.influence = influence_of(plate, layout, edge, _FUNCTIONS, self._rows)
         side = self.patch.a if self.patch.strip else min(self.patch.a, self.patch.b)
@@ -188,7 +202,7 @@ class _Loads:
 
     def _doubt(self, s: float, force: float) -> Array | float:
         trust = self.influence.trust(s, (_PROFILE * force) ** 2)
-        return 0.0 if trust is None else 1 / trust - 1
+        return 0.0 if trust is None else (1 / trust - 1)[self._element]
 
     def several(self, p: Array) -> _Model:
         """Loads (L, 4): x, y and squared radius, and force in units."""
@@ -199,7 +213,7 @@ class _Loads:
             np.multiply(rows[1:], force, out=own[:3])
             own[3] = rows[0]
             total += force * rows[0]
-            doubt.reshape(3, -1)[:] += self._doubt(s, force)
+            doubt += self._doubt(s, force)
         return _Model(total, J.reshape(-1, J.shape[2]), doubt)
 
     def line(self, p: Array) -> _Model:
@@ -213,7 +227,7 @@ class _Loads:
             J[:2] += along
             J[2:4] += t * along
             J[4] += share * rows[0]
-            doubt.reshape(3, -1)[:] += self._doubt(s, force * share)
+            doubt += self._doubt(s, force * share)
         return _Model(force * J[4], J, doubt)
 
     def free(self, p: Array, slopes: Array) -> Mask:

@@ -143,7 +143,7 @@ class Scanner:
             return self._all
         elements = self._inside.copy()
         elements[self._in_turn()] = True
-        return self._sensor.scan(np.flatnonzero(np.tile(elements, 3)))
+        return self._sensor.scan(np.flatnonzero(elements[self._sensor.layout.element]))
 
     def _next_channels(self) -> NDArray[np.intp]:
         next_ones = (self._turn + np.arange(self.count)) % len(self._live)
@@ -185,7 +185,8 @@ def contact_bound(
         compliance(f.reshape(basis.shape)).ravel() for f in basis.jet(contact.x, contact.y)[:3]
     )
     slopes = np.stack([contact.force * by_x, contact.force * by_y, by_force], axis=1)
-    weights = np.where(layout.live, 1.0 if weight is None else weight, 0.0)
+    each = np.ones(len(layout)) if weight is None else weight
+    weights = np.where(layout.live.ravel(), each[layout.element], 0.0)
     M = layout.operator(basis, sensor.plate)
     J: Array = np.sqrt(weights).reshape(-1, 1) * (M @ slopes)
     length = np.linalg.norm(J, axis=0)
@@ -217,7 +218,7 @@ class ScanTradeoff:
 
     @cached_property
     def gain(self) -> float:
-        return self.rate / self.full_rate
+        return self.rate / self.full_rate if math.isfinite(self.full_rate) else 1.0
 
     @staticmethod
     def of(sensor: Sensor, region: Region, contact: PointLoad, noise: float) -> "ScanTradeoff":

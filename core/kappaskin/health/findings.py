@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from kappaskin.errors import RankDeficient
 from kappaskin.estimation import FAULTS, Estimator, Fit, Uncertainty
-from kappaskin.frames import COMPONENTS, Array, Indices, Mask
+from kappaskin.frames import Array, Indices, Mask
 from kappaskin.health.inconsistency import InconsistencyTest, centred
-from kappaskin.sensing import Sensor
+from kappaskin.sensing import Sensor, SensorLayout
 
 _MOST_LISTED = 256  # findings that are listed one by one
 
@@ -72,22 +72,21 @@ class Health:
 
 
 def findings(
-    kinds: NDArray[np.uint8], since: Array, figures: Array, retained: Mask
+    kinds: NDArray[np.uint8], since: Array, figures: Array, retained: Mask, layout: SensorLayout
 ) -> tuple[Finding, ...]:
     """The findings for C channels with `kinds`, `since` and `retained` (C,), `figures` (C, 2)."""
-    P = len(kinds) // 3
     return tuple(
         Finding(
             int(channel),
-            int(channel % P),
-            COMPONENTS[int(channel) // P],
+            int(layout.element[channel]),
+            layout.kind_names[layout.kind[channel]],
             FAULTS[int(kinds[channel])],
             float(since[channel]),
             _figure(
                 FAULTS[int(kinds[channel])],
                 float(figures[channel, 0]),
                 float(figures[channel, 1]),
-                P,
+                layout,
             ),
             bool(retained[channel]),
         )
@@ -95,7 +94,7 @@ def findings(
     )
 
 
-def _figure(kind: str, first: float, second: float, elements: int) -> str:
+def _figure(kind: str, first: float, second: float, layout: SensorLayout) -> str:
     """The figures of `classify_faults` in words and units."""
     if math.isnan(first):
         return "reported by the device"
@@ -106,8 +105,7 @@ def _figure(kind: str, first: float, second: float, elements: int) -> str:
     if kind == "saturated":
         return f"saturated for {100 * first:.0f} % of the last second"
     if kind == "swapped":
-        other = int(first)
-        return f"has the readings of {COMPONENTS[other // elements]} of element {other % elements}"
+        return f"has the readings of {layout.reading_name(int(first))}"
     trend = f", drifting by {second:+.2g} 1/m per minute" if kind == "drifting" else ""
     return f"{first:+.2f} 1/m off the prediction of its neighbours{trend}"
 
@@ -223,7 +221,7 @@ FaultCodes = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Exclusion:
-    """The channels excluded from a fit: with a fault in `kinds` (3, P) and not `retained`.
+    """The channels excluded from a fit: with a fault in `kinds` and not `retained`, (3, P) or (R,).
 
     `ideal` is the fit at rest with every channel of such a skin, `fit` the one without these.
     """
@@ -239,11 +237,11 @@ class Exclusion:
     def none(cls, sensor: Sensor, fit: Fit, ideal: Fit) -> "Exclusion":
         """No exclusion but of the channels that `sensor` itself reports as dead."""
         shape = sensor.layout.live.shape
-        kinds = np.zeros(shape, np.uint8)
-        return cls(kinds, np.zeros(shape, bool), ideal, fit, None, kinds[0])
+        no_fault = np.zeros(len(sensor.layout), np.uint8)
+        return cls(np.zeros(shape, np.uint8), np.zeros(shape, bool), ideal, fit, None, no_fault)
 
     def __call__(self, curvature: Array) -> Array:
-        """The `curvature` (3, P) to fit: NaN where it is excluded."""
+        """The readings `curvature` to fit: NaN where one is excluded."""
         return curvature if self._out is None else np.where(self._out, np.nan, curvature)
 
     def words(self, suspect: FaultCodes | None) -> FaultCodes:
@@ -290,7 +288,8 @@ def exclude(
     out = np.isin(np.arange(kinds.size), worst[:count]).reshape(shape)
     retained = np.isin(np.arange(kinds.size), worst[count:]).reshape(shape)
     own = kinds.reshape(shape).copy()
-    worst_of: FaultCodes = own.max(axis=0)
+    worst_of: FaultCodes = np.zeros(len(estimator.layout), np.uint8)
+    np.maximum.at(worst_of, estimator.layout.element, kinds)
     return replace(
         was, kinds=own, retained=retained, fit=fit, _out=out if count else None, _worst=worst_of
     )
@@ -311,8 +310,8 @@ def _most(estimator: Estimator, worst: Indices, loosest: float) -> tuple[Fit, in
 
 
 def _without(estimator: Estimator, channels: Indices) -> Fit | None:
-    missing = np.zeros(3 * len(estimator.layout), bool)
+    missing = np.zeros(estimator.layout.channels, bool)
     missing[channels] = True
     with suppress(RankDeficient):
-        return estimator.at_rest(missing.reshape(3, -1))
+        return estimator.at_rest(missing.reshape(estimator.frame_shape))
     return None

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from kappaskin.errors import Refusal
 from kappaskin.frames import OVERTAKEN, Array, Frame, Mask
 from kappaskin.health.findings import (
     DEAD,
@@ -50,6 +51,9 @@ class HealthMonitor:
     Without motion no channel is called dead, stuck or swapped. The work of an evaluation is spread
     over the frames that follow, so that none of them waits for all of it.
 
+    Neighbours predict xx, yy and xy alone: of other readings only those are found that the device
+    reports as dead, or that are on a rail or missing.
+
     `kinds` (C,) are numbers in `FAULTS`, 0 for healthy channels; `badness` (C,) ranks them.
     """
 
@@ -62,7 +66,7 @@ class HealthMonitor:
     def reset(self) -> None:
         """Forget all readings and findings, as when the device has restarted."""
         layout, C = self.sensor.layout, self.sensor.channels
-        self._test = InconsistencyTest(layout)
+        self._predicted = None if layout.reads else InconsistencyTest(layout)
         self.kinds = np.where(layout.lacking.ravel(), DEAD, 0).astype(np.uint8)
         self._since, self._figures = np.full(C, math.nan), np.full((C, 2), math.nan)
         self._suspects = np.zeros(C, bool)
@@ -83,12 +87,22 @@ class HealthMonitor:
             self._steps = self._evaluate(statistics)
         return next(self._steps, False)
 
+    @property
+    def _test(self) -> InconsistencyTest:
+        if self._predicted is None:
+            raise Refusal("expected a curvature sensor, whose elements their neighbours predict")
+        return self._predicted
+
     def _evaluate(self, statistics: ChannelStatistics) -> Iterator[bool]:
         """The steps of an evaluation, each as long as the estimate of a frame; True after the last.
 
         There are no more of them than frames in an evaluation.
         """
         self._since[np.isnan(self._since) & (self.kinds > 0)] = statistics.time
+        if self._predicted is None:
+            self._find_saturated(statistics)
+            yield True
+            return
         wrong = self._dead | (self.kinds > 0)
         for _ in self._test.steps(statistics, wrong | self._suspects, wrong):
             yield False
@@ -106,11 +120,13 @@ class HealthMonitor:
     def badness(self) -> Array:
         """Rank (C,) of the faults: channels without any information first, then by how far off."""
         nothing = np.isin(self.kinds, (DEAD, SATURATED, STUCK))
-        return np.where(self.kinds > 0, self._test.off, 0.0) + np.where(nothing, 1e9, 0.0)
+        off = self._predicted.off if self._predicted else 0.0
+        return np.where(self.kinds > 0, off, 0.0) + np.where(nothing, 1e9, 0.0)
 
     def findings(self, retained: Mask) -> tuple[Finding, ...]:
         """The findings, of which some channels are `retained` (C,) in the fit all the same."""
-        return findings(self.kinds, self._since, self._figures, retained)
+        layout = self.sensor.layout
+        return findings(self.kinds, self._since, self._figures, retained, layout)
 
     def _find(self, which: Mask, kind: int, since: float) -> None:
         self._since[which & (self.kinds == 0)] = since
@@ -147,7 +163,7 @@ class HealthMonitor:
         self._figures[here, 0], self._figures[here, 1] = share[here], 0.0
         self.kinds[here & (share < _FREE)] = 0
         railed = np.flatnonzero(here & (share == 1))
-        if railed.size:
+        if railed.size and self._predicted:
             self._call_dead(railed)
 
     def _call_dead(self, railed: NDArray[np.intp]) -> None:

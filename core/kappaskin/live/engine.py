@@ -291,14 +291,20 @@ class Engine:
         return self._ring.read(status.generation, status.slot, sequence)
 
     def recent(self, status: Status, after: int) -> tuple[Array, Array, int]:
-        """Device times (T,) in s and `traced` quantities (T, 3 k, P) of estimates since `after`.
+        """Device times (T,) in s and `traced` quantities (T, n k, P) of estimates since `after`.
 
-        The three components of each of k quantities, such as `curvature` in 1/m. `after` is the
+        The n kinds of readings of each of k quantities, such as `curvature`. `after` is the
         number that the last call returned, 0 at first; at most the last 64 estimates.
         """
         if status.slot is None:
             return np.empty(0), np.empty((0, 3, 0)), 0
-        return self._ring.recent(status.generation, status.slot, after)
+        times, values, last = self._ring.recent(status.generation, status.slot, after)
+        if values.ndim == 2 and status.sensor is not None:
+            layout = status.sensor.layout
+            count = values.shape[1] // layout.channels
+            each = layout.by_kind(values.reshape(len(values), count, layout.channels))
+            values = each.reshape(len(values), count * len(layout.kinds), len(layout))
+        return times, values, last
 
     def compared(self, status: Status) -> Estimate | None:
         """The newest estimate with the setup that is compared with."""

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from kappaskin._files import hold, left_behind
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Estimate
-from kappaskin.pipeline import ACROSS, ALONG, COLUMN, ELEMENT, REPORTED, ROW, Pipeline, stored
+from kappaskin.pipeline import REPORTED, Pipeline, axes_of, stored
 
 _SIZE = 96 * 2**20  # pages that are never written cost no memory
 _STATUS_SIZE = 8 * 2**20  # the calibration of a large skin is most of it
@@ -38,9 +38,7 @@ _OURS, _OURS_AT = b"kappaskin shared memory\0", 40  # in the header
 def slot_type(pipeline: Pipeline) -> np.dtype[np.void]:
     """The record of one estimate: the fields of `Estimate` between two tickets."""
     setup = pipeline.setup
-    (along, across), (ny, nx) = pipeline.basis.shape, (setup.ny, setup.nx)
-    P = len(pipeline.sensor.layout)
-    lengths = {ELEMENT: P, ALONG: along, ACROSS: across, ROW: ny, COLUMN: nx}
+    lengths = axes_of(pipeline.sensor.layout, pipeline.basis.shape, (setup.nx, setup.ny))
     stored = {path: (of.kind, of.shape(lengths)) for path, of in _STORED.items()}
     return np.dtype([("opened", "u8"), *_fields(Estimate, "", stored), ("closed", "u8")])
 
@@ -270,8 +268,9 @@ class Ring:
     ) -> tuple[Array, Array, int]:
         """Reader: times (T,) in s and what is `traced` of all after the one numbered `after`.
 
-        It is (T, 3 k, P), for each of the k quantities its components. As many of `generation` as
-        are still there, and the number of the last, counted from 1.
+        It is (T, 3 k, P), for each of the k quantities its components, or (T, k R) of other
+        readings. As many of `generation` as are still there, and the number of the last, counted
+        from 1.
         """
         written = int(self._header[self._WRITTEN])
         if not self._mapped(generation, slot):

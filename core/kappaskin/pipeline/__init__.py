@@ -11,12 +11,14 @@ from kappaskin.pipeline.reported import COLUMN as COLUMN
 from kappaskin.pipeline.reported import ELEMENT as ELEMENT
 from kappaskin.pipeline.reported import REPORTED as REPORTED
 from kappaskin.pipeline.reported import ROW as ROW
+from kappaskin.pipeline.reported import Axes as Axes
 from kappaskin.pipeline.reported import Getter as Getter
 from kappaskin.pipeline.reported import Number as Number
 from kappaskin.pipeline.reported import Readout as Readout
 from kappaskin.pipeline.reported import Reported as Reported
 from kappaskin.pipeline.reported import ReportedQuantity as ReportedQuantity
 from kappaskin.pipeline.reported import SkinColour as SkinColour
+from kappaskin.pipeline.reported import axes_of as axes_of
 from kappaskin.pipeline.reported import curvature_invariant as curvature_invariant
 from kappaskin.pipeline.reported import getters as getters
 from kappaskin.pipeline.reported import numbers_of as numbers_of

@@ -64,7 +64,7 @@ class FrameAssembly(Stateful):
         return self._list_is_whole
 
     def __call__(self, frame: Frame, curvature: Array) -> tuple[Array, Mask]:
-        """The `curvature` (3, P) of `frame` with earlier readings, and which are new (3, P)."""
+        """The readings `curvature` of `frame` with earlier ones, and which of them are new."""
         flat = curvature.ravel()
         if self.is_whole(frame):
             np.copyto(self._values, flat)
@@ -118,7 +118,7 @@ class Pipeline:
         across = 1 if sensor.layout.patch.strip else setup.Nj
         self.basis = basis_for(sensor.layout.patch, edge, setup.Ni, across)
         layout, rim_sd = sensor.layout, setup.rim_sd
-        self.fit = estimator_for(setup.method, self.basis, layout, rim_sd=rim_sd)
+        self.fit = estimator_for(setup.method, self.basis, layout, sensor.sigma, rim_sd)
         self._read_at = sensor.scan().times  # of the first, the second ... channel of a scan
         self._whole = self.fit.at_rest()
         loosest = _LOOSE * float(np.linalg.norm(self._whole.unit_sd))
@@ -131,7 +131,7 @@ class Pipeline:
         self._surface = self.basis.on_grid(self._x, self._y)
         known = setup.calibration and setup.calibration.weights
         plate = known.plate(sensor.plate) if known else sensor.plate
-        self._contacts = contacts_of(plate, sensor.layout, self.basis, edge)
+        self._contacts = contacts_of(plate, sensor.layout, self.basis, edge, sensor.sigma)
         self._bounded = LowerBound(plate, edge, known.deepest if known else 0.0)
         self.left_out = Exclusion.none(sensor, self._whole, self._ideal())
         self._no_shape = np.full(self.basis.shape, np.nan)
@@ -146,7 +146,8 @@ class Pipeline:
         if layout.lacking.any():
             whole = replace(layout, live=layout.live | layout.lacking)
             setup = self.setup
-            estimator = estimator_for(setup.method, self.basis, whole, rim_sd=setup.rim_sd)
+            sigma = self.sensor.sigma
+            estimator = estimator_for(setup.method, self.basis, whole, sigma, setup.rim_sd)
             return estimator.at_rest()
         return self._whole
 
@@ -167,7 +168,7 @@ class Pipeline:
         return tare.offset - np.nan_to_num(calibration.offset)
 
     def curvature(self, frame: Frame) -> Array:
-        """Curvature (3, P) in 1/m; NaN where a channel is dead, unscanned, on a rail or failed.
+        """Readings by the frame's shape; NaN where a channel is dead, unscanned or on a rail.
 
         With a calibration each frame is to be given once, in order: the loops have a memory.
         """
@@ -178,7 +179,7 @@ class Pipeline:
             flat = flat - self._zero
         if self.past.correct is not None:
             flat = self.past.correct(flat, time)
-        return flat.reshape(3, -1)
+        return flat.reshape(self.sensor.layout.frame_shape)
 
     def rest(self) -> Rest:
         """The expected readings of a skin that is straight now, without a new tare.
@@ -252,7 +253,7 @@ class Pipeline:
             frame.taken,
             frame.taken_sd,
             self._clock(),
-            nominal.reshape(3, -1),
+            nominal.reshape(curvature.shape),
             curvature,
             fresh,
             fit.residual,

@@ -98,8 +98,16 @@ class Quantities:
         return of(Reported(estimate, skin=self))
 
     def of_elements(self, name: str, estimate: Estimate) -> Array:
-        """The values (P,) in SI units: of curvature as each element reads it; NaN where missing."""
-        of = skin_colours()[name].of_elements
+        """The values (P,) in SI units: of curvature as each element reads it; NaN where missing.
+
+        Where the elements read other than xx, yy and xy, as the fit has it there.
+        """
+        colour = skin_colours()[name]
+        of, on_surface = colour.of_elements, colour.on_surface is not None
+        if self.layout.reads and (colour.row >= 0 or on_surface):
+            of = None  # what elements read as xx, yy and xy
+            if not on_surface:
+                return np.full(len(self.layout), np.nan)
         if of is not None:
             return of(Reported(estimate, skin=self))
         corners, weights = self._interpolation

@@ -17,6 +17,7 @@ from kappaskin.bases import Basis, basis_for
 from kappaskin.contact import (
     KINDS,
     ContactObject,
+    Imprints,
     LowerBound,
     as_one,
     contacts_of,
@@ -312,7 +313,9 @@ def reconstruct(
     if not (contact or objects):
         return out
     plate = _plate(patch, found, str(texts.get("inplane", np.array("")).item()))
-    contacts_in, bounded = contacts_of(plate, layout, functions, edge), LowerBound(plate, edge)
+    by_shape = layout.reads or plate.unknown_material  # a sigma may be another in each frame
+    find = Imprints if by_shape else contacts_of
+    contacts_in, bounded = find(plate, layout, functions, edge), LowerBound(plate, edge)
     fits = _fits(method, functions, layout, frames, sigma if layout.reads else None)
     read = [each.readings for each in fits]
     pairs, drifts = list[tuple[Contact, Contact]](), np.zeros(len(fits))

@@ -18,6 +18,7 @@ import numpy as np
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Fit
 from kappaskin.frames import COMPONENTS, Array, Estimate
+from kappaskin.sensing import SensorLayout
 
 if TYPE_CHECKING:
     from kappaskin.pipeline.quantities import Quantities
@@ -27,6 +28,24 @@ UNKNOWN = math.pi / math.sqrt(12)
 
 ELEMENT, ALONG, ACROSS, ROW, COLUMN = "element", "along", "across", "row", "column"
 """Axes of a quantity whose length depends on the skin, the functions and the surface's points."""
+_OF_READINGS = COMPONENTS, ELEMENT
+_READING = "reading"
+Axes = dict[str, int | tuple[str, ...]]
+
+
+def axes_of(layout: SensorLayout, functions: tuple[int, int], points: tuple[int, int]) -> Axes:
+    """The lengths of all axes, for Ni x Nj `functions` and nx x ny `points`.
+
+    Where elements read other than xx, yy and xy, the names of all readings, which have one axis.
+    """
+    lengths = (len(layout), *functions, *points[::-1])
+    axes: Axes = dict(zip((ELEMENT, ALONG, ACROSS, ROW, COLUMN), lengths, strict=True))
+    if layout.reads:
+        kinds, elements = layout.kind.tolist(), layout.element.tolist()
+        names = layout.kind_names
+        axes[_READING] = tuple(f"{names[k]}_{p}" for k, p in zip(kinds, elements, strict=True))
+    return axes
+
 
 _SUFFIX = {
     "": "",
@@ -218,6 +237,9 @@ class ReportedQuantity:
     What has `COMPONENTS` at every element may be a column `element_head` of the element panel.
     `traced` is the title of what is drawn of it over time: then it is a field of the estimate with
     one of `colours` for each component, by whose names it is in the table of all elements.
+
+    What has `COMPONENTS` at every element has one axis, of all readings, and their units where a
+    layout reads other than those; a number that is in the unit of the readings is `as_readings`.
     """
 
     name: str
@@ -243,6 +265,7 @@ class ReportedQuantity:
     element_head: str = ""
     traced: str = ""
     colours: tuple[SkinColour, ...] = ()
+    as_readings: bool = False
 
     @property
     def forms(self) -> tuple[tuple[str, str, Getter], ...]:
@@ -254,20 +277,45 @@ class ReportedQuantity:
         )
         return tuple((suffix, text, _got(get)) for suffix, text, get in of if get is not None)
 
-    def labels(self, lengths: dict[str, int]) -> tuple[str, ...]:
+    def _axes(self, lengths: Axes) -> list[tuple[str, ...]]:
+        """The labels along each axis."""
+        if self.of_readings and isinstance(names := lengths.get(_READING), tuple):
+            return [names]
+        axes = [lengths[axis] if isinstance(axis, str) else axis for axis in self.parts]
+        return [tuple(map(str, range(axis))) if isinstance(axis, int) else axis for axis in axes]
+
+    @property
+    def of_readings(self) -> bool:
+        """Whether it is a number for each reading."""
+        return self.parts == _OF_READINGS
+
+    def unit_of(self, layout: SensorLayout) -> str:
+        """Its unit: of what is in the unit of the readings, that of a `layout`.
+
+        A number in units of their noise has none.
+        """
+        if self.as_readings and len(set(layout.kind_units)) > 1:
+            return ""
+        return layout.units if self.unit and (self.of_readings or self.as_readings) else self.unit
+
+    def units_of(self, layout: SensorLayout) -> tuple[str, ...]:
+        """The unit of each reading of a `layout`, of what is in those; else none."""
+        if not (layout.reads and self.unit and self.of_readings):
+            return ()
+        kinds: list[int] = layout.kind.tolist()
+        return tuple(layout.kind_units[k] for k in kinds)
+
+    def labels(self, lengths: Axes) -> tuple[str, ...]:
         """What is appended to the name for each number, flattened, by the `lengths` of axes.
 
         Empty for a number.
         """
-        names = [
-            tuple(map(str, range(lengths[axis]))) if isinstance(axis, str) else axis
-            for axis in self.parts
-        ]
-        return tuple("".join(f"_{each}" for each in parts) for parts in product(*names))
+        axes = self._axes(lengths)
+        return tuple("".join(f"_{each}" for each in parts) for parts in product(*axes))
 
-    def shape(self, lengths: dict[str, int]) -> tuple[int, ...]:
+    def shape(self, lengths: Axes) -> tuple[int, ...]:
         """Its shape as an array; `lengths` are those of some axes."""
-        return tuple(lengths[axis] if isinstance(axis, str) else len(axis) for axis in self.parts)
+        return tuple(map(len, self._axes(lengths)))
 
     @property
     def published(self) -> tuple[Number, ...]:
@@ -481,6 +529,11 @@ def _invariant(
     )
 
 
+def _per_metre(value: float, reported: Reported) -> float:
+    """A `value` in the unit of the readings where that is 1/m for sure, of xx, yy and xy."""
+    return value if reported.estimate.curvature.ndim == 2 else math.nan
+
+
 _FIT = (
     ReportedQuantity(
         "surface",
@@ -669,6 +722,8 @@ _FIT = (
         group="fit",
         keys=(("noise_per_m", "standard deviation of one reading"),),
         form="%.3g",
+        as_readings=True,
+        quick=lambda r: [_per_metre(r.estimate.noise, r)],
         labels_shown=("Noise of a reading",),
         shown=("1/m", 1.0, 3),
     ),
@@ -692,6 +747,8 @@ _FIT = (
         group="fit",
         keys=(("drift_per_m", "smooth shift of all readings by RMS, 0 where none is told"),),
         form="%.3g",
+        as_readings=True,
+        quick=lambda r: [_per_metre(r.estimate.drift, r)],
         labels_shown=("Drift of all readings",),
         shown=("1/m", 1.0, 3),
     ),
@@ -1084,13 +1141,16 @@ class Readout(NamedTuple):
 
 
 def readouts(estimate: Estimate) -> list[Readout]:
-    """What the screen shows of an estimate: first of the contact, then of the fit."""
+    """What the screen shows of an estimate: first of the contact, then of the fit.
+
+    Numbers in the unit of the readings only where that is 1/m for sure, of xx, yy and xy.
+    """
     reported = Reported(estimate)
     return [
         readout
         for group in ("contact", "fit")
         for quantity in REPORTED
-        if quantity.group == group
+        if quantity.group == group and not (quantity.as_readings and estimate.curvature.ndim == 1)
         for readout in readouts_of(quantity, reported)
     ]
 

@@ -25,7 +25,7 @@ _BURST = 5  # that may come at once, as frames do
 _INFO = 20  # what a log calls what is no warning
 _FLOAT32 = 7  # what a point cloud calls it
 _NO_TRUTH = Truth(np.empty((0, 0)), np.full(2, math.nan), "")
-_COLUMNS = ("x", "y", "z", "displacement", "xx", "yy", "xy")
+_COLUMNS = ("x", "y", "z", "displacement")
 
 
 class Recorder:
@@ -203,14 +203,15 @@ class _Views:
         P, C, N = len(layout), pipeline.sensor.channels, pipeline.basis.shape
         head: dict[str, str | int] = {"header.frame_id": m.FRAME}
         self._pose = MessageLayout(m.POSE, head)
-        self._curvature = MessageLayout(m.CURVATURE, head | {"curvature": 3 * P, "suspect": P})
+        self._curvature = MessageLayout(m.CURVATURE, head | {"curvature": C, "suspect": P})
         self._shape = MessageLayout(m.COEFFICIENTS, head | {"coefficients": math.prod(N)})
         self._functions = N
         self._scanned = 0  # channels in the frame recorded last
         self._counts = MessageLayout(m.COUNTS, head | {"channels": 0, "counts": 0})
-        step = 4 * len(_COLUMNS)
-        cloud = head | {"fields": len(_COLUMNS), "data": P * step}
-        for n, name in enumerate(_COLUMNS):
+        names, self._by_kind = (*_COLUMNS, *layout.kind_names), layout.by_kind
+        step = 4 * len(names)
+        cloud = head | {"fields": len(names), "data": P * step}
+        for n, name in enumerate(names):
             cloud[f"fields.{n}.name"] = name
             cloud[f"fields.{n}.offset"] = 4 * n
             cloud[f"fields.{n}.datatype"] = _FLOAT32
@@ -220,7 +221,7 @@ class _Views:
         fit = pipeline.fit
         self.every = isinstance(fit, Stateful) and not fit.has_memory
         """Whether estimates depend on which frames were computed, so that all are recorded."""
-        bytes_each = 4 * C + 4 * C + 8 * 3 * P + 8 * math.prod(N) + P * step
+        bytes_each = 4 * C + 4 * C + 8 * C + 8 * math.prod(N) + P * step
         self.affordable = _Throttle(min(_HEAVY, _BYTES / bytes_each))
 
     def heavy(self, frame: Frame, estimate: Estimate, stamp: int) -> list[tuple[m.Topic, bytes]]:
@@ -252,7 +253,7 @@ class _Views:
         """The surface at the elements, with their readings."""
         f = self._displacement @ estimate.coefficients.ravel()
         rest, normal = self._patch.at_rest(self._positions)
-        columns = [*(rest - normal * f[:, None]).T, f, *estimate.curvature]
+        columns = [*(rest - normal * f[:, None]).T, f, *self._by_kind(estimate.curvature)]
         points = np.stack(columns, axis=1).astype("<f4")
         return {**self._cloud_size, "data": points.reshape(-1).view(np.uint8)}
 

@@ -4,8 +4,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
 from kappaskin.scenes.effects import (
     EFFECTS,
     NOTHING,
@@ -20,12 +18,14 @@ from kappaskin.scenes.effects import (
     Saturation,
     Size,
     Skew,
+    StatedNoise,
     StretchingEffect,
     Survey,
     Temperature,
     Tension,
 )
 from kappaskin.scenes.scene import EffectSelection, Scene, survey
+from kappaskin.sensing import DigitalReadings, kind_of_reading
 
 
 @dataclass(frozen=True)
@@ -82,16 +82,23 @@ def effects_of(scene: Scene) -> dict[str, Effect]:
         there.append(StretchingEffect(plate.thickness))
     if layout.gage_length:
         there.append(GageLength(layout.gage_length))
-    if dead := tuple(np.flatnonzero(~layout.live.any(axis=0)).tolist()):
+    if dead := tuple(layout.dead):
         there.append(DeadElements(dead))
-    if not plate.patch.base_curvature and scene.laid is None:
+    if not (layout.reads or plate.patch.base_curvature or scene.laid):
         there.append(FiniteSlopeEffect())
-    if scene.moves:
+    electronics = scene.transduction
+    if scene.moves and not isinstance(electronics, DigitalReadings):
         there.append(Skew())
     there += [
         effect.on(layout) if isinstance(effect, Temperature) else effect for effect in scene.effects
     ]
-    there += [Saturation(scene.transduction), Quantisation(scene.transduction)]
+    if electronics.noise:
+        stated = dict(electronics.noise)
+        noise = tuple(stated[kind_of_reading(name)[0]] for name in layout.each_reads)
+        there.append(StatedNoise(max(noise), noise))
+    if not isinstance(electronics, DigitalReadings):
+        there.append(Saturation(electronics))
+    there.append(Quantisation(electronics))
     return {effect.name: effect for effect in there}
 
 
@@ -163,8 +170,11 @@ def _percent(share: float) -> str:
 
 
 def kept_effects(scene: Scene) -> tuple[Effect, ...]:
-    """The effects that `plan` keeps; without a survey of the scene where its choice needs none."""
-    if scene.choice.auto:
+    """The effects that `plan` keeps; without a survey of the scene where its choice needs none.
+
+    All, where readings of several units have no peak in common by which a plan could judge them.
+    """
+    if scene.choice.auto and len(set(scene.layout.kind_units)) == 1:
         return plan(scene).kept
     there, off = effects_of(scene), scene.choice.off
     return tuple(effect for name, effect in there.items() if effect.authored or name not in off)

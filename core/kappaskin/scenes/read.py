@@ -37,6 +37,7 @@ from kappaskin.scenes.schema import (
     FORMAT,
     LOADS,
     OBJECTS,
+    READINGS,
     SCENE,
     SKIN,
     STEP,
@@ -51,7 +52,13 @@ from kappaskin.scenes.stimulus import (
     RecordedMotion,
     Stimulus,
 )
-from kappaskin.sensing import FIRST_GENERATION, SECOND_GENERATION, SensorLayout, Transduction
+from kappaskin.sensing import (
+    FIRST_GENERATION,
+    SECOND_GENERATION,
+    DigitalReadings,
+    SensorLayout,
+    Transduction,
+)
 from kappaskin.skin import Disk, Patch, Polygon
 
 TABLE_1_NOISE = 0.40 / math.sqrt(3)
@@ -76,7 +83,8 @@ _LARGEST_SCENE = 2**21  # bytes: more takes longer than a few seconds to read
 _LARGEST_RECORD = 2**22  # bytes of a recorded motion
 
 _SIDE = Within(1e-4, 10, "m")
-_MOST_ELEMENTS = 2**16 // 3  # as many as the wire format can number
+_MOST_READINGS = 2**16
+_MOST_ELEMENTS = _MOST_READINGS // 3  # with three readings, as many as the wire format can number
 _MOST_VALUES = 2**25  # of functions at channels, a quarter of a gigabyte
 _MOST_TOUCHES = 10_000  # some seconds to read
 _MOST_FUNCTIONS, _MOST_THAT_MIX = 64**2, 20**2  # some seconds to make the skin of
@@ -167,7 +175,7 @@ def scene_of(top: TomlTable, file: Path, trust: Trust = False) -> Scene:
         _stimulus(table, plate, lambda load, by: scaled_to(plate, load, by, basis()), find)
         for table in top.tables("touch")
     )
-    electronics = _electronics(top.table("electronics"))
+    electronics = _electronics(top, layout)
     choice, effects = _effects(top, electronics, layout)
     rate, seed = SCENE.value(top, "rate"), SCENE.value(top, "seed")
     with top.blamed():
@@ -233,13 +241,52 @@ def read_elements(table: TomlTable, patch: Patch) -> SensorLayout:
             check_elements(*grid)
             layout = SensorLayout.regular(patch, *grid)
         check_elements(len(layout))
+        averaged = {key: ELEMENTS.value(table, key) for key in ("gage_length", "cell")}
+        layout = replace(layout, **averaged)
+        with table.blamed("reads"):
+            layout = layout.reading_each(ELEMENTS.value(table, "reads"))
+            if layout.channels > _MOST_READINGS:
+                raise Refusal(
+                    f"expected at most {_MOST_READINGS} readings of all elements, got "
+                    f"{layout.channels}; take fewer"
+                )
         layout = layout.without(ELEMENTS.value(table, "dead"))
-        layout = replace(layout, gage_length=ELEMENTS.value(table, "gage_length"))
     table.done()
     return layout
 
 
-def _electronics(table: TomlTable) -> Transduction:
+def _electronics(top: TomlTable, layout: SensorLayout) -> Transduction | DigitalReadings:
+    table, digital = top.table("electronics"), top.table("readings")
+    if layout.senses_curvature_only:
+        if "readings" in top:
+            raise top.refusal(
+                "expected [electronics] of elements that read curvature, got [readings]", "readings"
+            )
+        return _bridge(table)
+    if "electronics" in top:
+        raise top.refusal(
+            f"expected no strain gages in elements that read {', '.join(layout.each_reads)}, got "
+            "[electronics]; give [readings] instead",
+            "electronics",
+        )
+    return _digital(digital, layout)
+
+
+def _digital(table: TomlTable, layout: SensorLayout) -> DigitalReadings:
+    """Digital readings, with the noise of each quantity that is read."""
+    names = list(dict.fromkeys(name for name, _ in layout.kinds))
+    noise = {name: READINGS.value(table, "noise") for name in names}
+    for name in names:
+        own = table.table(name)
+        noise[name] = READINGS.value(own, "noise", default=noise[name])
+        own.done()
+    stated = tuple(noise.items()) if any(noise.values()) else ()
+    made = READINGS.make(table, DigitalReadings, noise=stated)
+    table.done(*names)
+    return made
+
+
+def _bridge(table: TomlTable) -> Transduction:
     chain = CHAINS[ELECTRONICS.value(table, "like")]
     parts = {
         name: _changed(table.table(name), getattr(chain, name))
@@ -270,7 +317,7 @@ def _cylinders(table: TomlTable, scene: Scene) -> Presentation:
 
 
 def _effects(
-    top: TomlTable, electronics: Transduction, layout: SensorLayout
+    top: TomlTable, electronics: Transduction | DigitalReadings, layout: SensorLayout
 ) -> tuple[EffectSelection, tuple[Effect, ...]]:
     """The selection of effects in the file, and the effects with parameters."""
     table = top.table("effects")
@@ -280,6 +327,11 @@ def _effects(
             own = table.table(name)
             if kind.elsewhere:
                 raise own.refusal(f"expected no table for this effect; {kind.elsewhere}")
+            if kind.of_gages and isinstance(electronics, DigitalReadings):
+                raise own.refusal(
+                    f"expected no {name} of elements that read {', '.join(layout.each_reads)}: "
+                    f"{kind.of_gages}"
+                )
             if name == "hysteresis" and "like" in own:
                 found.append(own.choose("like", LOOPS))
             elif kind is StrainLimit:
@@ -289,7 +341,7 @@ def _effects(
             own.done()
             if isinstance(effect := found[-1], StuckElements | IntermittentElements):
                 with own.blamed("elements"):
-                    effect.channels((3 * len(layout),))
+                    effect.channels((layout.channels // len(layout), len(layout)))
     accuracy = SCENE.value(top, "accuracy")
     with top.blamed("accuracy"):
         EffectSelection(accuracy=accuracy)

@@ -20,9 +20,9 @@ from kappaskin.mechanics import (
     shapes_under,
 )
 from kappaskin.scenes.cylinders import Presentation
-from kappaskin.scenes.effects import EFFECTS, Effect, ReadingEffect, Survey
+from kappaskin.scenes.effects import EFFECTS, Effect, ReadingEffect, StatedNoise, Survey
 from kappaskin.scenes.stimulus import Indenter, Motion, Stimulus, contact_of
-from kappaskin.sensing import Sensor, SensorLayout, Transduction
+from kappaskin.sensing import DigitalReadings, Sensor, SensorLayout, Transduction
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Scene:
     layout: SensorLayout
     stimuli: tuple[Stimulus, ...] = ()
     effects: tuple[Effect, ...] = ()
-    transduction: Transduction = field(default_factory=Transduction)
+    transduction: Transduction | DigitalReadings = field(default_factory=Transduction)
     rate: float = 500.0
     seed: int = 0
     reference: tuple[int, int] = (15, 15)
@@ -87,6 +87,8 @@ class Scene:
             raise Refusal(f"expected no loads on a skin that lies on cylinders, got {self.loads}")
         if self.seed < 0:
             raise Refusal(f"expected a seed of at least 0, got {self.seed}")
+        if self.layout.reads:
+            self._check_readings()
         names = [effect.name for effect in self.effects]
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise Refusal(f"expected each effect once, got {', '.join(twice)} more than once")
@@ -97,6 +99,24 @@ class Scene:
             )
         for stimulus in self.stimuli:
             stimulus.check(self.plate)
+
+    def _check_readings(self) -> None:
+        """Refuse what elements that read other than xx, yy and xy cannot have."""
+        read = ", ".join(self.layout.each_reads)
+        self.transduction.check(self.layout)
+        if self.laid:
+            self.layout.check_curvature_sensor("a skin that lies on cylinders")
+        if not isinstance(self.transduction, DigitalReadings):
+            return
+        for effect in self.effects:
+            if effect.of_gages:
+                raise Refusal(
+                    f"expected no {effect.name} of digital readings of {read}: {effect.of_gages}"
+                )
+            if effect.name == StatedNoise.name and self.transduction.noise:
+                raise Refusal(
+                    f"expected one noise, got that in [readings] and {effect.name}; leave one out"
+                )
 
     @cached_property
     def basis(self) -> Basis:
@@ -284,6 +304,11 @@ def survey(scene: Scene) -> Survey:
     """The survey of one repetition of `scene`, by which the sizes of effects are judged."""
     basis = scene.basis
     layout = replace(scene.layout, gage_length=0.0)
+    if len(set(layout.kind_units)) > 1:
+        raise Refusal(
+            f"expected readings of one unit, by the peak of which effects are judged, got "
+            f"{layout.units}; all effects of such a scene are simulated, but for those in off"
+        )
     times = np.array(scene.survey_times)
     M = layout.operator(basis, scene.plate)
     pressing = LoadingHistory(scene, scene.plate)
@@ -294,11 +319,11 @@ def survey(scene: Scene) -> Survey:
     # In turn, so that what stretches is sought from where it was.
     both = np.stack([forces, later], axis=1).reshape(-1, basis.size)
     c, then = shapes_under(scene.plate, basis, both).reshape(-1, 2, basis.size).swapaxes(0, 1)
-    curvature = (c @ M.T).reshape(len(times), 3, len(layout))
+    curvature = (c @ M.T).reshape(len(times), *layout.frame_shape)
     if scene.laid is not None:
         laid = [np.repeat(scene.laid.curvature(t), len(layout)) for t in times.tolist()]
         curvature = np.reshape(laid, curvature.shape)
-    scan, read_after = scene.sensor().scan(), np.zeros(3 * len(layout))
+    scan, read_after = scene.sensor().scan(), np.zeros(layout.channels)
     read_after[scan.channels] = scan.times
     return Survey(
         scene.plate,

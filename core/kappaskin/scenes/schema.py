@@ -10,6 +10,7 @@ from typing import Any
 from kappaskin._schema import Key, Part, PartKind, Unit, Within, fields_of
 from kappaskin._toml import REQUIRED
 from kappaskin.bases import EDGES
+from kappaskin.frames import COMPONENTS
 from kappaskin.mechanics import (
     INPLANE,
     Block,
@@ -39,7 +40,14 @@ from kappaskin.scenes.stimulus import (
     TapStep,
     TurnStep,
 )
-from kappaskin.sensing import Amplifier, Converter, HalfBridge, Multiplexer, SensorLayout
+from kappaskin.sensing import (
+    Amplifier,
+    Converter,
+    DigitalReadings,
+    HalfBridge,
+    Multiplexer,
+    SensorLayout,
+)
 from kappaskin.skin import Disk, Patch, Polygon
 
 _SECOND = Unit.same("s")
@@ -230,9 +238,47 @@ ELEMENTS = Part(
             0.0,
             example=0.001,
         ),
+        "cell": Key(
+            "Cell",
+            "Sides of a rectangle over which an element averages heights and slopes.",
+            _MM,
+            0.0,
+            example=[0.001, 0.001],
+        ),
+        "reads": Key(
+            "Reads",
+            "What every element reads: `height`, `slope@DEGREES` and `curvature@DEGREES` along a "
+            "direction from x, `twist`, and `xx`, `yy`, `xy` for the curvature along x, along y "
+            "and the twist. Noise and offsets are in the unit of what is read: m, m/m, 1/m.",
+            kind=tuple[str, ...],
+            default=COMPONENTS,
+            example=["height"],
+        ),
     },
     (SensorLayout,),
     either=(("grid", "positions"),),
+)
+
+READINGS = Part(
+    "Readings",
+    {
+        "resolution": Key(
+            "Resolution",
+            "Step of a reading that is no curvature, in its unit: such readings come as numbers.",
+            limits=Within(1e-12, 1e3),
+        ),
+        "noise": Key(
+            "Noise",
+            "Standard deviation of the readings in their unit; in `[readings.height]`, "
+            "`[readings.slope]` and so on that of one quantity. Readings of several units need it: "
+            "it weighs them.",
+            kind=float,
+            default=0.0,
+            limits=Within(0.0, 1e4),
+            example=1e-6,
+        ),
+    },
+    (DigitalReadings,),
 )
 
 ELECTRONICS = Part(
@@ -638,6 +684,7 @@ PARTS = {
     "scene": SCENE,
     "skin": SKIN,
     "elements": ELEMENTS,
+    "readings": READINGS,
     "electronics": ELECTRONICS,
     "bridge": BRIDGE,
     "multiplexer": MULTIPLEXER,

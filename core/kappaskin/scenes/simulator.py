@@ -54,14 +54,14 @@ class Simulator:
         """
         was, self.scene, self._still = self.scene, scene, None
         before, self._kept = self._kept, kept_effects(scene)
-        same_elements = np.array_equal(scene.layout.positions, was.layout.positions)
+        same_elements = _same_elements(scene.layout, was.layout)
         skin = (scene.plate, scene.edge, scene.reference, scene.layout.gage_length)
         same_skin = skin == (was.plate, was.edge, was.reference, was.layout.gage_length)
         if not (same_elements and same_skin and _of_skin(before) == _of_skin(self._kept)):
             self._take_skin()
         else:
             self._take_stimuli()
-        same_size = len(scene.layout) == len(was.layout)
+        same_size = scene.layout.channels == was.layout.channels
         reading = scene.seed, _of_readings(self._kept)
         if not same_size or reading != (was.seed, _of_readings(before)):
             self._start_effects()
@@ -81,7 +81,8 @@ class Simulator:
         self._dead = None if live.all() else np.flatnonzero(~live)
 
     def _start_effects(self) -> None:
-        shape = (3 * len(self.scene.layout),)
+        P = len(self.scene.layout)
+        shape = self._frame_shape = self.scene.layout.channels // P, P
         self._effects = [
             (effect.start(shape, _stream(self.scene.seed, effect.name)), effect.at_once)
             for effect in _of_readings(self._kept)
@@ -129,7 +130,7 @@ class Simulator:
         return self._pressed(time).loads
 
     def _read(self, scan: Scan, time: float, truth: Truth) -> Array:
-        """Curvature (3 P,) of a scan begun at `time`; channels outside it as at the start."""
+        """Readings (C,) of a scan begun at `time`; channels outside it as at the start."""
         scene, first = self.scene, self._sensed(truth.coefficients)
         if not (scene.moves and self._skewed):
             return first
@@ -143,7 +144,7 @@ class Simulator:
         return first + s * (4 * middle - 3 * first - last + s * 2 * (first + last - 2 * middle))
 
     def _true(self, scan: Scan, time: float) -> tuple[Truth | None, Array]:
-        """The truth, None where coefficients cannot express it, and curvature (3 P,) in 1/m."""
+        """The truth, None where coefficients cannot express it, and the readings (C,)."""
         if self.scene.laid is not None:
             laid = self.scene.laid.curvature(self.playing.time(time))
             return None, np.repeat(laid, len(self.scene.layout))
@@ -151,16 +152,18 @@ class Simulator:
         return truth, self._read(scan, time, truth)
 
     def reading(self, scan: Scan, time: float) -> tuple[Truth | None, Array]:
-        """The truth, and the curvature (3 P,) in 1/m that is read; dead channels read nothing."""
+        """The truth, and the readings (C,), in 1/m of curvature; dead channels read nothing."""
         truth, curvature = self._true(scan, time)
+        curvature = curvature.reshape(self._frame_shape)
         for effect, _ in self._effects:
             curvature = effect(curvature, time)
+        curvature = curvature.reshape(-1)
         if self._dead is not None:
             curvature[self._dead] = 0.0
         return truth, curvature
 
     def readings(self, scan: Scan, times: Array) -> tuple[list[Truth | None], Array]:
-        """The truths, and the curvature (T, 3 P) in 1/m that is read, of frames at `times` (T,).
+        """The truths, and the readings (T, C) of frames at `times` (T,).
 
         As `reading` gives them one after the other, each effect on all frames before the next. Of
         a skin that nothing moves on there is one truth.
@@ -168,12 +171,14 @@ class Simulator:
         moments = times.tolist() if self.scene.moves or self.scene.laid else times[:1].tolist()
         truths, each = zip(*(self._true(scan, time) for time in moments), strict=True)
         curvature = np.array(each) if len(each) == len(times) else np.tile(each, (len(times), 1))
+        curvature = curvature.reshape(-1, *self._frame_shape)
         for effect, at_once in self._effects:
             if at_once:
                 curvature = effect(curvature, math.nan)
             else:
                 frames = zip(curvature, times.tolist(), strict=True)
                 curvature = np.array([effect(frame, time) for frame, time in frames])
+        curvature = curvature.reshape(len(times), -1)
         if self._dead is not None:
             curvature[:, self._dead] = 0.0
         return list(truths), curvature
@@ -203,8 +208,16 @@ class Simulator:
         return Frame(n & 0xFFFFFFFF, time, clock(), scan.channels, counts, truth)
 
 
+def _same_elements(layout: SensorLayout, other: SensorLayout) -> bool:
+    """Whether the same is read at the same places."""
+    if layout.kinds != other.kinds or not np.array_equal(layout.positions, other.positions):
+        return False
+    same_kind = np.array_equal(layout.kind, other.kind)
+    return same_kind and np.array_equal(layout.element, other.element)
+
+
 def _linear(layout: SensorLayout, basis: Basis, plate: Plate) -> Callable[[Array], Array]:
-    """Coefficients (Ni, Nj) to curvature (3 P,) at the elements; on a grid along x, then y."""
+    """Coefficients (Ni, Nj) to readings (C,) of the elements; on a grid along x, then y."""
     product = isinstance(basis, ProductBasis) and not basis.patch.base_curvature
     averaged = layout.gage_length or any(layout.cell)
     if product and layout.shape and not (layout.reads or averaged):

@@ -27,13 +27,14 @@ from kappaskin.scenes.schema import (
     LOADS,
     OBJECTS,
     PARTS,
+    READINGS,
     SCENE,
     SKIN,
     STEP,
     TOUCH,
 )
 from kappaskin.scenes.stimulus import Indenter, Motion, MotionPath, MotionStep, Orbit, Stimulus
-from kappaskin.sensing import SensorLayout, Transduction
+from kappaskin.sensing import DigitalReadings, SensorLayout, Transduction
 from kappaskin.skin import Disk, Patch, Polygon
 
 _MOST_CELLS = 2**20  # of a grid that is looked for
@@ -99,15 +100,16 @@ def _patch(patch: Patch) -> dict[str, Any]:
 def _elements(layout: SensorLayout) -> dict[str, Any]:
     grid = _grid(layout)
     made = SensorLayout.scattered(layout.patch, layout.positions) if grid is None else grid[1]
-    dead = np.flatnonzero(~layout.live.any(axis=0)).tolist()
+    made, dead = made.reading_each(layout.each_reads), layout.dead
     if made.shape != layout.shape or (made.without(dead).live != layout.live).any():
         raise Refusal(
             "expected elements that a scene file can describe, got a grid that is not regular, or "
             "elements with some dead channels; all channels of a dead element must be dead"
         )
     placed = {"positions": layout.positions.tolist()} if grid is None else {"grid": list(grid[0])}
-    gages = _fields(layout, without=("patch", "positions", "live", "shape"))
-    return {**placed, **({"dead": dead} if dead else {}), **gages}
+    gages = _fields(layout, without=("patch", "positions", "live", "shape", "reads"))
+    reads = {"reads": layout.each_reads} if layout.reads else {}
+    return {**placed, **({"dead": dead} if dead else {}), **gages, **reads}
 
 
 def _grid(layout: SensorLayout) -> tuple[tuple[int, int], SensorLayout] | None:
@@ -128,8 +130,20 @@ def _cells(places: Array, side: float) -> int:
     return round(side / float(np.diff(np.unique(places)).min(initial=side)))
 
 
-def _electronics(electronics: Transduction) -> list[str]:
+def _readings(digital: DigitalReadings) -> list[str]:
+    """The tables of digital readings."""
+    noise = {name: float(each) for name, each in digital.noise}
+    alike = len(set(noise.values())) == 1
+    top = _fields(digital, without=("noise",)) | ({"noise": min(noise.values())} if alike else {})
+    tables = [table("[readings]", top, READINGS.comments())] if top else []
+    each = {} if alike else noise
+    return tables + [table(f"[readings.{name}]", {"noise": each[name]}, {}) for name in each]
+
+
+def _electronics(electronics: Transduction | DigitalReadings) -> list[str]:
     """The tables of what differs from the chain that the electronics are most like."""
+    if isinstance(electronics, DigitalReadings):
+        return _readings(electronics)
     each = {name: _changes(electronics, chain) for name, chain in CHAINS.items()}
     like = min(each, key=lambda name: sum(map(len, each[name].values())))
     usual = ELECTRONICS.key("like").default

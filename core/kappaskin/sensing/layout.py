@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from kappaskin.bases import Basis, SineBasis, curvature_at, gauss, hoop_at
 from kappaskin.errors import Refusal
-from kappaskin.frames import Array, Indices, Mask
+from kappaskin.frames import COMPONENTS, Array, Indices, Mask
 from kappaskin.mechanics import Plate
 from kappaskin.skin import Patch
 
@@ -106,6 +107,31 @@ QUANTITIES = {"height": "m", "slope": "m/m", "curvature": "1/m", "twist": "1/m"}
 """What an element may read, with its unit."""
 _ALONG = ("slope", "curvature")  # have a direction
 _ALIKE = 9  # decimals of a direction in rad: those equal so far are one
+_CURVATURES = (("curvature", 0.0), ("curvature", np.pi / 2), ("twist", 0.0))  # xx, yy and xy
+_DEGREES = 6  # decimals of a direction in degrees in a name
+
+
+def kind_of_reading(name: str) -> tuple[str, float]:
+    """The quantity and its direction in rad of a `name`: height, slope@30, twist, xx ..."""
+    if name in COMPONENTS:
+        return _CURVATURES[COMPONENTS.index(name)]
+    quantity, at, degrees = name.partition("@")
+    with suppress(ValueError):
+        if quantity in QUANTITIES and bool(at) == (quantity in _ALONG):
+            direction = float(degrees) if at else 0.0
+            if abs(direction) <= 360:
+                return quantity, math.radians(direction)
+    raise Refusal(
+        f"expected a reading among {', '.join(COMPONENTS)}, height, slope@DEGREES, "
+        f"curvature@DEGREES (from x, -360 to 360) and twist, got {name!r:.60}"
+    )
+
+
+def name_of_reading(quantity: str, direction: float) -> str:
+    """The name of a quantity along a `direction` in rad, as `kind_of_reading` takes it."""
+    degrees = round(math.degrees(direction), _DEGREES)
+    degrees -= 360 if degrees > 180 else 0
+    return f"{quantity}@{degrees:.10g}" if quantity in _ALONG else quantity
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +215,8 @@ class SensorLayout:
     (m, n) for a regular grid, with element p + m q in column p (along x) and row q (along y), and
     None otherwise. Curvature is the mean over gages of `gage_length` in m, along x, y or the
     direction, the twist that along both diagonals. So are slopes; without gages they, and heights,
-    are the mean over a rectangle with the sides `cell` in m.
+    are the mean over a rectangle with the sides `cell` in m. The operator has the readings times
+    `scale` (R,), as 1 over their noise.
     """
 
     patch: Patch
@@ -199,6 +226,7 @@ class SensorLayout:
     gage_length: float = 0.0
     reads: Readings | None = None
     cell: tuple[float, float] = (0.0, 0.0)
+    scale: Array | None = None
 
     def __post_init__(self) -> None:
         P = self.positions
@@ -298,6 +326,25 @@ class SensorLayout:
         reads = Readings(element, names, along, tuple(free))
         return replace(self, reads=reads, live=np.ones(element.shape, bool))
 
+    def reading_each(self, names: Iterable[str]) -> "SensorLayout":
+        """The same elements, each with the readings of these `names` (`kind_of_reading`).
+
+        Reading k P + p is number k of element p. xx, yy and xy make a curvature sensor.
+        """
+        kinds = [kind_of_reading(name) for name in names]
+        if not kinds or len(set(kinds)) < len(kinds):
+            raise Refusal(f"expected at least one reading, each once, got {', '.join(names)}")
+        if tuple(kinds) == _CURVATURES:
+            return self.of_curvature
+        P, (quantities, directions) = len(self), zip(*kinds, strict=True)
+        element = np.tile(np.arange(P), len(kinds))
+        return self.reading(element, np.repeat(quantities, P), np.repeat(directions, P))
+
+    @property
+    def of_curvature(self) -> "SensorLayout":
+        """The same elements as a curvature sensor, all of them live."""
+        return replace(self, reads=None, live=_channels(self.patch, len(self)))
+
     def without(self, elements: Iterable[int]) -> "SensorLayout":
         """The same layout with all channels of `elements` dead."""
         live = self.live.copy()
@@ -306,6 +353,16 @@ class SensorLayout:
             raise Refusal(f"expected dead elements between 0 and {len(self) - 1}, got {dead}")
         live[np.isin(self.element, dead).reshape(live.shape)] = False
         return replace(self, live=live)
+
+    @property
+    def alive(self) -> Mask:
+        """Which elements (P,) have a live reading."""
+        return np.isin(np.arange(len(self)), self.element[self.live.ravel()])
+
+    @property
+    def dead(self) -> list[int]:
+        """The elements that have readings, all of them dead."""
+        return np.setdiff1d(self.element, np.flatnonzero(self.alive)).tolist()
 
     @property
     def lacking(self) -> Mask:
@@ -344,6 +401,48 @@ class SensorLayout:
     def kind(self) -> Indices:
         """Which of `kinds` each reading (R,) is."""
         return self.reads.kind if self.reads else np.repeat(np.arange(3), len(self))
+
+    @property
+    def kind_names(self) -> list[str]:
+        """The names of `kinds`; xx, yy and xy of a curvature sensor."""
+        return [name_of_reading(*kind) for kind in self.kinds] if self.reads else [*COMPONENTS]
+
+    @property
+    def kind_units(self) -> list[str]:
+        """The units of `kinds`."""
+        return [QUANTITIES[quantity] for quantity, _ in self.kinds]
+
+    @property
+    def each_reads(self) -> list[str]:
+        """The names of the k readings of every element, reading k P + p that of element p.
+
+        A `Refusal` where elements differ in what they read.
+        """
+        P, kind = len(self), self.kind
+        first = kind[::P]
+        blocks = np.array_equal(kind, np.repeat(first, P)[: len(kind)])
+        in_order = np.array_equal(self.element, np.tile(np.arange(P), len(first))[: len(kind)])
+        if len(kind) % P or not (blocks and in_order):
+            raise Refusal(
+                "expected the same readings of every element, all elements of one after the "
+                f"other, got {len(kind)} readings of {P} elements; make them with reading_each"
+            )
+        return [self.kind_names[k] for k in first]
+
+    def reading_name(self, channel: int) -> str:
+        """What a reading is, in words: height of element 3."""
+        return f"{self.kind_names[self.kind[channel]]} of element {self.element[channel]}"
+
+    def by_kind(self, readings: Array) -> Array:
+        """`readings` (..., R), by kind and element, (..., k, P); NaN where there is none.
+
+        Those of a curvature sensor as they are, (..., 3, P).
+        """
+        if not self.reads:
+            return readings
+        found = np.full((*readings.shape[:-1], len(self.kinds), len(self)), np.nan)
+        found[..., self.kind, self.element] = readings
+        return found
 
     @property
     def senses_curvature_only(self) -> bool:
@@ -387,7 +486,7 @@ class SensorLayout:
             names = ", ".join(dict.fromkeys(name for name, _ in self.kinds))
             raise Refusal(
                 f"expected a curvature sensor for {purpose}, xx, yy and xy of every element, got "
-                f"readings of {names}; such readings can only be reconstructed yet"
+                f"readings of {names}"
             )
 
     def operator(self, basis: Basis, plate: Plate | None = None) -> Array:
@@ -399,7 +498,8 @@ class SensorLayout:
             raise Refusal(f"the layout is on {self.patch}, the basis on {basis.patch}; use one")
         curvature = plate.curvature(basis) if plate else partial(curvature_at, basis)
         if self.reads:
-            return self._read_by(self.reads, basis, plate, curvature)
+            M = self._read_by(self.reads, basis, plate, curvature)
+            return M if self.scale is None else self.scale[:, None] * M
         if not self.gage_length:
             return curvature(self.positions).reshape(self.channels, basis.size)
         along = partial(_along, basis, self.positions, self.gage_length, curvature)
@@ -435,9 +535,6 @@ class SensorLayout:
             else:
                 M[own] = _twist(partial(_along, basis, at, L, curvature))
         return M
-
-
-_CURVATURES = (("curvature", 0.0), ("curvature", np.pi / 2), ("twist", 0.0))
 
 
 # The deflected skin is r = r0 - f n0 + v t. r0 is the skin at rest, of curvature H along x, t and e

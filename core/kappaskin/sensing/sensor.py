@@ -1,5 +1,6 @@
 """Sensor description: skin, elements, electronics, and the scan of its channels."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -56,8 +57,8 @@ class Scan:
 
     @property
     def rate(self) -> float:
-        """Frame rate in 1/s when one scan follows the other."""
-        return 1 / self.duration
+        """Frame rate in 1/s when one scan follows the other; infinite where none takes time."""
+        return 1 / self.duration if self.duration else math.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +67,7 @@ class Sensor:
 
     `rate` in frames/s, infinite where the device decides it. One with a line format of its own has
     the text of its `description`. Channel c of the device is number `channel_map[c]` of the
-    flattened (3, P) array, a permutation (3 P,); None means the same order.
+    readings of a frame, flattened, a permutation (C,); None means the same order.
     """
 
     layout: SensorLayout
@@ -82,7 +83,7 @@ class Sensor:
     description: str = ""
 
     def __post_init__(self) -> None:
-        self.layout.check_curvature_sensor("scenes, the window and recordings")
+        self.transduction.check(self.layout)
         if self.plate.patch != self.layout.patch:
             raise Refusal(
                 f"the elements are on {self.layout.patch}, the plate on {self.plate.patch}; use one"
@@ -112,7 +113,7 @@ class Sensor:
         if chosen.size and not (chosen.dtype.kind in "iu" and chosen.max() < self.channels):
             raise Refusal(
                 f"expected channels from 0 to {self.channels - 1}, got {channels!s:.80}; channel "
-                "component * P + element is one reading"
+                "kind * P + element is one reading"
             )
         electronics = self.transduction
         return Scan(
@@ -122,11 +123,27 @@ class Sensor:
         )
 
     @cached_property
+    def sigma(self) -> Array | None:
+        """Standard deviation of each reading, by the frame's shape, where they differ in unit.
+
+        Else None, and the noise is estimated. A `Refusal` where the sensor does not state it.
+        """
+        layout, noise = self.layout, dict(self.transduction.noise)
+        if len(set(layout.kind_units)) == 1:
+            return None
+        if unknown := [name for name, _ in layout.kinds if not noise.get(name)]:
+            raise Refusal(
+                f"expected the noise of readings that differ in unit, {layout.units}, got none of "
+                f"{unknown[0]}; give noise in [readings.{unknown[0]}]"
+            )
+        return np.array([noise[name] for name, _ in layout.kinds])[layout.kind]
+
+    @cached_property
     def _dead(self) -> Mask | None:
         return None if self.layout.live.all() else ~self.layout.live.ravel()
 
     def nominal(self, frame: Frame) -> Array:
-        """Curvature (3 P,) in 1/m by Eq. 8; NaN where dead, not scanned or on a rail."""
+        """Readings (C,), curvature by Eq. 8; NaN where dead, not scanned or on a rail."""
         flat = np.empty(self.channels)
         flat.fill(np.nan)
         flat[frame.channels] = self.transduction.curvature(frame.counts)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Counts, Mask
+from kappaskin.sensing.layout import SensorLayout
 
 
 def _require_positive(owner: object, *names: str) -> None:
@@ -171,6 +172,7 @@ class Transduction:
     Raises a `Refusal` when the unbent skin already drives the amplifier or converter to a rail.
     """
 
+    noise: ClassVar[tuple[tuple[str, float], ...]] = ()  # not stated
     bridge: HalfBridge = field(default_factory=HalfBridge)
     multiplexer: Multiplexer = field(default_factory=Multiplexer)
     amplifier: Amplifier = field(default_factory=Amplifier)
@@ -190,6 +192,15 @@ class Transduction:
                 f"+-{self.converter.full_scale:g} V at the converter, got {out:.4g} V with a "
                 f"balance voltage of {self.bridge.v_bal:g} V; balance the bridge with "
                 f"{self.bridge.null_voltage(self.multiplexer.supply_resistance):.6g} V"
+            )
+
+    def check(self, layout: SensorLayout) -> None:
+        """Raise a `Refusal` for readings that no half-bridge has."""
+        if not layout.senses_curvature_only:
+            raise Refusal(
+                f"expected digital readings of {' and '.join(layout.kind_names)}, got a "
+                "half-bridge of strain gages, which reads curvature; give [readings] instead of "
+                "[electronics]"
             )
 
     @property
@@ -283,6 +294,11 @@ class Transduction:
         return (counts <= low) | (counts >= high)
 
     @property
+    def count_bytes(self) -> int:
+        """Bytes of a count on the wire."""
+        return 2 if self.converter.bits <= 16 else 4
+
+    @property
     def settling_time(self) -> float:
         """Time in s from the switch of the multiplexer to the conversion of a channel."""
         return self.multiplexer.settling_time
@@ -306,25 +322,37 @@ class Transduction:
 class DigitalReadings:
     """Readings that a device sends as numbers, all at once: its electronics are not known.
 
-    A frame holds them in counts of `resolution`, in 1/m; the lowest one stands for no reading.
+    A frame holds them in counts of `resolution`, in the unit of each; the lowest one stands for no
+    reading. `noise` is the standard deviation of some quantities, by name, in their units.
     """
 
-    resolution: float = 1e-6
+    resolution: float = 1e-7
+    noise: tuple[tuple[str, float], ...] = ()
     limits: ClassVar[tuple[int, int]] = -(2**31), 2**31 - 1
+    count_bytes: ClassVar[int] = 4
     settling_time: ClassVar[float] = 0.0
     conversion_time: ClassVar[float] = 0.0
     channel_time: ClassVar[float] = 0.0
     strain_limit_curvature: ClassVar[float] = math.inf
 
+    def __post_init__(self) -> None:
+        _require_positive(self, "resolution")
+        for name, noise in self.noise:
+            if not (math.isfinite(noise) and noise >= 0):
+                raise Refusal(f"expected a noise of {name} of at least zero, got {noise}")
+
+    def check(self, layout: SensorLayout) -> None:
+        """Any reading may be digital."""
+
     def counts(self, curvature: Array) -> Counts:
-        """Counts for `curvature` in 1/m; the lowest for NaN and for what is out of range."""
+        """Counts for `curvature`, or other readings; the lowest for NaN and out of range."""
         counts = np.rint(curvature / self.resolution)
         low, high = self.limits
         known = (counts > low) & (counts < high)
         return np.where(known, counts, low).astype(np.int32)
 
     def curvature(self, counts: Counts) -> Array:
-        """Curvature in 1/m for `counts`; NaN where there was none."""
+        """Curvature, or other readings, for `counts`; NaN where there was none."""
         curvature = cast("Array", counts * self.resolution)
         curvature[self.saturated(counts)] = np.nan
         return curvature

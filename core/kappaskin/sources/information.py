@@ -13,7 +13,7 @@ from kappaskin.bases import check_edge
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.mechanics import Plate
 from kappaskin.scenes import PARTS, check_elements, check_sides
-from kappaskin.sensing import Sensor, SensorLayout, Transduction
+from kappaskin.sensing import QUANTITIES, DigitalReadings, Sensor, SensorLayout, Transduction
 from kappaskin.skin import Disk, Patch, Polygon
 from kappaskin.sources.description import described_sensor, described_text
 
@@ -71,9 +71,17 @@ SENSOR = Part(
         "grid": replace(_ELEMENTS.key("grid"), default=None),
         "positions": replace(_ELEMENTS.key("positions"), default=None),
         "gage_length": _ELEMENTS.key("gage_length"),
+        "cell": replace(_ELEMENTS.key("cell"), default=None),
+        "reads": replace(_ELEMENTS.key("reads"), default=None),
+        "readings": Key(
+            "Readings",
+            "Of readings that come as numbers, instead of the electronics: `resolution`, and "
+            "`noise`, a table of standard deviations by quantity.",
+            default=None,
+        ),
         "dead_channels": Key(
             "Dead channels",
-            "Readings without a working gage: `component * P + element`, from 0.",
+            "Readings without a working gage: `kind * P + element`, from 0.",
             kind=tuple[int, ...],
         ),
         "channel_map": Key(
@@ -116,7 +124,16 @@ def sensor_to_json(sensor: Sensor) -> str:
         "inplane": sensor.plate.inplane or None,
         "rigidity": None if sensor.plate.unknown_material else sensor.plate.rigidity,
     }
-    values |= {name: asdict(getattr(sensor.transduction, name)) for name in _CHAIN}
+    if layout.reads:
+        values["reads"] = layout.each_reads
+        values["cell"] = layout.cell if any(layout.cell) else None
+    else:
+        values |= {"reads": None, "cell": None}
+    if isinstance(chain := sensor.transduction, DigitalReadings):
+        values["readings"] = {"resolution": chain.resolution, "noise": dict(chain.noise)}
+        values |= dict.fromkeys(_CHAIN)
+    else:
+        values |= {name: asdict(getattr(chain, name)) for name in _CHAIN} | {"readings": None}
     written = {name: values[name] for name in SENSOR.keys if values[name] is not None}
     return json.dumps(written, separators=(",", ":"))
 
@@ -141,7 +158,8 @@ def sensor_from_json(text: str) -> Sensor:
 
 
 def _sensor(table: TomlTable) -> Sensor:
-    values = {name: SENSOR.value(table, name) for name in SENSOR.keys if name not in _CHAIN}
+    own = {*_CHAIN, "readings"}
+    values = {name: SENSOR.value(table, name) for name in SENSOR.keys if name not in own}
     patch = _patch(values)
     check_sides(patch)
     check_edge(patch, values["edge"])
@@ -189,17 +207,29 @@ def _layout(patch: Patch, values: dict[str, Any]) -> SensorLayout:
         layout = SensorLayout.scattered(patch, values["positions"])
     else:
         raise Refusal("expected the grid or the positions of the elements, got neither")
-    dead, channels = values["dead_channels"], range(3 * len(layout))
+    averaged = {key: values[key] for key in ("gage_length", "cell") if values[key]}
+    layout = replace(layout, **averaged)
+    if values["reads"]:
+        layout = layout.reading_each(values["reads"])
+    dead, channels = values["dead_channels"], range(layout.channels)
     if unknown := [channel for channel in dead if channel not in channels]:
         raise Refusal(
             f"expected dead channels from 0 to {channels[-1]}, got {unknown!s:.80}; count "
-            "them component by component"
+            "them kind by kind"
         )
-    live = np.isin(channels, np.array(dead, np.intp), invert=True).reshape(3, -1)
-    return replace(layout, live=live, gage_length=values["gage_length"])
+    live = np.isin(channels, np.array(dead, np.intp), invert=True)
+    return replace(layout, live=live.reshape(layout.frame_shape))
 
 
-def _transduction(table: TomlTable) -> Transduction:
+def _transduction(table: TomlTable) -> Transduction | DigitalReadings:
+    if "readings" in table:
+        digital = table.table("readings")
+        noise = digital.table("noise")
+        each = tuple((name, noise.get(name, float)) for name in QUANTITIES if name in noise)
+        readings = digital.make(DigitalReadings, noise=each)
+        noise.done()
+        digital.done()
+        return readings
     parts = ((name, PARTS[name]) for name in _CHAIN)
     made: dict[str, Any] = {
         name: part.make(table.table(name), part.made[0], complete=True) for name, part in parts

@@ -15,6 +15,7 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Frame
 from kappaskin.scenes import Scene, Simulator
 from kappaskin.scenes.effects import CorruptedFrames, DroppedFrames
+from kappaskin.sensing import DigitalReadings
 from kappaskin.sources import information
 from kappaskin.sources.decoder import FROM_HOST, Decoder
 from kappaskin.sources.description import Description
@@ -162,7 +163,7 @@ class PseudoDevice:
         if self._lines is not None:
             curvature = chain.curvature(frame.counts)[np.argsort(frame.channels)]
             return self._lines.encoded(self.spent, frame.device_time, curvature)
-        width = 2 if chain.converter.bits <= 16 else 4
+        width = chain.count_bytes
         return encode_samples(self.spent, frame.device_time, frame.channels, frame.counts, width)
 
     def _send(self, message: bytes) -> None:
@@ -267,6 +268,8 @@ class PseudoDevice:
 
     def _take_gain(self, requested: int) -> bytes:
         chain = self._scene.transduction
+        if isinstance(chain, DigitalReadings):
+            raise _RefusedCommand(Fault.OUT_OF_RANGE, "digital readings have no gain")
         try:
             amplifier = replace(chain.amplifier, gain=requested / 1000)
             scene = replace(self._scene, transduction=replace(chain, amplifier=amplifier))

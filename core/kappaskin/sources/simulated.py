@@ -113,7 +113,7 @@ class SimulatedSource:
             recorder.clock(math.nan, state)
 
     def _record(self, recorder: InputRecorder, frames: list[Frame]) -> None:
-        width = 2 if self._simulator.scene.transduction.converter.bits <= 16 else 4
+        width = self._simulator.scene.transduction.count_bytes
         for frame in frames:
             recorder.simulated(frame)
             if frame.channels is not self._listed:  # scans of one list share it

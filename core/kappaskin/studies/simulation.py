@@ -26,16 +26,19 @@ def simulated_readings(
 ) -> dict[str, NDArray[Any]]:
     """Frames of `scene`: what `kappaskin simulate` writes, each array (T, ...).
 
-    A frame that the link loses is NaN in `curvature` and -1 in `counts`, on all its channels.
+    A frame that the link loses is NaN in `curvature` and -1 in `counts`, on all its channels. Of a
+    sensor that reads other than xx, yy and xy the readings are `values`, each of an `element`, a
+    `quantity` and a `direction`, as `kappaskin reconstruct` takes them.
     """
-    P, skin = len(scene.layout), scene.plate.patch
-    if not 1 <= frames <= _MOST // (3 * P):
-        raise Refusal(f"expected 1 to {_MOST // (3 * P)} frames of {3 * P} channels, got {frames}")
+    layout, skin = scene.layout, scene.plate.patch
+    C, shape = layout.channels, layout.frame_shape
+    if not 1 <= frames <= _MOST // C:
+        raise Refusal(f"expected 1 to {_MOST // C} frames of {C} channels, got {frames}")
     scene = scene if seed is None else replace(scene, seed=seed)
     simulator, scan = Simulator(scene), scene.sensor().scan()
     time = np.arange(frames) / scene.rate
-    curvature = np.full((frames, 3 * P), np.nan)
-    counts = np.full((frames, 3 * P), -1, np.int32)
+    curvature = np.full((frames, C), np.nan)
+    counts = np.full((frames, C), -1, np.int32)
     truth = np.full((frames, *scene.basis.shape), np.nan)
     contact = np.full((frames, 2), np.nan)
     for n, moment in enumerate(time.tolist()):
@@ -46,14 +49,23 @@ def simulated_readings(
             curvature[n] = reading
             counts[n] = scene.transduction.counts(reading)
     size = (skin.a,) if skin.strip else (skin.a, skin.b)
-    places = scene.layout.positions
+    places = layout.positions
+    read: dict[str, NDArray[Any]] = {"curvature": curvature.reshape(frames, *shape)}
+    if layout.reads:
+        own = layout.reads
+        read = {"values": curvature, "element": own.element, "quantity": own.quantity}
+        read["direction"] = own.direction
+    if (sigma := scene.sensor().sigma) is not None:
+        read["sigma"] = sigma
+    one = len(set(layout.kind_units)) == 1
+    planned = [entry.to_json() for entry in plan(scene)] if one else []
     return {
-        "counts": counts.reshape(frames, 3, P),
-        "curvature": curvature.reshape(frames, 3, P),
+        "counts": counts.reshape(frames, *shape),
+        **read,
         "truth": truth,
         "time": time,
         "contact": contact,
-        "plan": np.array(json.dumps([entry.to_json() for entry in plan(scene)])),
+        "plan": np.array(json.dumps(planned)),
         "size": np.array(size),
         "positions": places[:, :1] if skin.strip else places,
         "radius": np.array(skin.radius),

@@ -35,7 +35,7 @@ def test_every_ready_scene_is_a_sensor_that_says_it_is_simulated(name):
     sensor = load_scene(name).sensor()
 
     assert sensor.simulated
-    assert sensor.channels == (30 if name == "fingertip" else 300)
+    assert sensor.channels == {"fingertip": 30, "camera": 400, "tilts": 200}.get(name, 300)
 
 
 @pytest.mark.parametrize(
@@ -79,7 +79,7 @@ def test_without_a_name_the_default_scene_is_loaded():
 def test_an_unknown_scene_is_refused_with_those_there_are():
     with pytest.raises(
         Refusal,
-        match=r"among bolt, calibration, centre, .*, or a file that ends in .toml; got 'moon'",
+        match=r"among bolt, calibration, camera, .*, or a file that ends in .toml; got 'moon'",
     ):
         load_scene("moon")
 

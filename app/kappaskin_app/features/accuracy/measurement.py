@@ -317,7 +317,7 @@ def _besides_noise(scene: Scene) -> list[object]:
 
 def _scene_difference(was: Scene, now: Scene) -> str:
     """The change of a simulated scene, except in the number of its elements."""
-    dead, dead_now = (np.flatnonzero(~scene.layout.live[0]).tolist() for scene in (was, now))
+    dead, dead_now = (scene.layout.dead for scene in (was, now))
     if (was.plate, was.edge) != (now.plate, now.edge):
         return "on another skin"
     if was.transduction != now.transduction:

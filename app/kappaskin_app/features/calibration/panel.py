@@ -149,7 +149,8 @@ class CalibratePanel(Panel):
         self.start.begin.setEnabled(status.sensor is not None and status.state == "streaming")
         if status.sensor is not None and status.connections != self._connection:
             self._connection = status.connections
-            radii = ", ".join(f"{1e3 * radius:g}" for radius in radii_for(status.sensor))
+            read = () if status.sensor.layout.reads else radii_for(status.sensor)
+            radii = ", ".join(f"{1e3 * radius:g}" for radius in read)
             with QSignalBlocker(self.start.radii):
                 self.start.radii.setText(radii)
                 self.start.radii.setCursorPosition(0)

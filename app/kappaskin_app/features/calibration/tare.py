@@ -251,8 +251,12 @@ def drift_text(status: Status) -> str:
         wait = "the skin is loaded" if drift.loaded else "wait two seconds"
         return f"Drift since the tare: unknown, {wait}"
     then = ", before the load" if drift.loaded else ""
+    layout = status.sensor.layout if status.sensor else None
+    by = f"{drift.curvature:.3f} 1/m"
+    if layout is not None and layout.reads:
+        by = f"{drift.curvature:.2g} {layout.units}"
     return (
-        f"Drift since the tare: {drift.curvature:.3f} 1/m (RMS), equal to a displacement of "
+        f"Drift since the tare: {by} (RMS), equal to a displacement of "
         f"{1e3 * drift.displacement:.3f} mm{then}"
     )
 

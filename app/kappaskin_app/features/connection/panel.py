@@ -232,7 +232,8 @@ def _recording_text(status: Status) -> str:
 def _sensor_text(sensor: Sensor, calibration: Calibration | None) -> str:
     """Description of a sensor."""
     patch, live = sensor.layout.patch, sensor.layout.live
-    sensing = live[:1] if patch.strip else live  # a strip bends along x alone
+    bends = patch.strip and not sensor.layout.reads  # along x alone
+    sensing = live[:1] if bends else live
     dead = int((~sensing).sum())
     a, b, radius = (round(1e3 * length, 1) for length in (patch.a, patch.b, patch.radius))
     bent = f", radius {radius:g} mm" if patch.base_curvature else ""

@@ -21,6 +21,7 @@ FACTS = ("Quantity", "Value", "95 % half-width", "Unit")
 _READ = tuple(quantity for quantity in REPORTED if quantity.traced)
 _HEADS = (f"{of.name.replace('_', ' ')} [{each.unit}]" for each in _READ for of in each.colours)
 ELEMENTS = ("Element", "x [mm]", "y [mm]", *_HEADS, "Fault")
+_OTHERS = {"m": 7, "m/m": 6, "1/m": 2}  # digits of readings, in SI units
 
 Rows = list[tuple[str, ...]]
 
@@ -39,13 +40,26 @@ def facts_of(estimate: Estimate, object_: str) -> Rows:
     return [*rows, ("Object", object_ or "unknown", "", "")]
 
 
+def head_of(sensor: Sensor | None) -> tuple[str, ...]:
+    """The heads of the table of all elements."""
+    layout = sensor.layout if sensor else None
+    if layout is None or not layout.reads:
+        return ELEMENTS
+    read = zip(layout.kind_names, layout.kind_units, strict=True)
+    return (*ELEMENTS[:3], *(f"{name} [{unit}]" for name, unit in read), ELEMENTS[-1])
+
+
 def elements_of(estimate: Estimate, sensor: Sensor) -> Rows:
     """Rows of every element: position, readings, and fault if it is excluded."""
-    places = 1e3 * sensor.layout.positions
-    if estimate.curvature.shape[1] != len(places):
+    layout = sensor.layout
+    places = 1e3 * layout.positions
+    if estimate.curvature.shape != layout.frame_shape:
         return []  # of the previous sensor
     reported = Reported(estimate)
     read = [(each.forms[0][2](reported), each.shown[2]) for each in _READ]
+    if layout.reads:
+        rows = zip(layout.by_kind(estimate.curvature), layout.kind_units, strict=True)
+        read = [(row[None], _OTHERS[unit]) for row, unit in rows]
     return [
         (
             str(number),
@@ -87,7 +101,7 @@ class NumbersPanel(QWidget):
         self.copy = QPushButton("&Copy as CSV")
         self.copy.setToolTip("Copy both tables, for a spreadsheet.")
         self.copy.clicked.connect(guarded(lambda *_: self._copy()))
-        self._facts, self._elements = Rows(), Rows()
+        self._facts, self._elements, self._head = Rows(), Rows(), ELEMENTS
         self._next = 0.0
         left, around = QVBoxLayout(), QHBoxLayout(self)
         left.addWidget(self.facts)
@@ -105,14 +119,18 @@ class NumbersPanel(QWidget):
         if estimate is not None and sensor is not None:
             self._facts, self._elements = facts_of(estimate, what), elements_of(estimate, sensor)
         _fill(self.facts, FACTS, self._facts)
-        _fill(self.elements, ELEMENTS, self._elements)
+        if head_of(sensor) != self._head:
+            self._head = head_of(sensor)
+            texts = len(self._head) - 1
+            self.elements.show_head(self._head, range(texts), range(1, texts + 1))
+        _fill(self.elements, self._head, self._elements)
         if self._facts:
             last, text = len(self._facts) - 1, self._facts[-1][1]
             self.facts.setSpan(last, 1, 1, len(FACTS) - 1)
             self.facts.write(last, 1, text, text).setTextAlignment(LEFT)  # that of the object
 
     def _copy(self) -> None:
-        text = csv_of((FACTS, self._facts), (ELEMENTS, self._elements))
+        text = csv_of((FACTS, self._facts), (self._head, self._elements))
         QGuiApplication.clipboard().setText(text)
 
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
-from kappaskin_app.features.heatmaps.heatmap import HeatmapGrid
+from kappaskin_app.features.heatmaps.heatmap import Heatmap, HeatmapGrid
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.colouring import locked_at
+from kappaskin_app.shell.colouring import READ, SHADES, locked_at, reading_shades
 from kappaskin_app.shell.display import Display, Shown, of_row
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.shown import COLOURS
@@ -26,6 +26,7 @@ class HeatmapsFeature:
         self._display: Display = shell.display
         self._settings = Settings()
         self._next = 0.0
+        self._names: tuple[str, ...] = ()
         self.maps = HeatmapGrid()
         self.heatmaps = self.maps.heatmaps
         shell.docks.put_right("curvature", "By element", self.maps, _TIP, share=0.22)
@@ -40,36 +41,54 @@ class HeatmapsFeature:
         display.numbers.connect(guarded(self._show_readings))
         display.shown.connect(guarded(self._show))
         shell.settings_shown.connect(guarded(self._show_settings))
+        self._selection = selection
         for name, heatmap in self.heatmaps.items():
-            heatmap.pointed.connect(guarded(selection.point))
-            heatmap.pointed.connect(guarded(lambda *_: display.show_numbers_soon()))
-            heatmap.chosen.connect(selection.chosen)
+            self._connect(heatmap)
             heatmap.lock_wanted.connect(guarded(partial(shell.requests.set, f"range_{name}")))
-            selection.pointed.connect(guarded(heatmap.show_element))
-            selection.target_changed.connect(guarded(heatmap.show_target))
+
+    def _connect(self, heatmap: Heatmap) -> None:
+        selection, display = self._selection, self._display
+        heatmap.pointed.connect(guarded(selection.point))
+        heatmap.pointed.connect(guarded(lambda *_: display.show_numbers_soon()))
+        heatmap.chosen.connect(selection.chosen)
+        selection.pointed.connect(guarded(heatmap.show_element))
+        selection.target_changed.connect(guarded(heatmap.show_target))
 
     def _show_settings(self, settings: Settings) -> None:
         self._settings = settings
-        self.maps.show_selected(settings.maps)
+        self._select()
         for name, heatmap in self.heatmaps.items():
             heatmap.show_lock(locked_at(name, settings) > 0)
 
+    def _select(self) -> None:
+        """Show the selected heatmaps: for xx, yy and xy what the elements read instead."""
+        selected, read = self._settings.maps, self.maps.readings
+        if read:
+            others = tuple(name for name in selected if name not in READ)
+            selected = read + others if len(others) < len(selected) else others
+        self._names = selected
+        self.maps.show_selected(selected)
+
     def _limits(self) -> dict[str, float]:
         """Colour limits of the visible heatmaps, in SI units."""
-        visible = [name for name in self._settings.maps if self.heatmaps[name].isVisible()]
-        return {name: self.heatmaps[name].limit for name in visible}
+        visible = [name for name in self._names if self.heatmaps[name].isVisible()]
+        return {name: self.heatmaps[name].limit for name in visible if name in SHADES}
 
     def _restart(self, status: Status) -> None:
-        if status.sensor is not None:
-            for heatmap in self.heatmaps.values():
-                heatmap.show_layout(status.sensor.layout)
+        if status.sensor is None:
+            return
+        for heatmap in self.maps.read(reading_shades(status.sensor.layout)):
+            self._connect(heatmap)
+        for heatmap in self.heatmaps.values():
+            heatmap.show_layout(status.sensor.layout)
+        self._select()
 
     def _show_status(self, _: Status) -> None:
         for heatmap in self.heatmaps.values():
             heatmap.show_lost(self._display.old)
 
     def _show_readings(self, estimate: Estimate | None) -> None:
-        for name in self._settings.maps:
+        for name in self._names:
             values = np.empty(0)
             if estimate is not None:
                 kinds = self._display.kinds(estimate)
@@ -82,10 +101,10 @@ class HeatmapsFeature:
         self._next = shown.now + _PERIOD
         display, estimate = self._display, shown.estimate
         crossed, dotted = display.marks(estimate.curvature)
-        for name in self._settings.maps:
-            heatmap = self.heatmaps[name]
+        for name in self._names:
+            heatmap, row = self.heatmaps[name], display.colouring.shades[name].row
             if heatmap.isVisible():
                 values = display.of_elements(name, estimate, shown.kinds)
-                heatmap.show_marks(crossed, dotted, of_row(name, shown.kinds))
+                heatmap.show_marks(crossed, dotted, of_row(row, shown.kinds))
                 tint = display.tint(name, estimate, values, shown.now)
-                heatmap.show_values(values, tint, of_row(name, shown.railed))
+                heatmap.show_values(values, tint, of_row(row, shown.railed))

@@ -1,6 +1,7 @@
 """Heatmaps: a quantity of every element, one cell each; a grid of them."""
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from PySide6.QtWidgets import (
 from kappaskin.estimation import FAULTS
 from kappaskin.frames import Array, Indices, Mask
 from kappaskin.sensing import SensorLayout
-from kappaskin_app.shell.colouring import SHADES
+from kappaskin_app.shell.colouring import SHADES, ReadingShade, Shade
 from kappaskin_app.theme import DARK_INK, WANTED, Colours, current, follow_look
 from kappaskin_app.widgets.colour_bar import ColourBar, LockButton
 from kappaskin_app.widgets.line import Line
@@ -241,9 +242,9 @@ class Heatmap(QWidget):
     chosen = Signal(int)
     lock_wanted = Signal(float)
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, shade: Shade | None = None) -> None:
         super().__init__()
-        self.name, self._shade = name, SHADES[name]
+        self.name, self._shade = name, shade or SHADES[name]
         self._title = Label(f"<b>{self._shade.symbol}</b>", rich=True)
         self._title.setToolTip(self._shade.tip)
         self.value = Line()
@@ -254,7 +255,9 @@ class Heatmap(QWidget):
         self.lock.setEnabled(name != "health")
         self.cells, self.bar = CellGrid(), ColourBar()
         self.cells.setToolTip(_LEGEND)
-        self.cells.setAccessibleName(f"Heatmap of {name.replace('_', ' ')}")
+        called = shade.label.lower() if shade else name.replace("_", " ")
+        self.cells.setAccessibleName(f"Heatmap of {called}")
+        self.lock.setVisible(shade is None)  # what is read has no range in the settings
         self.cells.pointed.connect(self.pointed)
         self.cells.chosen.connect(self.chosen)
         self._tint, self._layout, self._element = self._shade.tint(1.0), None, -1
@@ -359,7 +362,9 @@ class HeatmapGrid(QScrollArea):
         self.heatmaps = {name: Heatmap(name) for name in SHADES}
         self._none = Label("Select heatmaps under View.", alignment=Qt.AlignmentFlag.AlignCenter)  # pyright: ignore[reportCallIssue]
         self._shown: tuple[str, ...] | None = None
-        whole = QWidget()
+        self.readings: tuple[str, ...] = ()
+        """The names of those of what the elements read, where that is not xx, yy and xy."""
+        self._whole = whole = QWidget()
         self._grid = QGridLayout(whole)
         self._grid.setContentsMargins(0, 0, 0, 0)
         self._grid.setSpacing(0)
@@ -372,6 +377,19 @@ class HeatmapGrid(QScrollArea):
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setMinimumWidth(_NARROWEST[0])
+
+    def read(self, shades: Mapping[str, ReadingShade]) -> list[Heatmap]:
+        """Have a heatmap for each of these, besides those of every sensor; returns the new ones."""
+        self.show_selected(())
+        for name in self.readings:
+            self.heatmaps.pop(name).deleteLater()
+        self.readings = tuple(shades)
+        made = [Heatmap(name, shade) for name, shade in shades.items()]
+        for heatmap in made:
+            heatmap.setParent(self._whole)
+            heatmap.hide()
+        self.heatmaps |= {heatmap.name: heatmap for heatmap in made}
+        return made
 
     def show_selected(self, names: tuple[str, ...]) -> None:
         """Show only the heatmaps called `names`."""
@@ -386,7 +404,7 @@ class HeatmapGrid(QScrollArea):
         for number, widget in enumerate(shown):
             self._grid.addWidget(widget, *divmod(number, columns))
             widget.show()
-        for row in range(len(SHADES)):
+        for row in range(len(self.heatmaps)):
             self._grid.setRowStretch(row, row * columns < len(shown))
         self._grid.setColumnStretch(1, columns - 1)
         self._grid.setColumnStretch(0, 1)

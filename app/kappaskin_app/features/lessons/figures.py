@@ -19,6 +19,8 @@ _RECENT = 24  # estimates of which the median is taken: one alone jumps with the
 
 def _peak(row: int) -> Callable[[Estimate], float]:
     def peak(estimate: Estimate) -> float:
+        if estimate.curvature.ndim == 1:  # of a sensor that reads others
+            return math.nan
         readings = estimate.curvature[row][np.isfinite(estimate.curvature[row])]
         return float(readings[np.argmax(np.abs(readings))]) if len(readings) else math.nan
 
@@ -51,7 +53,7 @@ OF_AN_ESTIMATE: dict[str, Callable[[Estimate], float]] = {
     "peak_yy": _peak(1),
     "peak_xy": _peak(2),
     "suspects": lambda e: float(np.count_nonzero(e.suspect)),
-    "unread": lambda e: float(np.isnan(e.curvature).any(axis=0).sum()),
+    "unread": lambda e: float(np.isnan(np.atleast_2d(e.curvature)).any(axis=0).sum()),
 }
 """Figures of one estimate, in SI units; yes is 1, no is 0."""
 

@@ -138,7 +138,7 @@ class MembraneView(QWidget):
         self._marked = (b"", -1)
         self.show_marked(np.empty(0, np.intp), -1)
         self.point(-1)
-        self._place_elements(sensor.layout.positions[sensor.layout.live.any(axis=0)])
+        self._place_elements(sensor.layout.positions[sensor.layout.alive])
         for ball in self._contacts:
             ball.scale = skin.size
         self._arrays = self._changing()

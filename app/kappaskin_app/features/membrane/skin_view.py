@@ -128,7 +128,7 @@ class SkinView(QObject):
         else:
             of_elements = display.of_elements(name, estimate, shown.kinds)
             tint = display.tint(name, estimate, of_elements, shown.now)
-            on_rail = of_row(name, shown.railed)
+            on_rail = of_row(shade.row, shown.railed)
             missing = current().missing
             values = tint.rgb(of_elements, missing, on_rail)
             beside = tint.legend(of_elements, missing, on_rail)

@@ -75,7 +75,7 @@ def relief(scene: Scene) -> Relief:
         skin.shading(),
         skin.faces()[:, 1:],
         np.abs(skin.values(share)),
-        _marks(skin, scene.layout.positions[scene.layout.live.any(axis=0)]),
+        _marks(skin, scene.layout.positions[scene.layout.alive]),
         bearing,
         tuple(_marks(skin, piece) for piece in pieces),
         tuple(_marks(skin, line) for line in outlines) + _rod(bearing),

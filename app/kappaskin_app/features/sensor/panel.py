@@ -123,7 +123,8 @@ def _facts(sensor: Sensor) -> tuple[str, str, str]:
     """Frame rate, resolution and range, and strain limit of the electronics."""
     chain = sensor.transduction
     if isinstance(chain, DigitalReadings):
-        return f"{sensor.channels} channels, at the device's rate", "not known", "not known"
+        step = f"{chain.resolution:.2g}, in the unit of each reading"
+        return f"{sensor.channels} channels, at the device's rate", step, "not known"
     most = min(abs(limit) for limit in chain.limits) * chain.resolution
     return (
         f"{sensor.channels} channels, {1 / chain.scan_time(sensor.channels):.0f}/s",

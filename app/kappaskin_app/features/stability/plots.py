@@ -65,7 +65,7 @@ class ModeMap(QWidget):
         return area
 
     def _paint_elements(self, painter: QPainter, area: QRectF, layout: SensorLayout) -> None:
-        patch, alive = layout.patch, np.any(layout.live, axis=0)
+        patch, alive = layout.patch, layout.alive
         painter.setPen(QPen(QColor("#16191d"), 1))
         for element, (x, y) in enumerate((layout.positions / (patch.a, patch.b)).tolist()):
             at = QPointF(area.left() + x * area.width(), area.bottom() - y * area.height())

@@ -6,7 +6,9 @@ from kappaskin_app.shell.window import MainWindow
 
 _ELEMENT = "The element clicked: last 10 s, spectrum, calibration and health"
 
-_TRACES = "The last 10 s of selected elements, one plot each for xx, yy and xy"
+_TRACES = (
+    "The last 10 s of selected elements, one plot each for what they read: xx, yy and xy, or others"
+)
 
 
 class TracesFeature:

@@ -2,11 +2,14 @@
 
 from collections.abc import Sequence
 
+import numpy as np
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from kappaskin.frames import COMPONENTS, Array
-from kappaskin.pipeline import REPORTED
+from kappaskin.pipeline import REPORTED, ReportedQuantity
+from kappaskin.sensing import SensorLayout
+from kappaskin_app.shell.colouring import READING_UNITS
 from kappaskin_app.widgets.parts import Label
 from kappaskin_app.widgets.plots import Curve, CurvePlot
 
@@ -18,6 +21,23 @@ _SPECTRUM = (
     "Amplitude of the sine that fits the last 10 s best at each frequency, by least squares "
     "(Lomb-Scargle), up to half the frame rate. Mains hum is a line."
 )
+
+
+def screen_unit(layout: SensorLayout, unit: str) -> str:
+    """The unit on the screen of readings in a `unit`; curvature is in 1/m."""
+    return READING_UNITS[unit][1] if layout.reads else unit
+
+
+def scales_of(layout: SensorLayout) -> tuple[Array, str]:
+    """The scale (k,) from SI units to the screen's of each kind of reading, and all units."""
+    scales = np.array([READING_UNITS[unit][0] for unit in layout.kind_units])
+    units = dict.fromkeys(screen_unit(layout, unit) for unit in layout.kind_units)
+    return scales, ", ".join(units)
+
+
+def traced_title(of: ReportedQuantity, layout: SensorLayout) -> str:
+    """The title of what is drawn over time of a quantity."""
+    return "Reading" if layout.reads and of.name == "curvature" else of.traced
 
 
 class ElementPanel(QWidget):
@@ -35,6 +55,7 @@ class ElementPanel(QWidget):
         self.button.setToolTip("Add this element to the traces (Ctrl+Alt+T), or remove it.")
         self.button.clicked.connect(lambda *_: self.plot_toggled.emit())
         self.button.setEnabled(False)
+        self._names, self._scales = list(COMPONENTS), np.ones(len(COMPONENTS))
         self.histories = [
             CurvePlot(of.traced, of.unit, True, _TRACE.format(f"{of.traced} (xx, yy, xy)"))
             for of in TRACED
@@ -51,6 +72,14 @@ class ElementPanel(QWidget):
         for plot in (*self.histories, self.spectrum):
             around.addWidget(plot, 3)
 
+    def show_layout(self, layout: SensorLayout) -> None:
+        """Name and scale what the elements of a layout read."""
+        self._names, (self._scales, unit) = layout.kind_names, scales_of(layout)
+        for of, plot in zip(TRACED, self.histories, strict=True):
+            names = f"{traced_title(of, layout)} ({', '.join(self._names)})"
+            plot.show_title(traced_title(of, layout), unit, _TRACE.format(names))
+        self.spectrum.show_title("Amplitude", unit, _SPECTRUM)
+
     def show_facts(self, title: str, facts: str) -> None:
         """Write the title and facts of the element; empty for none."""
         for label, text in ((self.title, title or _NONE), (self.facts, facts)):
@@ -62,16 +91,23 @@ class ElementPanel(QWidget):
         self.button.setText("Stop plo&tting" if plotted else "Plo&t")
 
     def show_history(self, times: Array, values: Array, seconds: float) -> None:
-        """Draw `values` (T, 3 k) of k quantities at `times` (T,) in s up to now."""
+        """Draw `values` (T, n k) of k quantities at `times` (T,) in s up to now."""
+        count = len(self._names)
         for number, plot in enumerate(self.histories):
             curves = [
-                Curve(name, n, values[:, 3 * number + n]) for n, name in enumerate(COMPONENTS)
+                Curve(name, n, self._scales[n] * values[:, count * number + n])
+                for n, name in enumerate(self._names)
             ]
             plot.show_curves(times, curves, (-seconds, 0.0), "s")
 
     def show_spectrum(self, frequencies: Array, amplitudes: Array) -> None:
-        """Draw `amplitudes` (3, F) in 1/m at `frequencies` (F,) in Hz, or a note without any."""
-        curves = [Curve(name, n, amplitudes[n]) for n, name in enumerate(COMPONENTS)]
+        """Draw `amplitudes` (n, F) in SI units at `frequencies` (F,) in Hz, or a note without."""
+        curves = [
+            Curve(name, n, scale * amplitude)
+            for n, (name, scale, amplitude) in enumerate(
+                zip(self._names, self._scales.tolist(), amplitudes, strict=True)
+            )
+        ]
         if not len(frequencies):
             self.spectrum.show_curves(frequencies, (), (0.0, 1.0), "Hz", "Not enough readings yet.")
             return
@@ -80,19 +116,40 @@ class ElementPanel(QWidget):
 
 
 class Traces(QWidget):
-    """A plot for each component with a curve for each element; `pointed` emits the element."""
+    """A plot for each quantity read, with a curve for each element; `pointed` emits the element."""
 
     pointed = Signal(int)
 
     def __init__(self) -> None:
         super().__init__()
-        titles = [(f"{of.traced} {name}", of.unit) for of in TRACED for name in COMPONENTS]
-        self.plots = [CurvePlot(title, unit, True, _TRACE.format(title)) for title, unit in titles]
-        around = QHBoxLayout(self)
-        around.setContentsMargins(8, 4, 8, 6)
-        for plot in self.plots:
-            around.addWidget(plot)
+        self._around = QHBoxLayout(self)
+        self._around.setContentsMargins(8, 4, 8, 6)
+        self.plots: list[CurvePlot] = []
+        self._scales = np.ones(len(COMPONENTS) * len(TRACED))
+        self._show_plots([(f"{of.traced} {name}", of.unit) for of in TRACED for name in COMPONENTS])
+
+    def _show_plots(self, titles: Sequence[tuple[str, str]]) -> None:
+        """Have a plot for each title and unit."""
+        for plot in self.plots[len(titles) :]:
+            plot.deleteLater()
+        del self.plots[len(titles) :]
+        for plot, (title, unit) in zip(self.plots, titles, strict=False):
+            plot.show_title(title, unit, _TRACE.format(title))
+        for title, unit in titles[len(self.plots) :]:
+            plot = CurvePlot(title, unit, True, _TRACE.format(title))
+            self._around.addWidget(plot)
             plot.pointed.connect(self.pointed)
+            self.plots.append(plot)
+
+    def show_layout(self, layout: SensorLayout) -> None:
+        """Have a plot for each quantity that the elements of a layout read."""
+        scales, _ = scales_of(layout)
+        units = [screen_unit(layout, unit) for unit in layout.kind_units]
+        kinds = list(zip(layout.kind_names, units, strict=True))
+        self._show_plots(
+            [(f"{traced_title(of, layout)} {n}", u) for of in TRACED for n, u in kinds]
+        )
+        self._scales = np.tile(scales, len(TRACED))
 
     def show_history(
         self, elements: Sequence[int], times: Array, values: Array, seconds: float
@@ -100,7 +157,7 @@ class Traces(QWidget):
         """Draw `values` (T, plots, k) of k `elements` at `times` (T,) in s up to now."""
         for row, plot in enumerate(self.plots):
             curves = [
-                Curve(str(element), n, values[:, row, n], element)
+                Curve(str(element), n, self._scales[row] * values[:, row, n], element)
                 for n, element in enumerate(elements)
             ]
             plot.show_curves(times, curves, (-seconds, 0.0), "s", _NONE_PLOTTED)

@@ -12,8 +12,13 @@ from kappaskin.estimation import amplitude_spectrum
 from kappaskin.frames import COMPONENTS, Array, Estimate
 from kappaskin.live import Status
 from kappaskin.pipeline import REPORTED, Reported, ReportedQuantity
-from kappaskin.sensing import Sensor
-from kappaskin_app.features.traces.element_panel import TRACED, ElementPanel, Traces
+from kappaskin.sensing import Sensor, SensorLayout
+from kappaskin_app.features.traces.element_panel import (
+    TRACED,
+    ElementPanel,
+    Traces,
+    scales_of,
+)
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.history import History
@@ -35,9 +40,8 @@ class ReadingBuffer:
     def __init__(self) -> None:
         self.clear(0)
 
-    def clear(self, elements: int) -> None:
-        """Start again, empty, for so many `elements`."""
-        rows = len(COMPONENTS) * len(TRACED)
+    def clear(self, elements: int, rows: int = len(COMPONENTS) * len(TRACED)) -> None:
+        """Start again, empty, for so many `elements` with so many `rows` of readings."""
         self._least = max(_LEAST_PERIOD, SECONDS * 4 * rows * elements / _MOST_BYTES)
         count = round(SECONDS / self._least) + 1
         self._times = np.full(count, np.nan)
@@ -46,10 +50,10 @@ class ReadingBuffer:
 
     def append(self, times: Array, readings: Array) -> None:
         """Store `readings` (T, rows, P) at `times` (T,) in s, thinned to the buffer's period."""
-        elements = readings.shape[2]
+        rows, elements = readings.shape[1:]
         for at, read in zip(times.tolist(), readings, strict=True):
-            if elements != self._read.shape[2] or at < self._last:
-                self.clear(elements)  # another sensor, or a restarted one
+            if (rows, elements) != self._read.shape[1:] or at < self._last:
+                self.clear(elements, rows)  # another sensor, or a restarted one
             if at - self._last >= (1 - _ROUNDING) * self._least:
                 self._times[self._next], self._read[self._next] = at, read
                 self._next, self._last = (self._next + 1) % len(self._times), at
@@ -63,16 +67,21 @@ class ReadingBuffer:
 
 
 _READ = tuple(quantity for quantity in REPORTED if quantity.element_head)
-_HEADS = (
-    *("", *(f"{quantity.element_head} [{quantity.unit}]" for quantity in _READ)),
-    *("gain", "offset [1/m]", "channel", "health"),
-)
+
+
+def _heads(layout: SensorLayout) -> tuple[str, ...]:
+    """The heads of the table of an element."""
+    unit = "1/m" if not layout.reads else scales_of(layout)[1]
+    read = (f"{quantity.element_head} [{unit}]" for quantity in _READ)
+    return ("", *read, "gain", f"offset [{unit}]", "channel", "health")
 
 
 def facts(element: int, sensor: Sensor, status: Status, estimate: Estimate) -> str:
-    """HTML table of the three channels of an element."""
-    rows = [_row(element, number, sensor, status, estimate) for number in range(3)]
-    cells = ["".join(f"<th align='left'>{head}&nbsp;&nbsp;</th>" for head in _HEADS)]
+    """HTML table of the channels of an element."""
+    channels = np.flatnonzero(sensor.layout.element == element).tolist()
+    rows = [_row(channel, sensor, status, estimate) for channel in channels]
+    heads = _heads(sensor.layout)
+    cells = ["".join(f"<th align='left'>{head}&nbsp;&nbsp;</th>" for head in heads)]
     cells += ["".join(f"<td>{cell}&nbsp;&nbsp;</td>" for cell in row) for row in rows]
     return (
         "<table style='white-space: nowrap'>"
@@ -88,27 +97,28 @@ def title(element: int, sensor: Sensor, displacement: float, sd: float) -> str:
     return f"<b>Element {element}</b> at ({x:.1f}, {y:.1f}) mm; displacement {inward}"
 
 
-def _row(
-    element: int, number: int, sensor: Sensor, status: Status, estimate: Estimate
-) -> tuple[str, ...]:
-    channel = number * len(sensor.layout) + element
+def _row(channel: int, sensor: Sensor, status: Status, estimate: Estimate) -> tuple[str, ...]:
+    layout = sensor.layout
+    kind = layout.kind[channel]
+    scale = float(scales_of(layout)[0][kind])
     found = [f for f in status.health.findings if f.channel == channel]
     health = "; ".join(f"{f.kind}: {f.figure}" for f in found) or "OK"
     reported = Reported(estimate)
     return (
-        f"<b>{COMPONENTS[number]}</b>",
-        *(_read(quantity, reported, number, element) for quantity in _READ),
+        f"<b>{layout.kind_names[kind]}</b>",
+        *(_read(quantity, reported, channel, scale) for quantity in _READ),
         *_calibration_cells(status.setup.calibration, channel),
         str(_wire_channel(sensor, channel)),
-        "dead: reported by the device" if sensor.layout.lacking[number, element] else health,
+        "dead: reported by the device" if layout.lacking.ravel()[channel] else health,
     )
 
 
-def _read(quantity: ReportedQuantity, reported: Reported, row: int, element: int) -> str:
-    """A component of a quantity of an element, with its standard deviation if it has one."""
+def _read(quantity: ReportedQuantity, reported: Reported, channel: int, scale: float) -> str:
+    """A quantity of a channel, `scale` times, with its standard deviation if it has one."""
     found = [of(reported) for suffix, _, of in quantity.forms if suffix != "_95"]
-    value, sd = np.broadcast_arrays(*found, math.nan)[:2]
-    return with_error(value[row, element], sd[row, element], quantity.shown[2], sign="+")
+    each = np.broadcast_arrays(*found, math.nan)[:2]
+    value, sd = (scale * float(one.flat[channel]) for one in each)
+    return with_error(value, sd, quantity.shown[2], sign="+")
 
 
 def _calibration_cells(calibration: Calibration | None, channel: int) -> tuple[str, str]:
@@ -210,6 +220,9 @@ class SelectedElement(QObject):
         if status.connections != self._connection:
             self._connection, self.element = status.connections, -1
             self._buffer.clear(0)  # another sensor may have as many elements and a later clock
+            if status.sensor is not None:
+                self.panel.show_layout(status.sensor.layout)
+                self.traces.show_layout(status.sensor.layout)
             self.panel.show_facts("", "")
         key = status.connections, estimate.generation
         if key != self._key:
@@ -221,7 +234,7 @@ class SelectedElement(QObject):
         if now >= self._next_plots:
             self._next_plots = now + _PLOT_PERIOD
             if self.traces.isVisible():
-                self._show_traces(estimate.curvature.shape[1])
+                self._show_traces(len(estimate.suspect))
 
     def _show_panel(self, estimate: Estimate, now: float) -> None:
         if now >= self._next_plots:
@@ -247,12 +260,13 @@ class SelectedElement(QObject):
 
     def _show_spectrum(self) -> None:
         times, values = self._buffer.of([self.element])
-        read = values[:, : len(COMPONENTS), 0]
+        kinds = values.shape[1] // len(TRACED)
+        read = values[:, :kinds, 0]
         # A dead channel counts as zero; frames that lack any other reading are excluded.
         known = np.isfinite(read).any(axis=0)
         whole = np.isfinite(read[:, known]).all(axis=1)
         if whole.sum() < _FEWEST or not known.any():
-            self.panel.show_spectrum(np.empty(0), np.empty((3, 0)))
+            self.panel.show_spectrum(np.empty(0), np.empty((kinds, 0)))
             return
         times, read = times[whole], np.where(known, read[whole], 0.0)
         span = float(times[-1] - times[0])

@@ -16,7 +16,7 @@ from kappaskin.pipeline import REVISION, Pipeline, Reported, Setup, setup_from_t
 from kappaskin.recording.disk import is_there
 from kappaskin.recording.reading import Recording
 from kappaskin.recording.writing import PROGRAM
-from kappaskin.sensing import Sensor
+from kappaskin.sensing import Sensor, SensorLayout
 from kappaskin.sources import sensor_from_json
 
 TABLES = (".csv", ".npz", ".h5")
@@ -226,8 +226,16 @@ def _facts(
         "skin": sensor.layout.patch.name,
         "positions": sensor.layout.positions.tolist(),
         "settings": setups,
-        "units": "SI: m, s, N, 1/m; curvature components xx, yy, xy",
+        "units": f"SI: m, s, N, 1/m; {_read(sensor.layout)}",
     }
+
+
+def _read(layout: SensorLayout) -> str:
+    """What elements read, in words."""
+    if not layout.reads:
+        return "curvature components xx, yy, xy"
+    units = zip(layout.kind_names, layout.kind_units, strict=True)
+    return "readings " + ", ".join(f"{name} in {unit}" for name, unit in units)
 
 
 @dataclass(frozen=True, eq=False)

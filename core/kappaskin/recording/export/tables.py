@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from kappaskin._text import json_cells
 from kappaskin.errors import lacking
-from kappaskin.pipeline import ACROSS, ALONG, ELEMENT, REPORTED, Getter
+from kappaskin.pipeline import REPORTED, Axes, Getter, axes_of
 from kappaskin.recording.export.request import ExportedFrame, ExportRequest, RecordingInfo
+from kappaskin.sensing import SensorLayout
 
 
 class Column(NamedTuple):
@@ -35,11 +36,13 @@ class Column(NamedTuple):
     labels: tuple[str, ...]
     text: str
     value: Callable[[ExportedFrame], Any]
+    units: tuple[str, ...] = ()
 
     def heads(self) -> list[str]:
-        """Names of its numbers, each with the unit."""
-        unit = f" [{self.unit}]" if self.unit else ""
-        return [f"{self.name}{label}{unit}" for label in self.labels or ("",)]
+        """Names of its numbers, each with the unit: its own of `units`, or that of all."""
+        labels = self.labels or ("",)
+        each = zip(labels, self.units or [self.unit] * len(labels), strict=True)
+        return [f"{self.name}{label}{f' [{unit}]' if unit else ''}" for label, unit in each]
 
     def row(self, exported: ExportedFrame) -> "NDArray[Any]":
         """The value of one frame; NaN where it has fewer numbers than the column."""
@@ -52,16 +55,17 @@ class Column(NamedTuple):
 
 def columns(info: RecordingInfo) -> tuple[Column, ...]:
     """All of them, for P elements and Ni x Nj functions: of the frame, then of its estimate."""
-    P = len(info.sensor.layout)
-    lengths = {ELEMENT: P, ALONG: info.functions[0], ACROSS: info.functions[1]}
+    layout = info.sensor.layout
+    lengths = axes_of(layout, info.functions, (0, 0))
 
     def counts(exported: ExportedFrame) -> "NDArray[np.float64]":
-        found = np.full(3 * P, np.nan)
+        found = np.full(layout.channels, np.nan)
         found[exported.frame.channels] = exported.frame.counts
-        return found.reshape(3, P)
+        return found.reshape(layout.frame_shape)
 
     nominal = next(quantity for quantity in REPORTED if quantity.name == "nominal")
-    made = {group: _columns(group, lengths) for group in ("frame", "fit", "contact", "second")}
+    groups = ("frame", "fit", "contact", "second")
+    made = {group: _columns(group, lengths, layout) for group in groups}
     return (
         Column(
             "time", "s", "<f8", (), (), "arrival time since the recording began", attrgetter("at")
@@ -71,7 +75,7 @@ def columns(info: RecordingInfo) -> tuple[Column, ...]:
             "counts",
             "",
             "<f8",
-            (3, P),
+            layout.frame_shape,
             nominal.labels(lengths),
             "NaN where not scanned",
             counts,
@@ -82,22 +86,27 @@ def columns(info: RecordingInfo) -> tuple[Column, ...]:
     )
 
 
-def _columns(group: str, lengths: dict[str, int]) -> list[Column]:
-    """The columns of the quantities of one group."""
+def _columns(group: str, lengths: Axes, layout: SensorLayout) -> list[Column]:
+    """The columns of the quantities of one group; `curvature` only where that is what is read."""
     return [
         Column(
-            f"{quantity.name}{suffix}",
-            quantity.unit,
+            f"{_name(quantity.name, layout)}{suffix}",
+            quantity.unit_of(layout),
             quantity.kind,
             quantity.shape(lengths),
             quantity.labels(lengths) if quantity.parts else (),
             text,
             _value(getter),
+            quantity.units_of(layout),
         )
         for quantity in REPORTED
         for suffix, text, getter in quantity.forms
         if quantity.group == group and suffix in quantity.columns
     ]
+
+
+def _name(name: str, layout: SensorLayout) -> str:
+    return "reading" if layout.reads and name == "curvature" else name
 
 
 def _value(getter: Getter) -> Callable[[ExportedFrame], Any]:

@@ -15,6 +15,7 @@ from kappaskin.scenes.effects.electronics import MainsHum as MainsHum
 from kappaskin.scenes.effects.electronics import Quantisation as Quantisation
 from kappaskin.scenes.effects.electronics import Saturation as Saturation
 from kappaskin.scenes.effects.electronics import Skew as Skew
+from kappaskin.scenes.effects.electronics import StatedNoise as StatedNoise
 from kappaskin.scenes.effects.electronics import UniformNoise as UniformNoise
 from kappaskin.scenes.effects.failures import CorruptedFrames as CorruptedFrames
 from kappaskin.scenes.effects.failures import DeadElements as DeadElements

@@ -18,7 +18,7 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics import Plate, shapes_under
 from kappaskin.scenes.effects.at_work import RunningEffect as RunningEffect
-from kappaskin.sensing import SensorLayout, Transduction
+from kappaskin.sensing import DigitalReadings, SensorLayout, Transduction
 
 
 def _check_ranges(name: str, effect: object) -> None:
@@ -35,15 +35,16 @@ class Survey:
 
     `coefficients` (S, N) in m at `times` (S,) in s are of `basis`; `forces` (S, N) in N the modal
     forces that make them, all zero where the skin lies on a cylinder; `curvature` (S, 3, P) in 1/m
-    is what point-like elements of `layout` would read; `rates` (3 P,) in 1/m/s is the fastest that
-    each of them changes, and `read_after` (3 P,) in s when in a scan it is read. Effects that act
-    before the one that is judged add at most `carried` in 1/m to a reading.
+    is what point-like elements of `layout` would read, (S, R) of other readings in units of theirs;
+    `rates` (C,) in 1/m/s is the fastest that each of them changes, and `read_after` (C,) in s when
+    in a scan it is read. Effects that act before the one that is judged add at most `carried` in
+    1/m to a reading.
     """
 
     plate: Plate
     basis: Basis
     layout: SensorLayout
-    transduction: Transduction
+    transduction: Transduction | DigitalReadings
     times: Array
     forces: Array
     coefficients: Array
@@ -60,14 +61,16 @@ class Survey:
 
     @cached_property
     def operator(self) -> Array:
-        """Coefficients to readings of point-like elements, (3 P, N)."""
+        """Coefficients to readings of point-like elements, (C, N)."""
         layout = replace(self.layout, gage_length=0.0)
         return layout.operator(self.basis, self.plate)
 
     @cached_property
     def wavenumber(self) -> float:
-        """k in 1/m of the scene: k^2 is the largest reading over the largest deflection."""
-        bent = np.abs(self.coefficients @ self.operator.T).max(initial=0.0)
+        """k in 1/m of the scene: k^2 is the largest curvature over the largest deflection."""
+        bends = replace(self.layout, gage_length=0.0).of_curvature
+        operator = bends.operator(self.basis, self.plate) if self.layout.reads else self.operator
+        bent = np.abs(self.coefficients @ operator.T).max(initial=0.0)
         deflection = self.coefficients @ self.basis.at(self.layout.positions).T
         most = np.abs(deflection).max(initial=0.0)
         return float(np.sqrt(bent / most)) if most else 0.0
@@ -83,7 +86,7 @@ class Survey:
         return self._shapes[plate]
 
     def readings_on(self, plate: Plate) -> Array:
-        """Readings (S, 3 P) of point-like elements for the same forces on another `plate`."""
+        """Readings (S, C) of point-like elements for the same forces on another `plate`."""
         return self.shapes_on(plate) @ self.operator.T
 
     def share(self, change: Array) -> float:
@@ -126,6 +129,8 @@ class Effect(ABC):
     """Keys in a scene file; none for an effect that follows from the rest of it."""
     elsewhere: ClassVar[str] = ""
     """Other keys of a scene file that define it."""
+    of_gages: ClassVar[str] = ""
+    """Why only strain gages have it; empty where any reading may."""
     authored: ClassVar[bool] = False
     """Whether only a scene's author selects it: a failure, whose `Size` has no error."""
 
@@ -154,9 +159,10 @@ class ReadingEffect(Effect):
 
     @abstractmethod
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
-        """The effect at work on curvature of `shape`, at rest, with a state of its own.
+        """The effect at work on curvature, or k readings of P elements, of `shape` (k, P).
 
-        It is given the frames in order of time, and leaves the array it is given alone.
+        It is at rest, with a state of its own, is given the frames in order of time, and leaves the
+        array it is given alone.
         """
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from kappaskin._schema import Within
 from kappaskin.errors import Refusal
 from kappaskin.scenes.effects.effect import Effect, ReadingEffect, RunningEffect, Size, Survey
-from kappaskin.sensing import Transduction
+from kappaskin.sensing import DigitalReadings, Transduction
 
 LARGEST = 6.0
 """Standard deviations that no reading of many frames is off by: one of 500 million is."""
@@ -47,6 +47,7 @@ class Skew(Effect):
     """Channels are read one after the other while the skin moves; `Scan.times` says when."""
 
     name: ClassVar = "skew"
+    of_gages: ClassVar = "digital readings are taken all at once"
     elsewhere: ClassVar = "it follows from the converter's times"
     formula: ClassVar = "scan time times rate of curvature over peak curvature"
 
@@ -67,6 +68,7 @@ class CrossTalk(ReadingEffect):
     """
 
     name: ClassVar = "cross-talk"
+    of_gages: ClassVar = "digital readings have no multiplexer"
     example: ClassVar = {"share": 0.02}
     formula: ClassVar = "share of the previously scanned channel"
 
@@ -94,11 +96,11 @@ class Quantisation(ReadingEffect):
     """Curvature is that of the count next to it, as `transduction` counts: no rails, only steps."""
 
     name: ClassVar = "quantisation"
-    elsewhere: ClassVar = "it follows from the converter"
+    elsewhere: ClassVar = "it follows from the converter, or the resolution in [readings]"
     at_once: ClassVar = True
     formula: ClassVar = "half a count over peak curvature"
 
-    transduction: Transduction
+    transduction: Transduction | DigitalReadings
 
     def size(self, survey: Survey) -> Size:
         number = self.transduction.resolution / 2 / survey.peak
@@ -182,6 +184,20 @@ class GaussianNoise(_WhiteNoise):
         from kappaskin.scenes.effects.at_work.electronics import gaussian
 
         return gaussian(self.rms, rng)
+
+
+@dataclass(frozen=True)
+class StatedNoise(GaussianNoise):
+    """The same as digital readings state it, with an RMS of its own for `each` of k readings."""
+
+    elsewhere: ClassVar = "set noise in [readings]"
+
+    each: tuple[float, ...] = ()
+
+    def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
+        from kappaskin.scenes.effects.at_work.electronics import gaussian
+
+        return gaussian(np.array(self.each)[:, None], rng)
 
 
 _APART = 4.0  # at most, from one frequency of the sum to the next: 1/f to 0.3 %

@@ -22,7 +22,7 @@ from kappaskin.sensing import SensorLayout
 
 @dataclass(frozen=True)
 class _Failing(Effect):
-    """Some `elements`, each with its three channels, fail."""
+    """Some `elements`, each with all its channels, fail."""
 
     authored: ClassVar = True
     formula: ClassVar = "share of the elements that fail"
@@ -43,11 +43,11 @@ class _Failing(Effect):
         return Size(len(self.elements) / len(survey.layout), 0.0)
 
     def channels(self, shape: tuple[int, ...]) -> NDArray[np.intp]:
-        """The channels (3, E) of the failing elements on a skin whose curvature is of `shape`."""
-        P = int(np.prod(shape)) // 3
+        """The channels (k, E) of the failing elements on a skin with readings of `shape` (k, P)."""
+        k, P = shape
         if absent := [p for p in self.elements if p >= P]:
             raise Refusal(f"expected {self.name} with elements from 0 to {P - 1}, got {absent}")
-        return np.add.outer(P * np.arange(3), np.array(self.elements, np.intp))
+        return np.add.outer(P * np.arange(k), np.array(self.elements, np.intp))
 
 
 @dataclass(frozen=True)

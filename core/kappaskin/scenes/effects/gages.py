@@ -86,6 +86,7 @@ class StrainLimit(ReadingEffect):
     """
 
     name: ClassVar = "strain-limit"
+    of_gages: ClassVar = "metal foil has the limit"
     example: ClassVar = {"share": 0.1}
     formula: ClassVar = "peak curvature over that of 1 % strain"
 
@@ -123,6 +124,7 @@ class Hysteresis(ReadingEffect):
     """
 
     name: ClassVar = "hysteresis"
+    of_gages: ClassVar = "its loops are those of gages on a substrate"
     example: ClassVar = {"like": "second"}
     formula: ClassVar = "hysteresis lag over peak curvature"
 
@@ -189,6 +191,7 @@ class Creep(ReadingEffect):
     """Of every reading the `share` relaxes away, with the `time_constant` in s."""
 
     name: ClassVar = "creep"
+    of_gages: ClassVar = "what creeps is the bond of a gage"
     example: ClassVar = {"share": 0.1, "time_constant": 8.0}
     formula: ClassVar = "share that relaxes during the scene"
 
@@ -273,7 +276,7 @@ class Temperature(ReadingEffect):
 
     def amplification(self, survey: Survey) -> float:
         T = abs(self.warmer(survey.duration))
-        shares = self.shares((3 * len(survey.layout),))
+        shares = self.shares(survey.curvature.shape[1:])
         return 1 + T * abs(self.gain) * float(np.abs(shares).max())
 
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
@@ -315,14 +318,14 @@ class Tolerance(ReadingEffect):
         return rng.normal(1.0, self.gain_sd, shape), rng.normal(0.0, self.offset_sd, shape)
 
     def size(self, survey: Survey) -> Size:
-        gain, offset = self.errors((3 * len(survey.layout),))
+        gain, offset = self.errors((survey.layout.channels,))
         K = survey.curvature.reshape(len(survey.times), -1)
         off = survey.share((gain - 1) * K + offset)
         off += float(np.abs(gain - 1).max()) * survey.carried / survey.peak
         return Size(self.gain_sd + self.offset_sd / survey.peak, off)
 
     def amplification(self, survey: Survey) -> float:
-        return float(np.abs(self.errors((3 * len(survey.layout),))[0]).max())
+        return float(np.abs(self.errors((survey.layout.channels,))[0]).max())
 
     def start(self, shape: tuple[int, ...], rng: np.random.Generator) -> RunningEffect:
         from kappaskin.scenes.effects.at_work.gages import tolerance

@@ -97,6 +97,7 @@ class Bench:
     """
 
     def __init__(self, scene: Scene) -> None:
+        scene.layout.check_curvature_sensor("the cost of accuracy")
         self._times = np.arange(SETTLING + DRAWS) / scene.rate
         self._pressed = _pressed(scene, self._times)
         if not np.isfinite([pressed.contact for pressed in self._pressed]).all():

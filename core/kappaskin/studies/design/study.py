@@ -354,6 +354,7 @@ def read_setup(top: TomlTable, file: Path) -> PointSetup:
     for name in made[2].what:
         measure.stands_for(name, "what", MEASURES)
     with place.blamed():
+        scene.layout.check_curvature_sensor("a study")
         check_placement(scene.layout, made[1].by)
     if (readings := made[2].frames * 3 * len(scene.layout)) > _MOST_READINGS:
         raise measure.refusal(

@@ -51,13 +51,6 @@ def test_stuck_elements_keep_what_they_read_first_from_then_on():
     np.testing.assert_array_equal(spoilt[10:, :, [1, 4]], np.tile(x[10, :, [1, 4]].T, (20, 1, 1)))
 
 
-def test_the_channels_of_an_element_are_the_same_ones_in_any_shape():
-    x = frames(8)
-    for effect in (StuckElements((3,)), IntermittentElements((3,), 0.05, 0.05)):
-        flat = played(effect, x.reshape(8, 3 * P))
-        np.testing.assert_array_equal(flat.reshape(8, 3, P), played(effect, x))
-
-
 def test_intermittent_elements_drop_to_zero_with_all_channels_and_come_back_true():
     x = frames(400)
 
@@ -73,12 +66,10 @@ def test_intermittent_elements_drop_to_zero_with_all_channels_and_come_back_true
 @pytest.mark.parametrize("rate", [20.0, 500.0])
 def test_they_are_there_and_away_for_as_long_as_was_told_at_any_rate(rate):
     E, seconds, on, off = 3000, 40.0, 2.0, 0.5
-    running = IntermittentElements(tuple(range(E)), on, off).start(
-        (3 * E,), np.random.default_rng(1)
-    )
-    x, count = np.ones(3 * E), int(seconds * min(rate, 20.0))
+    running = IntermittentElements(tuple(range(E)), on, off).start((3, E), np.random.default_rng(1))
+    x, count = np.ones((3, E)), int(seconds * min(rate, 20.0))
     times = np.arange(count) * seconds / count
-    there = np.array([running(x, t)[:E] for t in times]) > 0
+    there = np.array([running(x, t)[0] for t in times]) > 0
 
     # Stationary from the first frame on; a pair of frames agrees as the chain's autocovariance.
     share, lag = on / (on + off), seconds / count
@@ -91,10 +82,8 @@ def test_they_are_there_and_away_for_as_long_as_was_told_at_any_rate(rate):
 
 def test_bursts_last_as_long_as_was_told_when_frames_come_fast():
     E, rate, on, off = 2000, 200.0, 0.5, 0.2
-    running = IntermittentElements(tuple(range(E)), on, off).start(
-        (3 * E,), np.random.default_rng(2)
-    )
-    there = np.array([running(np.ones(3 * E), n / rate)[:E] for n in range(2000)]) > 0
+    running = IntermittentElements(tuple(range(E)), on, off).start((3, E), np.random.default_rng(2))
+    there = np.array([running(np.ones((3, E)), n / rate)[0] for n in range(2000)]) > 0
 
     ends = np.count_nonzero(there[1:] & ~there[:-1])
     assert np.count_nonzero(~there) / ends / rate == pytest.approx(off, rel=0.05)
@@ -120,7 +109,7 @@ def test_elements_that_are_none_are_refused(kind, elements):
 @pytest.mark.parametrize("kind", [StuckElements, IntermittentElements])
 def test_elements_that_the_skin_has_not_are_refused(kind):
     with pytest.raises(Refusal, match=rf"{kind.name} with elements from 0 to 4, got \[5, 9\]"):
-        kind((1, 5, 9)).start((3 * P,), np.random.default_rng(0))
+        kind((1, 5, 9)).start((3, P), np.random.default_rng(0))
 
 
 # The link

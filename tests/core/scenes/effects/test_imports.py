@@ -61,7 +61,7 @@ effect = {effect.name: effect for effect in every}[sys.argv[1]]
 if isinstance(effect, FiniteSlopeEffect):
     effect.sensed(basis, layout)(c)
 elif isinstance(effect, ReadingEffect):
-    effect.start((48,), np.random.default_rng(0))(K, 0.0)
+    effect.start((3, 16), np.random.default_rng(0))(K.reshape(3, 16), 0.0)
 else:
     effect.start(np.random.default_rng(0))(0)
 sys.setprofile(None)

@@ -6,7 +6,7 @@ import numpy as np
 
 from kappaskin.frames import Array
 from kappaskin.scenes.effects.at_work import RunningEffect
-from kappaskin.sensing import Transduction
+from kappaskin.sensing import DigitalReadings, Transduction
 
 
 def hum(amplitude: float, frequency: float, rng: np.random.Generator) -> RunningEffect:
@@ -32,7 +32,10 @@ def cross_talk(share: float, shape: tuple[int, ...]) -> RunningEffect:
     return read
 
 
-def quantisation(electronics: Transduction) -> RunningEffect:
+def quantisation(electronics: Transduction | DigitalReadings) -> RunningEffect:
+    if isinstance(electronics, DigitalReadings):
+        resolution = electronics.resolution
+        return lambda readings, _: np.rint(readings / resolution) * resolution
     sensitivity, offset = electronics.sensitivity, electronics.offset
     step, resolution = electronics.converter.step, electronics.resolution
     # The volts as the converter computes them, or counts next to the middle of a step would differ.
@@ -50,7 +53,7 @@ def uniform(rms: float, rng: np.random.Generator) -> RunningEffect:
     return lambda curvature, _: curvature + rng.uniform(-limit, limit, curvature.shape)
 
 
-def gaussian(rms: float, rng: np.random.Generator) -> RunningEffect:
+def gaussian(rms: float | Array, rng: np.random.Generator) -> RunningEffect:
     return lambda curvature, _: curvature + rng.normal(0.0, rms, curvature.shape)
 
 
