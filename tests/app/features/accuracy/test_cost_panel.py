@@ -160,7 +160,8 @@ def test_each_effect_of_the_scene_is_told_with_and_without_it(measured: MainWind
         assert time == duration(cost.time_per_frame)
         assert (with_it, without) == (length(cost.rms_with), length(cost.rms_without))
     assert rows["Finite slope"][0] == "no"
-    assert found["Uniform noise"].rms_without < 0.5 * found["Uniform noise"].rms_with
+    # What remains are the waves of the load that the setting's functions do not have.
+    assert found["Uniform noise"].rms_without < 0.7 * found["Uniform noise"].rms_with
     assert not measured.cost.no_effects.isVisible()
 
 
@@ -183,8 +184,8 @@ def test_effects_are_judged_with_the_setting_in_use(measured: MainWindow, until)
         next(cost for cost in each if cost.name == "uniform-noise")
         for each in (was, measured.measurement.effect_costs())
     )
-    # Four functions cannot follow the load, noise or not.
-    assert noise.rms_without > 3 * before.rms_without
+    # Four functions follow the load less well, noise or not.
+    assert noise.rms_without > 1.8 * before.rms_without
     until(lambda: _rows(measured).get("Uniform noise", [])[3:] == [length(noise.rms_without)])
     measured.history.stack.undo()
     until(lambda: measured.measurement.effect_costs() == was)
