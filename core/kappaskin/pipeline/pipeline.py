@@ -208,9 +208,16 @@ class Pipeline:
         times[frame.channels] = frame.device_time + self._read_at[: len(frame.channels)]
         return self.fit.follow(curvature, times.reshape(curvature.shape), held)
 
+    def _as_told(self, fit: Fit) -> Fit:
+        """The fit with the noise that the sensor tells, if it does."""
+        told = self.sensor.noise
+        if math.isnan(told):
+            return fit
+        return replace(fit, known_noise=np.array(told), weights=np.array(1 / told))
+
     def _fitted(self, frame: Frame, curvature: Array, held: Array) -> Fit:
         try:
-            fit = self._followed(frame, curvature, held)
+            fit = self._as_told(self._followed(frame, curvature, held))
             if self._is_determined(fit):
                 return fit
         except RankDeficient:
@@ -243,7 +250,7 @@ class Pipeline:
         if math.isfinite(noise):
             contact, second = map(self._bounded, self._contacts(fit.readings, fit))
         if math.isfinite(noise) and (drifted := self._contacts.drift) is not None:
-            fit, drift = drifted.fit, drifted.size
+            fit, drift = self._as_told(drifted.fit), drifted.size
             self.fitted, surface, noise = fit, self._surface(fit.coefficients), float(fit.noise)
         return Estimate(
             self.generation,

@@ -36,7 +36,8 @@ class Columns:
     """What the numbers of a record are: each of `names`, and the readings among them.
 
     The number at `places` (n,) is the reading of `channels` (n,), scale times it plus offset, in
-    1/m. `time` and `sequence` are the places of these, -1 without; a time is in `time_unit` s.
+    its unit; a frame has it as one of `readings`. `time` and `sequence` are the places of these, -1
+    without; a time is in `time_unit` s.
     """
 
     names: tuple[str, ...]
@@ -44,6 +45,7 @@ class Columns:
     channels: Indices
     scale: Array
     offset: Array
+    readings: DigitalReadings
     time: int = -1
     time_unit: float = 1.0
     sequence: int = -1
@@ -51,10 +53,10 @@ class Columns:
     def __len__(self) -> int:
         return len(self.names)
 
-    def numbers(self, sequence: int, time: float, curvature: Array) -> Array:
-        """The numbers of a record at `time` in s, of `curvature` (3 P,) in 1/m; 0 if ignored."""
+    def numbers(self, sequence: int, time: float, readings: Array) -> Array:
+        """The numbers of a record at `time` in s, of all `readings` (C,); 0 if ignored."""
         numbers = np.zeros(len(self))
-        numbers[self.places] = (curvature[self.channels] - self.offset) / self.scale
+        numbers[self.places] = (readings[self.channels] - self.offset) / self.scale
         if self.time >= 0:
             numbers[self.time] = time / self.time_unit
         if self.sequence >= 0:
@@ -72,7 +74,7 @@ class LineDecoder(ABC):
     def __init__(self, columns: Columns) -> None:
         self.sequence = SequenceCounter()
         self.last = ""
-        self._columns, self._readings = columns, DigitalReadings()
+        self._columns = columns
         self._bytes_in = self._bytes_good = self._number = 0
         self._sequences = SEQUENCES  # numbers after which the device's begin again
         self._discarded: Counter[str] = Counter()
@@ -89,8 +91,8 @@ class LineDecoder(ABC):
         return self.sequence.take(self.sequence.good if sequence < 0 else sequence)
 
     @abstractmethod
-    def encoded(self, sequence: int, time: float, curvature: Array) -> bytes:
-        """The record that a device would send at `time` in s, of `curvature` (3 P,) in 1/m."""
+    def encoded(self, sequence: int, time: float, readings: Array) -> bytes:
+        """The record that a device would send at `time` in s, of all `readings` (C,)."""
 
     @abstractmethod
     def _records(self) -> Iterator[Samples]:
@@ -134,7 +136,7 @@ class LineDecoder(ABC):
         time = math.nan if columns.time < 0 else float(numbers[columns.time]) * columns.time_unit
         sequence = -1 if columns.sequence < 0 else self._unwrapped(int(numbers[columns.sequence]))
         values = columns.scale * numbers[columns.places] + columns.offset
-        return Samples(sequence, time, columns.channels, self._readings.counts(values))
+        return Samples(sequence, time, columns.channels, columns.readings.counts(values))
 
     def _unwrapped(self, number: int) -> int:
         """A sequence number of 32 bits, which goes on where the device's begins again."""
@@ -214,8 +216,8 @@ class TextDecoder(_Lines):
         except ValueError:
             return "no number"
 
-    def encoded(self, sequence: int, time: float, curvature: Array) -> bytes:
-        numbers = self._columns.numbers(sequence, time, curvature)
+    def encoded(self, sequence: int, time: float, readings: Array) -> bytes:
+        numbers = self._columns.numbers(sequence, time, readings)
         separator = self._separator or SEPARATORS[0]
         return f"{separator.join(f'{number:.12g}' for number in numbers.tolist())}\r\n".encode()
 
@@ -275,10 +277,10 @@ class JsonDecoder(_Lines):
             numbers += [math.nan if each is None else float(each) for each in values]
         return np.array(numbers)
 
-    def encoded(self, sequence: int, time: float, curvature: Array) -> bytes:
+    def encoded(self, sequence: int, time: float, readings: Array) -> bytes:
         values: list[float | None] = [
             None if math.isnan(number) else float(f"{number:.12g}")
-            for number in self._columns.numbers(sequence, time, curvature).tolist()
+            for number in self._columns.numbers(sequence, time, readings).tolist()
         ]
         record, at = dict[str, Any](), 0
         for path, count in self._paths:
@@ -355,9 +357,9 @@ class BinaryDecoder(LineDecoder):
             self._sequences = min(2**bits, SEQUENCES)
         self._sync, self._size = sync, len(sync) + self._body.size + self._check.size
 
-    def encoded(self, sequence: int, time: float, curvature: Array) -> bytes:
+    def encoded(self, sequence: int, time: float, readings: Array) -> bytes:
         columns = self._columns
-        numbers = columns.numbers(sequence, time, curvature).tolist()
+        numbers = columns.numbers(sequence, time, readings).tolist()
         counters = {columns.time, columns.sequence}
         values = [
             _as(code, number, self._body.format[0], wraps=place in counters)

@@ -12,10 +12,10 @@ from dataclasses import replace
 import numpy as np
 
 from kappaskin.errors import Refusal
-from kappaskin.frames import Frame
+from kappaskin.frames import Frame, Indices
 from kappaskin.scenes import Scene, Simulator
 from kappaskin.scenes.effects import CorruptedFrames, DroppedFrames
-from kappaskin.sensing import DigitalReadings
+from kappaskin.sensing import DigitalReadings, SensorLayout, Transduction
 from kappaskin.sources import information
 from kappaskin.sources.decoder import FROM_HOST, Decoder
 from kappaskin.sources.description import Description
@@ -62,9 +62,9 @@ class PseudoDevice:
         clock: Callable[[], float] = time.monotonic,
         description: Description | None = None,
     ) -> None:
-        if description is not None:
-            _check_same_elements(scene, description)
         self._lines = None if description is None else description.decoder()
+        if description is not None:
+            scene, self._order = _as_described(scene, description.sensor.layout)
         self._scene, self._simulator, self._clock = scene, Simulator(scene), clock
         self._sensor = scene.sensor()
         self._information = information.sensor_to_json(self._sensor)
@@ -161,8 +161,8 @@ class PseudoDevice:
         """The bytes that say what was read in a frame."""
         chain = self._scene.transduction
         if self._lines is not None:
-            curvature = chain.curvature(frame.counts)[np.argsort(frame.channels)]
-            return self._lines.encoded(self.spent, frame.device_time, curvature)
+            readings = chain.curvature(frame.counts)[np.argsort(frame.channels)][self._order]
+            return self._lines.encoded(self.spent, frame.device_time, readings)
         width = chain.count_bytes
         return encode_samples(self.spent, frame.device_time, frame.channels, frame.counts, width)
 
@@ -300,13 +300,28 @@ class PseudoDevice:
         os.close(slave)
 
 
-def _check_same_elements(scene: Scene, description: Description) -> None:
-    own, described = scene.layout.positions, description.sensor.layout.positions
-    if own.shape != described.shape or not np.allclose(own, described):
+def _as_described(scene: Scene, layout: SensorLayout) -> tuple[Scene, Indices]:
+    """The scene with elements that read what is described, and which of its readings those are.
+
+    Each element has every kind of reading in the `layout`; what is of strain gages alone is left
+    out where they read other than curvature.
+    """
+    if scene.layout.patch != layout.patch:
         raise Refusal(
-            f"expected a scene with the elements of the description ({description.sensor.layout}), "
-            f"got {scene.layout}, or others at other places; give both the same [elements] and size"
+            f"expected a scene on the skin of the description ({layout.patch.name}), got one on "
+            f"{scene.layout.patch.name}; give both the same size and shape in [skin]"
         )
+    order = layout.kind * len(layout) + layout.element
+    own = scene.layout
+    if not (own.reads or layout.reads) and np.array_equal(own.positions, layout.positions):
+        return scene, order
+    read = layout.of_curvature
+    if layout.reads:
+        read = read.reading_each(layout.kind_names)
+    if layout.senses_curvature_only and isinstance(scene.transduction, Transduction):
+        return replace(scene, layout=read), order
+    effects = tuple(effect for effect in scene.effects if not effect.of_gages)
+    return replace(scene, layout=read, transduction=DigitalReadings(), effects=effects), order
 
 
 def _numbers(form: str, arguments: bytes) -> tuple[int, ...]:
