@@ -14,8 +14,8 @@ import numpy as np
 from kappaskin.errors import Refusal
 from kappaskin.frames import Frame, Indices
 from kappaskin.scenes import Scene, Simulator
-from kappaskin.scenes.effects import CorruptedFrames, DroppedFrames
-from kappaskin.sensing import DigitalReadings, SensorLayout, Transduction
+from kappaskin.scenes.effects import CorruptedFrames, DroppedFrames, ReadingEffect
+from kappaskin.sensing import Sensor, Transduction
 from kappaskin.sources import information
 from kappaskin.sources.decoder import FROM_HOST, Decoder
 from kappaskin.sources.description import Description
@@ -64,7 +64,7 @@ class PseudoDevice:
     ) -> None:
         self._lines = None if description is None else description.decoder()
         if description is not None:
-            scene, self._order = _as_described(scene, description.sensor.layout)
+            scene, self._order = _as_described(scene, description.sensor)
         self._scene, self._simulator, self._clock = scene, Simulator(scene), clock
         self._sensor = scene.sensor()
         self._information = information.sensor_to_json(self._sensor)
@@ -268,7 +268,7 @@ class PseudoDevice:
 
     def _take_gain(self, requested: int) -> bytes:
         chain = self._scene.transduction
-        if isinstance(chain, DigitalReadings):
+        if not isinstance(chain, Transduction):
             raise _RefusedCommand(Fault.OUT_OF_RANGE, "digital readings have no gain")
         try:
             amplifier = replace(chain.amplifier, gain=requested / 1000)
@@ -300,16 +300,17 @@ class PseudoDevice:
         os.close(slave)
 
 
-def _as_described(scene: Scene, layout: SensorLayout) -> tuple[Scene, Indices]:
-    """The scene with elements that read what is described, and which of its readings those are.
+def _as_described(scene: Scene, sensor: Sensor) -> tuple[Scene, Indices]:
+    """The scene with elements that read as the `sensor`, and which of its readings those are.
 
-    Each element has every kind of reading in the `layout`; what is of strain gages alone is left
-    out where they read other than curvature.
+    Each element has every kind of reading of the sensor. Where they are other than curvature, they
+    have the noise that the sensor tells in place of what the scene says of strain gages.
     """
+    layout = sensor.layout
     if scene.layout.patch != layout.patch:
         raise Refusal(
-            f"expected a scene on the skin of the description ({layout.patch.name}), got one on "
-            f"{scene.layout.patch.name}; give both the same size and shape in [skin]"
+            f"expected a scene on the skin of the description, a {layout.patch.name}, got one on "
+            f"a {scene.layout.patch.name}; give both the same [skin]"
         )
     order = layout.kind * len(layout) + layout.element
     own = scene.layout
@@ -320,8 +321,10 @@ def _as_described(scene: Scene, layout: SensorLayout) -> tuple[Scene, Indices]:
         read = read.reading_each(layout.kind_names)
     if layout.senses_curvature_only and isinstance(scene.transduction, Transduction):
         return replace(scene, layout=read), order
-    effects = tuple(effect for effect in scene.effects if not effect.of_gages)
-    return replace(scene, layout=read, transduction=DigitalReadings(), effects=effects), order
+    kept = (e for e in scene.effects if e.authored or not isinstance(e, ReadingEffect))
+    effects = tuple(effect for effect in kept if not effect.of_gages)
+    digital = sensor.transduction
+    return replace(scene, layout=read, transduction=digital, effects=effects), order
 
 
 def _numbers(form: str, arguments: bytes) -> tuple[int, ...]:

@@ -179,11 +179,39 @@ def test_an_unplugged_board_is_back_when_it_is_plugged_in(tmp_path):
     assert source.accounting().balanced
 
 
-def test_a_scene_with_other_elements_is_refused(tmp_path):
-    with pytest.raises(Refusal, match="the elements of the description"):
-        PseudoDevice(
-            load_scene("off-centre"), description=load_description(written(tmp_path, "text"))
-        )
+def test_a_scene_on_another_skin_is_refused(tmp_path):
+    file = written(tmp_path, "text")
+    file.write_text(file.read_text().replace("[0.1, 0.1]", "[0.1, 0.08]"))
+    with pytest.raises(Refusal, match="0.1 x 0.08 m, got one on a .* of 0.1 x 0.1 m"):
+        PseudoDevice(load_scene("off-centre"), description=load_description(file))
+
+
+READ = {
+    "heights": ('"height:0..35"', "scale = 1e-6\nnoise = 1e-6"),
+    "free heights": ('"height:0..35"', 'scale = 1e-6\nnoise = 1e-6\ndatum = "free"'),
+    "slopes": ('"slope@0:0..35", "slope@90:0..35"', "scale = 1e-3\nnoise = 1e-4"),
+    "mixed": (
+        '"height:0..35", "slope@45:3..20", "xx:0..35", "curvature@60:0..35"',
+        "noise = 0.1\n[readings.height]\nnoise = 1e-6\n[readings.slope]\nnoise = 1e-4",
+    ),
+    "curvatures": ('"curvature@0:0..35", "curvature@60:0..35", "curvature@120:0..35"', ""),
+}
+
+
+@pytest.mark.parametrize("what", READ)
+def test_any_scene_plays_a_board_that_reads_other_quantities(tmp_path, what):
+    columns, readings = READ[what]
+    file = tmp_path / "other.toml"
+    line = f'[line]\nkind = "text"\ncolumns = ["sequence", "time_us", {columns}]\n[readings]\n'
+    file.write_text(HEAD + line + readings)
+    scene = replace(load_scene("off-centre"), rate=100.0)
+    with board(file, scene) as port, closing(open_source(described_source(file, port))) as source:
+        frames = frames_of(source, 20)
+        pipeline = Pipeline(source.sensor, Setup(Ni=4, Nj=4))
+        estimates = [pipeline(frame) for frame in frames]
+
+    assert source.accounting().balanced
+    np.testing.assert_allclose(estimates[-1].contact.position, [0.02, 0.08], atol=4e-3)
 
 
 def test_a_simulated_skin_has_no_description(tmp_path):
