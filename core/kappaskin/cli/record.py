@@ -101,6 +101,9 @@ def record(
         show(f"{written.lost:,} messages were not recorded: the disk is too slow")
     if slope:
         _warn(slope_warning(slope))
+    for event in status.events:
+        if event.kind == "noise":
+            _warn(event.text)
     gone = status.message if status.state == LOST else ""
     for why in filter(None, (written.trouble, status.refusal, gone)):
         show(f"kappaskin: {why}", error=True)

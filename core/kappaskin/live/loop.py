@@ -21,6 +21,7 @@ from kappaskin.frames import Event, Frame
 from kappaskin.live.pipelines import (
     ComparedPipeline,
     LiveHealthMonitor,
+    NoiseCheck,
     PipelineHost,
     PipelineStatus,
 )
@@ -51,7 +52,7 @@ class EngineLoop:
     def __init__(self, requests: RequestReceiver, ring: Ring, compared: Ring) -> None:
         self._requests, self._ring = requests, ring
         self._source: Source | None = None
-        self._health = LiveHealthMonitor()
+        self._health, self._noise = LiveHealthMonitor(), NoiseCheck()
         self._place = np.full(2, math.nan)  # of the last contact, in m
         self._status: Status = ring.read_status() or Status()
         self._recorder = LiveRecorder(self._status.recording)
@@ -346,6 +347,9 @@ class EngineLoop:
         if source is not None:
             pipeline = self._main.pipeline
             watch, fit = (pipeline.drift, pipeline.fitted) if pipeline else (None, None)
+            if fit and (doubt := self._noise(fit)):
+                self._add_event(Event(now, "noise", doubt))
+                status = self._status
             status = replace(
                 status,
                 accounting=source.accounting(),

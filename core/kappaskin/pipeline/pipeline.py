@@ -119,6 +119,7 @@ class Pipeline:
         self.basis = basis_for(sensor.layout.patch, edge, setup.Ni, across)
         layout, rim_sd = sensor.layout, setup.rim_sd
         self.fit = estimator_for(setup.method, self.basis, layout, sensor.sigma, rim_sd)
+        self._told = sensor.noise
         self._read_at = sensor.scan().times  # of the first, the second ... channel of a scan
         self._whole = self.fit.at_rest()
         loosest = _LOOSE * float(np.linalg.norm(self._whole.unit_sd))
@@ -210,10 +211,9 @@ class Pipeline:
 
     def _as_told(self, fit: Fit) -> Fit:
         """The fit with the noise that the sensor tells, if it does."""
-        told = self.sensor.noise
-        if math.isnan(told):
+        if math.isnan(self._told):
             return fit
-        return replace(fit, known_noise=np.array(told), weights=np.array(1 / told))
+        return replace(fit, known_noise=np.array(self._told), weights=np.array(1 / self._told))
 
     def _fitted(self, frame: Frame, curvature: Array, held: Array) -> Fit:
         try:

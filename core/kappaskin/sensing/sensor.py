@@ -128,7 +128,7 @@ class Sensor:
         told = {noise for _, noise in self.transduction.noise}
         return told.pop() if len(told) == 1 and self.sigma is None and all(told) else math.nan
 
-    @cached_property
+    @property
     def sigma(self) -> Array | None:
         """Standard deviation of each reading, by the frame's shape, where they differ in unit.
 

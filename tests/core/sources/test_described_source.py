@@ -16,9 +16,12 @@ from kappaskin.cli import of_sensor
 from kappaskin.errors import SourceError
 from kappaskin.live import Engine
 from kappaskin.recording import Verification
+from kappaskin.frames import Frame
+from kappaskin.live.pipelines import NoiseCheck
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
 from kappaskin.sources import PseudoDevice, described_source, load_description, open_source
+from kappaskin.sources.description import description_of
 
 pytestmark = [
     pytest.mark.slow,
@@ -182,7 +185,7 @@ def test_an_unplugged_board_is_back_when_it_is_plugged_in(tmp_path):
 def test_a_scene_on_another_skin_is_refused(tmp_path):
     file = written(tmp_path, "text")
     file.write_text(file.read_text().replace("[0.1, 0.1]", "[0.1, 0.08]"))
-    with pytest.raises(Refusal, match="0.1 x 0.08 m, got one on a .* of 0.1 x 0.1 m"):
+    with pytest.raises(Refusal, match=r"0.1 x 0.08 m, got one on a .* of 0.1 x 0.1 m"):
         PseudoDevice(load_scene("off-centre"), description=load_description(file))
 
 
@@ -217,6 +220,39 @@ def test_any_scene_plays_a_board_that_reads_other_quantities(tmp_path, what):
 def test_a_simulated_skin_has_no_description(tmp_path):
     with pytest.raises(Refusal, match="a port or URL with --sensor, got sim:"):
         of_sensor("sim:", written(tmp_path, "text"))
+
+
+def scattered(noise, told):
+    """50 fits to readings of such a noise in 1/m, of a sensor that tells another or none."""
+    readings = f"[readings]\nnoise = {told}\n" if told else ""
+    found = description_of(HEAD + LINES["json"] + readings, "board.toml")
+    pipeline, rng = Pipeline(found.sensor, Setup(Ni=4, Nj=4)), np.random.default_rng(3)
+    lines, told = found.decoder(whole=True), []
+    for n in range(50):
+        (record,) = lines.feed(lines.encoded(n, n / 100, rng.normal(0, noise, 108)))
+        at = record.time
+        pipeline(Frame(record.sequence, at, at, record.channels, record.counts, None, at, 0.0))
+        told.append(pipeline.fitted)
+    return told
+
+
+def test_a_noise_that_is_told_is_that_of_the_error_bars():
+    told, estimated = scattered(0.2, told=0.2), scattered(0.2, told=None)
+
+    assert {float(fit.noise) for fit in told} == {0.2}
+    np.testing.assert_allclose(told[0].sd, estimated[0].sd * 0.2 / estimated[0].noise)
+
+
+@pytest.mark.parametrize(("told", "words"), [(0.2, ""), (0.05, "too small"), (0.9, "too large")])
+def test_a_noise_that_is_told_wrong_is_said_once(told, words):
+    check = NoiseCheck()
+    said = [text for fit in scattered(0.2, told) for text in (check(fit), check(fit)) if text]
+
+    assert [words in text for text in said] == [True] * bool(words)
+
+
+def test_a_noise_that_is_not_told_is_not_judged():
+    assert not any(map(NoiseCheck(), scattered(0.2, told=None)))
 
 
 def test_a_name_without_a_port_is_refused(tmp_path):
