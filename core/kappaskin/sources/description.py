@@ -16,6 +16,7 @@ import numpy as np
 from kappaskin._files import read_file
 from kappaskin._schema import Key, Part, Unit, Within
 from kappaskin._toml import TomlTable, parsed
+from kappaskin._toml import table as toml_table
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Indices
 from kappaskin.scenes import read_elements, read_skin
@@ -164,6 +165,13 @@ READINGS = Part(
             default="fixed",
             choices=(("fixed", "Fixed"), ("free", "Free")),
         ),
+        "calibration": Key(
+            "Calibration",
+            "In `[readings]` alone: file of a calibration of this sensor, whose gains and offsets "
+            "are taken off the readings after scale and offset.",
+            kind=str,
+            default="",
+        ),
     },
 )
 
@@ -229,7 +237,37 @@ def load_description(file: Path, serial_number: str = "") -> Description:
         text = read_file(file, _LARGEST).decode("utf-8-sig")
     except (OSError, ValueError) as error:
         raise Refusal(f"{file}: cannot be read as a sensor's description ({error})") from error
-    return description_of(text.replace("\r\n", "\n"), str(file), serial_number)
+    return description_of(
+        _with_calibration(text.replace("\r\n", "\n"), file), str(file), serial_number
+    )
+
+
+# Recordings keep the text of a description, and need no other file: so the gains and offsets of the
+# calibration that it names are put behind it.
+_CALIBRATION = "\n[calibration]  # as it was in its file\n"
+
+
+def _with_calibration(text: str, file: Path) -> str:
+    table = TomlTable(parsed(text, file), text, str(file)).table("readings")
+    if not (name := READINGS.value(table, "calibration")):
+        return text
+    path = file.parent / name
+    try:
+        found = tomllib.loads(read_file(path, _LARGEST).decode())
+        device, each = found["device"], found["line"]
+        values = {key: device[key] for key in ("name", "serial_number")}
+        values |= {key: each[key] for key in ("gain", "offset")}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise table.refusal(
+            f"{path}: cannot be read as a calibration ({error})", "calibration"
+        ) from error
+    if loops := [name for name in ("hysteresis", "creep") if name in found]:
+        raise table.refusal(
+            f"{path} corrects {loops[0]}, which depends on the past; expected gains and offsets "
+            "alone: leave it out here, and load that file in the window",
+            "calibration",
+        )
+    return f"{text}{toml_table(_CALIBRATION.rstrip(), values)}"
 
 
 @lru_cache(8)
@@ -253,6 +291,8 @@ def description_of(text: str, name: str, serial_number: str = "") -> Description
     with line.blamed("fields" if kind == "json" else "columns"):
         layout, columns = _columns(names, layout, readings)
     own = LINE.value(line, "id") or serial_number or hashlib.sha256(text.encode()).hexdigest()[:12]
+    if readings.calibration:
+        layout, columns = _calibrated(layout, columns, top.table("calibration"), own)
     title = TOP.value(top, "title", default=Path(name).name.removesuffix(SUFFIX))
     sensor = Sensor(
         layout,
@@ -331,6 +371,29 @@ def _numbers_of(elements: int, shape: tuple[int, int] | None) -> list[int]:
     return np.arange(elements).reshape(shape[1], shape[0]).T.ravel().tolist()
 
 
+def _calibrated(
+    layout: SensorLayout, columns: Columns, table: TomlTable, own: str
+) -> tuple[SensorLayout, Columns]:
+    """The same of a calibrated sensor: reading = offset + gain times what is read."""
+    name, of = table.get("name", str), table.get("serial_number", str)
+    if of != own:
+        raise table.refusal(
+            f"expected a calibration of this sensor, {own}, got one of {name} {of}; give id in "
+            "[line] before you calibrate it, as this file is another with every change"
+        )
+    gain, offset = (np.array(table.get(key, tuple[float, ...])) for key in ("gain", "offset"))
+    table.done()
+    if not len(gain) == len(offset) == layout.channels:
+        raise table.refusal(
+            f"expected {layout.channels} gains and offsets, got {len(gain)} and {len(offset)}; "
+            "calibrate the sensor again"
+        )
+    live = layout.live & np.isfinite(gain).reshape(layout.frame_shape)
+    gain = np.where(np.isfinite(gain) & (gain != 0), gain, 1.0)[columns.channels]
+    scale, zero = columns.scale / gain, (columns.offset - offset[columns.channels]) / gain
+    return replace(layout, live=live), replace(columns, scale=scale, offset=zero)
+
+
 class _Conversion:
     """What [readings] says of each column: in the table of its quantity, else for all."""
 
@@ -338,6 +401,7 @@ class _Conversion:
         self._table = table
         self._own = {name: table.table(name) for name in _TABLES if name in table}
         self._used = set[str]()
+        self.calibration: str = READINGS.value(table, "calibration")
 
     def of(self, what: str, key: str) -> Any:
         """The value of a `key` for readings such as xx or slope@30."""

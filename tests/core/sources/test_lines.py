@@ -4,6 +4,8 @@ import json
 import math
 import struct
 import zlib
+from dataclasses import replace
+from datetime import UTC, datetime
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Refusal
+from kappaskin.calibration import Calibration
 from kappaskin.sources import load_description
 from kappaskin.sources.description import description_of
 from kappaskin.sources.wire import Samples
@@ -430,6 +433,55 @@ def test_one_noise_of_all_readings_is_that_of_the_sensor():
     assert described(curved).sensor.layout.reads is None
     assert math.isnan(described(curved).sensor.noise)
     assert described(curved + "noise = 0.2").sensor.noise == 0.2
+
+
+def calibrated(folder, text, **changed):
+    """The description in a file, with a calibration of it, of gain 2, offset 1, and one failed."""
+    file = folder / "board.toml"
+    file.write_text(text)
+    sensor = load_description(file).sensor
+    C = sensor.channels
+    made = Calibration.nominal(sensor, datetime.now(UTC))
+    gain, zero = np.where(np.arange(C) == 3, np.nan, 2.0), np.ones(C)
+    failed = replace(made, gain=gain, offset=zero, failures=((3, "noisy"),), **changed)
+    failed.save(folder / "bench.toml")
+    file.write_text(text.replace("[readings]", '[readings]\ncalibration = "bench.toml"'))
+    return file
+
+
+CURVED = TEXT.replace('"xy:2"', '"yy:0..5", "xy:0..5"').replace("[line]", '[line]\nid = "bench"')
+
+
+def test_a_calibration_is_taken_off_the_readings(tmp_path):
+    found = load_description(calibrated(tmp_path, SKIN + CURVED))
+    line = ",".join(["0", "0", *["3"] * 18]).encode() + b"\n"
+    (samples,) = found.decoder(whole=True).feed(line)
+
+    # scale 0.5 and offset 1: 2.5, less 1, by 2
+    told = found.sensor.transduction.curvature(samples.counts)[samples.channels != 3]
+    assert told.tolist() == [0.75] * 17
+    assert np.flatnonzero(~found.sensor.layout.live.ravel()).tolist() == [3]
+
+
+def test_a_description_keeps_the_calibration_that_it_names(tmp_path):
+    found = load_description(calibrated(tmp_path, SKIN + CURVED))
+    (tmp_path / "bench.toml").unlink()
+
+    again = description_of(found.text, "board.toml")
+
+    np.testing.assert_array_equal(again.columns.scale, found.columns.scale)
+
+
+def test_a_calibration_of_another_sensor_or_none_is_refused(tmp_path):
+    file = calibrated(tmp_path, SKIN + CURVED.replace('id = "bench"', ""))
+    with pytest.raises(Refusal, match="give id in"):
+        load_description(file)
+    (tmp_path / "bench.toml").write_text("gain = 3")
+    with pytest.raises(Refusal, match="cannot be read as a calibration"):
+        load_description(file)
+    (tmp_path / "bench.toml").unlink()
+    with pytest.raises(Refusal, match="cannot be read as a calibration"):
+        load_description(file)
 
 
 def test_dead_elements_are_dead_in_any_reading():
