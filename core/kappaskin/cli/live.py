@@ -10,6 +10,7 @@ from cyclopts import Parameter
 from kappaskin.cli.common import (
     FAILED,
     Described,
+    SourceName,
     Switch,
     Whole,
     check_time,
@@ -34,7 +35,7 @@ Perhaps = Annotated[list[str] | None, Parameter(negative="", consume_multiple=Tr
 
 
 def publish(
-    source: str,
+    source: SourceName,
     *,
     udp: Many = None,
     foxglove: Perhaps = None,
@@ -93,7 +94,7 @@ def publish(
         engine.publish(targets, allow_origin or ())
         engine.connect(source, trust)
         status = _watched(engine, time.monotonic() + seconds, stopped)
-    if status.state == LOST:
+    if status.state == LOST and not status.ended:
         show(f"kappaskin: {status.message}", error=True)
         return FAILED
     return FAILED if math.isnan(status.publishing.latency.whole) else 0
@@ -106,7 +107,7 @@ def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
     printed, line, slope = time.monotonic(), "", 0.0
     noticed = set[str]()
     status = engine.status()
-    while not stopped and time.monotonic() < end:
+    while not (stopped or status.ended) and time.monotonic() < end:
         time.sleep(_POLL)
         engine.revive()
         status = engine.status()

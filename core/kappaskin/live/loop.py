@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from kappaskin._processes import ProcessPriority
-from kappaskin.errors import Refusal, SourceError
+from kappaskin.errors import EndedSource, Refusal, SourceError
 from kappaskin.frames import Event, Frame
 from kappaskin.live.pipelines import (
     ComparedPipeline,
@@ -242,7 +242,7 @@ class EngineLoop:
         try:
             frames = source.read(_READ)
         except Refusal as error:  # a scene that leaves its skin, a file that is gone
-            self._lose(str(error))
+            self._lose(str(error), isinstance(error, EndedSource))
             return
         self._follow(source)
         self._arrivals.read(frames)
@@ -252,12 +252,13 @@ class EngineLoop:
         for frame in frames:
             self._check_health(frame)
 
-    def _lose(self, message: str) -> None:
-        """Close a source that failed."""
+    def _lose(self, message: str, ended: bool = False) -> None:
+        """Close a source that failed, or `ended`."""
         if self._source is not None:
             self._status = replace(self._status, accounting=self._source.accounting())
         self._close()
-        self._status = replace(self._status, state=LOST, message=message, rate=0.0, replay=None)
+        lost = {"state": LOST, "message": message, "ended": ended}
+        self._status = replace(self._status, **lost, rate=0.0, replay=None)
         self._report()
 
     def _compute(self, frames: list[Frame], pipeline: Pipeline) -> None:

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from types import NoneType
-from typing import Any, cast
+from typing import Any, BinaryIO, cast
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Indices
 from kappaskin.sensing import DigitalReadings
 from kappaskin.sources.decoder import SEQUENCES, Accounting, SequenceCounter
-from kappaskin.sources.wire import Message, Samples
+from kappaskin.sources.wire import Samples
 
 TIMES = {"time": 1.0, "time_ms": 1e-3, "time_us": 1e-6}
 """Columns of time, with their unit in s."""
@@ -27,7 +27,7 @@ TIMES = {"time": 1.0, "time_ms": 1e-3, "time_us": 1e-6}
 SEPARATORS = (",", ";", "\t", " ")
 """Separators that are recognised, in this order; a space stands for any number of them."""
 
-_LONGEST = 2**16  # bytes of a line
+_LONGEST, _NUMBER = 2**16, 32  # bytes of a line, and for each number where there are many
 _SHOWN = 60  # characters of a line that was discarded
 
 
@@ -80,7 +80,7 @@ class LineDecoder(ABC):
         self._discarded: Counter[str] = Counter()
         self._buffer = b""
 
-    def feed(self, data: bytes) -> list[Message]:
+    def feed(self, data: bytes) -> list[Samples]:
         """The new frames in order, duplicates left out."""
         self._bytes_in += len(data)
         self._buffer += data
@@ -97,6 +97,19 @@ class LineDecoder(ABC):
     @abstractmethod
     def _records(self) -> Iterator[Samples]:
         """The records in the buffer, which are taken off it."""
+
+    @abstractmethod
+    def next_of(self, file: BinaryIO) -> bytes:
+        """The next bytes of a file, with one record at most; none at its end."""
+
+    @abstractmethod
+    def whole(self, datagram: bytes) -> bytes:
+        """What to feed of a `datagram`, whose records do not go on in the next."""
+
+    @property
+    def timed(self) -> bool:
+        """Whether records tell the time."""
+        return self._columns.time >= 0
 
     @property
     def held(self) -> bytes:
@@ -159,7 +172,7 @@ class _Lines(LineDecoder):
     def __init__(self, columns: Columns, whole: bool = False) -> None:
         super().__init__(columns)
         # Of the first line the beginning may be missing, and what is left of it look like a line.
-        self._whole = whole
+        self._whole, self._longest = whole, max(_LONGEST, _NUMBER * len(columns))
 
     @abstractmethod
     def _numbers(self, line: bytes) -> Array | str:
@@ -167,7 +180,7 @@ class _Lines(LineDecoder):
 
     def _records(self) -> Iterator[Samples]:
         *lines, self._buffer = self._buffer.split(b"\n")
-        if len(self._buffer) > _LONGEST:
+        if len(self._buffer) > self._longest:
             self._discard("too long", self._buffer)
             self._buffer, self._whole = b"", False
         for line in lines:
@@ -183,6 +196,12 @@ class _Lines(LineDecoder):
                 self._discard("time or sequence", line + b"\n")
             else:
                 yield self._samples(found, size)
+
+    def next_of(self, file: BinaryIO) -> bytes:
+        return file.readline(self._longest)
+
+    def whole(self, datagram: bytes) -> bytes:
+        return datagram if datagram.endswith(b"\n") else datagram + b"\n"
 
     @property
     def held(self) -> bytes:
@@ -368,6 +387,16 @@ class BinaryDecoder(LineDecoder):
         body = self._body.pack(*values)
         check = self._check.pack(self._sum(body)) if self._check.size else b""
         return self._sync + body + check
+
+    def next_of(self, file: BinaryIO) -> bytes:
+        return file.read(self._size)
+
+    def whole(self, datagram: bytes) -> bytes:
+        if not len(datagram) % self._size:
+            return datagram
+        self._bytes_in += len(datagram)
+        self._discard("no whole number of records", datagram)
+        return b""
 
     def _records(self) -> Iterator[Samples]:
         data, at, sync = self._buffer, 0, self._sync

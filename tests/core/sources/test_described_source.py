@@ -14,10 +14,10 @@ import pytest
 from kappaskin import Pipeline, Refusal, Setup, load_scene
 from kappaskin.cli import of_sensor
 from kappaskin.errors import SourceError
-from kappaskin.live import Engine
-from kappaskin.recording import Verification
 from kappaskin.frames import Frame
+from kappaskin.live import Engine
 from kappaskin.live.pipelines import NoiseCheck
+from kappaskin.recording import Verification
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
 from kappaskin.sources import PseudoDevice, described_source, load_description, open_source
