@@ -517,3 +517,16 @@ def test_the_identifier_is_the_given_one_else_the_ports_else_of_the_text():
     first, second = (description_of(t, "x").sensor.serial_number for t in (text, text + "# a\n"))
     assert first != second
     assert math.isfinite(int(first, 16))
+
+
+def test_json_and_binary_records_may_have_any_readings():
+    json_line = '[line]\nkind = "json"\nfields = { "cam.h" = "height:0..2", tilt = "slope@30:4" }\n'
+    binary = '[line]\nkind = "binary"\nstruct = "<4h"\ncolumns = ["height:0..2", "slope@30:4"]\n'
+    noise = "[readings.height]\nnoise = 1e-5\nscale = 1e-3\n[readings.slope]\nnoise = 1e-3\n"
+    record = b'{"cam": {"h": [1, 2, null]}, "tilt": -4}\n'
+
+    (told,) = decoder(json_line + noise).feed(record)
+    (packed,) = decoder(binary + noise).feed(struct.pack("<4h", 1, 2, 3, -4))
+
+    np.testing.assert_allclose(readings(told, json_line + noise), [1e-3, 2e-3, np.nan, -4])
+    np.testing.assert_allclose(readings(packed, binary + noise), [1e-3, 2e-3, 3e-3, -4])
