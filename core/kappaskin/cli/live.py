@@ -116,7 +116,9 @@ def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
         for target in status.publishing.targets:
             if target.refusal:
                 raise Refusal(target.refusal)
-        _print_notices(status.publishing.targets, noticed)
+        told = [(one.target, notice) for one in status.publishing.targets for notice in one.notices]
+        told += [("noise", event.text) for event in status.events if event.kind == "noise"]
+        _print_notices(told, noticed)
         if status.slope > _STEEPER * slope:
             slope = status.slope
             show(f"kappaskin: {slope_warning(slope)}", error=True)
@@ -128,14 +130,13 @@ def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
     return status
 
 
-def _print_notices(targets: "tuple[TargetStatus, ...]", printed: set[str]) -> None:
-    """Print notices that have not been `printed` on standard error."""
-    for target in targets:
-        for notice in target.notices:
-            text = f"kappaskin: {target.target}: {notice}"
-            if text not in printed:
-                printed.add(text)
-                show(text, error=True)
+def _print_notices(notices: list[tuple[str, str]], printed: set[str]) -> None:
+    """Print what is said of something, unless it is `printed` already, on standard error."""
+    for of, notice in notices:
+        text = f"kappaskin: {of}: {notice}"
+        if text not in printed:
+            printed.add(text)
+            show(text, error=True)
 
 
 def _line(status: "Status") -> str:
