@@ -279,7 +279,10 @@ def description_of(text: str, name: str, serial_number: str = "") -> Description
     top = TomlTable(parsed(text, Path(name)), text, name)
     if (version := TOP.value(top, "format")) != FORMAT:
         raise top.refusal(f"expected format = {FORMAT}, got {version}", "format")
-    plate, edge = read_skin(top.table("skin"))
+    skin = top.table("skin")
+    plate, edge = read_skin(skin)
+    # Where nobody says how stiff the skin is, the rigidity of the default skin says nothing either.
+    plate = replace(plate, unknown_material=plate.unknown_material or "rigidity" not in skin)
     elements = top.table("elements")
     if "reads" in elements:
         raise elements.refusal("expected none: the columns tell what is read", "reads")

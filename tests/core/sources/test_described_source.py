@@ -255,6 +255,24 @@ def test_a_noise_that_is_not_told_is_not_judged():
     assert not any(map(NoiseCheck(), scattered(0.2, told=None)))
 
 
+@pytest.mark.parametrize("what", ["heights", "curvatures"])
+def test_without_a_rigidity_no_force_is_told(tmp_path, what):
+    columns, readings = READ[what]
+    line = f'[line]\nkind = "text"\ncolumns = ["sequence", "time_us", {columns}]\n[readings]\n'
+    file = tmp_path / "gel.toml"
+    file.write_text(HEAD.replace("rigidity = 3.7e-3\n", "") + line + readings)
+    scene = replace(load_scene("off-centre"), rate=100.0)
+    with board(file, scene) as port, closing(open_source(described_source(file, port))) as source:
+        frames = frames_of(source, 20)
+        pipeline = Pipeline(source.sensor, Setup(Ni=4, Nj=4))
+        contacts = [pipeline(frame).contact for frame in frames]
+
+    assert source.sensor.plate.unknown_material
+    assert contacts[-1].present
+    np.testing.assert_allclose(contacts[-1].position, [0.02, 0.08], atol=15e-3)
+    assert all(np.isnan(contact.force) for contact in contacts)
+
+
 def test_a_name_without_a_port_is_refused(tmp_path):
     with pytest.raises(SourceError, match="sensor:FILE"):
         open_source(f"sensor:{written(tmp_path, 'text')}")
