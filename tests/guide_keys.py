@@ -45,7 +45,7 @@ _OWN_OPENING = """
 _OWN_PLACES = {
     "At the top": TOP,
     "`[line]`": LINE,
-    "`[readings]`, or `[readings.xx]` ...": READINGS,
+    "`[readings]`, or `[readings.height]` ...": READINGS,
 }
 _WORDS = {float: "number", int: "whole number", str: "text", bool: "true or false"}
 

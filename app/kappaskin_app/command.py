@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cyclopts import App
 
-from kappaskin.cli import Described, Limit, Switch, allow, check_output, of_sensor
+from kappaskin.cli import Described, Limit, SourceName, Switch, allow, check_output, of_sensor
 from kappaskin.errors import Refusal, lacking
 
 app = App(name="app", help_format="markdown")
@@ -51,7 +51,7 @@ def run(
     file: Path | None = None,
     /,
     *,
-    source: str = "sim:",
+    source: SourceName = "sim:",
     seconds: float | None = None,
     screenshot: Path | None = None,
     limit: Limit = "",

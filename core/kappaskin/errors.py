@@ -19,6 +19,10 @@ class SourceError(Refusal):
     """A source cannot be opened, stopped answering, or speaks something else."""
 
 
+class EndedSource(Refusal):
+    """A source has come to its end: a file, or standard input."""
+
+
 class Damaged(Refusal):
     """A file is not whole, and a repair may save what is."""
 

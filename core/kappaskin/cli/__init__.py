@@ -14,6 +14,7 @@ from kappaskin.cli.common import FAILED as FAILED
 from kappaskin.cli.common import REFUSED as REFUSED
 from kappaskin.cli.common import Described as Described
 from kappaskin.cli.common import Limit as Limit
+from kappaskin.cli.common import SourceName as SourceName
 from kappaskin.cli.common import Switch as Switch
 from kappaskin.cli.common import allow as allow
 from kappaskin.cli.common import check_output as check_output

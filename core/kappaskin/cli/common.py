@@ -38,9 +38,23 @@ Limit = Annotated[
 
 Described = Annotated[
     Path | None,
-    Parameter(help="TOML file that describes a sensor with a line format of its own."),
+    Parameter(
+        help="TOML file that describes a sensor with a line format of its own; the source may then "
+        "also be udp://:PORT, - for standard input, or a file to play."
+    ),
 ]
 """An option for `of_sensor`."""
+
+
+def _source(_: type, tokens: Sequence[Token]) -> str:
+    name = tokens[0].value
+    if name.startswith("-") and name != "-":
+        raise ValueError(f"expected a source, or - for standard input, got the option {name}")
+    return name
+
+
+SourceName = Annotated[str, Parameter(allow_leading_hyphen=True, converter=_source)]
+"""The name of a source; - is standard input, and no option."""
 
 _UNITS = {"kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12}
 
@@ -84,7 +98,11 @@ def allow(limit: str) -> None:
 def of_sensor(source: str, sensor: Path | None) -> str:
     """The name of `source` where it has the description in the file `sensor`, if there is one."""
     if sensor is None:
+        if source == "-" or source.startswith("udp://"):
+            raise Refusal(f"expected --sensor FILE, which describes the lines of {source}; give it")
         return source
+    if source == "-" and (sys.stdin is None or sys.stdin.closed):
+        raise Refusal("expected a source, but standard input (-) is closed; pipe something to it")
     from kappaskin.sources import described_source, load_description
 
     if source.startswith(("sim:", "replay:")):

@@ -10,6 +10,7 @@ from cyclopts import Parameter
 from kappaskin.cli.common import (
     FAILED,
     Described,
+    SourceName,
     Switch,
     Whole,
     check_time,
@@ -34,7 +35,7 @@ Perhaps = Annotated[list[str] | None, Parameter(negative="", consume_multiple=Tr
 
 
 def publish(
-    source: str,
+    source: SourceName,
     *,
     udp: Many = None,
     foxglove: Perhaps = None,
@@ -93,7 +94,7 @@ def publish(
         engine.publish(targets, allow_origin or ())
         engine.connect(source, trust)
         status = _watched(engine, time.monotonic() + seconds, stopped)
-    if status.state == LOST:
+    if status.state == LOST and not status.ended:
         show(f"kappaskin: {status.message}", error=True)
         return FAILED
     return FAILED if math.isnan(status.publishing.latency.whole) else 0
@@ -106,7 +107,7 @@ def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
     printed, line, slope = time.monotonic(), "", 0.0
     noticed = set[str]()
     status = engine.status()
-    while not stopped and time.monotonic() < end:
+    while not (stopped or status.ended) and time.monotonic() < end:
         time.sleep(_POLL)
         engine.revive()
         status = engine.status()
@@ -115,7 +116,9 @@ def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
         for target in status.publishing.targets:
             if target.refusal:
                 raise Refusal(target.refusal)
-        _print_notices(status.publishing.targets, noticed)
+        told = [(one.target, notice) for one in status.publishing.targets for notice in one.notices]
+        told += [("noise", event.text) for event in status.events if event.kind == "noise"]
+        _print_notices(told, noticed)
         if status.slope > _STEEPER * slope:
             slope = status.slope
             show(f"kappaskin: {slope_warning(slope)}", error=True)
@@ -127,14 +130,13 @@ def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
     return status
 
 
-def _print_notices(targets: "tuple[TargetStatus, ...]", printed: set[str]) -> None:
-    """Print notices that have not been `printed` on standard error."""
-    for target in targets:
-        for notice in target.notices:
-            text = f"kappaskin: {target.target}: {notice}"
-            if text not in printed:
-                printed.add(text)
-                show(text, error=True)
+def _print_notices(notices: list[tuple[str, str]], printed: set[str]) -> None:
+    """Print what is said of something, unless it is `printed` already, on standard error."""
+    for of, notice in notices:
+        text = f"kappaskin: {of}: {notice}"
+        if text not in printed:
+            printed.add(text)
+            show(text, error=True)
 
 
 def _line(status: "Status") -> str:

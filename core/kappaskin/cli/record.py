@@ -15,6 +15,7 @@ from kappaskin.cli.common import (
     Limit,
     Pair,
     ProgressLine,
+    SourceName,
     Switch,
     allow,
     check_output,
@@ -41,7 +42,7 @@ _BEGIN = 10.0  # s within which something must come
 
 
 def record(
-    source: str,
+    source: SourceName,
     out: Path,
     *,
     seconds: float = math.inf,
@@ -53,7 +54,8 @@ def record(
     Records every byte received and every estimate computed from it, to an MCAP file that Foxglove,
     PlotJuggler and the tools of ROS 2 open. It is called OUT.part until it is complete;
     `kappaskin repair` restores an incomplete one. Exit code 1 if the recording ended early, as on a
-    full disk, if no readings arrived, or if the connection was lost in the end.
+    full disk, if no readings arrived, or if the connection was lost in the end. A source that
+    ends, as a file does, ends the recording.
 
     Example: `kappaskin record sim: press.mcap --seconds 10`
 
@@ -101,7 +103,10 @@ def record(
         show(f"{written.lost:,} messages were not recorded: the disk is too slow")
     if slope:
         _warn(slope_warning(slope))
-    gone = status.message if status.state == LOST else ""
+    for event in status.events:
+        if event.kind == "noise":
+            _warn(event.text)
+    gone = status.message if status.state == LOST and not status.ended else ""
     for why in filter(None, (written.trouble, status.refusal, gone)):
         show(f"kappaskin: {why}", error=True)
     failed = written.trouble or status.refusal or gone or written.lost
@@ -139,6 +144,8 @@ def _recorded(
             usual = None
         over = max(written.seconds, now - recording) >= seconds
         if stopped or written.trouble or over:
+            return slope
+        if status.ended and status.accounting.accepted:
             return slope
         if status.state == LOST and not known:
             raise Refusal(status.message)

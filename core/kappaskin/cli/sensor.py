@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from kappaskin.cli.common import (
     FAILED,
     Described,
+    SourceName,
     Switch,
     check_output,
     check_time,
@@ -60,7 +61,7 @@ def _report(text: str) -> None:
 
 
 def calibrate(
-    source: str,
+    source: SourceName,
     *,
     out: Path,
     radii: str | None = None,
@@ -114,6 +115,8 @@ def calibrate(
     from kappaskin.recording import ReplayedSource as ReplayedSource  # registers replay:
 
     check_output(out, source.removeprefix("sim:"), *filter(None, [sensor]))
+    if source == "-" and dwell is None:
+        raise Refusal("expected --dwell: standard input is the sensor, and cannot answer; give it")
     source = of_sensor(source, sensor)
     Calibration.check_writable(out)
     if weights is not None:
@@ -173,7 +176,7 @@ _READ = 0.05  # s that one read may wait
 
 
 def tare(
-    source: str, *, undo: Switch = False, sensor: Described = None, trust: Switch = False
+    source: SourceName, *, undo: Switch = False, sensor: Described = None, trust: Switch = False
 ) -> None:
     """Tare a sensor: take its readings at rest as its zero.
 
@@ -318,7 +321,9 @@ def press(
 _WAIT = 0.1  # s
 
 
-def monitor(port: str, *, seconds: float = math.inf, reset: Switch = False) -> int:
+def monitor(
+    port: SourceName, *, seconds: float = math.inf, reset: Switch = False, sensor: Described = None
+) -> int:
     """Print the messages of a device as readable lines, for bring-up.
 
     Every message with its sequence number, time and content (of scans, ten a second), every gap and
@@ -336,19 +341,25 @@ def monitor(port: str, *, seconds: float = math.inf, reset: Switch = False) -> i
     reset
         Pulse DTR and RTS first, which resets many boards.
     """
-    from kappaskin.sources import WireMonitor
+    from kappaskin.sources import WireMonitor, load_description, parts_of
 
     check_time(seconds, "listen")
+    file, url = parts_of(of_sensor(port, sensor))
+    described = load_description(Path(file)) if file else None
     stopped = stops()
     end = time.monotonic() + seconds
-    with closing(WireMonitor(port)) as listening:
+    with closing(WireMonitor(url or port, description=described)) as listening:
         if reset:
             listening.reset()
         while not (stopped or listening.lost) and time.monotonic() < end:
             for line in listening.read(_WAIT):
                 show(line)
     show(listening.summary())
-    return FAILED if listening.lost or not listening.accounting().accepted else 0
+    return (
+        FAILED
+        if (listening.lost and not listening.ended) or not listening.accounting().accepted
+        else 0
+    )
 
 
 def device(

@@ -16,6 +16,7 @@ from kappaskin.estimation.fit import Fit as Fit
 from kappaskin.estimation.fit import Uncertainty as Uncertainty
 from kappaskin.estimation.fit import power_of_two as power_of_two
 from kappaskin.estimation.fit import propagated_covariance as propagated_covariance
+from kappaskin.estimation.fit import sigma_warning as sigma_warning
 from kappaskin.estimation.fit import slope_warning as slope_warning
 from kappaskin.estimation.least_squares import AsPrinted, Direct
 from kappaskin.estimation.least_squares import FiniteSlopeLeastSquares as FiniteSlopeLeastSquares

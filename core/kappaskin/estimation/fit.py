@@ -194,7 +194,8 @@ class Fit:
     (...) in 1/m is the noise where the estimator knows it. An iteration took `steps` (...); where
     it has not `converged` (...), the result is that of least squares. `suspect` (..., P) says which
     elements were excluded and why, as numbers in `FAULTS`; None where the estimator excludes none.
-    `weights` (T, 3 P) in m are 1 / sigma of each frame, None where they are the estimator's.
+    `weights` (T, 3 P) in m, or one number, are 1 / sigma of each frame, None where they are the
+    estimator's.
     """
 
     estimator: "Estimator"
@@ -327,9 +328,10 @@ class Fit:
         And where none was given, or the estimator has a memory, whose residuals it decides itself.
         Of one frame, or of all of them together.
         """
-        if self.estimator.sigma is None or self.estimator.has_memory or not self.readings.size:
-            return 1.0
         estimator, layout = self.estimator, self.estimator.layout
+        given = estimator.sigma is not None or self.weights is not None
+        if not given or estimator.has_memory or not self.readings.size:
+            return 1.0
         weight = estimator.weight if self.weights is None else self.weights
         residual, read = (
             np.atleast_2d(estimator.flattened(each.astype(float))) * weight

@@ -16,11 +16,12 @@ from pathlib import Path
 import numpy as np
 
 from kappaskin._processes import ProcessPriority
-from kappaskin.errors import Refusal, SourceError
+from kappaskin.errors import EndedSource, Refusal, SourceError
 from kappaskin.frames import Event, Frame
 from kappaskin.live.pipelines import (
     ComparedPipeline,
     LiveHealthMonitor,
+    NoiseCheck,
     PipelineHost,
     PipelineStatus,
 )
@@ -51,7 +52,7 @@ class EngineLoop:
     def __init__(self, requests: RequestReceiver, ring: Ring, compared: Ring) -> None:
         self._requests, self._ring = requests, ring
         self._source: Source | None = None
-        self._health = LiveHealthMonitor()
+        self._health, self._noise = LiveHealthMonitor(), NoiseCheck()
         self._place = np.full(2, math.nan)  # of the last contact, in m
         self._status: Status = ring.read_status() or Status()
         self._recorder = LiveRecorder(self._status.recording)
@@ -241,7 +242,7 @@ class EngineLoop:
         try:
             frames = source.read(_READ)
         except Refusal as error:  # a scene that leaves its skin, a file that is gone
-            self._lose(str(error))
+            self._lose(str(error), isinstance(error, EndedSource))
             return
         self._follow(source)
         self._arrivals.read(frames)
@@ -251,12 +252,13 @@ class EngineLoop:
         for frame in frames:
             self._check_health(frame)
 
-    def _lose(self, message: str) -> None:
-        """Close a source that failed."""
+    def _lose(self, message: str, ended: bool = False) -> None:
+        """Close a source that failed, or `ended`."""
         if self._source is not None:
             self._status = replace(self._status, accounting=self._source.accounting())
         self._close()
-        self._status = replace(self._status, state=LOST, message=message, rate=0.0, replay=None)
+        lost = {"state": LOST, "message": message, "ended": ended}
+        self._status = replace(self._status, **lost, rate=0.0, replay=None)
         self._report()
 
     def _compute(self, frames: list[Frame], pipeline: Pipeline) -> None:
@@ -346,6 +348,9 @@ class EngineLoop:
         if source is not None:
             pipeline = self._main.pipeline
             watch, fit = (pipeline.drift, pipeline.fitted) if pipeline else (None, None)
+            if fit and (doubt := self._noise(fit)):
+                self._add_event(Event(now, "noise", doubt))
+                status = self._status
             status = replace(
                 status,
                 accounting=source.accounting(),

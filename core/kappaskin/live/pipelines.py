@@ -1,12 +1,14 @@
 """Pipelines of the engine, built in the background, and the faulty channels they exclude."""
 
 import math
+from collections import deque
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from kappaskin.errors import Refusal
+from kappaskin.estimation import Fit, sigma_warning
 from kappaskin.frames import Array, Frame
 from kappaskin.health import FaultCodes, Health, HealthMonitor
 from kappaskin.live.ring import Ring, slot_type
@@ -109,6 +111,32 @@ class PipelineHost:
             return False
         self.excluded = monitor.kinds.copy(), monitor.badness.copy()
         return True
+
+
+_JUDGED = 50  # fits by which a noise is judged
+
+
+class NoiseCheck:
+    """Says once of each estimator that the readings scatter other than the sensor tells."""
+
+    def __init__(self) -> None:
+        self._last: Fit | None = None
+        self._ratios, self._said = deque[float](maxlen=_JUDGED), False
+
+    def __call__(self, fit: Fit) -> str:
+        """What to say, now that there is this `fit`; mostly nothing."""
+        if fit is self._last:
+            return ""
+        if self._last is None or fit.estimator is not self._last.estimator:
+            self._ratios.clear()
+            self._said = False
+        self._last = fit
+        self._ratios.append(fit.sigma_ratio)
+        if self._said or len(self._ratios) < _JUDGED:
+            return ""
+        text = sigma_warning(float(np.median(self._ratios)))
+        self._said = bool(text)
+        return text
 
 
 @dataclass(frozen=True, eq=False)

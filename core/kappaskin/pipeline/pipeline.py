@@ -119,6 +119,7 @@ class Pipeline:
         self.basis = basis_for(sensor.layout.patch, edge, setup.Ni, across)
         layout, rim_sd = sensor.layout, setup.rim_sd
         self.fit = estimator_for(setup.method, self.basis, layout, sensor.sigma, rim_sd)
+        self._told = sensor.noise
         self._read_at = sensor.scan().times  # of the first, the second ... channel of a scan
         self._whole = self.fit.at_rest()
         loosest = _LOOSE * float(np.linalg.norm(self._whole.unit_sd))
@@ -208,9 +209,15 @@ class Pipeline:
         times[frame.channels] = frame.device_time + self._read_at[: len(frame.channels)]
         return self.fit.follow(curvature, times.reshape(curvature.shape), held)
 
+    def _as_told(self, fit: Fit) -> Fit:
+        """The fit with the noise that the sensor tells, if it does."""
+        if math.isnan(self._told):
+            return fit
+        return replace(fit, known_noise=np.array(self._told), weights=np.array(1 / self._told))
+
     def _fitted(self, frame: Frame, curvature: Array, held: Array) -> Fit:
         try:
-            fit = self._followed(frame, curvature, held)
+            fit = self._as_told(self._followed(frame, curvature, held))
             if self._is_determined(fit):
                 return fit
         except RankDeficient:
@@ -243,7 +250,7 @@ class Pipeline:
         if math.isfinite(noise):
             contact, second = map(self._bounded, self._contacts(fit.readings, fit))
         if math.isfinite(noise) and (drifted := self._contacts.drift) is not None:
-            fit, drift = drifted.fit, drifted.size
+            fit, drift = self._as_told(drifted.fit), drifted.size
             self.fitted, surface, noise = fit, self._surface(fit.coefficients), float(fit.noise)
         return Estimate(
             self.generation,

@@ -19,7 +19,7 @@ FRAME = "skin"
 """The frame of reference: that of `Patch`, x along the skin, z outward at its middle."""
 
 _WARNING, _INFORMATION = 3, 2
-_GRAVE = ("gap", "gone", "refused", "engine", "other", "restarted")
+_GRAVE = ("gap", "gone", "refused", "engine", "other", "restarted", "noise")
 
 Schema = dict[str, Any]
 

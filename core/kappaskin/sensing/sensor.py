@@ -122,7 +122,13 @@ class Sensor:
             electronics.conversion_time,
         )
 
-    @cached_property
+    @property
+    def noise(self) -> float:
+        """Standard deviation of a reading as it is told, of readings of one unit; else NaN."""
+        told = {noise for _, noise in self.transduction.noise}
+        return told.pop() if len(told) == 1 and self.sigma is None and all(told) else math.nan
+
+    @property
     def sigma(self) -> Array | None:
         """Standard deviation of each reading, by the frame's shape, where they differ in unit.
 

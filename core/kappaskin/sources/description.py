@@ -5,22 +5,28 @@ import json
 import math
 import re
 import tomllib
-from collections import Counter
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
 from kappaskin._files import read_file
 from kappaskin._schema import Key, Part, Unit, Within
 from kappaskin._toml import TomlTable, parsed
+from kappaskin._toml import table as toml_table
 from kappaskin.errors import Refusal
-from kappaskin.frames import COMPONENTS
+from kappaskin.frames import COMPONENTS, Indices
 from kappaskin.scenes import read_elements, read_skin
-from kappaskin.sensing import DigitalReadings, Sensor
+from kappaskin.sensing import (
+    QUANTITIES,
+    DigitalReadings,
+    Sensor,
+    SensorLayout,
+    kind_of_reading,
+)
 from kappaskin.sources.decoder import Decoder
 from kappaskin.sources.lines import (
     CHECKSUMS,
@@ -37,7 +43,11 @@ SUFFIX = ".toml"
 _LARGEST = 2**20  # bytes
 _MOST_COLUMNS = 2**16
 _SEQUENCE = "sequence"
-_READING = re.compile(rf"({'|'.join(COMPONENTS)}):(\d{{1,6}})(?:\.\.(\d{{1,6}}))?")
+_READING = re.compile(r"([^:]{1,40}):(\d{1,6})(?:\.\.(\d{1,6}))?")
+_TABLES = tuple(dict.fromkeys((*COMPONENTS, *QUANTITIES)))  # of [readings]
+_STEPS = {"1/m": 1e-6, "m": 1e-8, "m/m": 1e-8}  # of the counts that stand for readings
+_STEP = 1e-7  # in readings of several units
+_ALIKE = 9  # decimals of directions that are one
 _BAUD = Within(50, 2**24, "baud", whole=True)
 _FACTOR = Within(-1e12, 1e12)
 
@@ -69,7 +79,8 @@ LINE = Part(
             "Columns",
             "What the numbers of a record are, in order: `time` (s), `time_ms`, `time_us`, "
             "`sequence`, an empty text for one that is ignored, or readings such as `xx:4` or "
-            "`xx:0..35` of elements 4, and 0 to 35.",
+            "`height:0..35` of elements 4, and 0 to 35. Readings are `xx`, `yy`, `xy` or `twist`, "
+            "`height`, `slope@DEGREES` and `curvature@DEGREES` along a direction from x.",
             kind=tuple[str, ...],
             default=(),
         ),
@@ -95,6 +106,14 @@ LINE = Part(
             default="none",
             choices=tuple((name, name) for name in CHECKSUMS),
         ),
+        "rate": Key(
+            "Rate",
+            "Of a file without times: records per second.",
+            Unit.same("1/s"),
+            kind=float,
+            default=0.0,
+            limits=Within(1e-3, 1e5, or_zero=True),
+        ),
         "baud": Key(
             "Baud rate",
             "Rate of the serial port; USB ports ignore it.",
@@ -117,19 +136,41 @@ READINGS = Part(
     {
         "scale": Key(
             "Scale",
-            "Reading per unit of the device's number.",
-            Unit.same("1/m"),
+            "Reading per unit of the device's number: in m of heights, m/m of slopes, 1/m of "
+            "curvatures.",
             kind=float,
             default=1.0,
             limits=_FACTOR,
         ),
         "offset": Key(
             "Offset",
-            "Reading where the device sends 0.",
-            Unit.same("1/m"),
+            "Reading where the device sends 0, in the same unit.",
             kind=float,
             default=0.0,
             limits=_FACTOR,
+        ),
+        "noise": Key(
+            "Noise",
+            "Standard deviation of a reading, in the same unit; estimated if omitted. Readings of "
+            "several units need it: it weighs them.",
+            kind=float,
+            default=0.0,
+            limits=Within(1e-12, 1e6, or_zero=True),
+        ),
+        "datum": Key(
+            "Datum",
+            "Whether the zero of the readings is known, or `free`: then each frame has an unknown "
+            "offset, one for heights and one for each direction of slopes or curvatures.",
+            kind=str,
+            default="fixed",
+            choices=(("fixed", "Fixed"), ("free", "Free")),
+        ),
+        "calibration": Key(
+            "Calibration",
+            "In `[readings]` alone: file of a calibration of this sensor, whose gains and offsets "
+            "are taken off the readings after scale and offset.",
+            kind=str,
+            default="",
         ),
     },
 )
@@ -144,8 +185,9 @@ class Description:
     baud_rate: int
     columns: Columns
     kind: str
-    separator: str
     paths: tuple[tuple[tuple[str, ...], int], ...]
+    rate: float
+    separator: str
     struct: str
     sync: bytes
     checksum: str
@@ -195,7 +237,37 @@ def load_description(file: Path, serial_number: str = "") -> Description:
         text = read_file(file, _LARGEST).decode("utf-8-sig")
     except (OSError, ValueError) as error:
         raise Refusal(f"{file}: cannot be read as a sensor's description ({error})") from error
-    return description_of(text.replace("\r\n", "\n"), str(file), serial_number)
+    return description_of(
+        _with_calibration(text.replace("\r\n", "\n"), file), str(file), serial_number
+    )
+
+
+# Recordings keep the text of a description, and need no other file: so the gains and offsets of the
+# calibration that it names are put behind it.
+_CALIBRATION = "\n[calibration]  # as it was in its file\n"
+
+
+def _with_calibration(text: str, file: Path) -> str:
+    table = TomlTable(parsed(text, file), text, str(file)).table("readings")
+    if not (name := READINGS.value(table, "calibration")):
+        return text
+    path = file.parent / name
+    try:
+        found = tomllib.loads(read_file(path, _LARGEST).decode())
+        device, each = found["device"], found["line"]
+        values = {key: device[key] for key in ("name", "serial_number")}
+        values |= {key: each[key] for key in ("gain", "offset")}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise table.refusal(
+            f"{path}: cannot be read as a calibration ({error})", "calibration"
+        ) from error
+    if loops := [name for name in ("hysteresis", "creep") if name in found]:
+        raise table.refusal(
+            f"{path} corrects {loops[0]}, which depends on the past; expected gains and offsets "
+            "alone: leave it out here, and load that file in the window",
+            "calibration",
+        )
+    return f"{text}{toml_table(_CALIBRATION.rstrip(), values)}"
 
 
 @lru_cache(8)
@@ -207,19 +279,27 @@ def description_of(text: str, name: str, serial_number: str = "") -> Description
     top = TomlTable(parsed(text, Path(name)), text, name)
     if (version := TOP.value(top, "format")) != FORMAT:
         raise top.refusal(f"expected format = {FORMAT}, got {version}", "format")
-    plate, edge = read_skin(top.table("skin"))
-    layout = read_elements(top.table("elements"), plate.patch)
+    skin = top.table("skin")
+    plate, edge = read_skin(skin)
+    # Where nobody says how stiff the skin is, the rigidity of the default skin says nothing either.
+    plate = replace(plate, unknown_material=plate.unknown_material or "rigidity" not in skin)
+    elements = top.table("elements")
+    if "reads" in elements:
+        raise elements.refusal("expected none: the columns tell what is read", "reads")
+    layout = read_elements(elements, plate.patch)
     line = top.table("line")
     kind = LINE.value(line, "kind")
     names, paths = _names(line, kind)
+    readings = _Conversion(top.table("readings"))
     with line.blamed("fields" if kind == "json" else "columns"):
-        columns = _columns(names, _numbers_of(len(layout), layout.shape), top.table("readings"))
+        layout, columns = _columns(names, layout, readings)
     own = LINE.value(line, "id") or serial_number or hashlib.sha256(text.encode()).hexdigest()[:12]
+    if readings.calibration:
+        layout, columns = _calibrated(layout, columns, top.table("calibration"), own)
     title = TOP.value(top, "title", default=Path(name).name.removesuffix(SUFFIX))
-    live = layout.live & np.isin(np.arange(layout.live.size), columns.channels).reshape(3, -1)
     sensor = Sensor(
-        replace(layout, live=live),
-        DigitalReadings(),
+        layout,
+        columns.readings,
         plate,
         edge,
         rate=math.inf,
@@ -229,15 +309,18 @@ def description_of(text: str, name: str, serial_number: str = "") -> Description
         simulated=False,
         description=text,
     )
-    settings = {key: LINE.value(line, key) for key in ("separator", "struct", "checksum")}
+    with top.blamed("readings"):
+        _ = sensor.sigma  # or refused here
+    settings = {key: LINE.value(line, key) for key in ("rate", "separator", "struct", "checksum")}
     try:
         sync = bytes.fromhex(LINE.value(line, "sync"))
     except ValueError as error:
         raise line.refusal(f"expected bytes in hex such as aa55: {error}", "sync") from error
     baud = LINE.value(line, "baud")
     line.done()
+    readings.done()
     top.done()
-    found = Description(text, sensor, baud, columns, kind, paths=paths, sync=sync, **settings)
+    found = Description(text, sensor, baud, columns, kind, paths, sync=sync, **settings)
     with line.blamed("struct" if kind == "binary" else "kind"):
         found.decoder()
     return found
@@ -270,15 +353,17 @@ def _expanded(table: TomlTable, key: str, names: tuple[str, ...]) -> tuple[str, 
         if not (match := _READING.fullmatch(name)):
             raise table.refusal(
                 f"expected {', '.join((*TIMES, _SEQUENCE))}, an empty text, or a reading such as "
-                f"xx:4 or {COMPONENTS[0]}:0..35 ({', '.join(COMPONENTS)}), got {name!r:.60}",
+                f"xx:4 or height:0..35, got {name!r:.60}",
                 key,
             )
-        component, first, last = match[1], int(match[2]), int(match[3] or match[2])
+        with table.blamed(key):
+            kind_of_reading(match[1])  # or refused here
+        what, first, last = match[1], int(match[2]), int(match[3] or match[2])
         if last < first:
             raise table.refusal(f"expected a range that goes up, got {name!r}", key)
         if len(found) + last - first >= _MOST_COLUMNS:
             raise table.refusal(f"expected at most {_MOST_COLUMNS} columns, got {name!r}", key)
-        found += [f"{component}:{k}" for k in range(first, last + 1)]
+        found += [f"{what}:{k}" for k in range(first, last + 1)]
     return tuple(found)
 
 
@@ -289,51 +374,141 @@ def _numbers_of(elements: int, shape: tuple[int, int] | None) -> list[int]:
     return np.arange(elements).reshape(shape[1], shape[0]).T.ravel().tolist()
 
 
-def _columns(names: tuple[str, ...], elements: list[int], readings: TomlTable) -> Columns:
+def _calibrated(
+    layout: SensorLayout, columns: Columns, table: TomlTable, own: str
+) -> tuple[SensorLayout, Columns]:
+    """The same of a calibrated sensor: reading = offset + gain times what is read."""
+    name, of = table.get("name", str), table.get("serial_number", str)
+    if of != own:
+        raise table.refusal(
+            f"expected a calibration of this sensor, {own}, got one of {name} {of}; give id in "
+            "[line] before you calibrate it, as this file is another with every change"
+        )
+    gain, offset = (np.array(table.get(key, tuple[float, ...])) for key in ("gain", "offset"))
+    table.done()
+    if not len(gain) == len(offset) == layout.channels:
+        raise table.refusal(
+            f"expected {layout.channels} gains and offsets, got {len(gain)} and {len(offset)}; "
+            "calibrate the sensor again"
+        )
+    live = layout.live & np.isfinite(gain).reshape(layout.frame_shape)
+    gain = np.where(np.isfinite(gain) & (gain != 0), gain, 1.0)[columns.channels]
+    scale, zero = columns.scale / gain, (columns.offset - offset[columns.channels]) / gain
+    return replace(layout, live=live), replace(columns, scale=scale, offset=zero)
+
+
+class _Conversion:
+    """What [readings] says of each column: in the table of its quantity, else for all."""
+
+    def __init__(self, table: TomlTable) -> None:
+        self._table = table
+        self._own = {name: table.table(name) for name in _TABLES if name in table}
+        self._used = set[str]()
+        self.calibration: str = READINGS.value(table, "calibration")
+
+    def of(self, what: str, key: str) -> Any:
+        """The value of a `key` for readings such as xx or slope@30."""
+        name = what.partition("@")[0]
+        table, value = self._table, READINGS.value(self._table, key)
+        if name in self._own:
+            self._used.add(name)
+            table, value = self._own[name], READINGS.value(self._own[name], key, default=value)
+        if key == "scale" and not value:
+            raise table.refusal("expected a scale other than 0", key)
+        return value
+
+    def noise(self, kinds: dict[str, str]) -> tuple[tuple[str, float], ...]:
+        """The noise that is told of each quantity, for the quantity of each column."""
+        told = {quantity: self.of(what, "noise") for what, quantity in kinds.items()}
+        if not any(told.values()):
+            return ()
+        for unit in set(QUANTITIES.values()):
+            found = {
+                what: self.of(what, "noise") for what in kinds if QUANTITIES[kinds[what]] == unit
+            }
+            if len(set(found.values())) > 1:
+                raise self._table.refusal(
+                    f"expected one noise for all readings in {unit}, got "
+                    + ", ".join(f"{noise:g} of {what}" for what, noise in found.items())
+                )
+        return tuple(told.items())
+
+    def done(self) -> None:
+        """Refuse what is not asked for, and tables of what no column reads."""
+        for name, table in self._own.items():
+            if name not in self._used:
+                raise table.refusal("expected a quantity that a column reads")
+            table.done()
+        self._table.done(*_TABLES)
+
+
+def _reading(
+    each: list[str], elements: Indices, layout: SensorLayout, readings: _Conversion
+) -> tuple[SensorLayout, Indices]:
+    """The layout with one reading of `each` name at each of `elements` (n,), and their channels."""
+    kinds = [kind_of_reading(what) for what in each]
+    datums = dict[str, str]()
+    for what, (quantity, _) in zip(each, kinds, strict=True):
+        datum = readings.of(what, "datum")
+        if datums.setdefault(quantity, datum) != datum:
+            raise Refusal(f"expected one datum of all readings of {quantity}, got fixed and free")
+    free = [quantity for quantity, datum in datums.items() if datum == "free"]
+    components = {COMPONENTS[k] for k in np.flatnonzero(layout.live.any(axis=1))}
+    if not free and set(each) == components:
+        numbers = np.array([COMPONENTS.index(what) for what in each])
+        channels = numbers * len(layout) + elements
+        live = layout.live & np.isin(np.arange(layout.channels), channels).reshape(3, -1)
+        return replace(layout, live=live), channels
+    quantities, directions = zip(*kinds, strict=True)
+    read = layout.reading(elements, quantities, directions, free).without(layout.dead)
+    return read, np.arange(len(each))
+
+
+def _columns(
+    names: tuple[str, ...], layout: SensorLayout, readings: _Conversion
+) -> tuple[SensorLayout, Columns]:
+    """The elements of the `layout` with what the columns read of them, and those columns."""
     for single in (_SEQUENCE, *TIMES):
         if names.count(single) > 1:
             raise Refusal(f"expected one column {single}, got {names.count(single)}")
     times = [name for name in TIMES if name in names]
     if len(times) > 1:
         raise Refusal(f"expected one column of time, got {' and '.join(times)}")
-    read = [(place, *name.split(":")) for place, name in enumerate(names) if ":" in name]
-    if not read:
+    places = [place for place, name in enumerate(names) if ":" in name]
+    if not places:
         raise Refusal("expected columns with readings such as xx:0..35, got none")
-    channels: list[int] = []
-    for _, component, number in read:
-        if int(number) >= len(elements):
-            raise Refusal(
-                f"expected elements from 0 to {len(elements) - 1}, got {component}:{number}"
-            )
-        channels.append(COMPONENTS.index(component) * len(elements) + elements[int(number)])
-    if len(set(channels)) < len(channels):
-        [(twice, _)] = Counter(names[place] for place, *_ in read).most_common(1)
-        raise Refusal(f"expected each reading once, got {twice} twice")
-    scale, offset = np.array([_factors(readings, component) for _, component, _ in read]).T
-    readings.done(*COMPONENTS)
-    return Columns(
+    numbers = _numbers_of(len(layout), layout.shape)
+    each, elements = list[str](), list[int]()
+    read: dict[tuple[str, float, int], str] = {}
+    for place in places:
+        what, _, number = names[place].partition(":")
+        if int(number) >= len(numbers):
+            raise Refusal(f"expected elements from 0 to {len(numbers) - 1}, got {names[place]}")
+        quantity, direction = kind_of_reading(what)
+        same = quantity, round(direction % (2 * math.pi), _ALIKE), int(number)
+        if same in read:
+            raise Refusal(f"expected each reading once, got {read[same]} and {names[place]}")
+        read[same] = names[place]
+        each.append(what)
+        elements.append(numbers[int(number)])
+    layout, channels = _reading(each, np.array(elements), layout, readings)
+    units = set(layout.kind_units)
+    digital = DigitalReadings(
+        _STEPS[units.pop()] if len(units) == 1 else _STEP,
+        readings.noise({what: kind_of_reading(what)[0] for what in each}),
+    )
+    columns = Columns(
         names,
-        np.array([place for place, *_ in read], np.intp),
-        np.array(channels, np.intp),
-        scale,
-        offset,
+        np.array(places, np.intp),
+        channels,
+        np.array([readings.of(what, "scale") for what in each]),
+        np.array([readings.of(what, "offset") for what in each]),
+        digital,
         names.index(times[0]) if times else -1,
         TIMES[times[0]] if times else 1.0,
         names.index(_SEQUENCE) if _SEQUENCE in names else -1,
     )
-
-
-def _factors(readings: TomlTable, component: str) -> tuple[float, float]:
-    """Scale and offset of a component: of its own table, else those of all."""
-    table = readings.table(component)
-    scale, offset = (
-        READINGS.value(table, key, default=READINGS.value(readings, key))
-        for key in ("scale", "offset")
-    )
-    table.done()
-    if not scale:
-        raise table.refusal("expected a scale other than 0", "scale")
-    return scale, offset
+    return layout, columns
 
 
 # Between the description and what is recorded of a sensor

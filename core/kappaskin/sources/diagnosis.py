@@ -14,9 +14,11 @@ from kappaskin.frames import Event, Frame
 from kappaskin.sources import information
 from kappaskin.sources.clock import ClockMap
 from kappaskin.sources.commands import DeviceCommands, operation_name
-from kappaskin.sources.decoder import SEQUENCES, Accounting, Decoder
-from kappaskin.sources.ports import BaudRateSearch, Port, SerialConnection
-from kappaskin.sources.serial_source import SerialSource
+from kappaskin.sources.decoder import SEQUENCES, Accounting
+from kappaskin.sources.description import Description
+from kappaskin.sources.lines import LineDecoder
+from kappaskin.sources.ports import BaudRateSearch, Port
+from kappaskin.sources.serial_source import SerialSource, connected, taken
 from kappaskin.sources.wire import VERSION, Command, FromDevice, Information, Reply, Samples
 
 _FEWEST_FRAMES = 3  # frames that tell no rate
@@ -117,20 +119,33 @@ def _frame_rate(frames: list[Frame]) -> tuple[float, float]:
 class WireMonitor:
     """The messages on a port or URL as lines of text; greets the device, and pings it.
 
-    Opening raises a `SourceError` that says why it cannot be. `lost` once the connection broke.
+    Opening raises a `SourceError` that says why it cannot be. `lost` once the connection broke, or
+    `ended`. A device with a `description` is sent nothing.
     """
 
-    def __init__(self, url: str, clock: Callable[[], float] = time.monotonic) -> None:
-        self.url, self._clock = url, clock
-        self._connection, self._decoder = SerialConnection(url, clock), Decoder()
-        self._rates = BaudRateSearch(self._connection.baud_rate)
+    def __init__(
+        self,
+        url: str,
+        clock: Callable[[], float] = time.monotonic,
+        description: Description | None = None,
+    ) -> None:
+        self.url, self._clock, self._described = url, clock, description
+        self._connection, self._decoder = connected(url, description, clock)
+        if description is None:
+            self._rates = BaudRateSearch(self._connection.baud_rate)
         self._commands = DeviceCommands(self._connection.write, ClockMap())
         self._began = self._received_at = self._good_at = self._tuned_at = clock()
         self._shown, self._unshown, self._samples = -math.inf, 0, 0
         self._last: int | None = None
         self._reported = Accounting()
         self.lost = False
-        self._commands.greet(self._began)
+        if self._described is None:
+            self._commands.greet(self._began)
+
+    @property
+    def ended(self) -> bool:
+        """Whether what was read has come to its end."""
+        return self.lost and self._connection.ended
 
     def reset(self) -> None:
         """Let DTR and RTS fall and rise again, at which many boards restart."""
@@ -139,27 +154,30 @@ class WireMonitor:
     def read(self, timeout: float) -> list[str]:
         """A line for each message and problem, after at most `timeout` s."""
         lost, lines = self._connection.lost, list[str]()
-        for now, data in self._connection.take(timeout):
+        for now, data in taken(self._connection, self._decoder, timeout):
             self._received_at = now
             for message in self._decoder.feed(data):
                 self._good_at = now
-                self._rates.good(self._connection.baud_rate)
+                if self._described is None:
+                    self._rates.good(self._connection.baud_rate)
                 lines += self._gap(message.sequence)
                 lines += [] if isinstance(message, Command) else self._describe(message, now)
             lines += self._problems(self.accounting())
-        self._commands.attend(self._clock())
+        if self._described is None:
+            self._commands.attend(self._clock())
         lines += self._hints(self._clock())
         if lost and self._connection.empty:
             self.lost = True
             self._decoder.line_ended()
             lines += self._problems(self.accounting())
-            why = (
-                self._connection.refusal or "connection lost: unplugged, or closed by the other end"
-            )
+            broken = "connection lost: unplugged, or closed by the other end"
+            why = self._connection.refusal or ("ended" if self.ended else broken)
             lines.append(str(why))
         return [f"{self._clock() - self._began:9.3f} s  {printable(line)}" for line in lines]
 
     def _gap(self, sequence: int) -> list[str]:
+        if sequence < 0:  # of a device that numbers nothing
+            return []
         last, self._last = self._last, sequence
         step = 1 if last is None else (sequence - last) % SEQUENCES
         if step == 1:
@@ -182,14 +200,15 @@ class WireMonitor:
             return []
         more = f"; {self._unshown} more before it" if self._unshown else ""
         self._shown, self._unshown = now, 0
-        return [_line("samples", message.sequence, _samples_text(message) + more, message.time)]
+        text = _samples_text(message, self._described) + more
+        return [_line("samples", message.sequence, text, message.time)]
 
     def _problems(self, now: Accounting) -> list[str]:
         """What went wrong since the last call."""
         was, self._reported = self._reported, now
         before = dict(was.discarded)
         lines = [
-            f"discarded    {count - before.get(reason, 0)} bytes: {reason}"
+            f"discarded    {count - before.get(reason, 0)} bytes: {self._shown_of(reason)}"
             for reason, count in now.discarded
             if count > before.get(reason, 0)
         ]
@@ -201,7 +220,19 @@ class WireMonitor:
             lines.append(f"version      the device uses {now.other_version}, this is {VERSION}")
         return lines
 
+    def _shown_of(self, reason: str) -> str:
+        """The reason, with the last line of a described device that was discarded for it."""
+        last = self._decoder.last if isinstance(self._decoder, LineDecoder) else ""
+        return last if last.startswith(f"{reason}: ") else reason
+
     def _hints(self, now: float) -> list[str]:
+        if self._described is not None:
+            by, quiet = self._connection.input, now - max(self._received_at, self._tuned_at)
+            hint = by.silence if by else "check its power, and that this is its port"
+            if quiet < _SILENCE or not hint:
+                return []
+            self._tuned_at = now
+            return [f"no bytes for {_SILENCE:g} s: {hint}"]
         since = max(self._good_at, self._tuned_at)
         if self._received_at > since and now - since > _RATE_DWELL:
             return [self._other_rate(now)]
@@ -245,8 +276,9 @@ class WireMonitor:
 
 
 def _line(kind: str, sequence: int | None, words: str, device_time: float | None = None) -> str:
-    at = "" if device_time is None else f"at {device_time:.6f} s  "
-    return f"{kind:<13}#{sequence}  {at}{words}"
+    at = "" if device_time is None or math.isnan(device_time) else f"at {device_time:.6f} s  "
+    number = "" if sequence is None or sequence < 0 else f"#{sequence}  "
+    return f"{kind:<13}{number}{at}{words}"
 
 
 def _device_text(text: str) -> str:
@@ -267,13 +299,16 @@ def _reply_text(reply: Reply) -> str:
     return f"to #{reply.command} {operation_name(reply.operation)}: {done}{data}"
 
 
-def _samples_text(samples: Samples) -> str:
+def _samples_text(samples: Samples, described: Description | None) -> str:
+    """What was scanned: counts, or the readings of a described device."""
     counts, channels = samples.counts, samples.channels
     if not len(counts):
         return "no channels"
-    first = " ".join(str(count) for count in counts[:_COUNTS_SHOWN])
+    if described is not None:
+        counts = described.sensor.transduction.curvature(counts)
+    first = " ".join(f"{count:g}" for count in counts[:_COUNTS_SHOWN])
     more = " ..." if len(counts) > _COUNTS_SHOWN else ""
     return (
         f"{len(counts)} channels from {channels[0]} to {channels[-1]}: {first}{more}, "
-        f"min {np.min(counts)}, max {np.max(counts)}"
+        f"min {np.min(counts):g}, max {np.max(counts):g}"
     )

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from types import NoneType
-from typing import Any, cast
+from typing import Any, BinaryIO, cast
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Indices
 from kappaskin.sensing import DigitalReadings
 from kappaskin.sources.decoder import SEQUENCES, Accounting, SequenceCounter
-from kappaskin.sources.wire import Message, Samples
+from kappaskin.sources.wire import Samples
 
 TIMES = {"time": 1.0, "time_ms": 1e-3, "time_us": 1e-6}
 """Columns of time, with their unit in s."""
@@ -27,7 +27,7 @@ TIMES = {"time": 1.0, "time_ms": 1e-3, "time_us": 1e-6}
 SEPARATORS = (",", ";", "\t", " ")
 """Separators that are recognised, in this order; a space stands for any number of them."""
 
-_LONGEST = 2**16  # bytes of a line
+_LONGEST, _NUMBER = 2**16, 32  # bytes of a line, and for each number where there are many
 _SHOWN = 60  # characters of a line that was discarded
 
 
@@ -36,7 +36,8 @@ class Columns:
     """What the numbers of a record are: each of `names`, and the readings among them.
 
     The number at `places` (n,) is the reading of `channels` (n,), scale times it plus offset, in
-    1/m. `time` and `sequence` are the places of these, -1 without; a time is in `time_unit` s.
+    its unit; a frame has it as one of `readings`. `time` and `sequence` are the places of these, -1
+    without; a time is in `time_unit` s.
     """
 
     names: tuple[str, ...]
@@ -44,6 +45,7 @@ class Columns:
     channels: Indices
     scale: Array
     offset: Array
+    readings: DigitalReadings
     time: int = -1
     time_unit: float = 1.0
     sequence: int = -1
@@ -51,10 +53,10 @@ class Columns:
     def __len__(self) -> int:
         return len(self.names)
 
-    def numbers(self, sequence: int, time: float, curvature: Array) -> Array:
-        """The numbers of a record at `time` in s, of `curvature` (3 P,) in 1/m; 0 if ignored."""
+    def numbers(self, sequence: int, time: float, readings: Array) -> Array:
+        """The numbers of a record at `time` in s, of all `readings` (C,); 0 if ignored."""
         numbers = np.zeros(len(self))
-        numbers[self.places] = (curvature[self.channels] - self.offset) / self.scale
+        numbers[self.places] = (readings[self.channels] - self.offset) / self.scale
         if self.time >= 0:
             numbers[self.time] = time / self.time_unit
         if self.sequence >= 0:
@@ -72,13 +74,13 @@ class LineDecoder(ABC):
     def __init__(self, columns: Columns) -> None:
         self.sequence = SequenceCounter()
         self.last = ""
-        self._columns, self._readings = columns, DigitalReadings()
+        self._columns = columns
         self._bytes_in = self._bytes_good = self._number = 0
         self._sequences = SEQUENCES  # numbers after which the device's begin again
         self._discarded: Counter[str] = Counter()
         self._buffer = b""
 
-    def feed(self, data: bytes) -> list[Message]:
+    def feed(self, data: bytes) -> list[Samples]:
         """The new frames in order, duplicates left out."""
         self._bytes_in += len(data)
         self._buffer += data
@@ -89,12 +91,25 @@ class LineDecoder(ABC):
         return self.sequence.take(self.sequence.good if sequence < 0 else sequence)
 
     @abstractmethod
-    def encoded(self, sequence: int, time: float, curvature: Array) -> bytes:
-        """The record that a device would send at `time` in s, of `curvature` (3 P,) in 1/m."""
+    def encoded(self, sequence: int, time: float, readings: Array) -> bytes:
+        """The record that a device would send at `time` in s, of all `readings` (C,)."""
 
     @abstractmethod
     def _records(self) -> Iterator[Samples]:
         """The records in the buffer, which are taken off it."""
+
+    @abstractmethod
+    def next_of(self, file: BinaryIO) -> bytes:
+        """The next bytes of a file, with one record at most; none at its end."""
+
+    @abstractmethod
+    def whole(self, datagram: bytes) -> bytes:
+        """What to feed of a `datagram`, whose records do not go on in the next."""
+
+    @property
+    def timed(self) -> bool:
+        """Whether records tell the time."""
+        return self._columns.time >= 0
 
     @property
     def held(self) -> bytes:
@@ -134,7 +149,7 @@ class LineDecoder(ABC):
         time = math.nan if columns.time < 0 else float(numbers[columns.time]) * columns.time_unit
         sequence = -1 if columns.sequence < 0 else self._unwrapped(int(numbers[columns.sequence]))
         values = columns.scale * numbers[columns.places] + columns.offset
-        return Samples(sequence, time, columns.channels, self._readings.counts(values))
+        return Samples(sequence, time, columns.channels, columns.readings.counts(values))
 
     def _unwrapped(self, number: int) -> int:
         """A sequence number of 32 bits, which goes on where the device's begins again."""
@@ -157,7 +172,7 @@ class _Lines(LineDecoder):
     def __init__(self, columns: Columns, whole: bool = False) -> None:
         super().__init__(columns)
         # Of the first line the beginning may be missing, and what is left of it look like a line.
-        self._whole = whole
+        self._whole, self._longest = whole, max(_LONGEST, _NUMBER * len(columns))
 
     @abstractmethod
     def _numbers(self, line: bytes) -> Array | str:
@@ -165,7 +180,7 @@ class _Lines(LineDecoder):
 
     def _records(self) -> Iterator[Samples]:
         *lines, self._buffer = self._buffer.split(b"\n")
-        if len(self._buffer) > _LONGEST:
+        if len(self._buffer) > self._longest:
             self._discard("too long", self._buffer)
             self._buffer, self._whole = b"", False
         for line in lines:
@@ -181,6 +196,12 @@ class _Lines(LineDecoder):
                 self._discard("time or sequence", line + b"\n")
             else:
                 yield self._samples(found, size)
+
+    def next_of(self, file: BinaryIO) -> bytes:
+        return file.readline(self._longest)
+
+    def whole(self, datagram: bytes) -> bytes:
+        return datagram if datagram.endswith(b"\n") else datagram + b"\n"
 
     @property
     def held(self) -> bytes:
@@ -214,8 +235,8 @@ class TextDecoder(_Lines):
         except ValueError:
             return "no number"
 
-    def encoded(self, sequence: int, time: float, curvature: Array) -> bytes:
-        numbers = self._columns.numbers(sequence, time, curvature)
+    def encoded(self, sequence: int, time: float, readings: Array) -> bytes:
+        numbers = self._columns.numbers(sequence, time, readings)
         separator = self._separator or SEPARATORS[0]
         return f"{separator.join(f'{number:.12g}' for number in numbers.tolist())}\r\n".encode()
 
@@ -275,10 +296,10 @@ class JsonDecoder(_Lines):
             numbers += [math.nan if each is None else float(each) for each in values]
         return np.array(numbers)
 
-    def encoded(self, sequence: int, time: float, curvature: Array) -> bytes:
+    def encoded(self, sequence: int, time: float, readings: Array) -> bytes:
         values: list[float | None] = [
             None if math.isnan(number) else float(f"{number:.12g}")
-            for number in self._columns.numbers(sequence, time, curvature).tolist()
+            for number in self._columns.numbers(sequence, time, readings).tolist()
         ]
         record, at = dict[str, Any](), 0
         for path, count in self._paths:
@@ -355,9 +376,9 @@ class BinaryDecoder(LineDecoder):
             self._sequences = min(2**bits, SEQUENCES)
         self._sync, self._size = sync, len(sync) + self._body.size + self._check.size
 
-    def encoded(self, sequence: int, time: float, curvature: Array) -> bytes:
+    def encoded(self, sequence: int, time: float, readings: Array) -> bytes:
         columns = self._columns
-        numbers = columns.numbers(sequence, time, curvature).tolist()
+        numbers = columns.numbers(sequence, time, readings).tolist()
         counters = {columns.time, columns.sequence}
         values = [
             _as(code, number, self._body.format[0], wraps=place in counters)
@@ -366,6 +387,16 @@ class BinaryDecoder(LineDecoder):
         body = self._body.pack(*values)
         check = self._check.pack(self._sum(body)) if self._check.size else b""
         return self._sync + body + check
+
+    def next_of(self, file: BinaryIO) -> bytes:
+        return file.read(self._size)
+
+    def whole(self, datagram: bytes) -> bytes:
+        if not len(datagram) % self._size:
+            return datagram
+        self._bytes_in += len(datagram)
+        self._discard("no whole number of records", datagram)
+        return b""
 
     def _records(self) -> Iterator[Samples]:
         data, at, sync = self._buffer, 0, self._sync

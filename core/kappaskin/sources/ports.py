@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import cast
@@ -20,6 +21,7 @@ from serial.tools import list_ports
 from serial.urlhandler import protocol_socket
 
 from kappaskin.errors import SourceError
+from kappaskin.sources.inputs import EndOfInput, Input
 
 BAUD_RATE = 2_000_000
 """Baud rate that 300 channels at 300 frames/s need on a UART; USB ports ignore it."""
@@ -36,6 +38,7 @@ _BACKLOG = 2**24  # bytes that may wait to be taken; beyond it they are discarde
 _CROWDED = 2**18  # bytes that may wait after that, or what is shown would be seconds old for good
 _CROWDED_FOR = 1.0  # s without such a loss, after which more may wait again
 _READ_OVERHEAD = 128  # bytes of memory that a read takes beside what came
+_PATIENT = 0.01  # s until it is looked whether what waits was taken
 _PULSE = 0.1  # s that DTR and RTS are low to reset a board
 _BROKEN = (serial.SerialException, OSError, TypeError)  # TypeError: closed while reading
 
@@ -217,6 +220,8 @@ class BaudRateSearch:
 class SerialConnection:
     """A port or URL that a thread of its own opens and reads until `close`; `lost` once it broke.
 
+    It is opened by `opened`, a port by default. An input that is no port may have `ended`.
+
     Raises a `SourceError` where it cannot be opened. Where the system takes long, it is `opening`
     until it is open, or `lost`: `refusal` then says why. `overrun` counts bytes that arrived while
     too many waited to be taken.
@@ -227,9 +232,12 @@ class SerialConnection:
         url: str,
         clock: Callable[[], float] = time.monotonic,
         baud_rate: int = BAUD_RATE,
+        opened: Callable[[], Input] | None = None,
     ) -> None:
         self.url, self._clock = url, clock
-        self._port: serial.SerialBase | None = None
+        self._open = opened or partial(open_port, url, baud_rate)
+        self._port: serial.SerialBase | Input | None = None
+        self.ended = False
         self.refusal: SourceError | None = None
         self.baud_rate = baud_rate
         self.overrun = 0
@@ -244,6 +252,11 @@ class SerialConnection:
         self._opened.wait(_OPENING)
         if self.refusal is not None:
             raise self.refusal
+
+    @property
+    def input(self) -> Input | None:
+        """What is read if that is no port, once it is open."""
+        return self._port if isinstance(self._port, Input) else None
 
     @property
     def lost(self) -> bool:
@@ -261,7 +274,7 @@ class SerialConnection:
     def _serve(self) -> None:
         """Open the port, and read it until the connection is lost."""
         try:
-            self._port = port = open_port(self.url, self.baud_rate)
+            self._port = port = self._open()
         except SourceError as error:
             self.refusal = error
             self._lost.set()
@@ -272,15 +285,25 @@ class SerialConnection:
             if self._closing.is_set():  # perhaps before there was anything to close
                 port.close()
             self._read(port)
+        except EndOfInput:
+            self.ended = True
+            self._lost.set()
         except _BROKEN:
             self._lost.set()
 
-    def _read(self, port: serial.SerialBase) -> None:
+    def _read(self, port: serial.SerialBase | Input) -> None:
         """Read bytes with the time they arrived."""
-        most, lost_at = _BACKLOG, -math.inf
+        most, lost_at, patient = _BACKLOG, -math.inf, isinstance(port, Input) and port.patient
         while not self._closing.is_set():
-            data = _arriving(port)
-            now, waiting = self._clock(), self._put - self._taken
+            if patient and self._put - self._taken > _CROWDED:
+                time.sleep(_PATIENT)
+                continue
+            if isinstance(port, Input):
+                now, data = port.arriving()
+            else:
+                data = _arriving(port)
+                now = self._clock()
+            waiting = self._put - self._taken
             if not waiting and now - lost_at > _CROWDED_FOR:
                 most = _BACKLOG
             if data and waiting > most:
@@ -311,7 +334,7 @@ class SerialConnection:
 
     def set_baud_rate(self, baud_rate: int) -> None:
         """Continue at another rate, where the port has one."""
-        if self._port is None:
+        if not isinstance(self._port, serial.SerialBase):
             return
         with suppress(*_BROKEN, ValueError):
             self._port.baudrate = baud_rate
@@ -319,7 +342,7 @@ class SerialConnection:
 
     def reset(self) -> None:
         """Let DTR and RTS fall and rise again, at which many boards restart."""
-        if self._port is None:
+        if not isinstance(self._port, serial.SerialBase):
             return
         with suppress(*_BROKEN):
             self._port.dtr = self._port.rts = False
@@ -342,7 +365,7 @@ class SerialConnection:
             self._port.close()
 
 
-def _has_room(port: serial.SerialBase) -> bool:
+def _has_room(port: serial.SerialBase | Input) -> bool:
     if not isinstance(port, serial.Serial | protocol_socket.Serial):
         return True
     return bool(select.select([], [port], [], 0.0)[1])

@@ -12,10 +12,10 @@ from dataclasses import replace
 import numpy as np
 
 from kappaskin.errors import Refusal
-from kappaskin.frames import Frame
+from kappaskin.frames import Frame, Indices
 from kappaskin.scenes import Scene, Simulator
-from kappaskin.scenes.effects import CorruptedFrames, DroppedFrames
-from kappaskin.sensing import DigitalReadings
+from kappaskin.scenes.effects import CorruptedFrames, DroppedFrames, ReadingEffect
+from kappaskin.sensing import Sensor, Transduction
 from kappaskin.sources import information
 from kappaskin.sources.decoder import FROM_HOST, Decoder
 from kappaskin.sources.description import Description
@@ -62,9 +62,9 @@ class PseudoDevice:
         clock: Callable[[], float] = time.monotonic,
         description: Description | None = None,
     ) -> None:
-        if description is not None:
-            _check_same_elements(scene, description)
         self._lines = None if description is None else description.decoder()
+        if description is not None:
+            scene, self._order = _as_described(scene, description.sensor)
         self._scene, self._simulator, self._clock = scene, Simulator(scene), clock
         self._sensor = scene.sensor()
         self._information = information.sensor_to_json(self._sensor)
@@ -161,8 +161,8 @@ class PseudoDevice:
         """The bytes that say what was read in a frame."""
         chain = self._scene.transduction
         if self._lines is not None:
-            curvature = chain.curvature(frame.counts)[np.argsort(frame.channels)]
-            return self._lines.encoded(self.spent, frame.device_time, curvature)
+            readings = chain.curvature(frame.counts)[np.argsort(frame.channels)][self._order]
+            return self._lines.encoded(self.spent, frame.device_time, readings)
         width = chain.count_bytes
         return encode_samples(self.spent, frame.device_time, frame.channels, frame.counts, width)
 
@@ -268,7 +268,7 @@ class PseudoDevice:
 
     def _take_gain(self, requested: int) -> bytes:
         chain = self._scene.transduction
-        if isinstance(chain, DigitalReadings):
+        if not isinstance(chain, Transduction):
             raise _RefusedCommand(Fault.OUT_OF_RANGE, "digital readings have no gain")
         try:
             amplifier = replace(chain.amplifier, gain=requested / 1000)
@@ -300,13 +300,31 @@ class PseudoDevice:
         os.close(slave)
 
 
-def _check_same_elements(scene: Scene, description: Description) -> None:
-    own, described = scene.layout.positions, description.sensor.layout.positions
-    if own.shape != described.shape or not np.allclose(own, described):
+def _as_described(scene: Scene, sensor: Sensor) -> tuple[Scene, Indices]:
+    """The scene with elements that read as the `sensor`, and which of its readings those are.
+
+    Each element has every kind of reading of the sensor. Where they are other than curvature, they
+    have the noise that the sensor tells in place of what the scene says of strain gages.
+    """
+    layout = sensor.layout
+    if scene.layout.patch != layout.patch:
         raise Refusal(
-            f"expected a scene with the elements of the description ({description.sensor.layout}), "
-            f"got {scene.layout}, or others at other places; give both the same [elements] and size"
+            f"expected a scene on the skin of the description, a {layout.patch.name}, got one on "
+            f"a {scene.layout.patch.name}; give both the same [skin]"
         )
+    order = layout.kind * len(layout) + layout.element
+    own = scene.layout
+    if not (own.reads or layout.reads) and np.array_equal(own.positions, layout.positions):
+        return scene, order
+    read = layout.of_curvature
+    if layout.reads:
+        read = read.reading_each(layout.kind_names)
+    if layout.senses_curvature_only and isinstance(scene.transduction, Transduction):
+        return replace(scene, layout=read), order
+    kept = (e for e in scene.effects if e.authored or not isinstance(e, ReadingEffect))
+    effects = tuple(effect for effect in kept if not effect.of_gages)
+    digital = sensor.transduction
+    return replace(scene, layout=read, transduction=digital, effects=effects), order
 
 
 def _numbers(form: str, arguments: bytes) -> tuple[int, ...]:

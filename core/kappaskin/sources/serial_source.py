@@ -4,9 +4,10 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 
-from kappaskin.errors import SourceError
+from kappaskin.errors import EndedSource, SourceError
 from kappaskin.estimation import Scanner
 from kappaskin.frames import Event, Frame
 from kappaskin.sensing import Sensor
@@ -21,10 +22,17 @@ from kappaskin.sources.description import (
     load_description,
     parts_of,
 )
+from kappaskin.sources.inputs import (
+    STANDARD_INPUT,
+    UDP,
+    Datagrams,
+    Input,
+    PlayedFile,
+    StandardInput,
+)
 from kappaskin.sources.interpreter import Interpreter
 from kappaskin.sources.lines import LineDecoder
 from kappaskin.sources.ports import (
-    BAUD_RATE,
     BaudRateSearch,
     Port,
     SerialConnection,
@@ -59,7 +67,8 @@ class SerialSource:
 
     Opening raises a `SourceError` where it cannot be; thereafter `trouble` says why no frames come.
     A thread of its own reads, so that no byte waits for arithmetic. A device with a line format of
-    its own has a `description` in place of its information, and is sent nothing.
+    its own has a `description` in place of its information, and is sent nothing; its lines may also
+    come as datagrams, on standard input, or from a file, which end with an `EndedSource`.
     """
 
     def __init__(
@@ -71,7 +80,7 @@ class SerialSource:
         self.url, self._clock = url, clock
         self._plug = Port.named(url)
         self._description = description
-        self._decoder = Decoder() if description is None else description.decoder()
+        connection, self._decoder = connected(url, description, clock)
         self._interpreter = Interpreter(url)
         self._events = _EventQueue(self._decoder.sequence, clock)
         self._scan_control = ScanControl()
@@ -83,7 +92,7 @@ class SerialSource:
         self._lost_at: float | None = None  # when the connection was lost, until the device is back
         self._next_try, self._changed_at = 0.0, -math.inf
         self._connection: SerialConnection | None = None
-        self._connect(self._new_connection(url))
+        self._connect(connection)
 
     @property
     def sensor(self) -> Sensor | None:
@@ -95,10 +104,6 @@ class SerialSource:
         return self._commands.temperature
 
     # The connection: opened, lost, opened again.
-
-    def _new_connection(self, url: str) -> SerialConnection:
-        described = self._description
-        return SerialConnection(url, self._clock, described.baud_rate if described else BAUD_RATE)
 
     def _connect(self, connection: SerialConnection) -> None:
         """Read from `connection`, and ask the device for its information."""
@@ -144,7 +149,7 @@ class SerialSource:
             return
         self._next_try = now + _RETRY
         try:
-            self._connect(self._new_connection(self._present_url()))
+            self._connect(connected(self._present_url(), self._description, self._clock)[0])
         except SourceError as error:
             self._disconnected = f"{error}; retrying"
 
@@ -173,7 +178,8 @@ class SerialSource:
         # Asked for first: what arrived before the connection was lost is still to be read.
         lost = connection.lost
         # No more than can be used, or a flood would be kept in memory.
-        arrived = [] if self._has_usable() else connection.take(0.0 if lost else timeout)
+        wait = 0.0 if lost else timeout
+        arrived = [] if self._has_usable() else taken(connection, self._decoder, wait)
         if self._opening and not connection.opening:
             self._connect(connection)
         for now, data in arrived:
@@ -194,7 +200,11 @@ class SerialSource:
             self._scan_control.begin()
         self._events.losses()
         if lost and connection.empty and not self._has_usable():
-            self._disconnect(connection)
+            if connection.ended and not frames:
+                self._decoder.line_ended()
+                raise EndedSource(f"{self.url}: ended, {self._decoder.accounting().words}")
+            if not connection.ended:
+                self._disconnect(connection)
         else:
             self._maintain(connection)
         return frames
@@ -366,6 +376,10 @@ class SerialSource:
                 f"uses {VERSION}; update the older of the two"
             )
         arrived = counts.bytes_in - self._bytes_before
+        by = self._connection.input if self._connection else None
+        if by is not None and now - self._received_at >= _PATIENCE:
+            silent = f"{self.url}: nothing came for more than {_PATIENCE:g} s; {by.silence}"
+            return silent if by.silence else ""
         if not arrived or (known and now - self._received_at >= _PATIENCE):
             return (
                 f"{self.url}: silent for more than {_PATIENCE:g} s; check the power, and that this "
@@ -388,6 +402,37 @@ class SerialSource:
             f"{self._rates.tried} it is another kind of device"
             + (f", or {others} reads its bytes" if others else "")
         )
+
+
+def connected(
+    url: str, description: Description | None, clock: Callable[[], float]
+) -> tuple[SerialConnection, Decoder | LineDecoder]:
+    """A connection to a device, and a decoder of what it sends.
+
+    A described one may also be datagrams, standard input, or a file, which begin with whole lines.
+    """
+    if description is None:
+        return SerialConnection(url, clock), Decoder()
+    opened: Callable[[], Input] | None = None
+    if url == STANDARD_INPUT:
+        opened = partial(StandardInput, clock)
+    elif url.startswith(UDP):
+        opened = partial(Datagrams, url, clock)
+    elif Path(url).is_file():
+        records = description.decoder(whole=True)
+        opened = partial(PlayedFile, Path(url), records, description.rate, clock)
+    connection = SerialConnection(url, clock, description.baud_rate, opened)
+    return connection, description.decoder(whole=opened is not None)
+
+
+def taken(
+    connection: SerialConnection, decoder: Decoder | LineDecoder, timeout: float
+) -> list[tuple[float, bytes]]:
+    """What arrived and when, to feed to the `decoder`, after at most `timeout` s."""
+    arrived, by = connection.take(timeout), connection.input
+    if by is None or not by.by_records or not isinstance(decoder, LineDecoder):
+        return arrived
+    return [(now, whole) for now, data in arrived if (whole := decoder.whole(data))]
 
 
 class _EventQueue:

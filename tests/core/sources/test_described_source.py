@@ -14,11 +14,14 @@ import pytest
 from kappaskin import Pipeline, Refusal, Setup, load_scene
 from kappaskin.cli import of_sensor
 from kappaskin.errors import SourceError
+from kappaskin.frames import Frame
 from kappaskin.live import Engine
+from kappaskin.live.pipelines import NoiseCheck
 from kappaskin.recording import Verification
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
 from kappaskin.sources import PseudoDevice, described_source, load_description, open_source
+from kappaskin.sources.description import description_of
 
 pytestmark = [
     pytest.mark.slow,
@@ -179,16 +182,95 @@ def test_an_unplugged_board_is_back_when_it_is_plugged_in(tmp_path):
     assert source.accounting().balanced
 
 
-def test_a_scene_with_other_elements_is_refused(tmp_path):
-    with pytest.raises(Refusal, match="the elements of the description"):
-        PseudoDevice(
-            load_scene("off-centre"), description=load_description(written(tmp_path, "text"))
-        )
+def test_a_scene_on_another_skin_is_refused(tmp_path):
+    file = written(tmp_path, "text")
+    file.write_text(file.read_text().replace("[0.1, 0.1]", "[0.1, 0.08]"))
+    with pytest.raises(Refusal, match=r"0.1 x 0.08 m, got one on a .* of 0.1 x 0.1 m"):
+        PseudoDevice(load_scene("off-centre"), description=load_description(file))
+
+
+READ = {
+    "heights": ('"height:0..35"', "scale = 1e-6\nnoise = 1e-6"),
+    "free heights": ('"height:0..35"', 'scale = 1e-6\nnoise = 1e-6\ndatum = "free"'),
+    "slopes": ('"slope@0:0..35", "slope@90:0..35"', "scale = 1e-3\nnoise = 1e-4"),
+    "mixed": (
+        '"height:0..35", "slope@45:3..20", "xx:0..35", "curvature@60:0..35"',
+        "noise = 0.1\n[readings.height]\nnoise = 1e-6\n[readings.slope]\nnoise = 1e-4",
+    ),
+    "curvatures": ('"curvature@0:0..35", "curvature@60:0..35", "curvature@120:0..35"', ""),
+}
+
+
+@pytest.mark.parametrize("what", READ)
+def test_any_scene_plays_a_board_that_reads_other_quantities(tmp_path, what):
+    columns, readings = READ[what]
+    file = tmp_path / "other.toml"
+    line = f'[line]\nkind = "text"\ncolumns = ["sequence", "time_us", {columns}]\n[readings]\n'
+    file.write_text(HEAD + line + readings)
+    scene = replace(load_scene("off-centre"), rate=100.0)
+    with board(file, scene) as port, closing(open_source(described_source(file, port))) as source:
+        frames = frames_of(source, 20)
+        pipeline = Pipeline(source.sensor, Setup(Ni=4, Nj=4))
+        estimates = [pipeline(frame) for frame in frames]
+
+    assert source.accounting().balanced
+    np.testing.assert_allclose(estimates[-1].contact.position, [0.02, 0.08], atol=4e-3)
 
 
 def test_a_simulated_skin_has_no_description(tmp_path):
     with pytest.raises(Refusal, match="a port or URL with --sensor, got sim:"):
         of_sensor("sim:", written(tmp_path, "text"))
+
+
+def scattered(noise, told):
+    """50 fits to readings of such a noise in 1/m, of a sensor that tells another or none."""
+    readings = f"[readings]\nnoise = {told}\n" if told else ""
+    found = description_of(HEAD + LINES["json"] + readings, "board.toml")
+    pipeline, rng = Pipeline(found.sensor, Setup(Ni=4, Nj=4)), np.random.default_rng(3)
+    lines, told = found.decoder(whole=True), []
+    for n in range(50):
+        (record,) = lines.feed(lines.encoded(n, n / 100, rng.normal(0, noise, 108)))
+        at = record.time
+        pipeline(Frame(record.sequence, at, at, record.channels, record.counts, None, at, 0.0))
+        told.append(pipeline.fitted)
+    return told
+
+
+def test_a_noise_that_is_told_is_that_of_the_error_bars():
+    told, estimated = scattered(0.2, told=0.2), scattered(0.2, told=None)
+
+    assert {float(fit.noise) for fit in told} == {0.2}
+    np.testing.assert_allclose(told[0].sd, estimated[0].sd * 0.2 / estimated[0].noise)
+
+
+@pytest.mark.parametrize(("told", "words"), [(0.2, ""), (0.05, "too small"), (0.9, "too large")])
+def test_a_noise_that_is_told_wrong_is_said_once(told, words):
+    check = NoiseCheck()
+    said = [text for fit in scattered(0.2, told) for text in (check(fit), check(fit)) if text]
+
+    assert [words in text for text in said] == [True] * bool(words)
+
+
+def test_a_noise_that_is_not_told_is_not_judged():
+    assert not any(map(NoiseCheck(), scattered(0.2, told=None)))
+
+
+@pytest.mark.parametrize("what", ["heights", "curvatures"])
+def test_without_a_rigidity_no_force_is_told(tmp_path, what):
+    columns, readings = READ[what]
+    line = f'[line]\nkind = "text"\ncolumns = ["sequence", "time_us", {columns}]\n[readings]\n'
+    file = tmp_path / "gel.toml"
+    file.write_text(HEAD.replace("rigidity = 3.7e-3\n", "") + line + readings)
+    scene = replace(load_scene("off-centre"), rate=100.0)
+    with board(file, scene) as port, closing(open_source(described_source(file, port))) as source:
+        frames = frames_of(source, 20)
+        pipeline = Pipeline(source.sensor, Setup(Ni=4, Nj=4))
+        contacts = [pipeline(frame).contact for frame in frames]
+
+    assert source.sensor.plate.unknown_material
+    assert contacts[-1].present
+    np.testing.assert_allclose(contacts[-1].position, [0.02, 0.08], atol=15e-3)
+    assert all(np.isnan(contact.force) for contact in contacts)
 
 
 def test_a_name_without_a_port_is_refused(tmp_path):

@@ -4,6 +4,8 @@ import json
 import math
 import struct
 import zlib
+from dataclasses import replace
+from datetime import UTC, datetime
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Refusal
+from kappaskin.calibration import Calibration
 from kappaskin.sources import load_description
 from kappaskin.sources.description import description_of
 from kappaskin.sources.wire import Samples
@@ -57,11 +60,19 @@ def decoder(line=TEXT, whole=True):
     return described(line).decoder(whole)
 
 
-def curvature(samples):
-    """The readings (18,) in 1/m by channel; NaN where none was sent."""
-    flat = np.full(18, np.nan)
-    flat[samples.channels] = described(TEXT).sensor.transduction.curvature(samples.counts)
-    return flat
+def curvature(samples, line=TEXT):
+    """xx, yy and xy of the elements (18,) in 1/m; NaN where none was sent."""
+    sensor, flat = described(line).sensor, np.full((3, 6), np.nan)
+    number = {"curvature@0": 0, "curvature@90": 1, "twist": 2}
+    kinds = [number.get(name, k) for k, name in enumerate(sensor.layout.kind_names)]
+    kind, element = (each[samples.channels] for each in (sensor.layout.kind, sensor.layout.element))
+    flat[np.array(kinds)[kind], element] = sensor.transduction.curvature(samples.counts)
+    return flat.ravel()
+
+
+def readings(samples, line):
+    """The readings (n,) of a record in their units, in the order of the columns."""
+    return described(line).sensor.transduction.curvature(samples.counts)
 
 
 def test_a_line_is_a_frame():
@@ -75,9 +86,10 @@ def test_a_line_is_a_frame():
 
 
 def test_channels_that_no_column_has_are_dead():
-    live = described(TEXT).sensor.layout.live
+    line = TEXT.replace('"xy:2"', '"xy:2", "yy:0..5"')
+    live = described(line).sensor.layout.live
 
-    assert live.tolist() == [[True] * 6, [False] * 6, [False, True, False, False, False, False]]
+    assert live.tolist() == [[True] * 6, [True] * 6, [False, True, False, False, False, False]]
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t", " ", "  "])
@@ -233,10 +245,10 @@ def test_every_checksum_is_read_as_it_is_written(checksum, order):
     line = BINARY.replace("crc32", checksum).replace('">', f'"{order}')
     lines = decoder(line)
 
-    (samples,) = decoder(line).feed(lines.encoded(7, 2.5, np.arange(18.0)))
+    (samples,) = decoder(line).feed(lines.encoded(7, 2.5, np.arange(6.0)))
 
     assert (samples.sequence, samples.time) == (7, 2.5)
-    np.testing.assert_allclose(curvature(samples)[6:12], np.arange(6.0, 12.0))
+    np.testing.assert_allclose(readings(samples, line), np.arange(6.0))
 
 
 def test_the_crc_is_that_of_the_catalogue():
@@ -249,14 +261,14 @@ def test_the_crc_is_that_of_the_catalogue():
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_a_device_would_send_is_what_is_read(kind):
-    K = np.round(np.random.default_rng(1).normal(0, 5, 18), 2)
+    channels = described(KINDS[kind]).sensor.channels
+    K = np.round(np.random.default_rng(1).normal(0, 5, channels), 2)
 
     (samples,) = decoder(KINDS[kind]).feed(decoder(KINDS[kind]).encoded(12, 3.25, K))
 
     assert samples.time == 3.25
-    read = np.isfinite(curvature(samples))
-    assert read.sum() == len(samples.channels)
-    np.testing.assert_allclose(curvature(samples)[read], K[read], atol=1e-6)
+    assert sorted(samples.channels) == list(range(channels))
+    np.testing.assert_allclose(readings(samples, KINDS[kind]), K[samples.channels], atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -307,15 +319,26 @@ def test_another_decoder_goes_on_from_the_bytes_held():
         ('kind = "text"', 'kind = "csv"', "text, json, binary"),
         ('"xx:0..5"', '"xx:0..6"', "elements from 0 to 5"),
         ('"xx:0..5"', '"xx:5..0"', "goes up"),
-        ('"xx:0..5"', '"xz:0..5"', "expected time"),
-        ('"xx:0..5"', '"height:0"', "expected time"),
-        ('"xx:0..5"', '"xx:0..5", "xx:3"', "xx:3 twice"),
+        ('"xx:0..5"', '"xz:0..5"', "line 10: line.columns: expected a reading among xx, yy"),
+        ('"xx:0..5"', '"xx"', "expected time"),
+        ('"xx:0..5"', '"xx:0-5"', "expected time"),
+        ('"xx:0..5"', '"slope:0"', "slope@DEGREES"),
+        ('"xx:0..5"', '"slope@north:0"', "slope@DEGREES"),
+        ('"xx:0..5"', '"height@10:0"', "slope@DEGREES"),
+        ('"xx:0..5"', '"xx:0..5", "xx:3"', "each reading once, got xx:3 and xx:3"),
+        ('"xx:0..5"', '"xx:0..5", "curvature@360:3"', "got xx:3 and curvature@360:3"),
         ('"time_ms"', '"time_ms", "time"', "one column of time"),
         ('"time_ms"', '"sequence", "sequence"', "one column sequence"),
         ('"xx:0..5", "xy:2"', '"sequence"', "with readings"),
         ("scale = 0.5", "scale = 0", "other than 0"),
         ("scale = 0.5", "scale = nan", "expected"),
-        ("scale = 0.5", "noise = 0.5", "no such key"),
+        ("scale = 0.5", "noises = 0.5", "no such key; did you mean noise"),
+        ("scale = 0.5", "noise = -1.0", "expected"),
+        ("scale = 0.5", 'datum = "loose"', "fixed, free"),
+        ("scale = 0.5", "[readings.height]\nscale = 2.0", "a quantity that a column reads"),
+        ("scale = 0.5", "[readings.xx]\nnoise = 0.1", "one noise for all readings in 1/m"),
+        ('"xx:0..5"', '"height:0..5"', "noise of readings that differ in unit"),
+        ("grid = [3, 2]", 'grid = [3, 2]\nreads = ["height"]', "the columns tell what is read"),
         ('columns = ["time_ms", "", "xx:0..5", "xy:2"]', "", "columns"),
         ("[line]", "[line]\nbaud = 12.5", "whole number"),
         ("[line]", "[lines]", "kind"),
@@ -364,12 +387,125 @@ def test_a_component_may_have_a_scale_of_its_own():
     assert curvature(samples)[13] == pytest.approx(-3.0)
 
 
+MIXED = """
+[line]
+kind = "text"
+columns = ["height:0..5", "slope@30:4", "slope@90:0..1", "curvature@45:5", "xx:5"]
+[readings]
+noise = 0.1
+[readings.height]
+scale = 1e-3
+noise = 1e-6
+datum = "free"
+[readings.slope]
+scale = 2.0
+offset = 1.0
+noise = 1e-3
+"""
+
+
+def test_columns_may_read_any_mix_of_quantities():
+    layout = described(MIXED).sensor.layout
+    (samples,) = decoder(MIXED).feed(b"0,1,2,3,4,5,6,7,8,9,10\n")
+
+    names = [layout.kind_names[k] for k in layout.kind]
+    assert names == ["height"] * 6 + ["slope@30"] + ["slope@90"] * 2 + [
+        "curvature@45",
+        "curvature@0",
+    ]
+    np.testing.assert_allclose(layout.positions[layout.element[6]], [0.05, 0.01])
+    np.testing.assert_allclose(
+        readings(samples, MIXED), [0, 1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 13, 15, 17, 9, 10], atol=1e-7
+    )
+
+
+def test_each_quantity_has_the_noise_and_the_datum_of_its_table():
+    sensor = described(MIXED).sensor
+
+    assert sensor.layout.reads.free == ("height",)
+    assert sensor.sigma.tolist() == [1e-6] * 6 + [1e-3] * 3 + [0.1] * 2
+    assert math.isnan(sensor.noise)
+
+
+def test_one_noise_of_all_readings_is_that_of_the_sensor():
+    curved = TEXT.replace('"xy:2"', '"yy:0..5", "xy:0..5"')
+
+    assert described(curved).sensor.layout.reads is None
+    assert math.isnan(described(curved).sensor.noise)
+    assert described(curved + "noise = 0.2").sensor.noise == 0.2
+
+
+def calibrated(folder, text, **changed):
+    """The description in a file, with a calibration of it, of gain 2, offset 1, and one failed."""
+    file = folder / "board.toml"
+    file.write_text(text)
+    sensor = load_description(file).sensor
+    C = sensor.channels
+    made = Calibration.nominal(sensor, datetime.now(UTC))
+    gain, zero = np.where(np.arange(C) == 3, np.nan, 2.0), np.ones(C)
+    failed = replace(made, gain=gain, offset=zero, failures=((3, "noisy"),), **changed)
+    failed.save(folder / "bench.toml")
+    file.write_text(text.replace("[readings]", '[readings]\ncalibration = "bench.toml"'))
+    return file
+
+
+CURVED = TEXT.replace('"xy:2"', '"yy:0..5", "xy:0..5"').replace("[line]", '[line]\nid = "bench"')
+
+
+def test_a_calibration_is_taken_off_the_readings(tmp_path):
+    found = load_description(calibrated(tmp_path, SKIN + CURVED))
+    line = ",".join(["0", "0", *["3"] * 18]).encode() + b"\n"
+    (samples,) = found.decoder(whole=True).feed(line)
+
+    # scale 0.5 and offset 1: 2.5, less 1, by 2
+    told = found.sensor.transduction.curvature(samples.counts)[samples.channels != 3]
+    assert told.tolist() == [0.75] * 17
+    assert np.flatnonzero(~found.sensor.layout.live.ravel()).tolist() == [3]
+
+
+def test_a_description_keeps_the_calibration_that_it_names(tmp_path):
+    found = load_description(calibrated(tmp_path, SKIN + CURVED))
+    (tmp_path / "bench.toml").unlink()
+
+    again = description_of(found.text, "board.toml")
+
+    np.testing.assert_array_equal(again.columns.scale, found.columns.scale)
+
+
+def test_a_calibration_of_another_sensor_or_none_is_refused(tmp_path):
+    file = calibrated(tmp_path, SKIN + CURVED.replace('id = "bench"', ""))
+    with pytest.raises(Refusal, match="give id in"):
+        load_description(file)
+    (tmp_path / "bench.toml").write_text("gain = 3")
+    with pytest.raises(Refusal, match="cannot be read as a calibration"):
+        load_description(file)
+    (tmp_path / "bench.toml").unlink()
+    with pytest.raises(Refusal, match="cannot be read as a calibration"):
+        load_description(file)
+
+
+def test_dead_elements_are_dead_in_any_reading():
+    text = (SKIN + MIXED).replace("grid = [3, 2]", "grid = [3, 2]\ndead = [3]")
+    layout = description_of(text, "x").sensor.layout
+
+    assert layout.element[~layout.live].tolist() == [3, 3]
+
+
+def test_heights_of_a_micrometre_are_not_rounded():
+    line = '[line]\nkind = "text"\ncolumns = ["height:0..5"]\n[readings]\nscale = 1e-6'
+    (samples,) = decoder(line).feed(b"0.1,0.2,0.3,-0.4,0.5,1e6\n")
+
+    expected = [1e-7, 2e-7, 3e-7, -4e-7, 5e-7, 1.0]
+    np.testing.assert_allclose(readings(samples, line), expected, atol=5e-9)
+
+
 def test_elements_by_position_count_as_they_are_listed():
     skin = SKIN.replace("grid = [3, 2]", "positions = [[0.01, 0.01], [0.05, 0.03], [0.03, 0.02]]")
     line = TEXT.replace('"xx:0..5", "xy:2"', '"xx:2", "xx:0..1"')
-    (samples,) = description_of(skin + line, "x.toml").decoder(whole=True).feed(b"0,0,1,2,3\n")
+    found = description_of(skin + line, "x.toml")
+    (samples,) = found.decoder(whole=True).feed(b"0,0,1,2,3\n")
 
-    assert samples.channels.tolist() == [2, 0, 1]
+    assert found.sensor.layout.element[samples.channels].tolist() == [2, 0, 1]
 
 
 def test_the_identifier_is_the_given_one_else_the_ports_else_of_the_text():
@@ -381,3 +517,16 @@ def test_the_identifier_is_the_given_one_else_the_ports_else_of_the_text():
     first, second = (description_of(t, "x").sensor.serial_number for t in (text, text + "# a\n"))
     assert first != second
     assert math.isfinite(int(first, 16))
+
+
+def test_json_and_binary_records_may_have_any_readings():
+    json_line = '[line]\nkind = "json"\nfields = { "cam.h" = "height:0..2", tilt = "slope@30:4" }\n'
+    binary = '[line]\nkind = "binary"\nstruct = "<4h"\ncolumns = ["height:0..2", "slope@30:4"]\n'
+    noise = "[readings.height]\nnoise = 1e-5\nscale = 1e-3\n[readings.slope]\nnoise = 1e-3\n"
+    record = b'{"cam": {"h": [1, 2, null]}, "tilt": -4}\n'
+
+    (told,) = decoder(json_line + noise).feed(record)
+    (packed,) = decoder(binary + noise).feed(struct.pack("<4h", 1, 2, 3, -4))
+
+    np.testing.assert_allclose(readings(told, json_line + noise), [1e-3, 2e-3, np.nan, -4])
+    np.testing.assert_allclose(readings(packed, binary + noise), [1e-3, 2e-3, 3e-3, -4])
