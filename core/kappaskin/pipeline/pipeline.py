@@ -211,13 +211,13 @@ class Pipeline:
 
     def _as_told(self, fit: Fit) -> Fit:
         """The fit with the noise that the sensor tells, if it does."""
-        if math.isnan(self._told):
+        if math.isnan(self._told) or fit.coefficients is self._no_shape:
             return fit
         return replace(fit, known_noise=np.array(self._told), weights=np.array(1 / self._told))
 
     def _fitted(self, frame: Frame, curvature: Array, held: Array) -> Fit:
         try:
-            fit = self._as_told(self._followed(frame, curvature, held))
+            fit = self._followed(frame, curvature, held)
             if self._is_determined(fit):
                 return fit
         except RankDeficient:
@@ -241,14 +241,17 @@ class Pipeline:
         curvature, fresh = self.past.hold(frame, scanned)
         out = self.left_out
         began = time.perf_counter()
-        fit = self.fitted = self._fitted(frame, out(scanned), out(curvature))
+        found = self._fitted(frame, out(scanned), out(curvature))
         fit_time = time.perf_counter() - began
+        fit = self.fitted = self._as_told(found)
         surface, noise = self._surface(fit.coefficients), float(fit.noise)
         if self.drift is not None:
             self.drift.follow(frame.device_time, curvature, surface, noise)
         contact, second, drift = NO_CONTACT, NO_CONTACT, 0.0
         if math.isfinite(noise):
-            contact, second = map(self._bounded, self._contacts(fit.readings, fit))
+            # By what the shape leaves: what the functions cannot follow is in no told noise.
+            left = found if math.isfinite(float(found.noise)) else fit
+            contact, second = map(self._bounded, self._contacts(fit.readings, left))
         if math.isfinite(noise) and (drifted := self._contacts.drift) is not None:
             fit, drift = self._as_told(drifted.fit), drifted.size
             self.fitted, surface, noise = fit, self._surface(fit.coefficients), float(fit.noise)
