@@ -274,6 +274,13 @@ def _text(row: Row, report: Report) -> Editor:
     return _line(QLineEdit(), str, lambda text, _: text, report)
 
 
+def _texts(row: Row, report: Report) -> Editor:
+    def read(text: str, _: Any) -> list[str]:
+        return [one.strip() for one in text.split(",") if one.strip()]
+
+    return _line(QLineEdit(), ", ".join, read, report)
+
+
 def _literal(row: Row, report: Report) -> Editor:
     """An editor of TOML, for values without their own editor."""
 
@@ -324,6 +331,7 @@ _MAKERS: dict[str, Callable[[Row, Report], Editor]] = {
     "switch": _switch,
     "choice": _choice,
     "text": _text,
+    "texts": _texts,
     "literal": _literal,
     "numbers": _numbers,
     "wholes": _numbers,

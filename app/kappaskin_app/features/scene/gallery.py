@@ -142,14 +142,15 @@ class CardPainter(QStyledItemDelegate):
         painter.drawText(place, how, title)
 
 
-# Demonstrations, then the paper's scenes, then scenes of one effect.
+# Demonstrations, then the paper's scenes, those of one effect, and those of other readings.
 _DEMONSTRATIONS = (
     "sphere pencil coin bolt tapping two-contacts fingertip circle exploring cylinder edge "
     "slipping demo"
 )
 _PAPER = "centre off-centre line calibration"
 _EFFECTS = "failing-elements creep-hold steep saturation long-gages on-foam stretching hot-room hum"
-ORDER = tuple(f"{_DEMONSTRATIONS} {_PAPER} {_EFFECTS}".split())
+_READINGS = "camera tilts"
+ORDER = tuple(f"{_DEMONSTRATIONS} {_PAPER} {_EFFECTS} {_READINGS}".split())
 
 _RESIZE_DELAY = 200  # ms after the last change of size until pictures are painted
 _CARD = 176  # px, approximate width of a cell: the columns fill the width

@@ -18,8 +18,8 @@ MOST = 1e12  # of any number shown in a box
 def kind_of(value: Any, key: Key) -> str:
     """The kind of editor of a value that is declared by `key`.
 
-    One of choice, text, literal, switch, number, whole, numbers, wholes and pairs; or a count of
-    numbers or whole ones, as in "2 number".
+    One of choice, text, texts, literal, switch, number, whole, numbers, wholes and pairs; or a
+    count of numbers or whole ones, as in "2 number".
     """
     if isinstance(value, str):
         plain = "literal" if "\n" in value else "text"
@@ -46,6 +46,8 @@ def _kind_of_list(value: list[Any], key: Key) -> str:
     """The kind of its numbers with their count, unless they are many or their count varies."""
     if value and all(isinstance(one, list) and all(map(_is_number, one)) for one in value):
         return "pairs"
+    if value and all(isinstance(one, str) for one in value):
+        return "texts"
     if not all(map(_is_number, value)):
         return "literal"
     if key.listed or len(value) not in (2, 3):
@@ -136,6 +138,7 @@ def sections_of(values: Values) -> tuple[Section, ...]:
         _section("Scene", "scene", "", values, ()),
         _skin(_table(values, "skin")),
         _section("Elements", "elements", "", _table(values, "elements"), ("elements",)),
+        *_readings(values),
         _electronics(_table(values, "electronics")),
         *(_touch(f"Touch {n}", *touch) for n, touch in enumerate(touches, 1)),
     ]
@@ -159,6 +162,20 @@ def _section(
 
 def _skin(values: Values) -> Section:
     return _section("Skin", "skin", str(values.get("shape", "rectangle")), values, ("skin",))
+
+
+def _readings(values: Values) -> list[Section]:
+    """The section of the readings, with one for each quantity, if elements say what they read."""
+    table, place = _table(values, "readings"), ("readings",)
+    if not (table or "reads" in _table(values, "elements")):
+        return []
+    sections = tuple(
+        _section(f"Readings of {name}", "readings", "", each, (*place, name), removable=True)
+        for name, each in table.items()
+        if isinstance(each, Mapping)
+    )
+    own = {key: value for key, value in table.items() if not isinstance(value, Mapping)}
+    return [_section("Readings", "readings", "", own, place, sections=sections)]
 
 
 def _electronics(values: Values) -> Section:

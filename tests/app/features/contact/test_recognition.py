@@ -132,7 +132,7 @@ def test_a_failure_is_reported_once_and_the_next_estimate_is_described(
     monkeypatch.setattr("kappaskin_app.features.contact.recognition.curvature_text", fail_once)
     until(lambda: told)
     described: list[str] = []
-    window.recognition.described.connect(described.append)
+    window.recognition.described.connect(lambda text, *_: described.append(text))
     until(lambda: described)
 
     assert told == ["Error in the program: once"]

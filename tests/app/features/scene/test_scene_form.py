@@ -58,9 +58,13 @@ def _edit(widget: QWidget, value: Any) -> Any:
         widget.stepBy(1 if widget.value() < widget.maximum() else -1)
         return widget.value()
     assert isinstance(widget, QLineEdit)
-    widget.setText("7" if isinstance(value, list) else "another")
+    if isinstance(value, list) and isinstance(value[0], str):
+        text, changed = "xx, another", ["xx", "another"]
+    else:
+        text, changed = ("7", [7]) if isinstance(value, list) else ("another", "another")
+    widget.setText(text)
     widget.editingFinished.emit()
-    return [7] if isinstance(value, list) else "another"
+    return changed
 
 
 def _rows(text: str) -> list[Any]:
