@@ -56,7 +56,10 @@ def means(a: np.ndarray, cells: int) -> np.ndarray:
 
 
 def plate(folder: Path) -> None:
-    """Slopes in 0.1 nrad and heights in 0.01 nm at every second node, x by x."""
+    """Slopes in 0.1 nrad and heights in 0.01 nm at every second node, x by x.
+
+    The descriptions make them a thousand times as large, as if the pulse were.
+    """
     lines = (folder / "fields_frame10.rpt").read_text().splitlines()
     rows = [line.split() for line in lines]
     nodes = np.array([row for row in rows if len(row) == 7 and row[0].isdigit()], float)
