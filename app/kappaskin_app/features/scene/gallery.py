@@ -159,7 +159,7 @@ ORDER = tuple(f"{_DEMONSTRATIONS} {_PAPER} {_EFFECTS} {_READINGS}".split())
 _FOLDER = Path(str(files("kappaskin_resources"))) / "measured"
 MEASURED = {
     "&Ball in a gel": _FOLDER / "ball" / "ball.mcap",
-    "P&late under a pulse": _FOLDER / "plate" / "slopes.mcap",
+    "C&lamped plate": _FOLDER / "plate" / "slopes.mcap",
 }
 """Recordings of what others measured, by their titles."""
 _SOURCES = (
