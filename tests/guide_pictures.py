@@ -48,14 +48,20 @@ def keep(made: Path, picture: Path) -> None:
     if picture.suffix == ".svg":
         shutil.copy(made, picture)
     else:
-        how = {"method": Image.Quantize.MAXCOVERAGE, "kmeans": 4, "dither": Image.Dither.NONE}
+        how = {
+            "colors": 192,
+            "method": Image.Quantize.MAXCOVERAGE,
+            "kmeans": 4,
+            "dither": Image.Dither.NONE,
+        }
         small(made).quantize(**how).save(picture, optimize=True)
 
 
 if __name__ == "__main__":
     os.chdir(tempfile.mkdtemp())
+    shutil.copytree(GUIDE.parent / "measured", "measured")
     for page in sorted(GUIDE.glob("*.md")):
         for picture, command in shown_on(page):
-            if command.split()[1] in ("figures", "app"):
+            if command.split()[1] in ("figures", "app", "replay"):
                 keep(drawn(command, picture.name), picture)
                 print(picture, f"{picture.stat().st_size / 1e3:.0f} kB", file=sys.stderr)

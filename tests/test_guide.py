@@ -206,6 +206,7 @@ def _keep(block: Block) -> None:
     "numbers",
     "own-sensor",
     "paper",
+    "real-sensors",
     "studies",
     "trouble",
 )

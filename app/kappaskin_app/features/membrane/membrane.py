@@ -28,6 +28,7 @@ from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, curre
 
 _LETTERS = 14  # px, of the caption
 _LIFT = 0.006  # of the skin's size above the surface, which would hide half of a line
+_POINT, _POINTS = 5, 80  # px of an element, and of many in a row: or they would hide the skin
 _STRIDE = 8  # surface lines between two lines of the true surface's wireframe
 
 
@@ -91,7 +92,7 @@ class MembraneView(QWidget):
         self._elements: Any = pv.PolyData(np.zeros((1, 3)))
         self._wire_actor: Any = None
         self._elements_actor = plotter.add_mesh(
-            self._elements, style="points", point_size=pixels(plotter, 5), **UNLIT
+            self._elements, style="points", point_size=pixels(plotter, _POINT), **UNLIT
         )
         self.excluded, self.target = Marks(plotter, 11, OUT), Marks(plotter, 18, WANTED)
         # Visible on every colour.
@@ -174,6 +175,8 @@ class MembraneView(QWidget):
         self._of_elements = self.skin.nearest(positions)
         points, out = self._elements_at_rest
         self._elements_actor.visibility = self._elements_shown
+        size = min(_POINT, _POINTS / max(len(positions), 1) ** 0.5)
+        self._elements_actor.prop.point_size = pixels(self.plotter, size)
         self._elements.points = points + self.lift * out
         self._elements.verts = np.column_stack(
             [np.ones(len(points), int), np.arange(len(points))]

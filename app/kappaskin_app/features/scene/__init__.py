@@ -8,6 +8,7 @@ from kappaskin.errors import Refusal
 from kappaskin.scenes import scene_file
 from kappaskin_app.features.scene.control import SceneControl
 from kappaskin_app.features.scene.editing import SceneEditing
+from kappaskin_app.features.scene.gallery import MEASURED
 from kappaskin_app.features.scene.load_panel import LoadPanel, NoisePanel
 from kappaskin_app.features.scene.panel import ScenePanel
 from kappaskin_app.features.scene.plan import EffectPlanner
@@ -106,4 +107,12 @@ class SceneFeature:
             play = partial(self.scene_control.play, scene_file(name))
             yield FinderEntry(
                 f"scene:{name}", f"Play the scene {card.text()}", "Scene, Gallery", play
+            )
+        for title, file in MEASURED.items():
+            replay = partial(self._shell.opening.open, file)
+            yield FinderEntry(
+                f"measured:{file.stem}",
+                f"Replay what was measured: {plain(title)}",
+                "Scene, Gallery",
+                replay,
             )

@@ -49,6 +49,7 @@ class SceneControl(QObject):
     def _wire(self) -> None:
         panel, session, planner = self._panel, self._session, self._planner
         panel.gallery.chosen.connect(guarded(lambda name: self.play(scene_file(name))))
+        panel.gallery.replay_wanted.connect(guarded(self._opening.open))
         panel.gallery.open_wanted.connect(guarded(self.open))
         panel.editor.edited.connect(guarded(self._editing.write))
         panel.editor.save_wanted.connect(guarded(self.save))

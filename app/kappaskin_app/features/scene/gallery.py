@@ -1,4 +1,8 @@
-"""Gallery of the built-in scenes."""
+"""Gallery of the built-in scenes, and of recordings of what others measured."""
+
+from functools import partial
+from importlib.resources import files
+from pathlib import Path
 
 from PySide6.QtCore import (
     QEvent,
@@ -42,7 +46,7 @@ from kappaskin_app.shell.background import Tasks
 from kappaskin_app.theme import FAINT, current, follow_look, grown
 from kappaskin_app.widgets.layout import scrolled
 from kappaskin_app.widgets.lettering import RIGHT
-from kappaskin_app.widgets.parts import ELLIPSIS, button, in_a_row, text_label
+from kappaskin_app.widgets.parts import ELLIPSIS, Label, button, in_a_row, text_label
 
 PICTURE, PLAYING = int(Qt.ItemDataRole.UserRole), int(Qt.ItemDataRole.UserRole) + 1
 """Roles of an item: its QPixmap, and whether it is simulated."""
@@ -152,6 +156,17 @@ _EFFECTS = "failing-elements creep-hold steep saturation long-gages on-foam stre
 _READINGS = "camera tilts"
 ORDER = tuple(f"{_DEMONSTRATIONS} {_PAPER} {_EFFECTS} {_READINGS}".split())
 
+_FOLDER = Path(str(files("kappaskin_resources"))) / "measured"
+MEASURED = {
+    "&Ball in a gel": _FOLDER / "ball" / "ball.mcap",
+    "C&lamped plate": _FOLDER / "plate" / "slopes.mcap",
+}
+"""Recordings of what others measured, by their titles."""
+_SOURCES = (
+    "Replay the heights that a camera saw of a gel, pressed by a ball of 4.0 mm radius (9DTact).",
+    "Replay the shape of a plate by its slopes, which a finite-element program computed (recolo).",
+)
+
 _RESIZE_DELAY = 200  # ms after the last change of size until pictures are painted
 _CARD = 176  # px, approximate width of a cell: the columns fill the width
 _TEXT_WIDTH = (190, 340)  # px of the text next to the cards, least and most
@@ -217,9 +232,13 @@ class _Cards(QListWidget):
 
 
 class GalleryPanel(QWidget):
-    """Cards of the built-in scenes; `chosen` requests a scene by name, `open_wanted` a file."""
+    """Cards of the built-in scenes; `chosen` requests a scene by name, `open_wanted` a file.
+
+    Below them are recordings of what others `measured`; `replay_wanted` requests one by its file.
+    """
 
     chosen = Signal(str)
+    replay_wanted = Signal(Path)
     open_wanted = Signal()
 
     def __init__(self, tasks: Tasks) -> None:
@@ -233,6 +252,10 @@ class GalleryPanel(QWidget):
             "&Simulate", "play-scene", "Simulate this scene (Enter, or double-click)."
         )
         self.open = button(f"&Open file{ELLIPSIS}", "open-scene", "Simulate a scene from a file.")
+        self.measured = [
+            button(title, f"measured-{number}", tip)
+            for number, (title, tip) in enumerate(zip(MEASURED, _SOURCES, strict=True))
+        ]
         self._lay_out()
         self._scenes: dict[str, Scene | str] = {}
         self._playing = ""
@@ -244,14 +267,18 @@ class GalleryPanel(QWidget):
         self.cards.played.connect(guarded(self._play))
         self.play.clicked.connect(guarded(self._play))
         self.open.clicked.connect(guarded(lambda *_: self.open_wanted.emit()))
+        for recorded, file in zip(self.measured, MEASURED.values(), strict=True):
+            recorded.clicked.connect(guarded(partial(self._replay, file)))
         self.cards.setCurrentRow(0)
         follow_look(self, self._fit)
 
     def _lay_out(self) -> None:
         self.file.setForegroundRole(FAINT)
+        heading = Label("Measured")
         bold = self.title.font()
         bold.setBold(True)
         self.title.setFont(bold)
+        heading.setFont(bold)
         details = QWidget()
         self._details = details
         column = QVBoxLayout(details)
@@ -262,7 +289,12 @@ class GalleryPanel(QWidget):
         column.addLayout(in_a_row(self.play, self.open))
         row = QHBoxLayout(self)
         row.setContentsMargins(4, 2, 8, 4)
-        row.addWidget(self.cards, 7)
+        scenes = QVBoxLayout()
+        scenes.addWidget(self.cards, 1)
+        measured = in_a_row(heading, *self.measured)
+        measured.addStretch(1)
+        scenes.addLayout(measured)
+        row.addLayout(scenes, 7)
         row.addWidget(details, 3)
 
     # Requests
@@ -276,6 +308,9 @@ class GalleryPanel(QWidget):
     def _play(self, *_: object) -> None:
         if self.selected:
             self.chosen.emit(self.selected)
+
+    def _replay(self, file: Path, *_: object) -> None:
+        self.replay_wanted.emit(file)
 
     # State
 

@@ -8,6 +8,7 @@ import pytest
 from PySide6.QtCore import Qt
 
 from kappaskin.scenes import scene_file
+from kappaskin_app.features.scene.gallery import MEASURED
 from kappaskin_app.shell.loads import loads_at
 
 from .conftest import EDIT, EFFECTS_PAGE, plays
@@ -143,3 +144,16 @@ def test_connecting_again_goes_on_with_the_scene_that_was_played(window, panel, 
     until(lambda: window.display.badge.text() == "OFF")
     panel.gallery.chosen.emit("hum")  # which is to play it
     until(lambda: window.display.badge.text() == "SIM" and plays(window, "hum"))
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_what_others_measured_is_replayed(window, panel, until, number) -> None:
+    file = list(MEASURED.values())[number]
+    panel.gallery.measured[number].click()
+    until(lambda: window.playback.summary is not None)
+    assert window.playback.summary.path == file
+    sensor = "measured-ball", "measured-plate-slopes"
+    until(lambda: window.session.status.sensor.serial_number == sensor[number])
+    until(lambda: np.isnan(window.session.estimate.contact.force))
+    until(lambda: window.session.estimate.contact.present)
+    assert window.session.estimate.surface.max() > 0.9e-3
