@@ -283,7 +283,7 @@ def test_every_channel_has_its_own_loops():
 
         def start(self, shape, rng):
             third = [effect.start(shape, rng) for effect in (none, narrow, wide)]
-            turn = np.arange(shape[0]) % 3
+            turn = np.arange(np.prod(shape)).reshape(shape) % 3
             return lambda x, t: np.choose(turn, [run(x, t) for run in third])
 
     report = report_of(Mixed(), TOLERANCE, NOISE)
@@ -306,7 +306,7 @@ def test_loops_of_another_make_shrink_as_well():
             return Size(1.0, 1.0)
 
         def start(self, shape, rng):
-            r = np.geomspace(1.0, 40.0, 60)[:, None]
+            r = np.geomspace(1.0, 40.0, 60).reshape(60, *np.ones_like(shape))
             w = np.zeros((60, *shape))
 
             def read(x, _):

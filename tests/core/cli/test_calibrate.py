@@ -91,7 +91,7 @@ def test_a_channel_that_fails_gives_1_and_a_file_without_it(run, tmp_path, monke
             return Size(1.0, 1.0)
 
         def start(self, shape: tuple[int, ...], _: object) -> Any:
-            alive = np.arange(shape[0]) != 217
+            alive = np.arange(np.prod(shape)).reshape(shape) != 217
             return lambda curvature, _: curvature * alive
 
     broken = replace(SCENE, effects=(Broken(), GaussianNoise(0.2)))
