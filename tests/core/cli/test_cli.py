@@ -249,7 +249,7 @@ def test_tables_as_printed_tells_why_they_cannot_be_meant(run) -> None:
 
 def test_a_device_of_no_scene_or_an_impossible_rate_is_refused(run) -> None:
     pytest.importorskip("pty", reason="no pseudo-terminals on this system")
-    refused(run("device", "nowhere"), "expected a scene among bolt, calibration, camera, centre, circle,")
+    refused(run("device", "nowhere"), "expected a scene among bolt, calibration, camera, centre,")
     refused(run("device", "circle", "--rate", "0"), "a rate of at most 666.7 frames/s, got 0")
     refused(run("device", "circle", "--rate", "1e9"), "a rate of at most 666.7 frames/s, got 1e+09")
     refused(run("device", "circle", "--rate", "nan"), "got nan")
