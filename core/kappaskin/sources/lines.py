@@ -187,7 +187,10 @@ class _Lines(LineDecoder):
             size = len(line) + 1
             if not self._whole:
                 self._whole = True
-                self._discard("half a line", line + b"\n", tell=False)
+                if line:
+                    self._discard("half a line", line + b"\n", tell=False)
+                else:  # the end of a line before, as `held` begins
+                    self._bytes_good += 1
                 continue
             found = self._numbers(line)
             if isinstance(found, str):

@@ -117,6 +117,14 @@ def test_the_first_line_may_be_half_a_line_and_is_no_frame():
     assert dict(lines.accounting().discarded) == {"half a line": len(LINE) - 2}
 
 
+def test_a_decoder_that_goes_on_where_another_was_discards_nothing():
+    lines, other = decoder(whole=True), decoder(whole=False)
+    lines.feed(LINE + LINE[:4])
+
+    assert len(other.feed(lines.held + LINE[4:])) == 1
+    assert not other.accounting().discarded
+
+
 @pytest.mark.parametrize(
     ("bad", "reason"),
     [
