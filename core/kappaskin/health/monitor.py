@@ -180,12 +180,12 @@ class HealthMonitor:
     def _suspect(self, statistics: ChannelStatistics) -> None:
         """Suspect the worst of the channels that are off, and those suspected before."""
         far = (self._test.distance > _FAR) & ~self._dead & (self.kinds == 0)
-        far &= ~self._test.pressed
         off = np.where(far & ~self._suspects, self._test.off, 0.0).reshape(3, -1)
         near = self._test.neighbours.near
+        # A pressed element misleads what is predicted of those around it, by less than of itself.
         around = off.max(axis=0)[near].max(axis=1, initial=0.0)
         new = (off > 0) & (off >= around)
-        self._suspects = (self._suspects & far) | new.ravel()
+        self._suspects = ((self._suspects & far) | new.ravel()) & ~self._test.pressed
         self._accused = np.where(self._suspects, self._accused + 1, 0)
 
     def _confirm(self, statistics: ChannelStatistics) -> None:

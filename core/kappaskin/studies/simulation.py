@@ -89,7 +89,7 @@ def _frame(scene: Scene, *names: str) -> Callable[[float], object]:
 
 
 def _running(curvature: Array, effect: ReadingEffect) -> Callable[[float], object]:
-    """The effect at work on readings `curvature` (3 P,) in 1/m."""
+    """The effect at work on readings `curvature` (3, P) in 1/m."""
     running = effect.start(curvature.shape, np.random.default_rng(0))
     return lambda moment: running(curvature, moment)
 
@@ -109,6 +109,7 @@ def costs_of(scene: Scene, plan: Plan) -> dict[str, float]:
     """
     bare = Simulator(_only(scene))
     _, curvature = bare.reading(scene.sensor().scan(), 0.0)
+    curvature = curvature.reshape(scene.layout.frame_shape)
     runs = {"": _frame(scene)}
     for entry in plan:
         if isinstance(entry.effect, ReadingEffect):

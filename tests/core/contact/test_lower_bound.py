@@ -81,7 +81,8 @@ def test_a_disk_is_marked_also_where_its_thickness_is_given(thickness):
 
 def test_without_a_contact_there_is_nothing_to_mark():
     assert LowerBound(Plate(SQUARE), "hinged")(NO_CONTACT) is NO_CONTACT
-    assert not LowerBound(Plate(SQUARE), "hinged")(told(math.nan, math.nan, math.nan)).present
+    unknown = LowerBound(Plate(SQUARE), "hinged")(told(math.nan, math.nan, math.nan))
+    assert not unknown.force_is_lower_bound
 
 
 @pytest.mark.parametrize(("force", "marked"), [(0.15, True), (0.001, False)])

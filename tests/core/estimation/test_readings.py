@@ -18,7 +18,7 @@ from kappaskin import (
     basis_for,
     estimator_for,
 )
-from kappaskin.contact import Contacts, ObjectFinder
+from kappaskin.contact import ObjectFinder
 from kappaskin.estimation import METHODS, place_elements
 
 SKIN = Patch(0.1, 0.08)
@@ -334,7 +334,6 @@ def test_what_takes_a_curvature_sensor_refuses_others_at_the_door():
     layout = LAYOUTS["height"]
     for made in (
         lambda: estimator_for("finite-slope", BASIS, layout),
-        lambda: Contacts(Plate(SKIN), layout),
         lambda: ObjectFinder(Plate(SKIN), layout),
         lambda: place_elements(layout, BASIS, "D", 5e-3),
     ):

@@ -149,7 +149,7 @@ def test_more_noise_means_more_error() -> None:
 
 def test_a_moving_load_is_judged_where_it_is() -> None:
     # In 2 ms it goes 0.55 mm: judged a frame late, the shape would be off by some 0.03 mm.
-    circle = replace(load_scene("circle"), effects=())
+    circle = replace(load_scene("circle"), effects=(), reference=(15, 15))
     fast = circle.touched_by(*circle.loads, motion=Orbit(0.022, 0.25))
     slow, quick = (measured(scene, EIGHT)[0] for scene in (circle, fast))
     assert 1e3 * quick.rms_exact < 0.006
@@ -595,7 +595,18 @@ def test_what_the_command_cannot_do_is_refused_before_it_measures(
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("name", [name for name in SCENES if name != "calibration"])
+OTHER_READINGS = ("camera", "tilts")
+
+
+@pytest.mark.parametrize("name", OTHER_READINGS)
+def test_what_accuracy_costs_is_refused_of_other_readings(name) -> None:
+    with pytest.raises(Refusal, match="expected a curvature sensor"):
+        next(costs(load_scene(name), [EIGHT]))
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in SCENES if name not in ("calibration", *OTHER_READINGS)]
+)
 def test_what_accuracy_costs_is_told_of_every_ready_scene_that_is_pressed(name) -> None:
     scene = load_scene(name)
     (cost,) = costs(scene, [replace(EIGHT, functions=(4, 1 if scene.plate.patch.strip else 4))])
