@@ -51,7 +51,7 @@ def test_a_recording_has_its_settings_before_and_with_the_tare_once_each(tmp_pat
     out = tmp_path / "a.mcap"
     with device_of(AT_REST) as port:
         assert main(["tare", port]) == 0
-        assert main(["record", port, str(out), "--seconds", "1"]) == 0
+        assert main(["record", port, str(out), "--seconds", "3"]) == 0
 
     with Recording(out) as recording:
         setups = [json.loads(text).get("tare") for _, text in recording.setups()]

@@ -123,7 +123,9 @@ def test_without_a_share_of_the_others_a_contact_is_off_by_no_more_than_it_moved
     assert undecided.sum() >= 3
     assert (channels[1:][undecided[:-1]] == 300).all()
     off = [np.hypot(*(e.contact.position - f.truth.contact)) for f, e in seen if e.contact.present]
-    assert max(off) < 2 * np.pi * 0.022 * 0.1  # while the oldest reading was held
+    # By what it moved while the oldest reading was held; readings of a point where it was, and of
+    # where it is, are together as one a little farther.
+    assert max(off) < 1.2 * 2 * np.pi * 0.022 * 0.1
 
 
 def test_elements_by_hand_are_scanned_and_off_scans_everything_again():

@@ -306,7 +306,7 @@ def test_a_block_given_back_is_gone() -> None:
 @pytest.mark.parametrize("size", ["4m", "512k"])
 def test_little_memory_is_made_do_with(tmp_path, size: str) -> None:
     file = tmp_path / "a.mcap"
-    done = with_memory(size, "record", "sim:", str(file), "--seconds", "1")
+    done = with_memory(size, "record", "sim:", str(file), "--seconds", "3")
     assert done.returncode == 0
     assert all("use finite-slope" in line for line in done.stderr.splitlines())
     with Recording(file) as recording:
