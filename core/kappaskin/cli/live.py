@@ -116,9 +116,9 @@ def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
         for target in status.publishing.targets:
             if target.refusal:
                 raise Refusal(target.refusal)
-        told = [(one.target, notice) for one in status.publishing.targets for notice in one.notices]
-        told += [("noise", event.text) for event in status.events if event.kind == "noise"]
-        _print_notices(told, noticed)
+        notices = [(one.target, notice) for one in status.publishing.targets for notice in one.notices]
+        notices += [("noise", event.text) for event in status.events if event.kind == "noise"]
+        _print_notices(notices, noticed)
         if status.slope > _STEEPER * slope:
             slope = status.slope
             show(f"kappaskin: {slope_warning(slope)}", error=True)
@@ -131,9 +131,9 @@ def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
 
 
 def _print_notices(notices: list[tuple[str, str]], printed: set[str]) -> None:
-    """Print what is said of something, unless it is `printed` already, on standard error."""
-    for of, notice in notices:
-        text = f"kappaskin: {of}: {notice}"
+    """Print (name, text) of each notice on standard error, unless it is already in `printed`."""
+    for name, notice in notices:
+        text = f"kappaskin: {name}: {notice}"
         if text not in printed:
             printed.add(text)
             show(text, error=True)

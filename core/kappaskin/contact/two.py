@@ -55,7 +55,7 @@ class Contacts:
     (`SmoothDrift`). No two are told on a flat skin of known thickness, whose readings are no sums
     of those of its loads.
 
-    Readings that differ in unit are weighed by their `sigma` (R,); no drift is told of those.
+    Readings in different units are weighted by `sigma` (R,); no drift is estimated from them.
     """
 
     def __init__(

@@ -281,7 +281,7 @@ def description_of(text: str, name: str, serial_number: str = "") -> Description
         raise top.refusal(f"expected format = {FORMAT}, got {version}", "format")
     skin = top.table("skin")
     plate, edge = read_skin(skin)
-    # Where nobody says how stiff the skin is, the rigidity of the default skin says nothing either.
+    # Without a given rigidity that of the default skin is no information.
     plate = replace(plate, unknown_material=plate.unknown_material or "rigidity" not in skin)
     elements = top.table("elements")
     if "reads" in elements:
@@ -418,9 +418,9 @@ class _Conversion:
         return value
 
     def noise(self, kinds: dict[str, str]) -> tuple[tuple[str, float], ...]:
-        """The noise that is told of each quantity, for the quantity of each column."""
-        told = {quantity: self.of(what, "noise") for what, quantity in kinds.items()}
-        if not any(told.values()):
+        """The given noise of each quantity that the columns read."""
+        given = {quantity: self.of(what, "noise") for what, quantity in kinds.items()}
+        if not any(given.values()):
             return ()
         for unit in set(QUANTITIES.values()):
             found = {
@@ -431,7 +431,7 @@ class _Conversion:
                     f"expected one noise for all readings in {unit}, got "
                     + ", ".join(f"{noise:g} of {what}" for what, noise in found.items())
                 )
-        return tuple(told.items())
+        return tuple(given.items())
 
     def done(self) -> None:
         """Refuse what is not asked for, and tables of what no column reads."""

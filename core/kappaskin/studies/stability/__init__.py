@@ -107,7 +107,7 @@ class Restartable(Protocol):
 
 
 class _WithoutDrift:
-    """The fits of an estimator, and of what the readings are without the drift told of them."""
+    """Fits by an estimator, to readings from which an estimated drift is subtracted."""
 
     def __init__(self, estimator: Estimator) -> None:
         layout = estimator.layout
