@@ -116,7 +116,9 @@ def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
         for target in status.publishing.targets:
             if target.refusal:
                 raise Refusal(target.refusal)
-        notices = [(one.target, notice) for one in status.publishing.targets for notice in one.notices]
+        notices = [
+            (one.target, notice) for one in status.publishing.targets for notice in one.notices
+        ]
         notices += [("noise", event.text) for event in status.events if event.kind == "noise"]
         _print_notices(notices, noticed)
         if status.slope > _STEEPER * slope:

@@ -119,7 +119,7 @@ class Pipeline:
         self.basis = basis_for(sensor.layout.patch, edge, setup.Ni, across)
         layout, rim_sd = sensor.layout, setup.rim_sd
         self.fit = estimator_for(setup.method, self.basis, layout, sensor.sigma, rim_sd)
-        self._told = sensor.noise
+        self._given_noise = sensor.noise
         self._read_at = sensor.scan().times  # of the first, the second ... channel of a scan
         self._whole = self.fit.at_rest()
         loosest = _LOOSE * float(np.linalg.norm(self._whole.unit_sd))
@@ -209,11 +209,12 @@ class Pipeline:
         times[frame.channels] = frame.device_time + self._read_at[: len(frame.channels)]
         return self.fit.follow(curvature, times.reshape(curvature.shape), held)
 
-    def _as_told(self, fit: Fit) -> Fit:
-        """The fit with the noise that the sensor tells, if it does."""
-        if math.isnan(self._told) or fit.coefficients is self._no_shape:
+    def _with_given_noise(self, fit: Fit) -> Fit:
+        """The fit with the noise that the sensor's description gives, if it gives one."""
+        noise = self._given_noise
+        if math.isnan(noise) or fit.coefficients is self._no_shape:
             return fit
-        return replace(fit, known_noise=np.array(self._told), weights=np.array(1 / self._told))
+        return replace(fit, known_noise=np.array(noise), weights=np.array(1 / noise))
 
     def _fitted(self, frame: Frame, curvature: Array, held: Array) -> Fit:
         try:
@@ -243,17 +244,17 @@ class Pipeline:
         began = time.perf_counter()
         found = self._fitted(frame, out(scanned), out(curvature))
         fit_time = time.perf_counter() - began
-        fit = self.fitted = self._as_told(found)
+        fit = self.fitted = self._with_given_noise(found)
         surface, noise = self._surface(fit.coefficients), float(fit.noise)
         if self.drift is not None:
             self.drift.follow(frame.device_time, curvature, surface, noise)
         contact, second, drift = NO_CONTACT, NO_CONTACT, 0.0
         if math.isfinite(noise):
-            # By what the shape leaves: what the functions cannot follow is in no told noise.
+            # By the residuals: a given noise lacks the error of too few functions.
             left = found if math.isfinite(float(found.noise)) else fit
             contact, second = map(self._bounded, self._contacts(fit.readings, left))
         if math.isfinite(noise) and (drifted := self._contacts.drift) is not None:
-            fit, drift = self._as_told(drifted.fit), drifted.size
+            fit, drift = self._with_given_noise(drifted.fit), drifted.size
             self.fitted, surface, noise = fit, self._surface(fit.coefficients), float(fit.noise)
         return Estimate(
             self.generation,

@@ -148,10 +148,10 @@ def _plate(patch: Patch, found: dict[str, Array], inplane: str) -> Plate:
     for name in _SKIN:
         if name in found and found[name].size != 1:
             raise Refusal(f"expected one {name}, got shape {found[name].shape}")
-    told: dict[str, Any] = {"rigidity": 1.0, "inplane": inplane}
-    told["unknown_material"] = "rigidity" not in found
-    told |= {name: float(found[name].item()) for name in _SKIN if name in found}
-    return Plate(patch, **told)
+    known: dict[str, Any] = {"rigidity": 1.0, "inplane": inplane}
+    known["unknown_material"] = "rigidity" not in found
+    known |= {name: float(found[name].item()) for name in _SKIN if name in found}
+    return Plate(patch, **known)
 
 
 def _patch(path: Path, size: Array, radius: Array, outline: Array | None) -> Patch:

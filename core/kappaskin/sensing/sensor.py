@@ -124,9 +124,9 @@ class Sensor:
 
     @property
     def noise(self) -> float:
-        """Standard deviation of a reading as it is told, of readings of one unit; else NaN."""
-        told = {noise for _, noise in self.transduction.noise}
-        return told.pop() if len(told) == 1 and self.sigma is None and all(told) else math.nan
+        """Given standard deviation of readings that have one unit; NaN where none is given."""
+        given = {noise for _, noise in self.transduction.noise}
+        return given.pop() if len(given) == 1 and self.sigma is None and all(given) else math.nan
 
     @property
     def sigma(self) -> Array | None:

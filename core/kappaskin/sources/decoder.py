@@ -109,6 +109,29 @@ class SequenceCounter:
         self._first: int | None = None
         self._missing: set[int] = set()
 
+    def accounting(
+        self,
+        bytes_in: int,
+        bytes_good: int,
+        discarded: Counter[str],
+        buffered: int,
+        other_version: int | None = None,
+    ) -> Accounting:
+        """The balance of these bytes, with the numbers counted so far."""
+        return Accounting(
+            bytes_in,
+            bytes_good,
+            tuple(discarded.items()),
+            buffered,
+            self.good,
+            self.accepted,
+            self.duplicate,
+            self.lost,
+            self.span,
+            self.restarts,
+            other_version,
+        )
+
     def take(self, sequence: int) -> bool:
         """Count one good message; False when it came before."""
         self.good += 1
@@ -354,19 +377,11 @@ class Decoder:
 
     def accounting(self, overrun: int = 0) -> Accounting:
         """The balance so far, with `overrun` bytes that came but were never fed."""
-        counts = self.sequence
-        discarded = self._discarded + Counter(overrun=overrun)
-        return Accounting(
+        return self.sequence.accounting(
             self._bytes_in + overrun,
             self._bytes_good,
-            tuple(discarded.items()),
+            self._discarded + Counter(overrun=overrun),
             len(self._buffer),
-            counts.good,
-            counts.accepted,
-            counts.duplicate,
-            counts.lost,
-            counts.span,
-            counts.restarts,
             self._other_version,
         )
 

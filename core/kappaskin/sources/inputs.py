@@ -108,7 +108,7 @@ class StandardInput(Input):
 
 
 class PlayedFile(Input):
-    """A file of records that come at the times they tell, or at a `rate` in 1/s without.
+    """A file of records, played at their time stamps, or without them at a `rate` in 1/s.
 
     Time that goes back begins anew. `decoder` is one that reads them, and no other's.
     """
@@ -124,15 +124,15 @@ class PlayedFile(Input):
         self._timed, self._decoder, self._rate = decoder.timed, decoder, rate
         if not (decoder.timed or rate):
             raise SourceError(
-                f"{path}: its records tell no time; give rate = 100, in records per second, in "
-                "[line], or a column of time"
+                f"{path}: its records have no time stamps; give rate = 100, in records per second, "
+                "in [line], or a column of time"
             )
         try:
             self._file = path.open("rb")
         except OSError as error:
             raise SourceError(f"{path}: cannot be read ({error.strerror})") from error
         self._held, self._due, self._played = b"", clock(), 0
-        self._began, self._last = -math.inf, math.inf  # of the times told: 0, and the last one
+        self._began, self._last = -math.inf, math.inf  # the clock at time stamp 0, the last stamp
 
     def arriving(self) -> tuple[float, bytes]:
         if not self._held:
@@ -150,11 +150,11 @@ class PlayedFile(Input):
     def _find_due(self) -> None:
         """When the next bytes are due; those without a record come with what was before them."""
         for record in self._decoder.feed(self._held):
-            told = record.time if self._timed else self._played / self._rate
+            stamp = record.time if self._timed else self._played / self._rate
             self._played += 1
-            if told < self._last:
-                self._began = max(self._due, self._clock()) - told
-            self._due, self._last = self._began + told, told
+            if stamp < self._last:
+                self._began = max(self._due, self._clock()) - stamp
+            self._due, self._last = self._began + stamp, stamp
 
     def close(self) -> None:
         self._file.close()

@@ -123,18 +123,9 @@ class LineDecoder(ABC):
 
     def accounting(self, overrun: int = 0) -> Accounting:
         """The balance so far, with `overrun` bytes that came but were never fed."""
-        counts, discarded = self.sequence, self._discarded + Counter(overrun=overrun)
-        return Accounting(
-            self._bytes_in + overrun,
-            self._bytes_good,
-            tuple(discarded.items()),
-            len(self._buffer),
-            counts.good,
-            counts.accepted,
-            counts.duplicate,
-            counts.lost,
-            counts.span,
-            counts.restarts,
+        discarded, buffered = self._discarded + Counter(overrun=overrun), len(self._buffer)
+        return self.sequence.accounting(
+            self._bytes_in + overrun, self._bytes_good, discarded, buffered
         )
 
     def _discard(self, reason: str, data: bytes, tell: bool = True) -> None:
