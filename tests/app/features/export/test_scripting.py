@@ -151,15 +151,18 @@ def test_a_script_of_a_recording_computes_the_same_bits_of_the_same_frame(
     text = asked.text(tmp_path)
     assert f'engine.connect("replay:{recording}")' in text
     found = _numbers(text, tmp_path, 20)
-    sequence = int(found["sequence"])
-    engine.seek(2.2, 0.0)  # so that what comes then is not what came before
-    until(lambda: session.estimate.sequence > sequence)
-    engine.seek((sequence - 3) / 100, 0.0)  # of 100 frames in a second
-    until(lambda: session.estimate.sequence <= sequence)
-    while (at := session.estimate.sequence) < sequence:
-        engine.step(1)
-        until(lambda at=at: session.estimate.sequence > at)
-    assert _same_bits(found, session.estimate)
+    sequence = int(found["sequence"])  # late if the script is slow, and of either source
+    computed = []
+    for begun in (at for at in (0.0, 1.8) if at + sequence / 100 < session.status.replay.length):
+        engine.seek(0.0, 0.0)  # so that what comes then is not what came before
+        until(lambda: session.estimate.sequence < 4)
+        engine.seek(begun + (sequence - 3) / 100, 0.0)  # of 100 frames in a second
+        until(lambda: sequence - 8 <= session.estimate.sequence <= sequence)
+        while (at := session.estimate.sequence) < sequence:
+            engine.step(1)
+            until(lambda at=at: session.estimate.sequence > at)
+        computed.append(_same_bits(found, session.estimate))
+    assert any(computed)
 
 
 def _names(text: str) -> set[str]:
