@@ -5,14 +5,17 @@ whose rigidity is withheld.
 """
 
 from functools import cache
+from itertools import product
 from math import sqrt
 
 import numpy as np
 import pytest
 
 import half_space
-from kappaskin import ObjectFinder, Patch, Plate, SensorLayout, basis_for, estimator_for
+from kappaskin import Frame, ObjectFinder, Patch, Plate, SensorLayout, basis_for, estimator_for
 from kappaskin.contact import Contacts, ImprintObjects, contacts_of
+from kappaskin.health import HealthMonitor
+from kappaskin.sensing import DigitalReadings, Sensor
 from measured import measured
 from navier import HingedPlate, Load
 from rigid import Compliance, ball
@@ -166,6 +169,30 @@ def test_errors_cover_a_ball_in_an_elastomer(reads, functions, frames):
 
     assert min(x, y, *covered) >= share(frames)
     assert other == forces == 0
+
+
+def test_healthy_heights_are_not_accused_under_an_imprint():
+    accused = looks = 0
+    for across, kind in product((20, 40), ("sphere", "punch", "cone")):
+        layout, rate, rng = heights(PAD, across, across), 32, np.random.default_rng(1)
+        chain, plate = DigitalReadings(), Plate(PAD, unknown_material=True)
+        gel = Sensor(layout, chain, plate, "hinged", np.inf, "gel", "1", "", simulated=False)
+        monitor = HealthMonitor(gel)
+        for n in range(12 * 4 * rate):  # held for 3 of 4 s, at another place each time
+            if n % (4 * rate) == 0:
+                # Half as wide as the elements lie at least: what one alone reads is a fault.
+                low, high = (0.01, 0.01, 0.02 / across, 8e-3), (0.03, 0.03, 5e-3, 0.03)
+                x, y, a, R = rng.uniform(low, high)
+                by = {"sphere": R, "punch": a**2 / R, "cone": 0.15}[kind]
+                away = np.hypot(*(layout.positions - (x, y)).T)
+                depth = getattr(half_space, kind)(away, a, by)
+            held = depth if n % (4 * rate) < 3 * rate else 0.0
+            counts = chain.counts(held + rng.normal(0, 2e-6, len(layout)))
+            looks += monitor(Frame(n, n / rate, n / rate, np.arange(len(layout)), counts))
+            accused += monitor.kinds.any()
+
+    assert looks > 900
+    assert accused < 0.01 * 12 * 4 * rate * 6
 
 
 @frames

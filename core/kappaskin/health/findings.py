@@ -12,7 +12,7 @@ from kappaskin.errors import RankDeficient
 from kappaskin.estimation import FAULTS, Estimator, Fit, Uncertainty
 from kappaskin.frames import Array, Indices, Mask
 from kappaskin.health.inconsistency import InconsistencyTest, centred
-from kappaskin.sensing import Sensor, SensorLayout
+from kappaskin.sensing import SHOWN_UNITS, Sensor, SensorLayout
 
 _MOST_LISTED = 256  # findings that are listed one by one
 
@@ -82,32 +82,31 @@ def findings(
             layout.kind_names[layout.kind[channel]],
             FAULTS[int(kinds[channel])],
             float(since[channel]),
-            _figure(
-                FAULTS[int(kinds[channel])],
-                float(figures[channel, 0]),
-                float(figures[channel, 1]),
-                layout,
-            ),
+            _figure(FAULTS[int(kinds[channel])], int(channel), figures[channel], layout),
             bool(retained[channel]),
         )
         for channel in np.flatnonzero(kinds)[:_MOST_LISTED]
     )
 
 
-def _figure(kind: str, first: float, second: float, layout: SensorLayout) -> str:
-    """The figures of `classify_faults` in words and units."""
+def _figure(kind: str, channel: int, figures: Array, layout: SensorLayout) -> str:
+    """The `figures` (2,) of `classify_faults` in words and units."""
+    times, unit = SHOWN_UNITS[layout.kind_units[layout.kind[channel]]]
+    first, second = times * figures
     if math.isnan(first):
         return "reported by the device"
     if kind in ("dead", "stuck"):
-        return f"reads {first:+.2f} 1/m while its neighbours predict {second:.2f} 1/m of change"
+        return (
+            f"reads {first:+.2f} {unit} while its neighbours predict {second:.2f} {unit} of change"
+        )
     if kind == "noisy":
-        return f"noise {first:.2g} 1/m, other channels {second:.2g} 1/m"
+        return f"noise {first:.2g} {unit}, other channels {second:.2g} {unit}"
     if kind == "saturated":
-        return f"saturated for {100 * first:.0f} % of the last second"
+        return f"saturated for {100 * figures[0]:.0f} % of the last second"
     if kind == "swapped":
-        return f"has the readings of {layout.reading_name(int(first))}"
-    trend = f", drifting by {second:+.2g} 1/m per minute" if kind == "drifting" else ""
-    return f"{first:+.2f} 1/m off the prediction of its neighbours{trend}"
+        return f"has the readings of {layout.reading_name(int(figures[0]))}"
+    trend = f", drifting by {second:+.2g} {unit} per minute" if kind == "drifting" else ""
+    return f"{first:+.2f} {unit} off the prediction of its neighbours{trend}"
 
 
 DEAD, STUCK, NOISY, SWAPPED, OFFSET, SATURATED, DRIFTING = (
@@ -138,10 +137,11 @@ def classify_faults(
 ) -> ChannelFaults:
     """The faults of `channels` (n,), which have one mean every `step` s.
 
-    Figures are in 1/m: for dead and stuck channels their reading and the predicted motion; for
-    noisy ones their noise and the median noise; for swapped ones the channel that reads what they
-    should, and NaN; for drifting ones and offsets how far they are off, and the drift per minute.
-    `resolution` in 1/m is that of one count.
+    Figures are in the unit of the readings: for dead and stuck channels their reading and the
+    predicted motion; for noisy ones their noise and the median noise; for swapped ones the channel
+    that reads what they should, and NaN; for drifting ones and offsets how far they are off, and
+    the drift per minute.
+    `resolution` is that of one count.
     """
     changed, predicted = test.changed[:, channels], test.predicted[:, channels]
     left = changed - predicted

@@ -7,6 +7,7 @@ from typing import cast
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from kappaskin.frames import Array, Frame, Indices, Mask
 from kappaskin.sensing import Sensor, SensorLayout
@@ -22,9 +23,9 @@ _PARTS = 4  # that are averaged, each by itself
 class ChannelStatistics:
     """Statistics of C channels over `seconds` that ended at `time` in s on the host's clock.
 
-    `means` (T, C) in 1/m over each of T parts, of `frames` frames each; NaN where a channel was not
-    read or on a rail. `noise` (C,) in 1/m from frame to frame, NaN where unknown; `railed` (C,) the
-    share of the readings on a rail, NaN where there were none.
+    `means` (T, C) of the readings over each of T parts, of `frames` frames each; NaN where a
+    channel was not read or on a rail. `noise` (C,) from frame to frame, NaN where unknown; `railed`
+    (C,) the share of the readings on a rail, NaN where there were none.
     """
 
     time: float
@@ -109,88 +110,144 @@ _MISSING = 1e9  # the same, of a reading that is not there
 _ELEMENTS_AT_ONCE = 512  # elements whose weights are computed together: 15 MB each time
 
 
-def _covariance(distance: Array) -> Array:
-    """Covariances (3, 3, ...) of the curvatures of two elements at a `distance` (2, ...).
+_STEPS = np.array([(0, 0), (1, 0), (0, 1), (2, 0), (0, 2), (1, 1)])
+"""How often w is derived along x and y, in each derivative that readings consist of."""
+_HERMITE = (
+    lambda u: np.ones_like(u),
+    lambda u: u,
+    lambda u: u**2 - 1,
+    lambda u: (u**2 - 3) * u,
+    lambda u: (u**2 - 6) * u**2 + 3,
+)
 
-    Of a displacement with the covariance exp(-r^2/2 l^2), the mean over the lengths l: its fourth
-    derivatives are He_m(x/l) He_n(y/l) exp(-r^2/2 l^2), m + n = 4, with Hermite's polynomials.
-    Scaled so that the variance of xx and of yy is 1, and that of xy 1/3.
+
+def _derivatives(kinds: list[tuple[str, float]]) -> Array:
+    """The coefficients (k, 6) of the derivatives in each of the `kinds` of readings."""
+    found = np.zeros((len(kinds), len(_STEPS)))
+    for row, (quantity, direction) in zip(found, kinds, strict=True):
+        c, s = round(math.cos(direction), 12), round(math.sin(direction), 12)
+        if quantity == "height":
+            row[0] = 1.0
+        elif quantity == "slope":
+            row[1:3] = c, s
+        elif quantity == "curvature":
+            row[3:] = c * c, s * s, 2 * c * s
+        else:
+            row[5] = 1.0
+    return found
+
+
+def _covariance(distance: Array, steps: NDArray[np.int_]) -> Array:
+    """Covariances (d, d, ...) of derivatives of w at two places a `distance` (2, ...) apart.
+
+    Of a displacement w with the covariance exp(-r^2/2 l^2), the mean over the lengths l: its
+    derivatives are (-1)^a He_m(x/l) He_n(y/l) exp(-r^2/2 l^2), with Hermite's polynomials and the
+    order a of the derivative at the first place; those derived by `steps` (d, 2) along x and y.
+    Scaled so that the variance of w_xx is 1.
     """
-    total = np.zeros((3, 3, *distance.shape[1:]))
+    orders = {tuple(order): 0.0 for order in (steps[:, None] + steps).reshape(-1, 2).tolist()}
     for length in _LENGTHS:
         u, v = distance / length
         bell = np.exp(-(u**2 + v**2) / 2) / (3 * len(_LENGTHS))
-        uu, vv = u**2 - 1, v**2 - 1
-        total[0, 0] += (uu * (uu - 4) - 2) * bell
-        total[1, 1] += (vv * (vv - 4) - 2) * bell
-        total[0, 1] += uu * vv * bell
-        total[0, 2] += (uu - 2) * u * v * bell
-        total[1, 2] += (vv - 2) * u * v * bell
-    total[2, 2] = total[1, 0] = total[0, 1]
-    total[2, :2] = total[:2, 2]
+        in_x = {m: bell * _HERMITE[m](u) for m in {m for m, _ in orders}}
+        in_y = {n: _HERMITE[n](v) for n in {n for _, n in orders}}
+        for m, n in orders:
+            orders[m, n] += length ** (4.0 - m - n) * in_x[m] * in_y[n]
+    total = np.empty((len(steps), len(steps), *distance.shape[1:]))
+    for i, first in enumerate(steps):
+        for j, second in enumerate(steps):
+            total[i, j] = (-1) ** first.sum() * orders[tuple(first + second)]
     return total
 
 
-class Neighbours:
-    """Prediction of each of P elements from its k nearest neighbours, by kriging.
+def _own_channels(layout: SensorLayout) -> tuple[Indices, Indices]:
+    """The elements (E,) that have readings, and those readings (E, q) of each.
 
-    The cost grows as the number of elements. An element's own readings do not enter its
-    prediction. `weights` (P, 3, 3 k) are those of the `channels` (P, 3 k) around each; `spread`
-    (P, 3) is the variance of the prediction in units of the mean square of their readings.
+    The last reading of an element that has fewer than others stands there several times.
+    """
+    elements, counts = np.unique(layout.element, return_counts=True)
+    column = np.minimum(np.arange(counts.max()), counts[:, None] - 1)
+    ordered = np.argsort(layout.element, kind="stable")
+    return elements, ordered[(np.cumsum(counts) - counts)[:, None] + column]
+
+
+class Neighbours:
+    """Prediction of each of E elements from its k nearest neighbours, by kriging.
+
+    The cost grows as the number of elements. An element's `own` (E, q) readings do not enter its
+    prediction. `weights` (E, q, k q) are those of the `channels` (E, k q) around each; `spread`
+    (E, q) is the variance of the prediction in units of the mean square of their readings.
+    Elements without a reading count as none: `of` (C,) is the element of each channel.
     """
 
     def __init__(self, layout: SensorLayout) -> None:
-        P = len(layout)
-        k = min(_COUNT, P - 1)
-        distance, near = scipy.spatial.KDTree(layout.positions).query(layout.positions, k + 1)
-        near = cast("Indices", near).reshape(P, k + 1)[:, 1:]
-        pitch = float(np.median(np.reshape(distance, (P, k + 1))[:, 1:2])) if k else 1.0
-        self._at = layout.positions.T / (pitch or 1.0)
+        elements, self.own = _own_channels(layout)
+        positions, E, q = layout.positions[elements], *self.own.shape
+        k = min(_COUNT, E - 1)
+        distance, near = scipy.spatial.KDTree(positions).query(positions, k + 1)
+        near = cast("Indices", near).reshape(E, k + 1)[:, 1:]
+        pitch = float(np.median(np.reshape(distance, (E, k + 1))[:, 1:2])) if k else 1.0
+        self._at = positions.T / (pitch or 1.0)
         self.near = near
-        """The elements (P, k) around each."""
-        self.channels: Indices = (near[:, None] + P * np.arange(3)[:, None]).reshape(P, 3 * k)
-        self.adjacent: Indices = self.channels.reshape(P, 3, k)[:, :, :_BESIDE].reshape(P, -1)
-        """The channels (P, c) of the elements next to each."""
-        close = (np.reshape(distance, (P, k + 1))[:, 1:] < _CLOSE * pitch).sum(axis=1)
+        """The elements (E, k) around each."""
+        self.of: Indices = np.searchsorted(elements, layout.element)
+        """The element (C,) of each channel."""
+        self.alike: Indices = np.empty((layout.channels, k), int)
+        """Of the elements (C, k) around each channel, the reading in the same place."""
+        self.alike[self.own] = self.own[near].swapaxes(1, 2)
+        self.channels: Indices = self.own[near].reshape(E, k * q)
+        self.adjacent: Indices = self.own[near[:, :_BESIDE]].reshape(E, -1)
+        """The channels (E, c) of the elements next to each."""
+        close = (np.reshape(distance, (E, k + 1))[:, 1:] < _CLOSE * pitch).sum(axis=1)
         self.alone: Array = _BESIDE / np.clip(close, 1, _BESIDE)
-        """Ratio (P,) of the close neighbours inside a grid to those of each element."""
-        self.weights = np.zeros((P, 3, 3 * k))
-        self.spread = np.ones((P, 3))
-        self.exclude(np.zeros(3 * P, bool), np.arange(P))
+        """Ratio (E,) of the close neighbours inside a grid to those of each element."""
+        parts = _derivatives(layout.kinds)
+        used = np.flatnonzero(parts.any(axis=0))
+        self._steps = _STEPS[used]
+        self._parts = parts[layout.kind[self.own]][:, :, used]
+        here = _covariance(np.zeros(2), self._steps)
+        self._variance = np.einsum("eqi,ij,eqj->eq", self._parts, here, self._parts)
+        self._power = float(self._variance.max())
+        self.weights = np.zeros((E, q, k * q))
+        self.spread = np.ones((E, q))
+        self.exclude(np.zeros(layout.channels, bool), np.arange(E))
 
     def affected_by(self, channels: Mask) -> Indices:
-        """The elements that some of `channels` (3 P,) predict."""
+        """The elements that some of `channels` (C,) predict."""
         return np.flatnonzero(channels[self.channels].any(axis=1))
 
     def exclude(self, missing: Mask, elements: Indices) -> None:
-        """Predict `elements` without the channels that are `missing` (3 P,)."""
+        """Predict `elements` (n,) without the channels that are `missing` (C,)."""
         for start in range(0, len(elements), _ELEMENTS_AT_ONCE):
             self._weigh(missing, elements[start : start + _ELEMENTS_AT_ONCE])
 
     def _weigh(self, missing: Mask, elements: Indices) -> None:
-        near, E = self._at[:, self.near[elements]], len(elements)
-        k = near.shape[2]
-        between = _covariance(near[:, :, :, None] - near[:, :, None])
-        S = between.transpose(2, 0, 3, 1, 4).reshape(E, 3 * k, 3 * k)
-        covariance = _covariance(near - self._at[:, elements, None])
-        adjacent = covariance.transpose(2, 1, 3, 0).reshape(E, 3 * k, 3)
-        noise = np.where(missing[self.channels[elements]], _MISSING, _NOISE)
-        S[:, np.arange(3 * k), np.arange(3 * k)] += noise
-        W = np.linalg.solve(S, adjacent)
-        own = np.diag(_covariance(np.zeros(2)))
+        at, around = self._at[:, self.near[elements]], self._parts[self.near[elements]]
+        n, k, q = around.shape[:3]
+        between = _covariance(at[:, :, :, None] - at[:, :, None], self._steps)
+        S = np.einsum("ekqi,ijekl,elrj->ekqlr", around, between, around, optimize=True)
+        S = S.reshape(n, k * q, k * q)
+        covariance = _covariance(at - self._at[:, elements, None], self._steps)
+        own = self._parts[elements]
+        parts = (around, covariance, own)
+        near = np.einsum("ekqi,ijek,erj->ekqr", *parts, optimize=True).reshape(n, k * q, q)
+        noise = np.where(missing[self.channels[elements]], _MISSING, _NOISE) * self._power
+        S[:, np.arange(k * q), np.arange(k * q)] += noise
+        W = np.linalg.solve(S, near)
         self.weights[elements] = W.swapaxes(1, 2)
-        self.spread[elements] = np.maximum(own - np.sum(W * adjacent, axis=1), 0.0)
+        left = self._variance[elements] - np.sum(W * near, axis=1)
+        self.spread[elements] = np.maximum(left, 0.0) / self._power
 
     def predict(self, readings: Array, elements: Indices) -> tuple[Array, Array]:
-        """Predicted readings of `elements` (E,) and their variance, (T, 3, E) each.
+        """Predicted readings of the channels `own[elements]` (n, q), and their variance.
 
-        From `readings` (T, 3 P) in 1/m, NaN where one of the neighbours is.
+        (T, n, q) each, from `readings` (T, C), NaN where one of the neighbours is.
         """
-        around = readings.T[self.channels[elements]]  # (E, 3 k, T)
+        around = readings.T[self.channels[elements]]  # (n, k q, T)
         predicted = np.matmul(self.weights[elements], around)
         power = np.einsum("ert,ert->et", around, around) / max(around.shape[1], 1)
         spread = self.spread[elements][:, :, None] * power[:, None]
-        return predicted.transpose(2, 1, 0), spread.transpose(2, 1, 0)
+        return predicted.transpose(2, 0, 1), spread.transpose(2, 0, 1)
 
 
 _KEPT = 128  # means, 16 a second
@@ -205,6 +262,7 @@ _FAR = 4.0  # standard deviations
 # most: 1.6 times, with 25 x 25 functions, where it presses on 10 x 10 elements; in a corner, with
 # fewer beside it, so many times more.
 _SHARP = 2.0
+_SHARP_IN_ELASTOMER = 6.0  # of heights, under a cone whose contact is as wide as the elements lie
 _SAME = 0.99  # of the correlation of what a channel reads and should, where a load presses on it
 _USUAL = 1.4826  # standard deviations are so many times the median of the amounts
 _FINE = 0.01  # of the largest change anywhere: the precision of any prediction
@@ -240,34 +298,35 @@ def _largest(values: Array) -> float:
 
 
 class InconsistencyTest:
-    """Changes of C channels, `changed` (T, C) in 1/m, against those `predicted` (T, C) for them.
+    """Changes of C channels, `changed` (T, C), against those `predicted` (T, C) for them.
 
     Changes are relative to the readings of about a minute ago: offsets and old contacts are
     consistent. A `missing` channel predicts no others, but is predicted by them. `variance` (T, C)
-    in 1/m^2 is that of the prediction. `distance` (C,) is how far a channel was off in the last two
-    seconds, in standard deviations, zero where unknown; `off` (C,) the same in 1/m. `beyond` (C,)
+    is that of the prediction. All are in the unit of the readings, which all have. `distance` (C,)
+    is how far a channel was off in the last two seconds, in standard deviations, zero where
+    unknown; `off` (C,) the same in the unit of the readings. `beyond` (C,)
     is above one where for a quarter of the time a channel was further off than four standard
     deviations and a point load on its element explain. A channel that is no further off, and always
     reads more than predicted, may be `pressed` (C,) by such a load.
     """
 
-    def __init__(self, layout: SensorLayout) -> None:
-        C = 3 * len(layout)
+    def __init__(self, layout: SensorLayout, elastomer: bool = False) -> None:
+        C, self._sharp = layout.channels, _SHARP_IN_ELASTOMER if elastomer else _SHARP
         self.neighbours = Neighbours(layout)
-        self._every = np.arange(len(layout))
+        self._every = np.arange(len(self.neighbours.own))
         self.missing = np.zeros(C, bool)
         self.reads: Array = np.full(C, np.nan)
-        """Last reading (C,) of each channel in 1/m."""
+        """Last reading (C,) of each channel."""
         self.base: Array = np.full(C, np.nan)
-        """Reference (C,) of the changes in 1/m."""
+        """Reference (C,) of the changes."""
         self.changed, self.predicted, self.variance = (
             np.full((_KEPT, C), np.nan) for _ in range(3)
         )
-        self._adjacent = np.zeros((_KEPT, len(layout)))
-        """Largest change (T, P) in 1/m of the elements next to each."""
-        self._typical = np.zeros(_KEPT)  # in 1/m, how far off healthy channels are
+        self._adjacent = np.zeros((_KEPT, len(self._every)))
+        """Largest change (T, E) of the elements next to each."""
+        self._typical = np.zeros(_KEPT)  # how far off healthy channels are
         self.usual = 0.0
-        """Median noise in 1/m of the channels whose noise is known."""
+        """Median noise of the channels whose noise is known."""
         self.distance, self.off, self.left_open = np.zeros(C), np.zeros(C), np.zeros(C)
         self.beyond = np.zeros(C)
         self.pressed = np.zeros(C, bool)
@@ -319,10 +378,11 @@ class InconsistencyTest:
 
     def _predict(self, elements: Indices, when: slice) -> None:
         heard = np.where(self.missing, 0.0, self.changed[when])
-        predicted, spread = self.neighbours.predict(heard, elements)
-        P = len(self._every)
-        for ring, new in ((self.predicted, predicted), (self.variance, spread)):
-            ring.reshape(_KEPT, 3, P)[when][:, :, elements] = new
+        own = self.neighbours.own[elements]
+        for ring, new in zip(
+            (self.predicted, self.variance), self.neighbours.predict(heard, elements), strict=True
+        ):
+            ring[when, own] = new
 
     def exclude(self, missing: Mask) -> None:
         """Exclude exactly the `missing` (C,) channels from all predictions."""
@@ -342,7 +402,8 @@ class InconsistencyTest:
     def _measure(self, statistics: ChannelStatistics) -> None:
         heard = statistics.noise[~self.missing & ~np.isnan(statistics.noise)]
         self.usual = float(np.median(heard)) if heard.size else self.usual
-        around = (self.neighbours.weights**2).sum(axis=2).T.ravel()
+        around = np.empty(len(self.reads))
+        around[self.neighbours.own] = (self.neighbours.weights**2).sum(axis=2)
         white = np.fmax(statistics.noise, self.usual) ** 2 + self.usual**2 * around
         white /= statistics.frames
         left = (self.changed - self.predicted)[self.recent]
@@ -350,7 +411,8 @@ class InconsistencyTest:
         s2 += white + self._typical[self.recent, None] ** 2
         with np.errstate(invalid="ignore", divide="ignore"):
             self.distance = rms(left / np.sqrt(s2))
-            sharp = _SHARP * np.tile(self.neighbours.alone * self._adjacent[self.recent], 3)
+            beside = self.neighbours.alone * self._adjacent[self.recent]
+            sharp = self._sharp * beside[:, self.neighbours.of]
             beyond = np.nan_to_num(np.abs(left) / (_FAR * np.sqrt(s2) + sharp))
         self.beyond = np.partition(beyond, _OFTEN, axis=0)[_OFTEN]
         changed, predicted = (
@@ -362,7 +424,7 @@ class InconsistencyTest:
         self.off, self.left_open = rms(left), rms(np.sqrt(s2))
 
     def motion(self) -> tuple[Array, Array, Array]:
-        """RMS (C,) in 1/m of the motion not predicted, of that predicted, and of its error.
+        """RMS (C,) of the motion not predicted, of that predicted, and of its error.
 
         In the last two seconds, without offsets.
         """
@@ -380,9 +442,10 @@ class InconsistencyTest:
         self.changed[:, channels] -= shift
 
     def predicted_levels(self, channels: Indices) -> tuple[Array, Array]:
-        """Predicted readings of `channels` (n,) now, in 1/m, and their variance, (n,) each."""
-        P = len(self._every)
+        """Predicted readings of `channels` (n,) now, and their variance, (n,) each."""
         reads = np.where(self.missing, 0.0, np.nan_to_num(self.reads))
-        predicted, spread = self.neighbours.predict(reads[None], channels % P)
-        row, each = channels // P, np.arange(len(channels))
-        return predicted[0, row, each], spread[0, row, each]
+        elements = self.neighbours.of[channels]
+        predicted, spread = self.neighbours.predict(reads[None], elements)
+        own = self.neighbours.own[elements] == channels[:, None]
+        at = np.arange(len(channels)), own.argmax(axis=1)
+        return predicted[0][at], spread[0][at]

@@ -21,7 +21,7 @@ from kappaskin.health.findings import (
     findings,
 )
 from kappaskin.health.inconsistency import ChannelStatistics, InconsistencyTest, StatisticsWindow
-from kappaskin.sensing import Sensor
+from kappaskin.sensing import DigitalReadings, Sensor
 
 _FAR = 4.0  # standard deviations: a channel that is further off is suspected
 _NEAR = 2.5  # the same: one that is nearer agrees with the others again
@@ -51,8 +51,10 @@ class HealthMonitor:
     Without motion no channel is called dead, stuck or swapped. The work of an evaluation is spread
     over the frames that follow, so that none of them waits for all of it.
 
-    Neighbours predict xx, yy and xy alone: of other readings only those are found that the device
-    reports as dead, or that are on a rail or missing.
+    Neighbours predict readings of one unit that are smooth over the distance of elements: all of a
+    plate, and the heights of any skin. Of a sensor of several units, such as heights and slopes, or
+    of slopes of an elastomer, which a sharp edge bends at once, only those channels are found that
+    the device reports as dead, or that are on a rail or missing.
 
     `kinds` (C,) are numbers in `FAULTS`, 0 for healthy channels; `badness` (C,) ranks them.
     """
@@ -66,7 +68,9 @@ class HealthMonitor:
     def reset(self) -> None:
         """Forget all readings and findings, as when the device has restarted."""
         layout, C = self.sensor.layout, self.sensor.channels
-        self._predicted = None if layout.reads else InconsistencyTest(layout)
+        elastomer, units = self.sensor.plate.unknown_material, set(layout.kind_units)
+        predictable = units == {"m"} or (len(units) == 1 and not elastomer)
+        self._predicted = InconsistencyTest(layout, elastomer) if predictable else None
         self.kinds = np.where(layout.lacking.ravel(), DEAD, 0).astype(np.uint8)
         self._since, self._figures = np.full(C, math.nan), np.full((C, 2), math.nan)
         self._suspects = np.zeros(C, bool)
@@ -90,7 +94,7 @@ class HealthMonitor:
     @property
     def _test(self) -> InconsistencyTest:
         if self._predicted is None:
-            raise Refusal("expected a curvature sensor, whose elements their neighbours predict")
+            raise Refusal("expected readings that their neighbours predict")
         return self._predicted
 
     def _evaluate(self, statistics: ChannelStatistics) -> Iterator[bool]:
@@ -138,17 +142,15 @@ class HealthMonitor:
 
     def _find_noisy(self, statistics: ChannelStatistics) -> None:
         """Find channels noisier than all others and their neighbours, in several evaluations."""
-        P = len(self.sensor.layout)
         usual = max(self._test.usual, self.sensor.transduction.resolution)
         # A region of interest leaves most channels without a noise: they are as the others.
         noise = np.where(np.isnan(statistics.noise), usual, statistics.noise)
         loud = np.flatnonzero((noise > _LOUD * usual) & ~self._dead)
-        near = self._test.neighbours.near[loud % P]
-        if near.shape[1]:
-            around = np.median(noise.reshape(3, P)[(loud // P)[:, None], near], axis=1)
-            loud = loud[noise[loud] > _LOUD * around]
+        around = noise[self._test.neighbours.alike[loud]]
+        if around.size:
+            loud = loud[noise[loud] > _LOUD * np.median(around, axis=1)]
         self._loud[:-1] = self._loud[1:]
-        self._loud[-1] = np.isin(np.arange(3 * P), loud)
+        self._loud[-1] = np.isin(np.arange(len(noise)), loud)
         often = self._loud[-1] & (self._loud.sum(axis=0) >= _LOUDS)
         self._find(self._may_be(often), NOISY, statistics.time)
         heard = (self.kinds == NOISY) & self._loud[-1]
@@ -174,18 +176,18 @@ class HealthMonitor:
         within = np.abs(predicted) + _FAR * np.sqrt(spread) < _WITHIN * rail
         dead = railed[within]
         self.kinds[dead] = DEAD
-        self._figures[dead, 0] = rail
+        digital = isinstance(chain, DigitalReadings)  # whose device reports what it cannot read
+        self._figures[dead, 0] = math.nan if digital else rail
         self._figures[dead, 1] = np.abs(predicted[within])
 
     def _suspect(self, statistics: ChannelStatistics) -> None:
         """Suspect the worst of the channels that are off, and those suspected before."""
         far = (self._test.distance > _FAR) & ~self._dead & (self.kinds == 0)
-        off = np.where(far & ~self._suspects, self._test.off, 0.0).reshape(3, -1)
-        near = self._test.neighbours.near
+        off = np.where(far & ~self._suspects, self._test.off, 0.0)
         # A pressed element misleads what is predicted of those around it, by less than of itself.
-        around = off.max(axis=0)[near].max(axis=1, initial=0.0)
-        new = (off > 0) & (off >= around)
-        self._suspects = ((self._suspects & far) | new.ravel()) & ~self._test.pressed
+        around = off[self._test.neighbours.channels].max(axis=1, initial=0.0)
+        new = (off > 0) & (off >= around[self._test.neighbours.of])
+        self._suspects = ((self._suspects & far) | new) & ~self._test.pressed
         self._accused = np.where(self._suspects, self._accused + 1, 0)
 
     def _confirm(self, statistics: ChannelStatistics) -> None:

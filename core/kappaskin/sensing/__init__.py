@@ -3,6 +3,7 @@
 from kappaskin.sensing.hysteresis import PrandtlIshlinskii as PrandtlIshlinskii
 from kappaskin.sensing.hysteresis import StandardLinearSolid as StandardLinearSolid
 from kappaskin.sensing.layout import QUANTITIES as QUANTITIES
+from kappaskin.sensing.layout import SHOWN_UNITS as SHOWN_UNITS
 from kappaskin.sensing.layout import DeflectedSurface as DeflectedSurface
 from kappaskin.sensing.layout import NormalCurvature as NormalCurvature
 from kappaskin.sensing.layout import Readings as Readings

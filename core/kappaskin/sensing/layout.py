@@ -105,6 +105,8 @@ def _channels(patch: Patch, elements: int) -> Mask:
 
 QUANTITIES = {"height": "m", "slope": "m/m", "curvature": "1/m", "twist": "1/m"}
 """What an element may read, with its unit."""
+SHOWN_UNITS = {"m": (1e6, "\N{MICRO SIGN}m"), "m/m": (1e3, "mrad"), "1/m": (1.0, "1/m")}
+"""How readings are shown: by how many times a unit, and its name."""
 _ALONG = ("slope", "curvature")  # have a direction
 _ALIKE = 9  # decimals of a direction in rad: those equal so far are one
 _CURVATURES = (("curvature", 0.0), ("curvature", np.pi / 2), ("twist", 0.0))  # xx, yy and xy

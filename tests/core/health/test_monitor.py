@@ -132,6 +132,39 @@ def test_a_stuck_channel_is_found_by_itself() -> None:
     assert finding.figure.startswith("reads +1.70 1/m while its neighbours predict ")
 
 
+@pytest.mark.parametrize(
+    ("name", "unit", "smallest"), [("camera", "\N{MICRO SIGN}m", 100), ("tilts", "mrad", 300)]
+)
+def test_faults_of_heights_and_slopes_are_found(name, unit, smallest) -> None:
+    frames, sensor = frames_of(name, 12), load_scene(name).sensor()
+    counts = np.array([frame.counts for frame in frames], float)
+    moving = np.argsort(counts.std(axis=0))
+    (worst, other), rng = moving[[-1, -8]], np.random.default_rng(0)
+    noise = np.median(np.abs(np.diff(counts, 2, axis=0))) / 0.6745 / np.sqrt(6)
+
+    def stuck(counts, time):
+        counts[worst] = 900
+
+    def noisy(counts, time):
+        counts[worst] += int(rng.normal(0, 12 * noise))
+
+    def offset(counts, time):
+        counts[worst] += int(smallest * noise) * (time > 3)
+
+    faults = {"stuck": stuck, "noisy": noisy, "offset": offset}
+    for kind, spoil in faults.items():
+        monitor, looks = watched(frames, spoil, sensor)
+        at, others = found_at(looks, [worst])
+        assert at <= 6.5
+        assert not others
+        (finding,) = monitor.findings(np.zeros(len(monitor.kinds), bool))
+        assert finding.kind == kind
+        assert f" {unit}" in finding.figure
+
+    monitor, _ = watched(frames, swap([worst], [other]), sensor)
+    assert told(monitor) == {worst: "swapped", other: "swapped"}
+
+
 def test_a_noisy_channel_is_found_in_two_seconds() -> None:
     rng = np.random.default_rng(0)
 
