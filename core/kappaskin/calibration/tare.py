@@ -42,7 +42,7 @@ _CHECK = 0.5  # s between two checks for a load
 
 @dataclass(frozen=True, eq=False)
 class Tare:
-    """What each of C channels of one device read at rest: `offset` (C,) in 1/m of Eq. 8.
+    """What each of C channels of one device read at rest: `offset` (C,) in their units (Eq. 8).
 
     It is an offset of the reading, before gain, creep and loops are undone, because what wanders is
     the bridge and the amplifier: the same shift of the voltage whatever the skin does. Loops are
@@ -166,11 +166,6 @@ class TareMeasurement:
 
     def tare(self, seeker: LoadDetector, rest: Rest, date: datetime, temperature: float) -> Tare:
         """The tare, or a `Refusal` that says why there is none; temperature NaN if not known."""
-        if len(set(self.sensor.layout.kind_units)) > 1:
-            raise Refusal(
-                "expected readings of one unit, whose noise tells a load from offsets, got "
-                f"{self.sensor.layout.units}; such a sensor has no tare"
-            )
         n = len(self._times)
         if n < _FEWEST:
             raise Refusal(
@@ -209,7 +204,7 @@ def _known(sensor: Sensor, readings: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """Mean (C,) and its standard error in 1/m; `noise` of one frame in 1/m."""
+    """Mean (C,) and its standard error; `noise` of one frame in units of `LoadDetector.sigma`."""
 
     mean: Array
     error: Array
@@ -218,6 +213,7 @@ class _Found:
 
 def _still(sensor: Sensor, seeker: LoadDetector, readings: Array) -> _Found:
     """The mean of `readings` (n, C), refused if they move by more than noise."""
+    readings = readings / seeker.sigma
     used = ~np.isnan(readings).all(axis=0)
     # A channel may be missing in a frame or two: its mean stands for it.
     mean = np.full(readings.shape[1], np.nan)
@@ -228,7 +224,8 @@ def _still(sensor: Sensor, seeker: LoadDetector, readings: Array) -> _Found:
     parts = _parts(filled, _PARTS) - mean
     for off in (parts, _parts(filled, 2) - mean):
         _check_still(sensor, seeker, off, noise, len(readings) / len(off))
-    return _Found(mean, parts.std(axis=0, ddof=1) / math.sqrt(_PARTS), noise)
+    error = parts.std(axis=0, ddof=1) / math.sqrt(_PARTS)
+    return _Found(seeker.sigma * mean, seeker.sigma * error, noise)
 
 
 def _parts(readings: Array, count: int) -> Array:
@@ -239,19 +236,23 @@ def _parts(readings: Array, count: int) -> Array:
 def _check_still(
     sensor: Sensor, seeker: LoadDetector, off: Array, noise: float, frames: float
 ) -> None:
-    """Refuse when a part of the time, of so many `frames`, is too far `off` (n, C) the mean."""
+    """Refuse when a part of the time, of so many `frames`, is too far `off` (n, C) the mean.
+
+    In units of `LoadDetector.sigma`.
+    """
     squares = np.nanmean(off**2, axis=1)
     part = off[int(squares.argmax())]
     by_noise = noise / math.sqrt(frames)
-    allowed = _STIR * noise + sensor.transduction.resolution
+    allowed = _STIR * noise + float((sensor.transduction.resolution / seeker.sigma).max())
     # Offsets of elements are constant: what changes is noise, or a load.
-    if squares.max() > allowed**2 or seeker(part, by_noise**2, share=0.0) is not None:
+    load = seeker(seeker.sigma * part, by_noise**2, share=0.0)
+    if squares.max() > allowed**2 or load is not None:
         channel = int(np.nanargmax(np.abs(part)))
+        units = seeker.sigma[channel], sensor.layout.kind_units[sensor.layout.kind[channel]]
         raise Refusal(
             f"the readings move: {_named(sensor, channel)} was off its mean by "
-            f"{abs(part[channel]):.2g} {sensor.layout.units} for {SECONDS / len(off):.2g} s, where "
-            "noise causes "
-            f"{by_noise:.2g}; let the skin come to rest, then tare again"
+            f"{units[0] * abs(part[channel]):.2g} {units[1]} for {SECONDS / len(off):.2g} s, where "
+            f"noise causes {units[0] * by_noise:.2g}; let the skin come to rest, then tare again"
         )
 
 
@@ -287,8 +288,9 @@ def _force(force: float) -> str:
 class Drift:
     """The drift of the tared readings of an unloaded skin.
 
-    `curvature` in 1/m, the RMS over the channels; `displacement` in m, the farthest that the
-    estimated surface has moved; `device_time` in s when. `loaded` says that the skin is now: the
+    `curvature`, the RMS over the channels in the unit of the readings, or in their given noise
+    where they differ in unit; `displacement` in m, the farthest that the estimated surface has
+    moved; `device_time` in s when. `loaded` says that the skin is now: the
     drift is the last from before. It is shown, never subtracted.
     """
 
@@ -336,6 +338,7 @@ class DriftMonitor:
             return self._drift
         self._checked = self._time
         mean = self._mean.ravel()
+        weighted = mean / self._seeker.sigma
         # As a frame shows it: a fainter trace of a load than one would see is drift, too.
         loaded = self._seeker(mean, self._noise**2) is not None
         if loaded or self._loaded:
@@ -344,7 +347,7 @@ class DriftMonitor:
             self._drift = replace(self._drift, loaded=True)
             return self._drift
         self._drift = self._next or self._drift
-        square = float(np.nanmean(mean**2)) - self._variance
+        square = float(np.nanmean(weighted**2)) - self._variance
         farthest = float(np.abs(self._surface).max())
         self._next = Drift(math.sqrt(max(square, 0.0)), farthest, self._time)
         return self._drift

@@ -62,8 +62,10 @@ class LoadDetector:
         points = np.stack(np.meshgrid(x[1:-1], y[1:-1]), -1).reshape(-1, 2)
         self._points = points[patch.moves(points)]
         M = plate.compliance(basis).after(layout.operator(basis, plate))
-        self._T = M @ basis.at(self._points).T
-        self._plain = level_and_slopes(layout).T
+        self.sigma = np.ones(layout.channels) if sensor.sigma is None else sensor.sigma
+        """Standard deviation (C,) of readings that differ in unit, their weight; else 1."""
+        self._T = M @ basis.at(self._points).T / self.sigma[:, None]
+        self._plain = level_and_slopes(layout).T / self.sigma[:, None]
         self._live = layout.live.ravel()
         self._cache = PatternCache[_LoadTables]()
 
@@ -79,14 +81,17 @@ class LoadDetector:
     def __call__(
         self, readings: Array, variance: float, share: float = _SHARE
     ) -> DetectedLoad | None:
-        """The load in `readings` (C,) in 1/m with noise of `variance`; None where there is none.
+        """The load in `readings` (C,) with noise of `variance`; None where there is none.
+
+        The variance is that of `readings / sigma`.
 
         It must explain this `share` of what the level and slopes leave, and more than chance.
         """
         used: NDArray[np.bool_] = self._live & np.isfinite(readings)
         tables = self._cache(used, self._tables)
-        unit = float(power_of_two(readings[used])[0])
-        read, variance = readings[used] / unit, (math.sqrt(variance) / unit) ** 2
+        read: Array = readings[used] / self.sigma[used]
+        unit = float(power_of_two(read)[0])
+        read, variance = read / unit, (math.sqrt(variance) / unit) ** 2
         K: Array = read - tables.Q @ (tables.Q.T @ read)
         power, h = float(K @ K), K @ tables.T
         explained = h**2 / tables.norm

@@ -254,7 +254,8 @@ def drift_text(status: Status) -> str:
     layout = status.sensor.layout if status.sensor else None
     by = f"{drift.curvature:.3f} 1/m"
     if layout is not None and layout.reads:
-        by = f"{drift.curvature:.2g} {layout.units}"
+        one = len(set(layout.kind_units)) == 1
+        by = f"{drift.curvature:.2g} {layout.units if one else 'times the noise'}"
     return (
         f"Drift since the tare: {by} (RMS), equal to a displacement of "
         f"{1e3 * drift.displacement:.3f} mm{then}"
