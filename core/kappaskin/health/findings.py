@@ -133,15 +133,15 @@ class ChannelFaults:
 
 
 def classify_faults(
-    test: InconsistencyTest, channels: Indices, resolution: float, step: float
+    test: InconsistencyTest, channels: Indices, resolution: Array, step: float
 ) -> ChannelFaults:
     """The faults of `channels` (n,), which have one mean every `step` s.
 
-    Figures are in the unit of the readings: for dead and stuck channels their reading and the
+    Figures are in the units of the test: for dead and stuck channels their reading and the
     predicted motion; for noisy ones their noise and the median noise; for swapped ones the channel
     that reads what they should, and NaN; for drifting ones and offsets how far they are off, and
     the drift per minute.
-    `resolution` is that of one count.
+    `resolution` (n,) is that of one count.
     """
     changed, predicted = test.changed[:, channels], test.predicted[:, channels]
     left = changed - predicted

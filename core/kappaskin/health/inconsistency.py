@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -110,6 +110,8 @@ _MISSING = 1e9  # the same, of a reading that is not there
 _ELEMENTS_AT_ONCE = 512  # elements whose weights are computed together: 15 MB each time
 
 
+_ORDERS = {"m": 0, "m/m": 1, "1/m": 2}
+"""How often w is derived in readings of each unit."""
 _STEPS = np.array([(0, 0), (1, 0), (0, 1), (2, 0), (0, 2), (1, 1)])
 """How often w is derived along x and y, in each derivative that readings consist of."""
 _HERMITE = (
@@ -207,7 +209,17 @@ class Neighbours:
         self._parts = parts[layout.kind[self.own]][:, :, used]
         here = _covariance(np.zeros(2), self._steps)
         self._variance = np.einsum("eqi,ij,eqj->eq", self._parts, here, self._parts)
-        self._power = float(self._variance.max())
+        self.scale = np.ones(layout.channels)
+        """What the readings (C,) are divided by, so that those of several units compare."""
+        units = np.array(layout.kind_units)[layout.kind]
+        for unit in set(layout.kind_units):
+            own = (units == unit)[self.own]
+            power = float(self._variance[own].max())
+            self._variance[own] /= power
+            self._parts[own] /= math.sqrt(power)
+            if len(set(layout.kind_units)) > 1:
+                order = _ORDERS[unit]
+                self.scale[units == unit] = math.sqrt(power) * (pitch or 1.0) ** (1 - order)
         self.weights = np.zeros((E, q, k * q))
         self.spread = np.ones((E, q))
         self.exclude(np.zeros(layout.channels, bool), np.arange(E))
@@ -231,12 +243,12 @@ class Neighbours:
         own = self._parts[elements]
         parts = (around, covariance, own)
         near = np.einsum("ekqi,ijek,erj->ekqr", *parts, optimize=True).reshape(n, k * q, q)
-        noise = np.where(missing[self.channels[elements]], _MISSING, _NOISE) * self._power
+        noise = np.where(missing[self.channels[elements]], _MISSING, _NOISE)
         S[:, np.arange(k * q), np.arange(k * q)] += noise
         W = np.linalg.solve(S, near)
         self.weights[elements] = W.swapaxes(1, 2)
         left = self._variance[elements] - np.sum(W * near, axis=1)
-        self.spread[elements] = np.maximum(left, 0.0) / self._power
+        self.spread[elements] = np.maximum(left, 0.0)
 
     def predict(self, readings: Array, elements: Indices) -> tuple[Array, Array]:
         """Predicted readings of the channels `own[elements]` (n, q), and their variance.
@@ -302,9 +314,9 @@ class InconsistencyTest:
 
     Changes are relative to the readings of about a minute ago: offsets and old contacts are
     consistent. A `missing` channel predicts no others, but is predicted by them. `variance` (T, C)
-    is that of the prediction. All are in the unit of the readings, which all have. `distance` (C,)
-    is how far a channel was off in the last two seconds, in standard deviations, zero where
-    unknown; `off` (C,) the same in the unit of the readings. `beyond` (C,)
+    is that of the prediction. All are of readings over `neighbours.scale`. `distance` (C,) is how
+    far a channel was off in the last two seconds, in standard deviations, zero where unknown; `off`
+    (C,) the same in those units. `beyond` (C,)
     is above one where for a quarter of the time a channel was further off than four standard
     deviations and a point load on its element explain. A channel that is no further off, and always
     reads more than predicted, may be `pressed` (C,) by such a load.
@@ -334,6 +346,11 @@ class InconsistencyTest:
     @property
     def recent(self) -> slice:
         return slice(_KEPT - _RECENT, None)
+
+    def scaled(self, statistics: ChannelStatistics) -> ChannelStatistics:
+        """The `statistics` of readings over `neighbours.scale`, of which all the rest is."""
+        scale = self.neighbours.scale
+        return replace(statistics, means=statistics.means / scale, noise=statistics.noise / scale)
 
     def steps(self, statistics: ChannelStatistics, missing: Mask, wrong: Mask) -> Iterator[None]:
         """Update with `statistics`, without the `missing` (C,) channels, some of them `wrong` (C,).

@@ -51,10 +51,10 @@ class HealthMonitor:
     Without motion no channel is called dead, stuck or swapped. The work of an evaluation is spread
     over the frames that follow, so that none of them waits for all of it.
 
-    Neighbours predict readings of one unit that are smooth over the distance of elements: all of a
-    plate, and the heights of any skin. Of a sensor of several units, such as heights and slopes, or
-    of slopes of an elastomer, which a sharp edge bends at once, only those channels are found that
-    the device reports as dead, or that are on a rail or missing.
+    Neighbours predict readings that are smooth over the distance of elements: all of a plate, and
+    the heights of any skin. Of an elastomer that reads slopes or curvatures, which a sharp edge
+    bends at once, only those channels are found that the device reports as dead, or that are on a
+    rail or missing.
 
     `kinds` (C,) are numbers in `FAULTS`, 0 for healthy channels; `badness` (C,) ranks them.
     """
@@ -69,7 +69,7 @@ class HealthMonitor:
         """Forget all readings and findings, as when the device has restarted."""
         layout, C = self.sensor.layout, self.sensor.channels
         elastomer, units = self.sensor.plate.unknown_material, set(layout.kind_units)
-        predictable = units == {"m"} or (len(units) == 1 and not elastomer)
+        predictable = units == {"m"} or not elastomer
         self._predicted = InconsistencyTest(layout, elastomer) if predictable else None
         self.kinds = np.where(layout.lacking.ravel(), DEAD, 0).astype(np.uint8)
         self._since, self._figures = np.full(C, math.nan), np.full((C, 2), math.nan)
@@ -97,6 +97,11 @@ class HealthMonitor:
             raise Refusal("expected readings that their neighbours predict")
         return self._predicted
 
+    @property
+    def _resolution(self) -> Array:
+        """That of one count of each channel (C,), in units of what the test compares."""
+        return self.sensor.transduction.resolution / self._test.neighbours.scale
+
     def _evaluate(self, statistics: ChannelStatistics) -> Iterator[bool]:
         """The steps of an evaluation, each as long as the estimate of a frame; True after the last.
 
@@ -107,6 +112,7 @@ class HealthMonitor:
             self._find_saturated(statistics)
             yield True
             return
+        statistics = self._predicted.scaled(statistics)
         wrong = self._dead | (self.kinds > 0)
         for _ in self._test.steps(statistics, wrong | self._suspects, wrong):
             yield False
@@ -130,7 +136,11 @@ class HealthMonitor:
     def findings(self, retained: Mask) -> tuple[Finding, ...]:
         """The findings, of which some channels are `retained` (C,) in the fit all the same."""
         layout = self.sensor.layout
-        return findings(self.kinds, self._since, self._figures, retained, layout)
+        figures = self._figures
+        if self._predicted:
+            unscaled = np.isin(self.kinds, (SATURATED, SWAPPED))
+            figures = figures * np.where(unscaled, 1.0, self._predicted.neighbours.scale)[:, None]
+        return findings(self.kinds, self._since, figures, retained, layout)
 
     def _find(self, which: Mask, kind: int, since: float) -> None:
         self._since[which & (self.kinds == 0)] = since
@@ -142,7 +152,7 @@ class HealthMonitor:
 
     def _find_noisy(self, statistics: ChannelStatistics) -> None:
         """Find channels noisier than all others and their neighbours, in several evaluations."""
-        usual = max(self._test.usual, self.sensor.transduction.resolution)
+        usual = np.maximum(self._test.usual, self._resolution)
         # A region of interest leaves most channels without a noise: they are as the others.
         noise = np.where(np.isnan(statistics.noise), usual, statistics.noise)
         loud = np.flatnonzero((noise > _LOUD * usual) & ~self._dead)
@@ -154,7 +164,7 @@ class HealthMonitor:
         often = self._loud[-1] & (self._loud.sum(axis=0) >= _LOUDS)
         self._find(self._may_be(often), NOISY, statistics.time)
         heard = (self.kinds == NOISY) & self._loud[-1]
-        self._figures[heard] = np.stack([noise, np.full(len(noise), usual)], axis=1)[heard]
+        self._figures[heard] = np.stack([noise, usual], axis=1)[heard]
 
     def _find_saturated(self, statistics: ChannelStatistics) -> None:
         self._railed[:-1] = self._railed[1:]
@@ -171,13 +181,13 @@ class HealthMonitor:
     def _call_dead(self, railed: NDArray[np.intp]) -> None:
         """Of channels that stay on a rail, find those dead whose neighbours predict far less."""
         chain = self.sensor.transduction
-        rail = chain.resolution * min(abs(limit) for limit in chain.limits)
+        rail = self._resolution[railed] * min(abs(limit) for limit in chain.limits)
         predicted, spread = self._test.predicted_levels(railed)
         within = np.abs(predicted) + _FAR * np.sqrt(spread) < _WITHIN * rail
         dead = railed[within]
         self.kinds[dead] = DEAD
         digital = isinstance(chain, DigitalReadings)  # whose device reports what it cannot read
-        self._figures[dead, 0] = math.nan if digital else rail
+        self._figures[dead, 0] = math.nan if digital else rail[within]
         self._figures[dead, 1] = np.abs(predicted[within])
 
     def _suspect(self, statistics: ChannelStatistics) -> None:
@@ -197,7 +207,7 @@ class HealthMonitor:
         if not channels.size:
             return
         step = statistics.seconds / len(statistics.means)
-        faults = classify_faults(self._test, channels, self.sensor.transduction.resolution, step)
+        faults = classify_faults(self._test, channels, self._resolution[channels], step)
         since = statistics.time - _CONFIRMED * statistics.seconds
         # For a noisy channel, being off for a while is no more specific fault.
         better = (self.kinds[channels] != NOISY) | ~np.isin(faults.kinds, _LOOSE)

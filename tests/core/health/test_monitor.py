@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from kappaskin import (
 from kappaskin.estimation import FAULTS, Scanner
 from kappaskin.health import HealthMonitor
 from kappaskin.health.inconsistency import StatisticsWindow
-from kappaskin.scenes import SCENES, Orbit
+from kappaskin.scenes import SCENES, Orbit, read_scene
 from kappaskin.scenes.effects import GaussianNoise
 
 pytestmark = pytest.mark.slow
@@ -163,6 +164,53 @@ def test_faults_of_heights_and_slopes_are_found(name, unit, smallest) -> None:
 
     monitor, _ = watched(frames, swap([worst], [other]), sensor)
     assert told(monitor) == {worst: "swapped", other: "swapped"}
+
+
+MIXED = """
+format = 1
+rate = 60.0
+[skin]
+size = [0.06, 0.06]
+rigidity = 3.7e-3
+[elements]
+grid = [12, 12]
+reads = ["height", "slope@30", "slope@120"]
+[readings.height]
+noise = 5e-6
+[readings.slope]
+noise = 5e-4
+[[touch]]
+what = "gaussian"
+sd = 0.002
+x = 0.03
+y = 0.03
+force = 0.1
+orbit = { radius = 0.012, period = 6.0 }
+"""
+
+
+def test_readings_of_several_units_predict_each_other() -> None:
+    scene = read_scene(MIXED, Path("mixed.toml"))
+    simulator, sensor = Simulator(scene), scene.sensor()
+    frames = [
+        simulator.scanned(sensor.scan(), n, n / 60, lambda n=n: n / 60) for n in range(9 * 60)
+    ]
+
+    _, looks = watched(frames, None, sensor)
+    assert not any(kinds.any() for _, kinds in looks)
+
+    for channel, unit in ((70, "\N{MICRO SIGN}m"), (144 + 70, "mrad"), (288 + 70, "mrad")):
+        held = frames[20].counts[channel]
+
+        def stuck(counts, time, channel=channel, held=held):
+            counts[channel] = held
+
+        monitor, looks = watched(frames, stuck, sensor)
+        _, others = found_at(looks, [channel])
+        assert not others
+        (finding,) = monitor.findings(np.zeros(432, bool))
+        assert finding.kind == "stuck"
+        assert f" {unit} while" in finding.figure
 
 
 def test_a_noisy_channel_is_found_in_two_seconds() -> None:
