@@ -30,7 +30,7 @@ class EffectSelection:
     """Selected effects: those that matter, or all; `on` and `off` by name.
 
     With `auto` an effect is left out when it and all others left out change no reading by more than
-    `accuracy`, a share of the scene's peak curvature.
+    `accuracy`, a share of the scene's peak reading.
     """
 
     auto: bool = False

@@ -86,7 +86,7 @@ SCENE = Part(
         ),
         "accuracy": Key(
             "Accuracy",
-            "Effects that change readings by less are omitted; as a share of the peak curvature.",
+            "Effects that change readings by less are omitted; as a share of the peak reading.",
             least=0.0,
             most=1.0,
         ),

@@ -89,7 +89,7 @@ def _frame(scene: Scene, *names: str) -> Callable[[float], object]:
 
 
 def _running(curvature: Array, effect: ReadingEffect) -> Callable[[float], object]:
-    """The effect at work on readings `curvature` (3, P) in 1/m."""
+    """The effect at work on readings `curvature` (k, P), k of each element."""
     running = effect.start(curvature.shape, np.random.default_rng(0))
     return lambda moment: running(curvature, moment)
 
@@ -109,7 +109,7 @@ def costs_of(scene: Scene, plan: Plan) -> dict[str, float]:
     """
     bare = Simulator(_only(scene))
     _, curvature = bare.reading(scene.sensor().scan(), 0.0)
-    curvature = curvature.reshape(scene.layout.frame_shape)
+    curvature = curvature.reshape(-1, len(scene.layout))  # by reading and element
     runs = {"": _frame(scene)}
     for entry in plan:
         if isinstance(entry.effect, ReadingEffect):
@@ -159,8 +159,8 @@ def plan_text(scene: Scene, rows: list[dict[str, Any]]) -> str:
     """The rows of `plan_rows` for people, those of the scene first."""
     there = [row for row in rows if row["microseconds"] is not None]
     lines = [
-        f"{printable(scene.title)}: errors as shares of the peak curvature, of which "
-        f"{scene.choice.accuracy:.2g} may be omitted",
+        f"{printable(scene.title)}: errors as shares of the peak {scene.layout.kinds[0][0]}, "
+        f"of which {scene.choice.accuracy:.2g} may be omitted",
         "",
         f"{'effect':<18}{'size':>9}{'error':>9}{'us':>7}  kept  why",
     ]

@@ -284,3 +284,12 @@ def test_a_drum_head_is_planned_with_its_tension(run, tmp_path):
 def test_two_effects_of_one_name_are_refused():
     with pytest.raises(Refusal, match="each effect once, got gaussian-noise"):
         replace(load_scene("centre"), effects=(GaussianNoise(0.1), GaussianNoise(0.2)))
+
+
+@pytest.mark.parametrize(("name", "quantity"), [("camera", "height"), ("tilts", "slope")])
+def test_the_command_tells_the_plan_of_heights_and_slopes(run, name, quantity):
+    code, out, err = run("plan", name)
+
+    assert (code, err) == (0, "")
+    assert f"shares of the peak {quantity}" in out
+    assert "gaussian-noise" in out

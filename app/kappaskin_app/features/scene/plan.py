@@ -85,7 +85,7 @@ _TIPS = (
     "Selected by the plan, or always on or off.",
     "Whether the effect is simulated.",
     "Dimensionless size of the effect in this scene; the tooltip shows the formula.",
-    "Largest change of a reading if the effect is omitted, relative to the scene's peak curvature.",
+    "Largest change of a reading if the effect is omitted, relative to the scene's peak reading.",
     "Computing time per frame, measured on this machine.",
     "Why the effect is simulated or omitted.",
 )
@@ -190,7 +190,7 @@ class EffectsPanel(QWidget):
         self.summary.setText(
             f"{len(chosen)} of {len(there)} effects are simulated, in {duration(taken)} per frame "
             f"({duration(all_)} for all). The omitted effects change readings by at most "
-            f"{_share(error)} of the peak curvature; {_share(self._choice.accuracy)} is permitted."
+            f"{_share(error)} of the peak reading; {_share(self._choice.accuracy)} is permitted."
         )
 
 

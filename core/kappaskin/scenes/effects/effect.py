@@ -103,7 +103,7 @@ class Survey:
 class Size:
     """How large an effect is in a scene: a dimensionless `number`, and what leaving it out does.
 
-    `error` is by how much readings would be off at most, as a share of the scene's peak curvature.
+    `error` is by how much readings would be off at most, as a share of the scene's peak reading.
     """
 
     number: float

@@ -27,7 +27,7 @@ class MainsHum(ReadingEffect):
 
     name: ClassVar = "mains-hum"
     example: ClassVar = {"amplitude": 0.5}
-    formula: ClassVar = "amplitude over peak curvature"
+    formula: ClassVar = "amplitude over the peak reading"
 
     amplitude: Annotated[float, Within(0, 1e4, "1/m")]
     frequency: Annotated[float, Within(1, 1000, "Hz")] = 50.0
@@ -49,7 +49,7 @@ class Skew(Effect):
     name: ClassVar = "skew"
     of_gages: ClassVar = "digital readings are taken all at once"
     elsewhere: ClassVar = "it follows from the converter's times"
-    formula: ClassVar = "scan time times rate of curvature over peak curvature"
+    formula: ClassVar = "scan time times rate of curvature over the peak reading"
 
     def size(self, survey: Survey) -> Size:
         number = survey.read_after.max() * survey.rates.max() / survey.peak
@@ -98,7 +98,7 @@ class Quantisation(ReadingEffect):
     name: ClassVar = "quantisation"
     elsewhere: ClassVar = "it follows from the converter, or the resolution in [readings]"
     at_once: ClassVar = True
-    formula: ClassVar = "half a count over peak curvature"
+    formula: ClassVar = "half a count over the peak reading"
 
     transduction: Transduction | DigitalReadings
 
@@ -150,7 +150,7 @@ class _WhiteNoise(ReadingEffect):
 
     example: ClassVar = {"rms": 0.1}
     at_once: ClassVar = True
-    formula: ClassVar = "RMS of the noise over peak curvature"
+    formula: ClassVar = "RMS of the noise over the peak reading"
     largest: ClassVar[float]  # deviation that is counted on, in standard deviations
 
     rms: Annotated[float, _RMS]
@@ -214,7 +214,7 @@ class FlickerNoise(ReadingEffect):
 
     name: ClassVar = "flicker-noise"
     example: ClassVar = {"rms": 0.1}
-    formula: ClassVar = "RMS of the noise over peak curvature"
+    formula: ClassVar = "RMS of the noise over the peak reading"
 
     rms: Annotated[float, Within(0, 1e4, "1/m")]
     low: Annotated[float, Within(1e-6, 1e6, "Hz")] = 0.01

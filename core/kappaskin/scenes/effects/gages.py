@@ -126,7 +126,7 @@ class Hysteresis(ReadingEffect):
     name: ClassVar = "hysteresis"
     of_gages: ClassVar = "its loops are those of gages on a substrate"
     example: ClassVar = {"like": "second"}
-    formula: ClassVar = "hysteresis lag over peak curvature"
+    formula: ClassVar = "hysteresis lag over the peak reading"
 
     thresholds: tuple[float, ...]
     weights: tuple[float, ...]
@@ -231,7 +231,7 @@ class Temperature(ReadingEffect):
 
     name: ClassVar = "temperature"
     example: ClassVar = {"rise": 5.0, "time_constant": 60.0, "offset": 0.05}
-    formula: ClassVar = "apparent curvature over peak curvature, plus change of the gain"
+    formula: ClassVar = "apparent reading over the peak reading, plus change of the gain"
 
     rise: Annotated[float, Within(-200, 200, "K")]
     time_constant: Annotated[float, Within(1e-3, 1e6, "s")]
@@ -306,7 +306,7 @@ class Tolerance(ReadingEffect):
     name: ClassVar = "tolerance"
     example: ClassVar = {"gain_sd": 0.05, "offset_sd": 1.0}
     at_once: ClassVar = True
-    formula: ClassVar = "sd of the gains, plus that of the offsets over peak curvature"
+    formula: ClassVar = "sd of the gains, plus that of the offsets over the peak reading"
 
     gain_sd: Annotated[float, Within(0, 10)]
     offset_sd: Annotated[float, Within(0, 1e4, "1/m")]
