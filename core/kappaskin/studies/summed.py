@@ -68,6 +68,6 @@ class SummedResponse:
         return e - e0 - e1, np.sqrt(np.mean((w - w0 - w1) ** 2, axis=(-2, -1)))
 
     def readings(self, layout: SensorLayout) -> Array:
-        """Curvature (T, 3, P) in 1/m to be added to what the elements read of the true shape."""
+        """Readings of T frames to be added to what the elements read of the true shape."""
         operator = layout.operator(self.basis, self._plate)
-        return (self.coefficients @ operator.T).reshape(-1, 3, len(layout))
+        return (self.coefficients @ operator.T).reshape(-1, *layout.frame_shape)

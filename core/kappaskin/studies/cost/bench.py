@@ -52,7 +52,9 @@ _CALLS, _SLOW = 5, 1e-3  # in a turn; one of a method whose frame takes longer, 
 
 @dataclass(frozen=True, eq=False)
 class _SkinReadings:
-    """Elements, and what they read of the scene: (T, 3, P) in 1/m, `exact` and as it is `read`.
+    """Elements, and what they read of the scene: T frames, `exact` and as it is `read`.
+
+    (T, 3, P) in 1/m of a curvature sensor, (T, R) of other readings in units of theirs.
 
     `beyond` is what they read of the skin's response beyond the scene's functions, where that is
     known.
@@ -72,9 +74,14 @@ def with_elements(scene: Scene, elements: tuple[int, int] | None) -> Scene:
     """The scene with m x n `elements`, at a rate that they can keep; with its own when None."""
     if elements in (None, scene.layout.shape):
         return scene
-    layout = SensorLayout.regular(scene.plate.patch, *elements)
-    slowest = 1 / scene.transduction.scan_time(3 * len(layout))
-    return replace(scene, layout=layout, rate=min(scene.rate, slowest))
+    layout, own = SensorLayout.regular(scene.plate.patch, *elements), scene.layout
+    if own.reads:
+        layout = layout.reading_each(own.each_reads)
+        layout = replace(layout, gage_length=own.gage_length, cell=own.cell)
+    scan_time = scene.transduction.scan_time(layout.channels)
+    return replace(
+        scene, layout=layout, rate=min(scene.rate, 1 / scan_time if scan_time else np.inf)
+    )
 
 
 def _pressed(scene: Scene, times: Array) -> list[AppliedLoads]:
@@ -97,7 +104,6 @@ class Bench:
     """
 
     def __init__(self, scene: Scene) -> None:
-        scene.layout.check_curvature_sensor("the cost of accuracy")
         self._times = np.arange(SETTLING + DRAWS) / scene.rate
         self._pressed = _pressed(scene, self._times)
         if not np.isfinite([pressed.contact for pressed in self._pressed]).all():
@@ -141,7 +147,7 @@ class Bench:
             simulator.change(scene.touched_by(*pressed.loads))
             read.append(sensor.nominal(simulator.scanned(sensor.scan(), n, t, lambda: 0.0)))
         operator = scene.layout.operator(scene.basis, scene.plate)
-        shape = (len(read), 3, len(scene.layout))
+        shape = (len(read), *scene.layout.frame_shape)
         beyond = None if self._response is None else self._response.readings(scene.layout)
         exact = (self._truth @ operator.T).reshape(shape)
         return _SkinReadings(sensor, exact, np.reshape(read, shape), beyond)
@@ -156,9 +162,9 @@ class Bench:
 
     def _scanned(self, setting: Setting, skin: _SkinReadings) -> tuple[SensorLayout, Scan]:
         """The skin's layout with the channels outside the scan dead, and the scan."""
-        elements = SCANS[setting.scanned](skin.layout, self.contact)
-        layout = replace(skin.layout, live=skin.layout.live & elements)
-        return layout, skin.sensor.scan(np.flatnonzero(np.tile(elements, 3)))
+        scanned = SCANS[setting.scanned](skin.layout, self.contact)[skin.layout.element]
+        live = skin.layout.live & scanned.reshape(skin.layout.frame_shape)
+        return replace(skin.layout, live=live), skin.sensor.scan(np.flatnonzero(scanned))
 
     def _cost(self, setting: Setting) -> Cost:
         skin = self._skin(setting.elements)
@@ -169,7 +175,8 @@ class Bench:
         )
 
         def started(curvature: Array) -> Estimator:
-            fit = estimator_for(setting.method, basis, layout, dtype=setting.precision)
+            sigma, precision = skin.sensor.sigma, setting.precision
+            fit = estimator_for(setting.method, basis, layout, sigma, dtype=precision)
             fit(curvature[0])
             return fit
 
@@ -273,7 +280,7 @@ class EffectCost:
     """What an effect of a scene takes and does; `kept` where the plan has it simulated.
 
     `time_per_frame` in s is what it adds to simulating a frame. Leaving it out changes no reading
-    by more than `bound`, a share of the peak curvature; None of a failure that a scene's author
+    by more than `bound`, a share of the peak reading; None of a failure that a scene's author
     decides on. `rms_with` and `rms_without` are RMS errors of the shape in m, with everything else
     as planned; None of a failure of the link, of which the frames that do arrive show nothing.
     """
@@ -293,7 +300,10 @@ def usual_setting(scene: Scene) -> Setting:
         functions = N, 1 if scene.plate.patch.strip else N
         try:
             estimator_for(
-                method, basis_for(scene.plate.patch, scene.edge, *functions), scene.layout
+                method,
+                basis_for(scene.plate.patch, scene.edge, *functions),
+                scene.layout,
+                scene.sensor().sigma,
             )
         except Refusal:
             continue
@@ -336,10 +346,11 @@ def effect_costs(scene: Scene, setting: Setting) -> tuple[EffectCost, ...]:
 def _without(scene: Scene, effect: Effect) -> Scene:
     """The scene without a failure; any other effect is for its choice to leave out."""
     if isinstance(effect, DeadElements):
-        live = np.array(scene.layout.live)
+        layout, live = scene.layout, scene.layout.live.ravel()
         # Of a strip, only what bends is there to be read.
-        live[np.ix_(np.flatnonzero(live.any(axis=1)), np.array(effect.elements))] = True
-        return replace(scene, layout=replace(scene.layout, live=live))
+        read = np.isin(layout.kind, layout.kind[live])
+        live = live | (read & np.isin(layout.element, effect.elements))
+        return replace(scene, layout=replace(layout, live=live.reshape(layout.frame_shape)))
     if effect.authored:
         others = tuple(one for one in scene.effects if one.name != effect.name)
         return replace(scene, effects=others)
@@ -353,7 +364,8 @@ class _EffectJudge:
         self._setting = setting
         self._basis = basis_for(scene.plate.patch, scene.edge, *setting.functions)
         self._reference = scene.basis
-        self._scanned = SCANS[setting.scanned](scene.layout, contact)
+        scanned = SCANS[setting.scanned](scene.layout, contact)[scene.layout.element]
+        self._scanned = scanned.reshape(scene.layout.frame_shape)
         frames = np.arange(SETTLING + _EACH) / scene.rate
         # One after the other, however short the scene.
         spacing = max(scene.survey_duration / _PLACES, len(frames) / scene.rate)
@@ -380,7 +392,7 @@ class _EffectJudge:
         return self._judged(fitted), self._judged(np.array(shapes))
 
     def _fitted(self, layout: SensorLayout, curvature: Array) -> Array:
-        """The coefficients (T, Ni, Nj) of `curvature` (T, 3 P), of which some is not scanned."""
+        """The coefficients (T, Ni, Nj) of `curvature` (T, R), of which some is not scanned."""
         live, s = layout.live & self._scanned, self._setting
         fit = estimator_for(s.method, self._basis, replace(layout, live=live), dtype=s.precision)
         K = np.where(live, curvature.reshape(-1, *live.shape), np.nan)

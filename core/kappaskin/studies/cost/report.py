@@ -383,7 +383,10 @@ def _more_elements(scene: Scene, cost: Cost, times: float) -> str:
     else:
         m, n = (math.ceil(along * math.sqrt(times)) for along in cost.setting.elements)
         count, name = m * n, f"{m} x {n} elements"
-    allowed, now = 1 / scene.rate / (3 * count), scene.transduction.channel_time
+    allowed, now = (
+        1 / scene.rate / (len(scene.layout.kinds) * count),
+        scene.transduction.channel_time,
+    )
     if allowed >= now:
         return f"about {name}, which the conversion allows at {scene.rate:g} frames/s"
     return (

@@ -598,12 +598,6 @@ def test_what_the_command_cannot_do_is_refused_before_it_measures(
 OTHER_READINGS = ("camera", "tilts")
 
 
-@pytest.mark.parametrize("name", OTHER_READINGS)
-def test_what_accuracy_costs_is_refused_of_other_readings(name) -> None:
-    with pytest.raises(Refusal, match="expected a curvature sensor"):
-        next(costs(load_scene(name), [EIGHT]))
-
-
 @pytest.mark.parametrize(
     "name", [name for name in SCENES if name not in ("calibration", *OTHER_READINGS)]
 )
