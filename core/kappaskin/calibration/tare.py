@@ -248,11 +248,12 @@ def _check_still(
     load = seeker(seeker.sigma * part, by_noise**2, share=0.0)
     if squares.max() > allowed**2 or load is not None:
         channel = int(np.nanargmax(np.abs(part)))
-        units = seeker.sigma[channel], sensor.layout.kind_units[sensor.layout.kind[channel]]
+        layout, one = sensor.layout, float(seeker.sigma[channel])
+        unit = layout.kind_units[int(layout.kind[channel])]
         raise Refusal(
             f"the readings move: {_named(sensor, channel)} was off its mean by "
-            f"{units[0] * abs(part[channel]):.2g} {units[1]} for {SECONDS / len(off):.2g} s, where "
-            f"noise causes {units[0] * by_noise:.2g}; let the skin come to rest, then tare again"
+            f"{one * abs(part[channel]):.2g} {unit} for {SECONDS / len(off):.2g} s, where noise "
+            f"causes {one * by_noise:.2g}; let the skin come to rest, then tare again"
         )
 
 

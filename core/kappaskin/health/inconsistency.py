@@ -1,7 +1,7 @@
 """Inconsistency test of each channel against the prediction of its neighbours."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import cast
 
@@ -114,7 +114,7 @@ _ORDERS = {"m": 0, "m/m": 1, "1/m": 2}
 """How often w is derived in readings of each unit."""
 _STEPS = np.array([(0, 0), (1, 0), (0, 1), (2, 0), (0, 2), (1, 1)])
 """How often w is derived along x and y, in each derivative that readings consist of."""
-_HERMITE = (
+_HERMITE: tuple[Callable[[Array], Array], ...] = (
     lambda u: np.ones_like(u),
     lambda u: u,
     lambda u: u**2 - 1,
@@ -147,7 +147,8 @@ def _covariance(distance: Array, steps: NDArray[np.int_]) -> Array:
     order a of the derivative at the first place; those derived by `steps` (d, 2) along x and y.
     Scaled so that the variance of w_xx is 1.
     """
-    orders = {tuple(order): 0.0 for order in (steps[:, None] + steps).reshape(-1, 2).tolist()}
+    shape = distance.shape[1:]
+    orders = {(m, n): np.zeros(shape) for m, n in (steps[:, None] + steps).reshape(-1, 2).tolist()}
     for length in _LENGTHS:
         u, v = distance / length
         bell = np.exp(-(u**2 + v**2) / 2) / (3 * len(_LENGTHS))
@@ -155,10 +156,10 @@ def _covariance(distance: Array, steps: NDArray[np.int_]) -> Array:
         in_y = {n: _HERMITE[n](v) for n in {n for _, n in orders}}
         for m, n in orders:
             orders[m, n] += length ** (4.0 - m - n) * in_x[m] * in_y[n]
-    total = np.empty((len(steps), len(steps), *distance.shape[1:]))
+    total = np.empty((len(steps), len(steps), *shape))
     for i, first in enumerate(steps):
         for j, second in enumerate(steps):
-            total[i, j] = (-1) ** first.sum() * orders[tuple(first + second)]
+            total[i, j] = (-1) ** first.sum() * orders[first[0] + second[0], first[1] + second[1]]
     return total
 
 
@@ -168,7 +169,7 @@ def _own_channels(layout: SensorLayout) -> tuple[Indices, Indices]:
     The last reading of an element that has fewer than others stands there several times.
     """
     elements, counts = np.unique(layout.element, return_counts=True)
-    column = np.minimum(np.arange(counts.max()), counts[:, None] - 1)
+    column = np.minimum(np.arange(int(counts.max())), counts[:, None] - 1)
     ordered = np.argsort(layout.element, kind="stable")
     return elements, ordered[(np.cumsum(counts) - counts)[:, None] + column]
 
@@ -214,7 +215,7 @@ class Neighbours:
         units = np.array(layout.kind_units)[layout.kind]
         for unit in set(layout.kind_units):
             own = (units == unit)[self.own]
-            power = float(self._variance[own].max())
+            power = float(cast("Array", self._variance[own]).max())
             self._variance[own] /= power
             self._parts[own] /= math.sqrt(power)
             if len(set(layout.kind_units)) > 1:
@@ -222,7 +223,7 @@ class Neighbours:
                 self.scale[units == unit] = math.sqrt(power) * (pitch or 1.0) ** (1 - order)
         self.weights = np.zeros((E, q, k * q))
         self.spread = np.ones((E, q))
-        self.exclude(np.zeros(layout.channels, bool), np.arange(E))
+        self.exclude(np.zeros(layout.channels, bool), np.arange(len(near)))
 
     def affected_by(self, channels: Mask) -> Indices:
         """The elements that some of `channels` (C,) predict."""
@@ -237,15 +238,14 @@ class Neighbours:
         at, around = self._at[:, self.near[elements]], self._parts[self.near[elements]]
         n, k, q = around.shape[:3]
         between = _covariance(at[:, :, :, None] - at[:, :, None], self._steps)
-        S = np.einsum("ekqi,ijekl,elrj->ekqlr", around, between, around, optimize=True)
-        S = S.reshape(n, k * q, k * q)
+        blocks = np.einsum("ekqi,ijekl,elrj->ekqlr", around, between, around, optimize=True)
+        S: Array = blocks.reshape(n, k * q, k * q)
         covariance = _covariance(at - self._at[:, elements, None], self._steps)
-        own = self._parts[elements]
-        parts = (around, covariance, own)
-        near = np.einsum("ekqi,ijek,erj->ekqr", *parts, optimize=True).reshape(n, k * q, q)
+        parts = (around, covariance, self._parts[elements])
+        near: Array = np.einsum("ekqi,ijek,erj->ekqr", *parts, optimize=True).reshape(n, k * q, q)
         noise = np.where(missing[self.channels[elements]], _MISSING, _NOISE)
         S[:, np.arange(k * q), np.arange(k * q)] += noise
-        W = np.linalg.solve(S, near)
+        W = cast("Array", np.linalg.solve(S, near))
         self.weights[elements] = W.swapaxes(1, 2)
         left = self._variance[elements] - np.sum(W * near, axis=1)
         self.spread[elements] = np.maximum(left, 0.0)
