@@ -97,9 +97,8 @@ class SmoothDrift:
         noise, of_noise = told
         judged = {"known_noise": np.array(noise), "spare": of_noise}
         found = self._beside(curvature, replace(fit, **judged))
-        after = self._beside.rest
-        along = Q @ after
-        squares = float(after.dot(after) - along.dot(along)) / noise**2
+        after, along = self._beside.rest, self._beside.along
+        squares = float(after.dot(after)) / noise**2
         better = left / noise**2 - squares
         if found.present and not contacts[0].present:  # more unknowns, as Schwarz counts them
             better -= _OF_LOAD * math.log(used.sum())

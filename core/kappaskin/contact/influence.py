@@ -62,13 +62,15 @@ def influence_of(
 
 _FINE = 32  # functions each way that heights and slopes are followed by
 
+# Seven points of the unit disc, and shares: their mean is that over the disc of all powers of x and
+# y up to the fifth (Abramowitz and Stegun, 25.4.61).
+_ANGLES = np.arange(6) * np.pi / 3
+_RING = math.sqrt(2 / 3) * np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
+_PLACES, _SHARES = np.vstack([[0.0, 0.0], _RING]), np.array([1 / 4] + 6 * [1 / 8])
+
 
 class _OfFunctions:
-    """As the functions of a basis follow it.
-
-    Heights and slopes depend on the size of a load where the functions are sines: the mean of one
-    of the wave number k over a disc of radius r is its value in the middle times 2 J1(k r) / (k r).
-    """
+    """As the functions of a basis follow it; heights and slopes depend on the size of a load."""
 
     unit = 1.0
 
@@ -79,19 +81,20 @@ class _OfFunctions:
         compliance = plate.compliance(self._basis)
         self._readings = compliance.after(layout.operator(self._basis, plate)).T.copy()
         self._C, self._out = compliance.after(np.eye(self._basis.size)), out
-        self.sized, self._k = False, np.zeros(self._basis.size)
-        if layout.reads and isinstance(self._basis, SineBasis) and not plate.patch.strip:
-            self.sized = True
-            self._k = np.hypot(*np.meshgrid(*self._basis.wavenumbers, indexing="ij")).ravel()
+        self.sized = layout.reads is not None and not plate.patch.strip
 
     def at(self, x: float, y: float, s: float) -> None:
-        felt = self._basis.jet(x, y)[:4].copy()  # which is cached
-        if self.sized:
-            z = self._k * math.sqrt(s)
-            felt[3] = felt[0] * (-(self._k**2) * scipy.special.jv(2, z) / z**2)
-            felt[:3] *= 2 * scipy.special.jv(1, z) / z
-        rows = 4 if self.sized else 3
-        np.dot(felt[:rows], self._readings, self._out[:rows])
+        felt = self._over_disc(x, y, s) if self.sized else self._basis.jet(x, y)[:3]
+        np.dot(felt, self._readings, self._out[: len(felt)])
+
+    def _over_disc(self, x: float, y: float, s: float) -> Array:
+        """The mean of each function over the disc, and its derivatives by x, y and s (4, N)."""
+        places = (x, y) + math.sqrt(s) * _PLACES
+        on = self._basis.patch.contains(places)
+        places, share, at = places[on], _SHARES[on], self._basis.at
+        f, f_x, f_y = share @ at(places), at(places, 1, 0), at(places, 0, 1)
+        outward = (share[:, None] * _PLACES[on] / (2 * math.sqrt(s))).T
+        return np.stack([f, share @ f_x, share @ f_y, outward[0] @ f_x + outward[1] @ f_y])
 
     def trust(self, s: float, share: float) -> Array | None:
         return None

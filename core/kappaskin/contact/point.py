@@ -215,7 +215,12 @@ class PointContact:
         self.misfit = math.nan
         """Variance that the last contact leaves of the readings, over that of the fit."""
         self.rest = self._readings
-        """What the last contact leaves (3 P,) of the readings in 1/m; 0 where one is missing."""
+        """What the last contact leaves (3 P,) of the readings in 1/m; 0 where one is missing.
+
+        Without what it leaves along the `free` directions.
+        """
+        self.along = np.zeros(len(self._free))
+        """What it leaves along each of those, made orthonormal, (d,)."""
         self.linear = self._rows[:0]
         """Readings of the last contact for a unit force, and their derivatives, (n, 3 P)."""
 
@@ -236,7 +241,7 @@ class PointContact:
         explained /= tables.norm
         explained.put(self._still, 0.0)
         row, column = divmod(int(explained.argmax()), len(self._x))
-        variance, self.rest = float(fit.noise) ** 2, K
+        variance, self.rest, self.along = float(fit.noise) ** 2, K, np.zeros(len(tables.free))
         if not explained[row, column] > _threshold(float(cast("float", fit.spare))) * variance:
             return NO_CONTACT
         self._rows[4] = self._readings = K
@@ -296,6 +301,9 @@ class PointContact:
         self.rest = self._rows[4] - np.dot(here.steps[: self._unknowns], self.linear)
         if tables.weights is not None:
             self.rest *= tables.weights
+        if len(tables.free):
+            self.along = tables.free @ self.rest
+            self.rest -= self.along @ tables.free
         return self._contact(x, y, s, here, tables, fit)
 
     def _worth(self, x: float, y: float) -> float:

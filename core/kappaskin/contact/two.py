@@ -67,7 +67,8 @@ class Contacts:
     ) -> None:
         self._scale = None if sigma is None else 1 / sigma
         layout = replace(layout, scale=self._scale)
-        self._one = PointContact(plate, layout, edge)
+        offsets = layout.offsets.T if sigma is None else layout.offsets.T / sigma
+        self._one = PointContact(plate, layout, edge, offsets)
         self._drift = None if self._scale is not None else SmoothDrift(plate, layout, edge)
         self.drift: FittedDrift | None = None
         """The drift beside the last contacts; None where there is none."""

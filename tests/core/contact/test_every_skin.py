@@ -1,6 +1,7 @@
 """A touch on every skin, held in every way: from what its elements read to shape and contact."""
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -16,6 +17,7 @@ from kappaskin import (
     SensorLayout,
     basis_for,
 )
+from kappaskin.contact import Contacts
 from navier import Load
 
 FUNCTIONS = 8  # along each side, of the skin that is touched; 6 of the shape fitted to it
@@ -146,3 +148,24 @@ def test_on_a_clamped_plate_what_elements_tell_is_found(held_skin):
         assert np.hypot(*(touch.position - place)) < 2e-5
         assert touch.force == pytest.approx(0.2, rel=1.5e-3)
         assert touch.load_radius == pytest.approx(4e-3, rel=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.where(which=lambda held: str(held) == "flat-clamped")
+def test_on_a_clamped_plate_heights_from_any_zero_give_the_force(held_skin):
+    truth, rng, noise = ArgyrisPlate(cells=16), np.random.default_rng(2), 2e-6
+    where = layout(held_skin).reading_each(["height"])
+    places = rng.uniform(0.025, 0.075, (15, 2))
+    w = [truth.displacement(Load(*place, 0.2, sd=2e-3), where.positions) for place in places]
+    for free in ((), ("height",)):
+        unknown, off = replace(where, reads=replace(where.reads, free=free)), []
+        fit = LeastSquares(held_skin.basis(6, 6), unknown)
+        find = Contacts(Plate(held_skin.patch), unknown, held_skin.edge)
+        for place, heights in zip(places, w, strict=True):
+            found = fit(heights + rng.normal(0, noise, heights.shape) + 1e-3 * len(free))
+            touch, _ = find(found.readings, found)
+            assert find.drift is None
+            off.append([*(touch.position - place) / touch.position_sd])
+            off[-1].append((touch.force - 0.2) / touch.force_sd)
+        assert (np.abs(off) < 1.96).mean() > 0.85
+        assert np.square(off).mean() < 1.6
