@@ -6,6 +6,7 @@ import os
 import zipfile
 import zlib
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from kappaskin.bases import Basis, basis_for
 from kappaskin.contact import (
     KINDS,
     ContactObject,
+    Contacts,
     Imprints,
     LowerBound,
     as_one,
@@ -281,9 +283,8 @@ def reconstruct(
     their units, less their offset where its datum is free; with a `grid` of nx x ny
     points also `grid_x` (nx,), `grid_y` (ny,) and `w` (T, ny, nx) in m. `edge` is one of `EDGES`,
     `method` one of `METHODS`. With `contact` also what `_contacts` and `_pairs` give, with
-    `objects` what `_objects` gives besides. Without a rigidity, and of `values`, contacts and
-    objects are found by the shape, without a force. What the shapes neglect goes to `warn`, in
-    words.
+    `objects` what `_objects` gives besides. Without a rigidity contacts are found by the shape,
+    without a force. What the shapes neglect goes to `warn`, in words.
     """
     found, texts = _read(readings)
     name, sigma = "values" if "values" in found else "curvature", found.get("sigma")
@@ -313,14 +314,19 @@ def reconstruct(
     if not (contact or objects):
         return out
     plate = _plate(patch, found, str(texts.get("inplane", np.array("")).item()))
-    by_shape = layout.reads or plate.unknown_material  # a sigma may be another in each frame
-    find = Imprints if by_shape else contacts_of
-    contacts_in, bounded = find(plate, layout, functions, edge), LowerBound(plate, edge)
+    bounded = LowerBound(plate, edge)
     fits = _fits(method, functions, layout, frames, sigma if layout.reads else None)
     read = [each.readings for each in fits]
     pairs, drifts = list[tuple[Contact, Contact]](), np.zeros(len(fits))
     contacts, there = list[Contact](), list[LocalGeometry]()
+
+    @lru_cache(1)
+    def finder(estimator: Estimator) -> Contacts | Imprints:
+        own = None if estimator.sigma is None else 1 / estimator.weight
+        return contacts_of(plate, layout, functions, edge, own)
+
     for frame, each in enumerate(fits):
+        contacts_in = finder(each.estimator)
         pairs.append(contacts_in(each.readings, each))
         if (drift := contacts_in.drift) is not None:
             fits[frame], read[frame], drifts[frame] = drift.fit, drift.readings, drift.size

@@ -748,20 +748,44 @@ def test_heights_need_no_direction_and_without_sigma_no_sigma(saved) -> None:
     assert np.allclose(found["coefficients"].reshape(T, -1), answer, rtol=0, atol=1e-12)
 
 
-def test_contacts_of_other_readings_are_those_of_the_shape_without_a_force(saved) -> None:
-    found = reconstruct(saved(**MIXED, rigidity=5e-3), (NI, NJ), objects=True)
-    expected = reconstruct(saved(rigidity=5e-3), (NI, NJ), objects=True)
-    assert shapes(found) == shapes(expected) | {"residual": (T, R)}
-    there = np.isfinite(found["contact"]).all(axis=1)
-    assert there.any()
-    assert np.isfinite(found["displacement"][there]).all()
-    assert np.isfinite(found["load_radius_95"][there]).all()
-    assert np.isfinite(found["principal"][there]).all()
-    assert np.isnan(found["force"]).all()
-    assert np.isnan(found["forces"]).all()
-    without = reconstruct(saved(**MIXED), (NI, NJ), contact=True)
-    assert "force" not in without
-    np.testing.assert_array_equal(without["contact"], found["contact"])
+def pressed(frames: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Loads x, y and F (frames, 3) on a hinged plate, and its readings and sigma (frames, R)."""
+    plate = HingedPlate(A, B, 5e-3, modes=120)
+    loads = RNG.uniform((0.3 * A, 0.3 * B, 0.2), (0.7 * A, 0.7 * B, 0.6), (frames, 3))
+    names = [f"{q}@{np.degrees(t)}" for q, t in zip(QUANTITY, DIRECTION, strict=True)]
+    values = np.empty((frames, R))
+    for name in dict.fromkeys(names):
+        own = np.flatnonzero([each == name for each in names])
+        for row, (x, y, force) in zip(values, loads, strict=True):
+            modes = plate.coefficients(Load(x, y, force, radius=3e-3))
+            row[own] = plate.read(modes, POSITIONS[ELEMENT[own]], name)
+    sigma = SIGMA * RNG.uniform(0.5, 2, (frames, R))
+    return loads, values + sigma * RNG.normal(size=(frames, R)), sigma
+
+
+def test_contacts_and_forces_of_other_readings_are_right_where_the_skin_is_a_known_plate(saved):
+    loads, values, sigma = pressed(12)
+    heights = np.where(QUANTITY == "height", 5e-3, 0.0)
+    readings = MIXED | {"values": values + heights, "sigma": sigma, "datum": "height"}
+    found = reconstruct(saved(**readings, rigidity=5e-3), (8, 8), objects=True)
+    off = np.column_stack([found["contact"], found["force"]]) - loads
+    off /= np.column_stack([found["contact_sd"], found["force_sd"]])
+    assert (np.abs(off) < 1.96).mean() > 0.85
+    assert np.square(off).mean() < 1.6
+    assert np.array_equal(found["contacts"][:, 0], found["contact"])
+
+
+def test_without_a_rigidity_contacts_of_other_readings_are_those_of_the_shape(saved) -> None:
+    _, values, sigma = pressed(2)
+    readings = MIXED | {"values": values, "sigma": sigma}
+    found = reconstruct(saved(**readings), (NI, NJ), objects=True)
+    expected = reconstruct(saved(), (NI, NJ), objects=True)
+    for name in set(expected) - {"residual"}:
+        assert found[name].shape == (2, *expected[name].shape[1:]), name
+    for name in ("contact", "displacement", "load_radius_95", "principal"):
+        assert np.isfinite(found[name]).all(), name
+    assert "force" not in found
+    assert "forces" not in found
 
 
 FEW = np.arange(5)
