@@ -22,7 +22,7 @@ from kappaskin.scenes.effects import (
 from kappaskin.scenes.effects.electronics import CrossTalk, FlickerNoise, MainsHum
 from kappaskin.sensing import Amplifier, HalfBridge
 
-CHANNELS = 300
+READINGS, CHANNELS = (3, 100), 300
 EFFECTS = [
     StrainLimit(Transduction(HalfBridge(substrate_thickness=1e-3)), 0.2),
     SECOND_GENERATION_LOOPS,
@@ -39,8 +39,8 @@ EFFECTS = [
     Quantisation(Transduction()),
     StuckElements((1, 40), since=0.3),
 ]
-X = np.random.default_rng(0).normal(0, 30, CHANNELS)
-Y = X[::-1].copy()
+X = np.random.default_rng(0).normal(0, 30, READINGS)
+Y = X[:, ::-1].copy()
 
 
 def bare():
@@ -55,7 +55,7 @@ def ticking(running):
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
 def test_an_effect_takes_a_few_microseconds_a_frame(effect, medians, figure, ratio) -> None:
-    work = ticking(effect.start((CHANNELS,), np.random.default_rng(0)))
+    work = ticking(effect.start(READINGS, np.random.default_rng(0)))
 
     ours, baseline = medians(work, bare, turns=60, calls=100)
 
