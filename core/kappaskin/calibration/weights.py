@@ -53,7 +53,6 @@ class WeightFit:
     """Finds the skin that tells known weights right, from what the elements read under each."""
 
     def __init__(self, sensor: Sensor, edge: str = "") -> None:
-        sensor.layout.check_curvature_sensor("a calibration with known weights")
         self.sensor, self.edge = sensor, edge or sensor.edge
         if not sensor.plate.rigidity:
             raise Refusal(
@@ -64,15 +63,15 @@ class WeightFit:
         spare = int(np.sum(sensor.layout.live)) // 2  # readings for as many functions
         along = min(_FUNCTIONS, spare if patch.strip else math.isqrt(spare))
         basis = basis_for(patch, self.edge, along, 1 if patch.strip else along)
-        self._shape = LeastSquares(basis, sensor.layout)
+        self._shape = LeastSquares(basis, sensor.layout, sensor.sigma)
         self._side = patch.a if patch.strip else min(patch.a, patch.b)
         self._usual = self._contact_of(sensor.plate)
 
     def _contact_of(self, plate: Plate) -> PointContact:
-        return PointContact(plate, self.sensor.layout, self.edge)
+        return PointContact(plate, self.sensor.layout, self.edge, self.sensor.sigma)
 
     def contact(self, readings: Array) -> Contact:
-        """The contact of a weight's `readings` (3, P) in 1/m; a `Refusal` where it tells nothing.
+        """The contact of a weight's `readings`, by the frame's shape; a `Refusal` without one.
 
         They are means over some time, less those of the skin without it.
         """
@@ -91,7 +90,7 @@ class WeightFit:
         return contact
 
     def __call__(self, weights: Sequence[float], readings: Sequence[Array]) -> KnownWeights:
-        """The fit to `weights` (n,) in N, n >= 3, by their `readings` (n, 3, P) in 1/m."""
+        """The fit to `weights` (n,) in N, n >= 3, by their `readings` in the shape of frames."""
         W = np.array(weights, float)
         if len(W) < FEWEST_WEIGHTS or len(readings) != len(W):
             raise Refusal(
@@ -271,7 +270,7 @@ _FOOT = 0.03  # of the shorter side: radius of a simulated weight's foot
 class Weighing:
     """The steps of known weights: the skin without one, then with each of `masses` in g.
 
-    `taken` are the readings so far, (3, P) in 1/m each, and `contacts` those of the weights.
+    `taken` are the readings so far, by the frame's shape, and `contacts` those of the weights.
     """
 
     def __init__(self, sensor: Sensor, masses: Sequence[float], edge: str = "") -> None:
@@ -301,7 +300,8 @@ class Weighing:
 
         Raises a `Refusal` where the step must be repeated.
         """
-        found, mean = "the skin without a weight", _mean(readings).reshape(3, -1)
+        found, mean = "the skin without a weight", _mean(readings)
+        mean = mean.reshape(self.fit.sensor.layout.frame_shape)
         if self.taken:
             contact = self.fit.contact(mean - self.taken[0])
             self._check_unit(contact.force)
@@ -330,7 +330,7 @@ class Weighing:
 
     @property
     def bent(self) -> list[Array]:
-        """What each weight so far changed in the readings (3, P) in 1/m."""
+        """What each weight so far changed in the readings, by the frame's shape."""
         return [readings - self.taken[0] for readings in self.taken[1:]]
 
     def laid(self, scene: Scene) -> Scene:

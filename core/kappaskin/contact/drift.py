@@ -67,7 +67,7 @@ class SmoothDrift:
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str = "hinged") -> None:
         self._columns, self._live = level_and_slopes(layout), layout.live.ravel()
         self._frame_shape = layout.frame_shape
-        self._beside = PointContact(plate, layout, edge, self._columns)
+        self._beside = PointContact(plate, layout, edge, free=self._columns)
         self._directions = PatternCache[Array]()
         self._reference: tuple[Estimator, Estimator] | None = None
         self._of_fit = PatternCache[Array]()
@@ -97,7 +97,7 @@ class SmoothDrift:
         noise, of_noise = told
         judged = {"known_noise": np.array(noise), "spare": of_noise}
         found = self._beside(curvature, replace(fit, **judged))
-        after, along = self._beside.rest, self._beside.along
+        after = self._beside.rest
         squares = float(after.dot(after)) / noise**2
         better = left / noise**2 - squares
         if found.present and not contacts[0].present:  # more unknowns, as Schwarz counts them
@@ -106,9 +106,9 @@ class SmoothDrift:
         usual = spare * left_by_chance(_LEFT, spare, of_noise)
         if better < _EVIDENT or squares > usual:
             return None
-        drift = along + Q @ np.where(used, curvature.ravel(), 0.0)
+        drift = self._beside.along + (Q @ np.where(used, curvature.ravel(), 0.0)) @ Q
         size = math.sqrt(float(drift.dot(drift)) / used.sum())
-        estimator, readings = fit.estimator, curvature - (drift @ Q).reshape(curvature.shape)
+        estimator, readings = fit.estimator, curvature - drift.reshape(curvature.shape)
         if estimator.has_memory or estimator.sigma is not None or estimator.basis.size > _MOST:
             return FittedDrift(size, readings, (found, NO_CONTACT), fit)
         rows = self._beside.linear if found.present else np.empty((0, len(used)))

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple, cast
 
@@ -174,8 +174,10 @@ class PointContact:
     contact is missed: T = M t there, with t = compliance times what each function of `basis` feels
     (Eqs. 2, 9), and T'K is one map from M'K. Gauss-Newton steps in x, y, s and P refine it with
     the `Influence`, which no number of functions cuts short. What readings right under the load
-    depend on how it is spread is added to their variance. Along the `free` directions (d, 3 P), as
-    those of a drift, the readings may be anything: they are fitted beside the load.
+    depend on how it is spread is added to their variance. Along the `free` directions (d, R), as
+    those of a drift, the readings may be anything: they are fitted beside the load. So are, unless
+    others are given, the offsets of quantities of an unknown zero. Readings are weighted by
+    `sigma`, that of each.
     """
 
     def __init__(
@@ -183,14 +185,19 @@ class PointContact:
         plate: Plate,
         layout: SensorLayout,
         edge: str = "hinged",
+        sigma: Array | None = None,
         free: Array | None = None,
     ) -> None:
+        self._scale = None if sigma is None else 1 / sigma.ravel()
+        layout = replace(layout, scale=self._scale)
         self.patch, strip = plate.patch, plate.patch.strip
         self.basis = basis_for(self.patch, edge, _FUNCTIONS, 1 if strip else _FUNCTIONS)
         compliance = plate.compliance(self.basis)
         self._M = compliance.after(layout.operator(self.basis, plate))
         self._modal = modal_projection(layout, self.basis, compliance, self._M)
-        self._free = np.empty((0, len(self._M))) if free is None else free
+        self._free = layout.offsets.T if free is None else free
+        if self._scale is not None:
+            self._free = self._free * self._scale
         # The readings of a load, their derivatives by x, y and s, what the elements read, and the
         # directions along which that may be anything.
         self._rows = np.zeros((5 + len(self._free), len(self._M)))
@@ -198,7 +205,7 @@ class PointContact:
         self._unknowns = 4 if self._influence.sized else 3
         self._stretched = StretchedSkin(plate, layout, edge) if plate.stretches else None
         self._live, self._element = layout.live.ravel(), layout.element
-        self._readings = np.zeros(len(self._M))
+        self._readings = self._none = np.zeros(len(self._M))
         x, y = self.patch.grid(_SEARCHED + 2, 3 if strip else _SEARCHED + 2)
         self._x, self._y = x[1:-1], y[1:-1]
         self._map = self.basis.on_grid(self._x, self._y)
@@ -215,14 +222,14 @@ class PointContact:
         self.misfit = math.nan
         """Variance that the last contact leaves of the readings, over that of the fit."""
         self.rest = self._readings
-        """What the last contact leaves (3 P,) of the readings in 1/m; 0 where one is missing.
+        """What the last contact leaves (R,) of the readings, 0 where one is missing.
 
-        Without what it leaves along the `free` directions.
+        Without what it leaves `along` the free directions. Over `sigma`, as all of these.
         """
-        self.along = np.zeros(len(self._free))
-        """What it leaves along each of those, made orthonormal, (d,)."""
+        self.along = self._readings
+        """What the last contact leaves along the free directions (R,)."""
         self.linear = self._rows[:0]
-        """Readings of the last contact for a unit force, and their derivatives, (n, 3 P)."""
+        """Readings of the last contact for a unit force, and their derivatives, (n, R)."""
 
     def _tables(self, used: Mask) -> _Tables:
         """The tables for the readings `used` (3 P,)."""
@@ -235,13 +242,14 @@ class PointContact:
 
     def __call__(self, curvature: Array, fit: Fit) -> Contact:
         """The contact for `curvature` (3, P) in 1/m, NaN where missing, and the `fit` to it."""
-        K, tables = self._used(curvature.ravel())
+        K = curvature.ravel()
+        K, tables = self._used(K if self._scale is None else K * self._scale)
         explained = self._map(self._modal(K).reshape(self.basis.shape))
         explained *= explained
         explained /= tables.norm
         explained.put(self._still, 0.0)
         row, column = divmod(int(explained.argmax()), len(self._x))
-        variance, self.rest, self.along = float(fit.noise) ** 2, K, np.zeros(len(tables.free))
+        variance, self.rest, self.along = float(fit.noise) ** 2, K, self._none
         if not explained[row, column] > _threshold(float(cast("float", fit.spare))) * variance:
             return NO_CONTACT
         self._rows[4] = self._readings = K
@@ -302,8 +310,8 @@ class PointContact:
         if tables.weights is not None:
             self.rest *= tables.weights
         if len(tables.free):
-            self.along = tables.free @ self.rest
-            self.rest -= self.along @ tables.free
+            self.along = (tables.free @ self.rest) @ tables.free
+            self.rest -= self.along
         return self._contact(x, y, s, here, tables, fit)
 
     def _worth(self, x: float, y: float) -> float:

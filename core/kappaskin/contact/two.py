@@ -65,22 +65,19 @@ class Contacts:
         edge: str = "hinged",
         sigma: Array | None = None,
     ) -> None:
-        self._scale = None if sigma is None else 1 / sigma
-        layout = replace(layout, scale=self._scale)
-        offsets = layout.offsets.T if sigma is None else layout.offsets.T / sigma
-        self._one = PointContact(plate, layout, edge, offsets)
-        self._drift = None if self._scale is not None else SmoothDrift(plate, layout, edge)
+        self._one = PointContact(plate, layout, edge, sigma)
+        self._drift = None if sigma is not None else SmoothDrift(plate, layout, edge)
         self.drift: FittedDrift | None = None
         """The drift beside the last contacts; None where there is none."""
-        self._pairs = None if plate.stretches else _Pairs(plate, layout, edge)
+        self._scale = None if sigma is None else 1 / sigma
+        weighted = replace(layout, scale=self._scale)
+        self._pairs = None if plate.stretches else _Pairs(plate, weighted, edge)
 
     def __call__(self, curvature: Array, fit: Fit) -> tuple[Contact, Contact]:
         """The stronger contact and the weaker one; without it `NO_CONTACT`.
 
         For `curvature` (3, P) in 1/m, NaN where missing, and the `fit` to it.
         """
-        if self._scale is not None:
-            curvature = curvature * self._scale
         found = self._pressed(curvature, fit)
         if self._drift is None:
             return found
@@ -104,6 +101,8 @@ class Contacts:
         contact = replace(contact, single=single)
         with np.errstate(all="ignore"):
             readings = curvature.ravel() / float(fit.noise)
+            if self._scale is not None:
+                readings *= self._scale
             if self._pairs is None or not np.nanmax(np.abs(readings)) < _LOUDEST:
                 return contact, NO_CONTACT
         return self._pairs(readings, fit, contact)

@@ -19,6 +19,7 @@ from kappaskin.calibration import (
 )
 from kappaskin.calibration.weights import newtons
 from kappaskin.mechanics import Plate
+from kappaskin.sensing import DigitalReadings
 from navier import HingedPlate, Load
 from studies import WEIGHED as RIGIDITY
 from studies import weighed
@@ -245,3 +246,23 @@ def test_all_that_resists_grows_by_the_same_share() -> None:
 def test_what_no_weights_can_find_is_refused(change) -> None:
     with pytest.raises(Refusal, match="expected"):
         replace(found(), **change)
+
+
+@pytest.mark.truth
+def test_weights_on_heights_and_slopes_of_an_unknown_zero_give_the_rigidity() -> None:
+    layout = SENSOR.layout.reading_each(["height", "slope@0", "slope@90"])
+    layout = replace(layout, reads=replace(layout.reads, free=("height", "slope")))
+    noise, rng = {"height": 1e-5, "slope": 1e-3}, np.random.default_rng(5)
+    digital = DigitalReadings(1e-9, tuple(noise.items()))
+    sensor = replace(SENSOR, layout=layout, transduction=digital)
+    places = rng.uniform(0.03, 0.07, (len(MASSES), 2))
+    sigma, offsets = sensor.sigma, layout.offsets
+    bent = []
+    for place, weight in zip(places, newtons(MASSES), strict=True):
+        modes = HINGED.coefficients(Load(*place, weight, radius=4e-3))
+        read = [HINGED.read(modes, layout.positions, name) for name in layout.each_reads]
+        bent.append(np.concatenate(read) + rng.normal(size=layout.channels) * sigma / 10)
+        bent[-1] += offsets @ rng.normal(0, 0.1, offsets.shape[1])
+    known = WeightFit(sensor)(newtons(MASSES), bent)
+    assert abs(known.rigidity - RIGIDITY) < 3 * known.rigidity_sd < 0.03 * RIGIDITY
+    assert known.passed
