@@ -42,7 +42,7 @@ class InUsePanel(Panel):
         super().__init__("In use")
         self.what = text_label()
         self.load = button(f"Load{ELLIPSIS}", "load", "Use a calibration from a file.")
-        self.stop = button("Stop using", "stop", "Return to nominal curvature (Ctrl+Z undoes).")
+        self.stop = button("Stop using", "stop", "Return to nominal readings (Ctrl+Z undoes).")
         self.body.addWidget(self.what)
         self.body.addLayout(in_a_row(self.load, self.stop))
         self._calibration: Calibration | None = None
@@ -76,7 +76,7 @@ class InUsePanel(Panel):
         found, sensor = self._calibration, self._status.sensor
         alarm = ""
         if found is None:
-            text = "None: readings are nominal curvature (Eq. 8)."
+            text = "None: readings are nominal (Eq. 8)."
         else:
             text = f"{found.name} {found.serial_number},\n{calibration_text(found)}"
             if self._in_progress:

@@ -87,7 +87,7 @@ def calibration_text(calibration: Calibration) -> str:
     """When a calibration was made, how many channels passed, and what known weights found."""
     passed, all_ = int(np.isfinite(calibration.gain).sum()), len(calibration.gain)
     day, known = calibration.date.astimezone(), calibration.weights
-    channels = "nominal curvature" if calibration.is_nominal else f"{passed} of {all_} channels"
+    channels = "nominal readings" if calibration.is_nominal else f"{passed} of {all_} channels"
     stiff = f", rigidity {known.rigidity:.3g} N m by {len(known.weights)} weights" if known else ""
     return f"calibrated {day:%Y-%m-%d}, {channels}{stiff}"
 

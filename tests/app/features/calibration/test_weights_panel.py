@@ -43,7 +43,7 @@ def test_weights_laid_on_in_the_window_give_the_rigidity_and_what_lay_there_retu
     panel.result.use.click()
     until(lambda: session.status.setup.calibration is not None)
     assert "by 4 weights" in weighing.in_use.what.text()
-    assert "nominal curvature" in weighing.in_use.what.text()
+    assert "nominal readings" in weighing.in_use.what.text()
     controller.save(tmp_path / "skin.toml")
     assert Calibration.read(tmp_path / "skin.toml").weights == controller.result
     weighing.history.stack.undo()
