@@ -119,7 +119,7 @@ class Estimator(ABC):
         self.basis, self.layout, self.rim_sd = basis, layout, rim_sd
         # Typed as float64: what holds for one holds for the other.
         self.dtype = cast("np.dtype[np.float64]", np.dtype(dtype))
-        self.combinations, unobservable = _combinations(basis, layout)
+        self.combinations, unobservable = combinations(basis, layout)
         """The combinations (N, F) of functions that are fitted; None for all of them."""
         self.undecided = rim_sd * unobservable
         """Unobservable shapes (N, q) in m, each one standard deviation large."""
@@ -407,7 +407,7 @@ def unobserved_function(basis: Basis, layout: SensorLayout, M: Array, used: Mask
 
     M (R, N) is the operator of the layout. Nothing where there is no such function.
     """
-    W = _combinations(basis, layout)[0]
+    W = combinations(basis, layout)[0]
     A = np.hstack([M[used] if W is None else M[used] @ W, layout.offsets[used]])
     s, Vt = np.linalg.svd(A / column_lengths(A))[1:]
     open_ = Vt[int(np.sum(s > s[:1] * max(A.shape) * np.finfo(float).eps)) :]
@@ -421,7 +421,7 @@ def unobserved_function(basis: Basis, layout: SensorLayout, M: Array, used: Mask
     return f"; no reading determines function {i + 1} x {j + 1}"
 
 
-def _combinations(basis: Basis, layout: SensorLayout) -> tuple[Array | None, Array]:
+def combinations(basis: Basis, layout: SensorLayout) -> tuple[Array | None, Array]:
     """The combinations (N, F) that readings may determine, and those (N, q) that none does.
 
     What has no curvature has heights and slopes.

@@ -3,6 +3,8 @@
 Readings with noise of variance s^2 leave the coefficients the covariance s^2 (M'M)^-1. A D-optimal
 placement makes the volume of that as small as can be, det M'M as large; an A-optimal one the mean
 variance of the displacement over the skin, trace (M'M)^-1 G with G the functions' mean products.
+Readings that differ in unit are divided by their noise first. Where their zero is unknown, M has a
+column for each offset, and G zeros: what is determined of the shape is what is left beside them.
 """
 
 import math
@@ -11,12 +13,12 @@ from dataclasses import replace
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import linalg
 
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
-from kappaskin.estimation.estimator import Estimator, column_lengths
+from kappaskin.estimation.estimator import Estimator, column_lengths, combinations
 from kappaskin.frames import Array, Mask
 from kappaskin.sensing import SensorLayout
 
@@ -27,19 +29,18 @@ def singular_values(basis: Basis, layout: SensorLayout) -> tuple[Array, Array]:
     They are those of M W with columns scaled to unit length: the first over the last is
     `LeastSquares.condition`. Where the readings do not determine all coefficients the last values
     are zero, or rounding, and no mixture of the last shapes changes the readings; the rigid motions
-    of an elastic rim are among them. The squared coefficients of each shape, in m, sum to 1 m^2.
+    of an elastic rim are among them where curvature alone is read. The squared coefficients of each
+    shape, in m, sum to 1 m^2.
     """
-    W = np.eye(basis.size) if basis.free is None else basis.free
+    some, still = combinations(basis, layout)
+    W = np.eye(basis.size) if some is None else some
     M_W = layout.operator(basis)[layout.live.ravel()] @ W
     length = column_lengths(M_W)
     A, back = M_W / length, W / np.where(np.isfinite(length), length, 1.0)
     R = cast("tuple[Array]", linalg.qr(A, mode="r"))[0][: A.shape[1]] if len(A) else A
     _, s, Vt = linalg.svd(R) if len(A) else (None, np.empty(0), np.eye(A.shape[1]))
-    values = np.concatenate([s, np.zeros(A.shape[1] - len(s))])
-    shapes = (back @ Vt.T).T
-    if basis.unobservable is not None:
-        values = np.concatenate([values, np.zeros(basis.unobservable.shape[1])])
-        shapes = np.vstack([shapes, basis.unobservable.T])
+    values = np.concatenate([s, np.zeros(A.shape[1] - len(s) + still.shape[1])])
+    shapes = np.hstack([back @ Vt.T, still]).T
     shapes /= np.linalg.norm(shapes, axis=1, keepdims=True)
     return values, shapes.reshape(len(shapes), *basis.shape)
 
@@ -50,44 +51,45 @@ _CROWD = 1.6  # the power that draws clustered elements to the middle
 _MOST_CANDIDATES = 10_000
 _RIDGE = 1e-9  # of the information of a reading on average, so that too few elements are no error
 
-Placement = Callable[[SensorLayout, Basis, float], SensorLayout]
-"""A function of layout, basis to determine, and least distance in m; a layout as large."""
+Placement = Callable[[SensorLayout, Basis, float, ArrayLike | None], SensorLayout]
+"""A function of layout, basis to determine, least distance in m, and sigma; a layout as large."""
 
 
 def predicted_sd(
     estimator: Estimator, noise: float, positions: Array, curvature: Array | None = None
 ) -> Array:
-    """Standard deviation (G,) in m of the displacement at `positions` (G, 2), for `noise` in 1/m.
+    """Standard deviation (G,) in m of the displacement at `positions` (G, 2).
 
-    How far estimates of one load differ from frame to frame, and what no reading determines of an
-    elastic rim; from the covariance alone, without simulation. Neither what the basis cannot
-    represent is in it nor what a prior decides. `curvature` (3, P) in 1/m are the readings of the
-    load without noise, at rest when None; `bayes` needs them: its prior's scale follows from them.
+    For a `noise` of the readings in their unit, 1/m of curvature, or in units of the sigma that the
+    estimator was given. How far estimates of one load differ from frame to frame, and what no
+    reading determines of an elastic rim; from the covariance alone, without simulation. Neither
+    what the basis cannot represent is in it nor what a prior decides. `curvature` (3, P), or other
+    readings (R,), are those of the load without noise, at rest when None; `bayes` needs them: its
+    prior's scale follows from them.
     """
     rows = estimator.basis.at(positions)
     undecided = np.linalg.norm(rows @ estimator.undecided, axis=1)
     return np.hypot(noise * estimator.scatter(noise, curvature).sd_of(rows), undecided)
 
 
-def _at(places: Array, layout: SensorLayout) -> SensorLayout:
-    """Elements like those of `layout` at `places` (P, 2) in m."""
-    layout.check_curvature_sensor("a new placement")
-    return replace(SensorLayout.scattered(layout.patch, places), gage_length=layout.gage_length)
-
-
-def _as_they_are(layout: SensorLayout, basis: Basis, spacing: float) -> SensorLayout:
+def _as_they_are(
+    layout: SensorLayout, basis: Basis, spacing: float, sigma: ArrayLike | None
+) -> SensorLayout:
     return layout
 
 
-def _clustered(layout: SensorLayout, basis: Basis, spacing: float) -> SensorLayout:
+def _clustered(
+    layout: SensorLayout, basis: Basis, spacing: float, sigma: ArrayLike | None
+) -> SensorLayout:
     """The same elements, drawn towards the middle of the skin."""
     half = np.array([layout.patch.a, layout.patch.b]) / 2
     u = layout.positions / half - 1
-    return _at(half * (1 + np.sign(u) * np.abs(u) ** _CROWD), layout)
+    places = half * (1 + np.sign(u) * np.abs(u) ** _CROWD)
+    return replace(layout, positions=places, shape=None)
 
 
 def _optimal(det: bool) -> Placement:
-    return lambda layout, basis, spacing: _exchanged(layout, basis, spacing, det)
+    return lambda layout, basis, spacing, sigma: _exchanged(layout, basis, spacing, sigma, det)
 
 
 PLACEMENTS: dict[str, Placement] = {
@@ -107,12 +109,34 @@ def check_placement(layout: SensorLayout, by: str) -> None:
         raise Refusal("expected only live elements for a new placement, got dead ones among them")
 
 
-def place_elements(layout: SensorLayout, basis: Basis, by: str, spacing: float) -> SensorLayout:
+def place_elements(
+    layout: SensorLayout, basis: Basis, by: str, spacing: float, sigma: ArrayLike | None = None
+) -> SensorLayout:
     """As many elements as `layout` has, placed by the name `by` to determine `basis`.
 
-    At least `spacing` in m from each other where the placement is optimal.
+    At least `spacing` in m from each other where the placement is optimal. Each reads what it did;
+    `sigma` is the standard deviation of each reading, as an estimator takes it, and needed where
+    readings differ in unit. Raises a `Refusal` for elements that differ in what they read.
     """
-    return PLACEMENTS[by](layout, basis, spacing)
+    return PLACEMENTS[by](layout, basis, spacing, sigma)
+
+
+def _sigma_of_each(layout: SensorLayout, sigma: ArrayLike | None) -> Array:
+    """The standard deviation (k,) of each reading of an element; 1 where all weigh the same."""
+    each, given = layout.each_reads, np.asarray(1.0 if sigma is None else sigma, float)
+    if sigma is None and " or " in layout.units:
+        raise Refusal(
+            f"expected the sigma of readings that differ in unit, {layout.units}, to place their "
+            "elements, got none; give each its standard deviation"
+        )
+    fits = given.shape in ((), layout.frame_shape)
+    of_all = np.broadcast_to(given if fits else np.nan, layout.frame_shape).reshape(len(each), -1)
+    if not np.all((of_all == of_all[:, :1]) & (of_all > 0) & (of_all < math.inf)):
+        raise Refusal(
+            f"expected a finite sigma above zero of {', '.join(each)}, one number or of shape "
+            f"{layout.frame_shape} and the same at every element, to place these; got {sigma!s:.80}"
+        )
+    return of_all[:, 0]
 
 
 def _candidates(layout: SensorLayout, spacing: float) -> Array:
@@ -122,7 +146,7 @@ def _candidates(layout: SensorLayout, spacing: float) -> Array:
     places = np.empty((0, 2))
     if 0 < m * n <= _MOST_CANDIDATES:
         places = SensorLayout.regular(patch, m, n).positions
-        places = places[patch.depth(places) >= layout.gage_length / 2]
+        places = places[layout.has_room(places)]
     if len(places) <= len(layout):
         raise Refusal(
             f"expected a spacing that leaves more than {len(layout)} places on a tiling of "
@@ -131,35 +155,42 @@ def _candidates(layout: SensorLayout, spacing: float) -> Array:
     return places
 
 
-def _exchanged(layout: SensorLayout, basis: Basis, spacing: float, det: bool) -> SensorLayout:
+def _exchanged(
+    layout: SensorLayout, basis: Basis, spacing: float, sigma: ArrayLike | None, det: bool
+) -> SensorLayout:
     """The layout after every exchange of one element for a free place that gains (Fedorov's).
 
     It starts from the free places nearest to the scene's elements, and takes the best exchange for
     one element after the other, until none gains.
     """
     places = _candidates(layout, spacing)
-    rows, products = _scaled(layout, basis, places)
+    rows, products = _scaled(layout, basis, places, sigma)
     chosen = _nearest(layout.positions, places)
     free = np.ones(len(places), bool)
     free[chosen] = False
     for _ in range(_SWEEPS):
         if not sum([_exchange(rows, products, chosen, free, n, det) for n in range(len(chosen))]):
             break
-    return _at(places[np.sort(chosen)], layout)
+    return replace(layout, positions=places[np.sort(chosen)], shape=None)
 
 
-def _scaled(layout: SensorLayout, basis: Basis, places: Array) -> tuple[Array, Array]:
-    """Readings (C, 3, F) of F functions by elements at `places`, each function scaled to unit size.
+def _scaled(
+    layout: SensorLayout, basis: Basis, places: Array, sigma: ArrayLike | None
+) -> tuple[Array, Array]:
+    """Readings (C, k, F) over their `sigma` by elements at `places`, of F unknowns.
 
-    And the mean products (F, F) of the functions over the skin, scaled alike.
+    And the mean products (F, F) over the skin of what they are as shapes: functions, or nothing of
+    an offset. Each unknown is scaled to unit size.
     """
-    W = np.eye(basis.size) if basis.free is None else basis.free
-    M = _at(places, layout).operator(basis) @ W
-    length = np.linalg.norm(M, axis=0) / math.sqrt(len(places))
+    there, C, each = layout.read_alike(places), len(places), _sigma_of_each(layout, sigma)
+    some, _ = combinations(basis, layout)
+    W = np.eye(basis.size) if some is None else some
+    M = np.hstack([there.operator(basis) @ W, there.offsets]) / np.repeat(each, C)[:, None]
+    length = np.linalg.norm(M, axis=0) / math.sqrt(C)
     points, weights = basis.quadrature()
-    shapes = basis.at(points) @ W / length
+    shapes = basis.at(points) @ np.pad(W, [(0, 0), (0, M.shape[1] - W.shape[1])]) / length
     products = (weights[:, None] * shapes).T @ shapes / weights.sum()
-    return np.ascontiguousarray((M / length).reshape(3, len(places), -1).swapaxes(0, 1)), products
+    return np.ascontiguousarray((M / length).reshape(len(each), C, -1).swapaxes(0, 1)), products
 
 
 def _nearest(positions: Array, places: Array) -> NDArray[np.intp]:
@@ -177,7 +208,7 @@ def _exchange(
 ) -> bool:
     """Move element `n` of those `chosen` to a better free place; whether there was one.
 
-    With M'M = A of the others and a place's rows r (3, F), det(A + r'r) = det(A) det(1 + r V r'),
+    With M'M = A of the others and a place's rows r (k, F), det(A + r'r) = det(A) det(1 + r V r'),
     V = A^-1, and trace((A + r'r)^-1 G) = trace(V G) - trace((1 + r V r')^-1 r V G V r').
     """
     others = rows[np.delete(chosen, n)].reshape(-1, rows.shape[2])
@@ -186,12 +217,13 @@ def _exchange(
     here = np.append(np.flatnonzero(free), chosen[n])
     r = rows[here]
     rV = r @ V
-    S = np.eye(3) + rV @ r.swapaxes(1, 2)
+    S = np.eye(rows.shape[1]) + rV @ r.swapaxes(1, 2)
     if det:
         information = np.linalg.slogdet(S)[1]
     else:
         shared = np.linalg.solve(S, rV @ products @ rV.swapaxes(1, 2))
-        information = np.trace(shared, axis1=1, axis2=2) / np.trace(V @ products)
+        variance = np.trace(V @ products) - np.trace(shared, axis1=1, axis2=2)
+        information = -variance / variance[-1]
     best = int(np.argmax(information))
     if not information[best] > information[-1] + _GAIN:
         return False

@@ -275,11 +275,9 @@ class SensorLayout:
     def _check_cells(self) -> None:
         if not any(self.cell):
             return
-        half = np.array(self.cell) / 2 * (1 - _ROUNDING)
-        if not (np.all(half >= 0) and np.all(half < np.inf)):
+        if not all(0 <= side < math.inf for side in self.cell):
             raise Refusal(f"expected two sides of a cell of at least 0 m, got {self.cell}")
-        corners = self.positions + half * np.array([[[1, 1]], [[1, -1]], [[-1, 1]], [[-1, -1]]])
-        inside = self.patch.contains(corners.reshape(-1, 2)).reshape(4, -1).all(axis=0)
+        inside = self.has_room(self.positions)
         if not inside.all():
             raise Refusal(
                 f"cells of {self.cell[0]:g} x {self.cell[1]:g} m go over the rim of the "
@@ -346,6 +344,30 @@ class SensorLayout:
     def of_curvature(self) -> "SensorLayout":
         """The same elements as a curvature sensor, all of them live."""
         return replace(self, reads=None, live=_channels(self.patch, len(self)))
+
+    def has_room(self, positions: Array) -> Mask:
+        """At which `positions` (C, 2) in m the gages and cells of an element are on the skin."""
+        half = np.array(self.cell) / 2 * (1 - _ROUNDING)
+        corners = positions + half * np.array([[[1, 1]], [[1, -1]], [[-1, 1]], [[-1, -1]]])
+        on = self.patch.contains(corners.reshape(-1, 2)).reshape(4, -1).all(axis=0)
+        return on & (self.patch.depth(positions) * (1 + _ROUNDING) >= self.gage_length / 2)
+
+    def read_alike(self, positions: ArrayLike) -> "SensorLayout":
+        """Elements at other `positions` (C, 2) in m, each with the k readings of every element.
+
+        Reading k C + c is number k of element c. A `Refusal` where elements differ in what they
+        read.
+        """
+        k, made = len(self.each_reads), SensorLayout.scattered(self.patch, positions)
+        made = replace(made, gage_length=self.gage_length, cell=self.cell)
+        if not self.reads:
+            return made
+        P, C = len(self), len(made)
+        quantity, direction = self.reads.quantity[::P], self.reads.direction[::P]
+        element = np.tile(np.arange(C), k)
+        return made.reading(
+            element, np.repeat(quantity, C), np.repeat(direction, C), self.reads.free
+        )
 
     def without(self, elements: Iterable[int]) -> "SensorLayout":
         """The same layout with all channels of `elements` dead."""
@@ -481,6 +503,21 @@ class SensorLayout:
             return np.empty((self.channels, 0))
         free = [k for k, (name, _) in enumerate(self.kinds) if name in self.reads.free]
         return np.equal.outer(self.kind, free).astype(float)
+
+    def sigma(self, noise: Iterable[tuple[str, float]]) -> Array | None:
+        """Standard deviation of each reading (R,) by the `noise` of quantities that differ in unit.
+
+        None where they do not. A `Refusal` where that of one is not stated.
+        """
+        if len(set(self.kind_units)) == 1:
+            return None
+        stated = dict(noise)
+        if unknown := [name for name, _ in self.kinds if not stated.get(name)]:
+            raise Refusal(
+                f"expected the noise of readings that differ in unit, {self.units}, got none of "
+                f"{unknown[0]}; give noise in [readings.{unknown[0]}]"
+            )
+        return np.array([stated[name] for name, _ in self.kinds])[self.kind]
 
     def check_curvature_sensor(self, purpose: str) -> None:
         """Raise a `Refusal` where the elements do not read xx, yy and xy, as a `purpose` needs."""

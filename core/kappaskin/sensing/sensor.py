@@ -134,15 +134,7 @@ class Sensor:
 
         Else None, and the noise is estimated. A `Refusal` where the sensor does not state it.
         """
-        layout, noise = self.layout, dict(self.transduction.noise)
-        if len(set(layout.kind_units)) == 1:
-            return None
-        if unknown := [name for name, _ in layout.kinds if not noise.get(name)]:
-            raise Refusal(
-                f"expected the noise of readings that differ in unit, {layout.units}, got none of "
-                f"{unknown[0]}; give noise in [readings.{unknown[0]}]"
-            )
-        return np.array([noise[name] for name, _ in layout.kinds])[layout.kind]
+        return self.layout.sigma(self.transduction.noise)
 
     @cached_property
     def _dead(self) -> Mask | None:

@@ -19,7 +19,7 @@ from kappaskin import (
     estimator_for,
 )
 from kappaskin.contact import ObjectFinder
-from kappaskin.estimation import METHODS, place_elements
+from kappaskin.estimation import METHODS
 
 SKIN = Patch(0.1, 0.08)
 BASIS = SineBasis(SKIN, 6, 5)
@@ -335,7 +335,6 @@ def test_what_takes_a_curvature_sensor_refuses_others_at_the_door():
     for made in (
         lambda: estimator_for("finite-slope", BASIS, layout),
         lambda: ObjectFinder(Plate(SKIN), layout),
-        lambda: place_elements(layout, BASIS, "D", 5e-3),
     ):
         with pytest.raises(Refusal, match=r"expected a curvature sensor .* got readings of height"):
             made()

@@ -76,8 +76,7 @@ def with_elements(scene: Scene, elements: tuple[int, int] | None) -> Scene:
         return scene
     layout, own = SensorLayout.regular(scene.plate.patch, *elements), scene.layout
     if own.reads:
-        layout = layout.reading_each(own.each_reads)
-        layout = replace(layout, gage_length=own.gage_length, cell=own.cell)
+        layout = replace(own.read_alike(layout.positions), shape=layout.shape)
     scan_time = scene.transduction.scan_time(layout.channels)
     return replace(
         scene, layout=layout, rate=min(scene.rate, 1 / scan_time if scan_time else np.inf)
