@@ -279,7 +279,7 @@ class ImprintObjects:
         layout = estimator.layout
         self._fit, self._plate = estimator, None
         if estimator.has_memory:
-            self._fit = LeastSquares(estimator.basis, layout)
+            self._fit = LeastSquares(estimator.basis, layout, estimator.sigma)
         if not layout.reads:
             self._plate = ObjectFinder(plate, layout, edge)
         elif plate.patch.strip:

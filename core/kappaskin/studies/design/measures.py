@@ -9,7 +9,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from kappaskin.bases import basis_for
-from kappaskin.contact import ContactObject, ObjectFinder, PointContact
+from kappaskin.contact import ContactObject, PointContact, contacts_of, object_finder
 from kappaskin.errors import Refusal
 from kappaskin.estimation import (
     PLACEMENTS,
@@ -30,26 +30,35 @@ from kappaskin.studies.accuracy import covered, points_on, rms_distance, root_me
 
 
 @lru_cache(2)
-def _contact_finder(estimator: Estimator, plate: Plate, edge: str) -> PointContact:
-    return PointContact(plate, estimator.layout, edge)
+def _contact_finder(
+    estimator: Estimator, plate: Plate, edge: str
+) -> Callable[[Array, Fit], Contact]:
+    layout = estimator.layout
+    if not (layout.reads or plate.unknown_material):
+        return PointContact(plate, layout, edge)
+    find = contacts_of(plate, layout, estimator.basis, edge, estimator.sigma)
+    return lambda readings, fit: find(readings, fit)[0]
 
 
 @lru_cache(2)
-def _object_finder(estimator: Estimator, plate: Plate, edge: str) -> ObjectFinder:
-    return ObjectFinder(plate, estimator.layout, edge)
+def _object_finder(
+    estimator: Estimator, plate: Plate, edge: str
+) -> Callable[[Array, float, Contact], ContactObject]:
+    return object_finder(plate, estimator.layout, edge, estimator)
 
 
 @dataclass(frozen=True, eq=False)
 class FrameBlock:
     """T frames that a `simulator` made, and what `estimator` makes of them.
 
-    `truths` are T, or one of a skin that nothing moves on; `curvature` (T, 3, P) in 1/m.
+    `truths` are T, or one of a skin that nothing moves on; `readings` are (T, 3, P) in 1/m of a
+    curvature sensor, (T, R) in units of theirs of others.
     """
 
     simulator: Simulator
     estimator: Estimator
     truths: list[Truth]
-    curvature: Array
+    readings: Array
 
     @property
     def scene(self) -> Scene:
@@ -58,19 +67,19 @@ class FrameBlock:
     @cached_property
     def fits(self) -> list[Fit]:
         """The fit of each frame, by an estimator that may remember those before."""
-        return [self.estimator(K) for K in self.curvature]
+        return [self.estimator(K) for K in self.readings]
 
     @cached_property
     def fit(self) -> Fit:
         """The fit of all frames, each of which is taken in once by what remembers."""
         return (
-            Fit.stacked(self.fits) if self.estimator.has_memory else self.estimator(self.curvature)
+            Fit.stacked(self.fits) if self.estimator.has_memory else self.estimator(self.readings)
         )
 
     @cached_property
     def coefficients(self) -> Array:
         """The fitted coefficients, (T, N) in m."""
-        return self.fit.coefficients.reshape(len(self.curvature), -1)
+        return self.fit.coefficients.reshape(len(self.readings), -1)
 
     @cached_property
     def true(self) -> Array:
@@ -96,12 +105,12 @@ class FrameBlock:
     def contacts(self) -> list[Contact]:
         """The contact that is found in each frame."""
         find = _contact_finder(self.estimator, self.scene.plate, self.scene.edge)
-        return [find(K, fit) for K, fit in zip(self.curvature, self.fits, strict=True)]
+        return [find(K, fit) for K, fit in zip(self.readings, self.fits, strict=True)]
 
     def objects(self) -> Generator[ContactObject]:
         """The object that is recognised in each frame."""
         find = _object_finder(self.estimator, self.scene.plate, self.scene.edge)
-        for K, fit, contact in zip(self.curvature, self.fits, self.contacts, strict=True):
+        for K, fit, contact in zip(self.readings, self.fits, self.contacts, strict=True):
             yield find(K, float(fit.noise), contact)
 
 
@@ -173,9 +182,24 @@ def _covered(block: FrameBlock) -> Array:
 
 
 def noise_of(scene: Scene) -> float:
-    """The standard deviation in 1/m of all noise there is that differs from reading to reading."""
-    each = [getattr(effect, "rms", 0.0) for effect in kept_effects(scene)]
-    return math.hypot(*each)
+    """The standard deviation of all noise there is that differs from reading to reading.
+
+    In the unit of the readings; where they differ in unit, over what [readings] states of each.
+    """
+    layout, sigma = scene.layout, scene.layout.sigma(scene.transduction.noise)
+    noise = np.zeros(layout.channels // len(layout))
+    for effect in kept_effects(scene):
+        noise = np.hypot(noise, getattr(effect, "each", getattr(effect, "rms", 0.0)))
+    noise = noise if sigma is None else noise / sigma[:: len(layout)]
+    if not np.allclose(noise, noise[0], atol=0):
+        each = zip(layout.each_reads, noise.tolist(), strict=True)
+        raise Refusal(
+            "expected the same noise in all readings, or in readings that differ in unit what "
+            "[readings] states, to predict accuracy from, got "
+            f"{', '.join(f'{own:.3g} in {name}' for name, own in each)}"
+            f"{'' if sigma is None else ' times that'}; leave out other effects of noise"
+        )
+    return float(noise[0])
 
 
 @lru_cache(8)
@@ -191,12 +215,13 @@ def _predicted(block: FrameBlock) -> Array:
 
 
 def _rate(block: FrameBlock) -> Array:
-    return np.array([block.scene.sensor().scan().rate])
+    rate = block.scene.sensor().scan().rate
+    return np.array([rate if math.isfinite(rate) else math.nan])  # of readings that come at once
 
 
 def _time(block: FrameBlock) -> Array:
     _ = block.fit  # an estimator with a memory takes all frames in before
-    frames = block.curvature[np.arange(_CALLS) % len(block.curvature)]
+    frames = block.readings[np.arange(_CALLS) % len(block.readings)]
     return np.array([statistics.median(seconds(block.estimator, K) for K in frames)])
 
 
@@ -231,7 +256,9 @@ def placed_estimator(
     """The estimator of a `method` for elements placed `by` a name, at a least `distance` in m."""
     patch, (Ni, Nj) = scene.plate.patch, functions
     basis = basis_for(patch, scene.edge, Ni, 1 if patch.strip else Nj)
-    return estimator_for(method, basis, place_elements(scene.layout, basis, by, distance))
+    sigma = scene.layout.sigma(scene.transduction.noise)
+    layout = place_elements(scene.layout, basis, by, distance, sigma)
+    return estimator_for(method, basis, layout, sigma)
 
 
 @dataclass(frozen=True)
@@ -276,7 +303,7 @@ class Prospect:
     """What is predicted of a design: `sd` (ny, nx) of the displacement in m, NaN off the skin.
 
     `x` (nx,) and `y` (ny,) are in m, `positions` (P, 2) where the elements are, `rate` in 1/s what
-    the conversions allow.
+    the conversions allow; infinite where readings come all at once.
     """
 
     x: Array
@@ -333,9 +360,9 @@ def prospect(design: Design) -> Prospect:
     estimator = design.estimator()
     x, y, on, points = _points(design.scene.plate.patch)
     sd = predicted_sd(estimator, noise_of(design.scene), points)
-    layout = estimator.layout
-    rate = 1 / design.scene.transduction.scan_time(3 * len(layout))
-    return Prospect(x, y, _on_map(on, sd), layout.positions, rate)
+    scan_time = design.scene.transduction.scan_time(estimator.layout.channels)
+    rate = 1 / scan_time if scan_time else math.inf
+    return Prospect(x, y, _on_map(on, sd), estimator.layout.positions, rate)
 
 
 def check(design: Design, frames: int = _MOST) -> Generator[Check]:
@@ -354,7 +381,8 @@ def check(design: Design, frames: int = _MOST) -> Generator[Check]:
         T = min(_BLOCK, frames - count)
         truths, read = simulator.readings(scan, (count + np.arange(T)) / scene.rate)
         known = np.array([truth.coefficients.ravel() for truth in truths if truth is not None])
-        fitted = estimator(read.reshape(T, 3, -1)).coefficients.reshape(T, -1) @ rows.T
+        fits = estimator(read.reshape(T, *scene.layout.frame_shape))
+        fitted = fits.coefficients.reshape(T, -1) @ rows.T
         error = fitted - known @ true_rows.T
         off += float(np.sum(error**2 @ shares))
         # Chan's way to add what differs from one mean to what does from another.

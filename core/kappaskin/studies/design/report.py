@@ -33,7 +33,8 @@ def value_text(value: Any) -> str:
         return f"{value:.4g}"
     if isinstance(value, list):
         many = cast("list[Any]", value)
-        text = (" x " if len(many) == 2 else ", ").join(value_text(one) for one in many)
+        pair = len(many) == 2 and not isinstance(many[0], str)
+        text = (" x " if pair else ", ").join(value_text(one) for one in many)
         return text if len(text) <= _LONGEST_VALUE else f"{len(many)} values"
     return str(value).lower() if isinstance(value, bool) else str(value)
 

@@ -34,7 +34,7 @@ from kappaskin.studies.design.study import (
 
 # Tasks
 
-MEANING = 2
+MEANING = 3
 """Incremented with every change that alters the numbers of a study."""
 
 _ONE_BY_ONE = threading.Lock()  # what blocks share is not made for several threads
@@ -109,11 +109,11 @@ def block_of(setup: PointSetup, estimator: Estimator, seed: int) -> FrameBlock:
         read = _compensated(scene, read)
     read[:, ~scene.layout.live.ravel()] = np.nan
     known = [truth for truth in truths if truth is not None]
-    return FrameBlock(simulator, estimator, known, read.reshape(len(times), 3, -1))
+    return FrameBlock(simulator, estimator, known, read.reshape(-1, *scene.layout.frame_shape))
 
 
 def _compensated(scene: Scene, read: Array) -> Array:
-    """Readings (T, 3 P) in 1/m, one after the other, with the scene's hysteresis compensated."""
+    """Readings (T, R) in 1/m, one after the other, with the scene's hysteresis compensated."""
     loops = [effect for effect in kept_effects(scene) if isinstance(effect, Hysteresis)]
     if not loops:
         raise Refusal("expected a scene with hysteresis to compensate, got one without")

@@ -354,12 +354,11 @@ def read_setup(top: TomlTable, file: Path) -> PointSetup:
     for name in made[2].what:
         measure.stands_for(name, "what", MEASURES)
     with place.blamed():
-        scene.layout.check_curvature_sensor("a study")
         check_placement(scene.layout, made[1].by)
-    if (readings := made[2].frames * 3 * len(scene.layout)) > _MOST_READINGS:
+    if (readings := made[2].frames * scene.layout.channels) > _MOST_READINGS:
         raise measure.refusal(
             f"expected at most {_MOST_READINGS} readings in a block, got {made[2].frames} frames "
-            f"of {3 * len(scene.layout)} = {readings}; take fewer frames and more blocks",
+            f"of {scene.layout.channels} = {readings}; take fewer frames and more blocks",
             "frames",
         )
     return PointSetup(scene, *made, tuple(read_draw(table) for table in drawing))
@@ -392,7 +391,7 @@ def estimator_of(content: dict[str, Any], setup: PointSetup) -> Estimator:
     """The estimator of a point, cached for points with the same sensor and fit."""
     if METHODS[setup.fit.method].has_memory:
         return _estimator(setup)
-    alike = {key: content.get(key) for key in ("skin", "elements", "fit", "place")}
+    alike = {key: content.get(key) for key in ("skin", "elements", "readings", "fit", "place")}
     return _cached_estimator(_SameSensor(json.dumps(alike, sort_keys=True), setup))
 
 
