@@ -333,7 +333,9 @@ class SensorLayout:
         """
         kinds = [kind_of_reading(name) for name in names]
         if not kinds or len(set(kinds)) < len(kinds):
-            raise Refusal(f"expected at least one reading, each once, got {', '.join(names)}")
+            raise Refusal(
+                f"expected at least one reading, each once, got {', '.join(names) or 'none'}"
+            )
         if tuple(kinds) == _CURVATURES:
             return self.of_curvature
         P, (quantities, directions) = len(self), zip(*kinds, strict=True)

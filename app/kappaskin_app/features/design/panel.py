@@ -12,7 +12,7 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin.studies import Prospect
-from kappaskin_app.features.design.prediction import DesignPrediction
+from kappaskin_app.features.design.prediction import DesignPrediction, noise_settings
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import Form, pass_window_keys
 from kappaskin_app.shell.settings import Settings, form_field
@@ -27,7 +27,8 @@ from kappaskin_app.widgets.surface_map import SurfaceMap
 from kappaskin_app.widgets.text import round_up
 
 _NAMES = tuple(field for field in DesignSettings.__dataclass_fields__)
-_LENGTHS = ("side_x", "side_y", "base_radius", "rim_radius")
+_LENGTHS = tuple(f"design_{side}" for side in ("side_x", "side_y", "base_radius", "rim_radius"))
+_NOISE = ("design_noise", "design_height_noise", "design_slope_noise")
 _STEPS = 200  # of a slider
 _FACTOR = 4  # steps of a logarithmic slider, to the next number of two digits
 _WIDE = 50  # ratio of the ends of a range, beyond which its slider is logarithmic
@@ -84,11 +85,13 @@ class DesignForm(Form):
             if isinstance(how, Range):
                 with QSignalBlocker(slider):
                     slider.setValue(_place(getattr(settings, name), how))
-        lengths = SHAPES[settings.design_shape].lengths
-        for length in _LENGTHS:
-            editor = self.editor(f"design_{length}").parentWidget()
+        shown = {f"design_{length}" for length in SHAPES[settings.design_shape].lengths}
+        shown |= (noise := set(noise_settings(settings).values()))
+        shown |= {"design_conversion"} if noise == {"design_noise"} else set()
+        for name in (*_LENGTHS, *_NOISE, "design_conversion"):
+            editor = self.editor(name).parentWidget()
             if editor is not None:
-                self.form.setRowVisible(editor, length in lengths)
+                self.form.setRowVisible(editor, name in shown)
 
 
 def _logarithmic(how: Range) -> bool:
@@ -204,8 +207,9 @@ class DesignPanel(QWidget):
             why = self._prediction.refusal if self._prediction else ""
             self.words.setText(f"Computing{ELLIPSIS}" if computing else sentence(why))
             return
+        rate = f", {found.rate:.0f} frames/s" if math.isfinite(found.rate) else ""
         words = [
-            f"{len(found.positions)} elements, {found.rate:.0f} frames/s. Due to noise: "
+            f"{len(found.positions)} elements{rate}. Due to noise: "
             f"{_micrometres(found.rms)} RMS over the skin, {_micrometres(found.worst)} at worst."
         ]
         if check is not None:

@@ -14,7 +14,7 @@ from kappaskin.live import Status
 from kappaskin.mechanics import Plate
 from kappaskin.scenes import Scene, write_scene
 from kappaskin.scenes.effects import GaussianNoise
-from kappaskin.sensing import SensorLayout, Transduction
+from kappaskin.sensing import DigitalReadings, SensorLayout, Transduction, kind_of_reading
 from kappaskin.skin import Patch
 from kappaskin.studies import Check, Design, Prospect, check, prospect
 from kappaskin_app.shell.background import BackgroundTask, Tasks
@@ -31,22 +31,39 @@ def patch_of(settings: Settings) -> Patch:
     return shape.make(*(getattr(settings, f"design_{name}") for name in shape.lengths))
 
 
+_NOISE = {"height": "design_height_noise", "slope": "design_slope_noise"}
+_RESOLUTION = 1e-9  # of readings that come as numbers: no noise is as small
+
+
+def noise_settings(settings: Settings) -> dict[str, str]:
+    """The setting of the noise of each quantity that the design reads, by name."""
+    quantities = dict.fromkeys(kind_of_reading(name)[0] for name in settings.design_reads)
+    return {name: _NOISE.get(name, "design_noise") for name in quantities}
+
+
 def scene_of(settings: Settings) -> Scene:
     """The design with its elements on a regular grid, and a point load in the middle."""
     s, patch = settings, patch_of(settings)
     layout, edge = SensorLayout.regular(patch, s.design_x, s.design_y), edges_of(patch)[0]
-    plate, electronics = Plate(patch), Transduction()
+    layout, plate, electronics = layout.reading_each(s.design_reads), Plate(patch), Transduction()
     converter = replace(electronics.converter, conversion_time=s.design_conversion)
-    electronics = replace(electronics, converter=converter)
-    fastest = 1 / electronics.scan_time(3 * len(layout))
+    electronics, effects = (
+        replace(electronics, converter=converter),
+        (GaussianNoise(s.design_noise),),
+    )
+    if not layout.senses_curvature_only:
+        noise = {name: getattr(s, own) for name, own in noise_settings(s).items()}
+        electronics, effects = DigitalReadings(_RESOLUTION, tuple(noise.items())), ()
+    scan_time = electronics.scan_time(layout.channels)
+    rate = min(SHAPES[s.design_shape].rate, 1 / scan_time if scan_time else math.inf)
     return Scene(
         "design",
         plate,
         layout,
         load_case_stimuli("centre", plate, edge),
-        (GaussianNoise(s.design_noise),),
+        effects,
         electronics,
-        rate=min(SHAPES[s.design_shape].rate, fastest if fastest < 1 else math.floor(fastest)),
+        rate=rate if rate < 1 else math.floor(rate),
         reference=reference_on(plate, edge, "centre"),
         edge=edge,
         title="A design",
@@ -69,7 +86,7 @@ def _placed(settings: Settings, found: Prospect) -> Scene:
     scene = scene_of(settings)
     if settings.design_place == "scene":
         return scene
-    return replace(scene, layout=SensorLayout.scattered(scene.plate.patch, found.positions))
+    return replace(scene, layout=replace(scene.layout, positions=found.positions, shape=None))
 
 
 def _checks(settings: Settings, found: Prospect) -> Generator[Check]:

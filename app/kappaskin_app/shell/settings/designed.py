@@ -2,7 +2,14 @@
 
 from dataclasses import dataclass
 
-from kappaskin_app.shell.settings.form_fields import MILLIMETRES, PER_METRE, Choice, Range, setting
+from kappaskin_app.shell.settings.form_fields import (
+    MILLIMETRES,
+    PER_METRE,
+    Choice,
+    Range,
+    Several,
+    setting,
+)
 from kappaskin_app.shell.settings.scene import SHAPES
 
 PLACINGS = (
@@ -15,6 +22,11 @@ PLACINGS = (
 
 def _length(label: str, tip: str) -> Range:
     return Range(label, tip, 5e-3, 0.5, 1e-3, *MILLIMETRES, 1)
+
+
+def _noise(of: str, least: float, most: float, step: float, scale: float, unit: str) -> Range:
+    tip = f"Standard deviation of the noise of {of}. The error bar is proportional to all noise."
+    return Range(f"Noise of {of.split()[0]}", tip, least, most, step, scale, unit, 2)
 
 
 @dataclass(frozen=True)
@@ -54,6 +66,22 @@ class DesignSettings:
     design_y: int = setting(
         10, Range("Elements along y", "n, the number of elements along y.", 2, 32, 1)
     )
+    design_reads: tuple[str, ...] = setting(
+        ("xx", "yy", "xy"),
+        Several(
+            "Readings",
+            "What every element reads. Curvatures alone are those of strain gages, converted one "
+            "after the other; all others come at once, as numbers.",
+            (
+                ("xx", "Curvature xx"),
+                ("yy", "Curvature yy"),
+                ("xy", "Twist xy"),
+                ("height", "Height"),
+                ("slope@0", "Slope along x"),
+                ("slope@90", "Slope along y"),
+            ),
+        ),
+    )
     design_functions_x: int = setting(
         8,
         Range(
@@ -69,22 +97,17 @@ class DesignSettings:
         Range("Basis functions in y", "Nj, the number of basis functions in y (Eq. 1).", 1, 24, 1),
     )
     design_noise: float = setting(
-        0.23,
-        Range(
-            "Noise",
-            "Standard deviation of the noise of each reading. The error bar is proportional to it.",
-            0.01,
-            10.0,
-            0.01,
-            *PER_METRE,
-            2,
-        ),
+        0.23, _noise("curvatures and the twist", 0.01, 10.0, 0.01, *PER_METRE)
     )
+    design_height_noise: float = setting(
+        5e-6, _noise("heights", 1e-7, 1e-3, 1e-7, 1e6, "\N{MICRO SIGN}m")
+    )
+    design_slope_noise: float = setting(5e-4, _noise("slopes", 1e-5, 0.1, 1e-5, 1e3, "mrad"))
     design_conversion: float = setting(
         5e-6,
         Range(
             "Conversion",
-            "Conversion time of one reading. A frame is three readings of each element, one after "
+            "Conversion time of one reading. A frame is all readings of each element, one after "
             "the other.",
             1e-6,
             1e-3,

@@ -1,5 +1,6 @@
 """The design panel: predicted at once, checked by a simulation, and saved as a scene."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -44,6 +45,24 @@ def test_every_outline_is_a_scene_that_opens_however_slow_its_converter_is(name:
     scene = scene_of(replace(shaped(name), design_conversion=form_field("design_conversion").most))
 
     assert read_scene(write_scene(scene), Path("a.toml")).rate == scene.rate
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_design_that_reads_heights_and_slopes_is_a_scene_that_opens(name: str):
+    settings = replace(shaped(name), design_reads=("height", "slope@0"))
+
+    scene = read_scene(write_scene(scene_of(settings)), Path("a.toml"))
+
+    assert scene.layout.each_reads == ["height", "slope@0"]
+    assert dict(scene.transduction.noise) == {"height": 5e-6, "slope": 5e-4}
+    assert scene.rate == SHAPES[name].rate
+
+
+def test_the_error_bar_of_heights_is_that_of_their_noise():
+    heights = replace(Settings(), design_reads=("height",), design_height_noise=2e-6)
+
+    # Of 8 x 8 sines on 10 x 10 elements, at whose places they are orthogonal.
+    assert prospect(design_of(heights)).rms == pytest.approx(2e-6 * 8 / 10, rel=1e-6)
 
 
 @pytest.mark.parametrize("name", RANGES)
@@ -115,6 +134,34 @@ def test_what_cannot_be_designed_is_told_and_mended(window: MainWindow, until):
     assert window.design.words.text()
     window.history.stack.undo()
     until(lambda: prediction.prospect is not None and not prediction.refusal)
+
+
+def test_what_elements_read_is_selected_placed_checked_and_saved(
+    window: MainWindow, until, tmp_path: Path
+):
+    form, prediction = window.design.form, window.prediction
+    window.docks.reveal("design")
+
+    chosen = {"design_reads": ("height", "slope@0"), "design_place": "clustered"}
+    window.history.change("readings", -1, **chosen)
+    until(lambda: prediction.prospect is not None and prediction.prospect.rate == math.inf)
+    shown = {name for name in RANGES if form.editor(name).isVisible()}
+    assert {"design_height_noise", "design_slope_noise"} < shown
+    assert not {"design_noise", "design_conversion"} & shown
+    assert "100 elements. Due to noise" in window.design.words.text()
+
+    window.design.simulate.click()
+    until(lambda: prediction.check is not None, 60)
+    assert prediction.check.rms_sd == pytest.approx(prediction.prospect.rms, rel=0.1)
+
+    prediction.write(tmp_path / "mine.toml")
+    layout = load_scene(str(tmp_path / "mine.toml")).layout
+    assert layout.each_reads == ["height", "slope@0"]
+    np.testing.assert_allclose(layout.positions, prediction.prospect.positions, atol=1e-9)
+
+    window.requests.set("design_reads", ())
+    until(lambda: bool(prediction.refusal))
+    assert "at least one reading" in window.design.words.text()
 
 
 def test_placing_takes_a_while_and_can_be_ended(window: MainWindow, until):
