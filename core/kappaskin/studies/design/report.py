@@ -24,11 +24,14 @@ from kappaskin.studies.design.results import (
 from kappaskin.studies.design.study import Axis, Study
 from kappaskin.studies.figures import style
 
-_LONGEST_VALUE = 24  # characters of a value
+_LONGEST_VALUE = 30  # characters of a value
 
 
 def value_text(value: Any) -> str:
     """A value of what is varied, short: 9 x 9 for two whole numbers."""
+    if isinstance(value, dict):
+        table = cast("dict[str, Any]", value)
+        return ", ".join(f"{key} {value_text(own)}" for key, own in table.items())
     if isinstance(value, float):
         return f"{value:.4g}"
     if isinstance(value, list):

@@ -150,7 +150,18 @@ def test_a_mean_has_the_digits_that_are_known(mean, half, told):
 
 @pytest.mark.parametrize(
     ("value", "told"),
-    [([6, 8], "6 x 8"), (0.1 + 0.2, "0.3"), ("D", "D"), (True, "true"), ([1] * 40, "40 values")],
+    [
+        ([6, 8], "6 x 8"),
+        (0.1 + 0.2, "0.3"),
+        ("D", "D"),
+        (True, "true"),
+        ([1] * 40, "40 values"),
+        (["slope@0", "slope@90"], "slope@0, slope@90"),
+        (
+            {"height": {"noise": 5e-6}, "slope": {"noise": 5e-4}},
+            "height noise 5e-06, slope noise 0.0005",
+        ),
+    ],
 )
 def test_values_are_told_briefly(value, told):
     assert value_text(value) == told
