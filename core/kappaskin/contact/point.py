@@ -241,9 +241,9 @@ class PointContact:
         return _Tables(norm, weights, max(len(M) - len(free) - self._unknowns, 1), free)
 
     def __call__(self, curvature: Array, fit: Fit) -> Contact:
-        """The contact for `curvature` (3, P) in 1/m, NaN where missing, and the `fit` to it."""
-        K = curvature.ravel()
-        K, tables = self._used(K if self._scale is None else K * self._scale)
+        """The contact for the readings of a frame, NaN where missing, and the `fit` to them."""
+        read = curvature.ravel()
+        K, tables = self._used(read if self._scale is None else read * self._scale)
         explained = self._map(self._modal(K).reshape(self.basis.shape))
         explained *= explained
         explained /= tables.norm
