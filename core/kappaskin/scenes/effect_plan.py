@@ -103,9 +103,15 @@ def effects_of(scene: Scene) -> dict[str, Effect]:
 
 
 def plan(scene: Scene) -> Plan:
-    """Plan of `scene` by its `choice`, with the size of every effect."""
-    there, seen = effects_of(scene), survey(scene)
-    sizes = _sizes(there, seen)
+    """Plan of `scene` by its `choice`, with the size of every effect.
+
+    Of readings that differ in unit, the largest share of a peak counts.
+    """
+    there, sizes = effects_of(scene), dict[str, Size]()
+    for unit in dict.fromkeys(scene.layout.kind_units):
+        part = replace(scene, layout=scene.layout.in_unit(unit))
+        for name, size in _sizes(effects_of(part), survey(part)).items():
+            sizes[name] = max(sizes.get(name, size), size, key=lambda each: each.error)
     reasons = _reasons(scene.choice, there, sizes)
     return Plan(
         tuple(
@@ -148,6 +154,8 @@ def _reasons(
             found[name] = True, "a failure in the scene"
         elif name in choice.on | choice.off:
             found[name] = name in choice.on, "as set in the scene"
+        elif isinstance(there[name], StatedNoise):
+            found[name] = True, "error bars rely on it"
         elif not choice.auto:
             found[name] = True, "the scene requests all effects"
         elif spent + error <= choice.accuracy:
@@ -170,11 +178,8 @@ def _percent(share: float) -> str:
 
 
 def kept_effects(scene: Scene) -> tuple[Effect, ...]:
-    """The effects that `plan` keeps; without a survey of the scene where its choice needs none.
-
-    All, where readings of several units have no peak in common by which a plan could judge them.
-    """
-    if scene.choice.auto and len(set(scene.layout.kind_units)) == 1:
+    """The effects that `plan` keeps; without a survey of the scene where its choice needs none."""
+    if scene.choice.auto:
         return plan(scene).kept
     there, off = effects_of(scene), scene.choice.off
     return tuple(effect for name, effect in there.items() if effect.authored or name not in off)

@@ -301,14 +301,12 @@ _STEP = 1e-3  # s over which a rate is taken; less of a motion that is as fast
 
 
 def survey(scene: Scene) -> Survey:
-    """The survey of one repetition of `scene`, by which the sizes of effects are judged."""
+    """The survey of one repetition of `scene`, by which the sizes of effects are judged.
+
+    Its readings have one unit.
+    """
     basis = scene.basis
     layout = replace(scene.layout, gage_length=0.0)
-    if len(set(layout.kind_units)) > 1:
-        raise Refusal(
-            f"expected readings of one unit, by the peak of which effects are judged, got "
-            f"{layout.units}; all effects of such a scene are simulated, but for those in off"
-        )
     times = np.array(scene.survey_times)
     M = layout.operator(basis, scene.plate)
     pressing = LoadingHistory(scene, scene.plate)

@@ -371,6 +371,17 @@ class SensorLayout:
             element, np.repeat(quantity, C), np.repeat(direction, C), self.reads.free
         )
 
+    def in_unit(self, unit: str) -> "SensorLayout":
+        """The same elements with their readings in this `unit` only."""
+        of_kind = np.array(self.kind_units) == unit
+        if not self.reads or of_kind.all():
+            return self
+        own, reads = of_kind[self.kind], self.reads
+        quantity = reads.quantity[own]
+        free = tuple(name for name in reads.free if name in quantity)
+        kept = Readings(reads.element[own], quantity, reads.direction[own], free)
+        return replace(self, reads=kept, live=self.live[own])
+
     def without(self, elements: Iterable[int]) -> "SensorLayout":
         """The same layout with all channels of `elements` dead."""
         live = self.live.copy()

@@ -57,15 +57,13 @@ def simulated_readings(
         read["direction"] = own.direction
     if (sigma := scene.sensor().sigma) is not None:
         read["sigma"] = sigma
-    one = len(set(layout.kind_units)) == 1
-    planned = [entry.to_json() for entry in plan(scene)] if one else []
     return {
         "counts": counts.reshape(frames, *shape),
         **read,
         "truth": truth,
         "time": time,
         "contact": contact,
-        "plan": np.array(json.dumps(planned)),
+        "plan": np.array(json.dumps([entry.to_json() for entry in plan(scene)])),
         "size": np.array(size),
         "positions": places[:, :1] if skin.strip else places,
         "radius": np.array(skin.radius),
@@ -158,9 +156,12 @@ def plan_rows(scene: Scene) -> list[dict[str, Any]]:
 def plan_text(scene: Scene, rows: list[dict[str, Any]]) -> str:
     """The rows of `plan_rows` for people, those of the scene first."""
     there = [row for row in rows if row["microseconds"] is not None]
+    read = " or ".join(dict.fromkeys(name for name, _ in scene.layout.kinds))
+    if not scene.layout.reads:
+        read = "curvature"
     lines = [
-        f"{printable(scene.title)}: errors as shares of the peak {scene.layout.kinds[0][0]}, "
-        f"of which {scene.choice.accuracy:.2g} may be omitted",
+        f"{printable(scene.title)}: errors as shares of the peak {read}, of which "
+        f"{scene.choice.accuracy:.2g} may be omitted",
         "",
         f"{'effect':<18}{'size':>9}{'error':>9}{'us':>7}  kept  why",
     ]

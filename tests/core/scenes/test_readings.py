@@ -181,12 +181,17 @@ def test_a_plan_judges_effects_by_the_peak_of_what_is_read():
     assert sizes["gaussian-noise"] == pytest.approx(1e-5 / peak, rel=1e-3)
 
 
-def test_readings_of_several_units_have_no_peak_in_common():
-    rest = "[readings]\nnoise = 1e-4"
+def test_a_plan_judges_readings_of_several_units_each_by_its_peak():
+    rest = "[readings.height]\nnoise = 1e-8\n[readings.slope]\nnoise = 1e-5"
     scene = scene_of("height", "slope@0", rest=rest)
-    with pytest.raises(Refusal, match="expected readings of one unit"):
-        plan(scene)
-    assert StatedNoise in {type(effect) for effect in kept_effects(scene)}
+    entries = {entry.name: entry for entry in plan(scene)}
+    heights, slopes = (truth_of(n, scene.layout.positions) for n in ("height", "slope@0"))
+    shares = 1e-8 / np.abs(heights).max(), 1e-5 / np.abs(slopes).max()
+    # Too little to be simulated, but error bars rely on it.
+    assert shares[0] < shares[1] < 1e-3
+    assert entries["gaussian-noise"].size.number == pytest.approx(shares[1], rel=1e-3)
+    assert not entries["quantisation"].kept
+    assert [type(effect) for effect in kept_effects(scene)] == [StatedNoise]
 
 
 REFUSED = {

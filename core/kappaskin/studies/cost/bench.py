@@ -387,13 +387,14 @@ class _EffectJudge:
         if Saturation.name in names:
             electronics = scene.transduction
             curvature[electronics.saturated(electronics.counts(curvature))] = np.nan
-        fitted = self._fitted(scene.layout, curvature)
+        fitted = self._fitted(scene.sensor(), curvature)
         return self._judged(fitted), self._judged(np.array(shapes))
 
-    def _fitted(self, layout: SensorLayout, curvature: Array) -> Array:
+    def _fitted(self, sensor: Sensor, curvature: Array) -> Array:
         """The coefficients (T, Ni, Nj) of `curvature` (T, R), of which some is not scanned."""
-        live, s = layout.live & self._scanned, self._setting
-        fit = estimator_for(s.method, self._basis, replace(layout, live=live), dtype=s.precision)
+        live, s = sensor.layout.live & self._scanned, self._setting
+        layout = replace(sensor.layout, live=live)
+        fit = estimator_for(s.method, self._basis, layout, sensor.sigma, dtype=s.precision)
         K = np.where(live, curvature.reshape(-1, *live.shape), np.nan)
         with np.errstate(all="ignore"):  # what is not finite is refused
             fitted = fit(K).coefficients.astype(float)
