@@ -136,7 +136,6 @@ class MembraneView(QWidget):
         self._wire = self._wireframe(skin)
         self._show_wire()
         self._positions = sensor.layout.positions
-        self._marked = (b"", -1)
         self.show_marked(np.empty(0, np.intp), -1)
         self.point(-1)
         self._place_elements(sensor.layout.positions[sensor.layout.alive])
