@@ -188,17 +188,22 @@ planned_scene = Cache(planned, _CACHED)
 
 
 def scene_of_sensor(sensor: Sensor, noise: float) -> Scene:
-    """A scene on a real `sensor` with a point load in its middle and its `noise` in 1/m."""
+    """A scene on a real `sensor` with a point load in its middle and the `noise` of a reading.
+
+    That is in the unit of its readings, or where they have several in units of what they state.
+    """
     plate, edge, chain = sensor.plate, sensor.edge, sensor.transduction
+    several = sensor.sigma is not None
     if isinstance(chain, DigitalReadings):
-        digital = replace(chain, noise=())
+        stated = tuple((name, noise * each) for name, each in chain.noise) if several else ()
+        digital = replace(chain, noise=stated)
         chain = Transduction() if sensor.layout.senses_curvature_only else digital
     return Scene(
         sensor.name,
         plate,
         sensor.layout,
         load_case_stimuli("centre", plate, edge),
-        effects=(GaussianNoise(noise),),
+        effects=() if several else (GaussianNoise(noise),),
         transduction=chain,
         rate=min(sensor.rate, _rate_of(chain, sensor.channels)),
         reference=reference_on(plate, edge, "centre"),
