@@ -312,7 +312,7 @@ def _noise_text(noise: float, layout: SensorLayout) -> str:
     """The noise of a reading; of several units, over that stated."""
     units = set(layout.kind_units)
     times, unit = SHOWN_UNITS[units.pop()] if len(units) == 1 else (1.0, "times that stated")
-    return f"{times * noise:.2g} {unit}"
+    return f"{times * noise:.2g}\N{NO-BREAK SPACE}{unit}"
 
 
 def _measurable(setting: Setting) -> bool:

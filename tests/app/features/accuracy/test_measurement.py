@@ -1,8 +1,10 @@
 """When costs are measured, and of what: the setting in use, this skin, a real sensor's."""
 
+import math
 import multiprocessing
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 
@@ -102,9 +104,12 @@ def test_a_sensor_of_several_units_is_reckoned_with_its_noise_over_that_stated()
     noise = (("height", 5e-6), ("slope", 5e-4))
     sensor = replace(
         scene_of(Settings()).sensor(),
-        layout=SensorLayout.regular(Patch(0.1, 0.1), 6, 6).reading_each(["height", "slope@30"]),
+        layout=SensorLayout.regular(Patch(0.1, 0.1), 6, 6).reading(
+            np.repeat(np.arange(36)[::-1], 2), ["slope", "height"] * 36, math.radians(30)
+        ),
         transduction=DigitalReadings(noise=noise),
     )
     scene = scene_of_sensor(sensor, 2.0)
+    assert scene.layout.each_reads == ["height", "slope@30"]
     assert dict(scene.transduction.noise) == pytest.approx({"height": 1e-5, "slope": 1e-3})
     assert scene.effects == ()
