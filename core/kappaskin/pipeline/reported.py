@@ -375,13 +375,16 @@ class ReportedQuantity:
         first, get, is_read = self.colours[0], _got(self.value), self.name == "curvature"
         kinds = zip(layout.kinds, layout.kind_names, layout.kind_units, strict=True)
         for row, (kind, name, unit) in enumerate(kinds):
-            words = name.replace("@", " ") + "\N{DEGREE SIGN}" * ("@" in name)
+            quantity, at, degrees = name.partition("@")
+            angle = degrees.replace("-", "\N{MINUS SIGN}") + "\N{DEGREE SIGN}" * bool(at)
+            words = f"{quantity} {angle}".rstrip()
             label = words.capitalize() if is_read else f"{self.name.capitalize()} {words}"
+            symbol = first.symbol.replace(COMPONENTS[0], angle if is_read else words)
             yield replace(
                 first,
                 name=name if is_read else f"{self.name}_{name}",
                 label=label,
-                symbol=label if is_read else first.symbol.replace(COMPONENTS[0], words),
+                symbol=label if is_read and quantity != "curvature" else symbol,
                 tip=f"{label} of the skin, as elements read it." if is_read else first.tip,
                 on_surface=partial(_of_fit, *kind) if is_read else None,
                 of_elements=partial(_of_kind, get, row),

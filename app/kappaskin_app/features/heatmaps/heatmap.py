@@ -329,7 +329,7 @@ class Heatmap(QWidget):
         elif self._element >= 0:
             self.value.show_text(self._value_at(self._element, values[self._element], self._layout))
         else:
-            self.value.show_text(self._summary(values), "peak ")
+            self.value.show_text(self._summary(values), "peak ", f" {self._shade.unit_shown}")
 
     def _value_at(self, element: int, value: float, layout: SensorLayout) -> str:
         x, y = layout.positions[element] * 1e3
