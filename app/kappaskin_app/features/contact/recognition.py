@@ -34,7 +34,7 @@ def curvature_text(estimate: Estimate) -> str:
     if not estimate.contact.present:
         return ""
     found = zip(estimate.geometry.principal, estimate.geometry.principal_sd, strict=True)
-    one, other = (with_error(value, sd, 1, sign="+") for value, sd in found)
+    one, other = (with_error(value, sd, 1 + (sd < 0.05), sign="+") for value, sd in found)
     return f"principal curvatures {one} and {other} 1/m"
 
 
