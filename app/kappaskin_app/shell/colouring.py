@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,20 +11,17 @@ import numpy as np
 from kappaskin.bases import basis_for
 from kappaskin.errors import RankDeficient
 from kappaskin.estimation import FAULTS, Estimator, estimator_for
-from kappaskin.frames import Array, Estimate
+from kappaskin.frames import COMPONENTS, Array, Estimate
 from kappaskin.live import Status
-from kappaskin.pipeline import ErrorBars, Quantities, SkinColour, skin_colours
-from kappaskin.sensing import Sensor, SensorLayout
+from kappaskin.pipeline import ErrorBars, Quantities, SkinColour, colours_of, skin_colours
+from kappaskin.sensing import SHOWN_UNITS, Sensor
 from kappaskin_app.shell.background import BackgroundTask, Tasks
-from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings import Settings, locked_at
 from kappaskin_app.theme import DIVERGING, PULLED, SEQUENTIAL
 from kappaskin_app.widgets.text import round_up
 from kappaskin_app.widgets.tint import Tint, rgb_of
 
 _UNITS = {"m": (1e3, "mm"), "1/m": (1.0, "1/m"), "1/m^2": (1.0, "1/m\u00b2"), "": (1.0, "")}
-READING_UNITS = {"m": (1e6, "\N{MICRO SIGN}m"), "m/m": (1e3, "mrad"), "1/m": (1.0, "1/m")}
-"""Scale and unit on the screen of each unit that is read."""
-_LEAST_READ = {"m": 10.0, "m/m": 1.0, "1/m": 0.5}  # of a range, on the screen's scale
 _DIGITS = {
     "mm": ".3f",
     "1/m": ".2f",
@@ -49,13 +47,17 @@ class Shade(SkinColour):
     """A quantity that colours the skin, in the units of the screen."""
 
     @property
+    def _shown(self) -> tuple[float, str]:
+        return (_UNITS if self.row < 0 else SHOWN_UNITS)[self.unit]
+
+    @property
     def scale(self) -> float:
         """The factor from SI units to those of the screen."""
-        return _UNITS[self.unit][0]
+        return self._shown[0]
 
     @property
     def unit_shown(self) -> str:
-        return _UNITS[self.unit][1]
+        return self._shown[1]
 
     def tint(self, limit: float, at_rest: float = 0.0, pulled: bool = False) -> Tint:
         """The colours of values up to `limit` from what they are `at_rest`."""
@@ -77,37 +79,12 @@ class Shade(SkinColour):
         )
 
 
-SHADES = {name: Shade(**vars(colour)) for name, colour in skin_colours().items()}
-
-READ = tuple(name for name, shade in SHADES.items() if shade.row >= 0 and shade.on_surface)
-"""The quantities that a curvature sensor reads, by name: xx, yy and xy."""
-
-
-class ReadingShade(Shade):
-    """A quantity that elements read, in the finer units of readings."""
-
-    @property
-    def scale(self) -> float:
-        return READING_UNITS[self.unit][0]
-
-    @property
-    def unit_shown(self) -> str:
-        return READING_UNITS[self.unit][1]
+def shades_of(colours: Mapping[str, SkinColour]) -> dict[str, Shade]:
+    """A shade of each colour, by name."""
+    return {name: Shade(**vars(colour)) for name, colour in colours.items()}
 
 
-def reading_shades(layout: SensorLayout) -> dict[str, ReadingShade]:
-    """A shade for each quantity and direction that is read other than xx, yy and xy, by name."""
-    if not layout.reads:
-        return {}
-    found: dict[str, ReadingShade] = {}
-    for row, (name, unit) in enumerate(zip(layout.kind_names, layout.kind_units, strict=True)):
-        quantity, at, degrees = name.partition("@")
-        words = quantity.capitalize() + (f" {degrees}\N{DEGREE SIGN}" if at else "")
-        key, tip = f"reading_{row}", f"{words} of the skin, as elements read it."
-        found[key] = ReadingShade(
-            key, words, words, tip, least=_LEAST_READ[unit], unit=unit, row=row
-        )
-    return found
+SHADES = shades_of(skin_colours())  # of a curvature sensor
 
 
 _CLEARLY = 1.5  # times as far out as in, or in as out, before the colours change sides
@@ -173,14 +150,11 @@ class Ranges:
         alike, group = [name], self._shades[name].group
         if settings.one_range and group:
             shown = {*settings.maps, settings.colour_by}
-            alike += [other for other in shown if SHADES[other].group == group]
-        return max(locked_at(one, settings) or self._steady[one].limit for one in alike)
-
-
-def locked_at(name: str, settings: Settings) -> float:
-    """What the range of the quantity `name` is locked to on the screen's scale, zero when not."""
-    locked = getattr(settings, f"range_{name}", 0.0)
-    return locked * SHADES[name].scale if locked else 0.0
+            alike += [other for other in shown if self._shades[other].group == group]
+        return max(
+            locked_at(one, settings) * self._shades[one].scale or self._steady[one].limit
+            for one in alike
+        )
 
 
 _AGAIN = 0.5  # s after which error bars that depend on the readings are updated
@@ -200,8 +174,8 @@ class Colouring:
     def __init__(self, tasks: Tasks) -> None:
         self._status = Status()
         self._sensor: Sensor | None = None
-        self.shades: dict[str, Shade] = dict(SHADES)
-        """What may be shown of the sensor, by name: also what its elements read."""
+        self.shades = SHADES
+        """What may be shown of the sensor, by name."""
         self._key: tuple[object, ...] = ()
         self._quantities: Quantities | None = None
         self._task = BackgroundTask(tasks, "", self._take)
@@ -212,8 +186,26 @@ class Colouring:
         """Take the sensor and setup of the next estimates."""
         if status.sensor is not None and status.sensor is not self._sensor:
             self._sensor = status.sensor
-            self.shades = SHADES | reading_shades(status.sensor.layout)
+            self.shades = shades_of(colours_of(status.sensor.layout))
         self._status = status
+
+    @property
+    def maps(self) -> tuple[str, ...]:
+        """What heatmaps may show: all but curvature that is not read."""
+        return tuple(n for n, shade in self.shades.items() if shade.row >= 0 or n not in COMPONENTS)
+
+    def possible(self, settings: Settings) -> Settings:
+        """The settings with what may be shown of the sensor.
+
+        A heatmap of what it does not read stands for those of all it reads, unless one of these is
+        selected.
+        """
+        read = tuple(n for n, shade in self.shades.items() if shade.row >= 0 and shade.on_surface)
+        maps = tuple(name for name in settings.maps if name in self.maps)
+        if len(maps) < len(settings.maps) and not {*maps} & {*read}:
+            maps = read + maps
+        by = settings.colour_by if settings.colour_by in self.shades else Settings.colour_by
+        return replace(settings, maps=maps, colour_by=by)
 
     def quantities(self, estimate: Estimate) -> Quantities | None:
         """The quantities of `estimate`; None while it is of another sensor."""
@@ -233,24 +225,19 @@ class Colouring:
         found = self._asked(name, estimate)
         if found is None:
             return np.full(estimate.surface.shape, np.nan)
-        return SHADES[name].scale * found.on_surface(name, estimate)
+        return self.shades[name].scale * found.on_surface(name, estimate)
 
     def of_elements(self, name: str, estimate: Estimate) -> Array:
         """The values (P,) of a quantity."""
         found = self._asked(name, estimate)
         if found is None:
             return np.full(len(estimate.suspect), np.nan)
-        shade = self.shades[name]
-        if isinstance(shade, ReadingShade):
-            return shade.scale * found.layout.by_kind(estimate.curvature)[shade.row]
-        return shade.scale * found.of_elements(name, estimate)
+        return self.shades[name].scale * found.of_elements(name, estimate)
 
     def at_rest(self, name: str, estimate: Estimate) -> float:
         """The value of a quantity of a skin at rest."""
         found = self.quantities(estimate)
-        if found is None or name not in SHADES:
-            return 0.0
-        return SHADES[name].scale * found.at_rest(name)
+        return 0.0 if found is None else self.shades[name].scale * found.at_rest(name)
 
     def _asked(self, name: str, estimate: Estimate) -> Quantities | None:
         found = self.quantities(estimate)

@@ -97,9 +97,9 @@ class Display(QObject):
         self.settings = settings
 
     def limits_shown(self) -> dict[str, float]:
-        """The colour limits of the visible views, in SI units, by setting."""
+        """The colour limits of the visible views, in SI units, by quantity."""
         found = {name: limit for source in self.limits for name, limit in source().items()}
-        return {f"range_{name}": limit for name, limit in found.items() if name != "health"}
+        return {name: limit for name, limit in found.items() if name != "health"}
 
     def show_numbers_soon(self) -> None:
         """Update the numbers with the next status."""

@@ -26,11 +26,10 @@ from PySide6.QtWidgets import (
 
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import plain
-from kappaskin_app.shell.form import Form
+from kappaskin_app.shell.form import ChoiceBox, Form
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.parts import Parts
 from kappaskin_app.shell.settings import form_field
-from kappaskin_app.shell.settings.form_fields import Choice
 from kappaskin_app.widgets.layout import scroll_to
 from kappaskin_app.widgets.parts import Label, plain_tip
 
@@ -143,8 +142,8 @@ def _setting(window: Parts, form: Form, editor: QWidget) -> Iterator[FinderEntry
         why_not = form.message.text() or _NOT_NOW
     title = how.label if how.label == form.title() else f"{form.title()}: {how.label}"
     yield FinderEntry(f"setting:{name}", title, place, partial(reveal, editor), "", why_not)
-    if isinstance(how, Choice):
-        for value, words in how.options:
+    if isinstance(editor, ChoiceBox):
+        for value, words in editor.options:
             refused = why_not or _refused(editor, value)
             select = partial(window.requests.set, name, value)
             yield FinderEntry(

@@ -51,6 +51,7 @@ def for_the_window(event: QEvent) -> bool:
     )
 
 
+Pairs = tuple[tuple[str, str], ...]  # values with their labels
 _NONE = "None"
 _TICKS = (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space)
 
@@ -63,12 +64,17 @@ class SeveralButton(QToolButton):
 
     chosen = Signal(tuple)
 
-    def __init__(self, options: tuple[tuple[str, str], ...]) -> None:
+    def __init__(self, options: Pairs) -> None:
         super().__init__()
-        self._options = options
         self.setMenu(_OpenMenu(self))
         self.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.set_options(options)
+
+    def set_options(self, options: Pairs) -> None:
+        """Have these options, none of them selected."""
+        self.options = options
+        self.menu().clear()
         self.ticks = {value: self._tick(words) for value, words in options}
         self.show_chosen(())
 
@@ -103,7 +109,7 @@ class SeveralButton(QToolButton):
 
     def _write(self) -> None:
         values = self._values()
-        first = dict(self._options)[values[0]] if values else _NONE
+        first = dict(self.options)[values[0]] if values else _NONE
         more = f" and {len(values) - 1} more" if len(values) > 1 else ""
         self.setText(first + more)
 
@@ -165,7 +171,23 @@ class RealBox(QDoubleSpinBox):
 
 
 class ChoiceBox(QComboBox):
-    """Elides a text that does not fit."""
+    """Has `options`, and elides a text that does not fit."""
+
+    options: Pairs = ()
+
+    def set_options(self, options: Pairs) -> None:
+        """Have these options, the first of them selected."""
+        self.options = options
+        self.clear()
+        for value, words in options:
+            self.addItem(words, value)
+        if max(len(words) for _, words in options) > _LONG:
+            # Else one long option would take its width from the skin.
+            self.view().setMinimumWidth(self.sizeHint().width())
+            policy = QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+            self.setSizeAdjustPolicy(policy)
+            self.setMinimumContentsLength(_SEEN)
+            self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
     def words_shown(self) -> str:
         option = QStyleOptionComboBox()
@@ -271,14 +293,7 @@ def _tip_of(how: Range, most: float) -> str:
 
 def _choice(how: Choice, changed: Callable[[Any], None]) -> _Editor:
     box = ChoiceBox()
-    for value, words in how.options:
-        box.addItem(words, value)
-    if max(len(words) for _, words in how.options) > _LONG:
-        # Else one long option would take its width from the skin.
-        box.view().setMinimumWidth(box.sizeHint().width())
-        box.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
-        box.setMinimumContentsLength(_SEEN)
-        box.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+    box.set_options(how.options)
     box.activated.connect(lambda index: changed(box.itemData(index)))
     return _Editor(box, lambda value: box.setCurrentIndex(box.findData(value)))
 
@@ -382,6 +397,15 @@ class Form(Panel):
         if isinstance(box, QComboBox) and isinstance(model, QStandardItemModel):
             for index in range(box.count()):
                 model.item(index).setEnabled(box.itemData(index) in values)
+
+    def show_options(self, name: str, options: Pairs, value: Any) -> None:
+        """Have these options of the choice called `name`, and show one, or several."""
+        editor = self._editors[name]
+        box = editor.widget
+        with QSignalBlocker(box):
+            if isinstance(box, ChoiceBox | SeveralButton) and options != box.options:
+                box.set_options(options)
+            editor.show(value)
 
     def show_limit(self, name: str, most: float) -> None:
         """Limit the number called `name` to `most`, in SI units."""

@@ -28,7 +28,8 @@ MENUS = (FILE, EDIT, SOURCE, RECORDING, SKIN, VIEW, LAYOUT, FIGURES, EXPORT, HEL
 class Parts(QMainWindow):
     """A window with settings and their history, a session, a display, docks and actions.
 
-    `settings_shown` brings the settings that views follow. `begun` reports, once all is
+    `settings_shown` brings the settings that views follow, with the quantities that may be shown of
+    the sensor, also of another one. `begun` reports, once all is
     installed, the recording resumed from another window (or None) and the source;
     `guide_requested` the page of the guide to show. `closing` ends tasks before the session
     ends, `closed` ends views after it.

@@ -78,7 +78,8 @@ def _value(name: str, value: Any) -> Any:
         return tuple(value)
     if isinstance(was, float) and type(value) is int:
         return float(value)
-    if type(value) is not type(was):
+    limits = value.values() if isinstance(value, dict) else ()
+    if type(value) is not type(was) or not all(isinstance(limit, float) for limit in limits):
         raise Refusal(f"{name}: expected {type(was).__name__}, got {value!r:.40}; leave it out")
     return value
 

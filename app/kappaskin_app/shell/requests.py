@@ -6,7 +6,7 @@ from typing import Any
 
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
-from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings import Settings, locking
 from kappaskin_app.shell.settings.publishing import PublishSettings
 from kappaskin_app.shell.simulation import with_consequences
 
@@ -24,6 +24,10 @@ class Requests:
 
     def toggle(self, name: str) -> None:
         self.set(name, not getattr(self._history.settings, name))
+
+    def lock(self, name: str, limit: float) -> None:
+        """Lock the colour range of the quantity `name` at a limit in SI units; zero unlocks it."""
+        self._history.request(f"range_{name}", **locking({name: limit}, self._history.settings))
 
     def switch_theme(self) -> None:
         self.set("theme", "light" if self._history.settings.theme == "dark" else "dark")

@@ -6,6 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from kappaskin.bases import edges_of
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Region
@@ -188,22 +190,38 @@ planned_scene = Cache(planned, _CACHED)
 
 
 def scene_of_sensor(sensor: Sensor, noise: float) -> Scene:
-    """A scene on a real `sensor` with a point load in its middle and its `noise` in 1/m."""
+    """A scene on a real `sensor` with a point load in its middle and the `noise` of a reading.
+
+    That is in the unit of its readings, or where they have several in units of what they state.
+    """
     plate, edge, chain = sensor.plate, sensor.edge, sensor.transduction
+    layout, several = _in_order(sensor.layout), sensor.sigma is not None
     if isinstance(chain, DigitalReadings):
-        digital = replace(chain, noise=())
-        chain = Transduction() if sensor.layout.senses_curvature_only else digital
+        stated = tuple((name, noise * each) for name, each in chain.noise) if several else ()
+        digital = replace(chain, noise=stated)
+        chain = Transduction() if layout.senses_curvature_only else digital
     return Scene(
         sensor.name,
         plate,
-        sensor.layout,
+        layout,
         load_case_stimuli("centre", plate, edge),
-        effects=(GaussianNoise(noise),),
+        effects=() if several else (GaussianNoise(noise),),
         transduction=chain,
         rate=min(sensor.rate, _rate_of(chain, sensor.channels)),
         reference=reference_on(plate, edge, "centre"),
         edge=edge,
     )
+
+
+def _in_order(layout: SensorLayout) -> SensorLayout:
+    """The layout with its readings as a scene has them, element by element of one kind each."""
+    reads, which = layout.reads, layout.by_kind(np.arange(layout.channels, dtype=float)).ravel()
+    if reads is None or len(which) != layout.channels or not np.isfinite(which).all():
+        return layout
+    order = which.astype(int)
+    element, quantity = reads.element[order], reads.quantity[order]
+    ordered = layout.reading(element, quantity, reads.direction[order], reads.free)
+    return replace(ordered, live=layout.live[order])
 
 
 def _rate_of(chain: Transduction | DigitalReadings, channels: int) -> float:

@@ -84,6 +84,9 @@ class MainWindow(Parts):
     def _finish(self, source: str, handed: ResumeInfo | None, already: bool) -> None:
         # After features, who may use a file then.
         self.session.reported.connect(guarded(self.opening.follow))
+        self.display.restarted.connect(
+            guarded(lambda _: self._show_settings(self.history.settings))
+        )
         self.panels.build()
         self.menus.finish()
         self.layouts.begin()
@@ -99,8 +102,9 @@ class MainWindow(Parts):
     def _show_settings(self, settings: Settings, anew: bool = False) -> None:
         before = None if anew else self.display.settings
         self.panels.show_settings(settings)
-        self.display.show_settings(settings)
-        self.settings_shown.emit(settings)
+        shown = self.display.colouring.possible(settings)
+        self.display.show_settings(shown)
+        self.settings_shown.emit(shown)
         look = settings.theme, settings.letters
         if before is None or look != (before.theme, before.letters):
             apply_look(THEMES[settings.theme], settings.letters)

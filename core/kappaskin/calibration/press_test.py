@@ -162,6 +162,7 @@ class PressTest:
         Those few have two elements in each column and in each row. They reveal any exchange of
         rows, of columns and of components, but not of two elements that are both left out.
         """
+        layout.check_curvature_sensor("a test of the channel map")
         live = cast("Mask", layout.live[:2].any(axis=0))
         chosen = np.flatnonzero(live)
         if quick and layout.shape and min(layout.shape) > 2:

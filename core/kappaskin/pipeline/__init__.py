@@ -19,6 +19,7 @@ from kappaskin.pipeline.reported import Reported as Reported
 from kappaskin.pipeline.reported import ReportedQuantity as ReportedQuantity
 from kappaskin.pipeline.reported import SkinColour as SkinColour
 from kappaskin.pipeline.reported import axes_of as axes_of
+from kappaskin.pipeline.reported import colours_of as colours_of
 from kappaskin.pipeline.reported import curvature_invariant as curvature_invariant
 from kappaskin.pipeline.reported import getters as getters
 from kappaskin.pipeline.reported import numbers_of as numbers_of

@@ -1,17 +1,18 @@
 """Quantities: an estimate to values at the points of its surface, or at the elements."""
 
+import math
 from functools import cached_property
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin.bases import Basis, CurvatureMap
+from kappaskin.bases import Basis, CurvatureMap, ValueMap
 from kappaskin.contact import CurvatureFormMap
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Estimator, Uncertainty
-from kappaskin.frames import Array, Estimate
-from kappaskin.pipeline.reported import Reported, curvature_invariant, skin_colours
+from kappaskin.frames import COMPONENTS, Array, Estimate
+from kappaskin.pipeline.reported import Reported, colours_of, curvature_invariant
 from kappaskin.sensing import SensorLayout
 
 _AT_ONCE = 2**21  # values of functions that are worked out at once
@@ -50,7 +51,7 @@ class ErrorBars:
 
 
 class Quantities:
-    """Values of `skin_colours` for estimates with one `basis` and one size of surface.
+    """Values of `colours_of` the `layout` for estimates with one `basis` and one size of surface.
 
     What a quantity needs is computed when it is first asked for. `error_bar` is NaN until
     `error_bars` is set.
@@ -58,6 +59,7 @@ class Quantities:
 
     def __init__(self, layout: SensorLayout, basis: Basis, nx: int, ny: int) -> None:
         self.layout, self.basis = layout, basis
+        self._colours = colours_of(layout)
         self.grid = layout.patch.grid(nx, ny)
         self.error_bars: ErrorBars | None = None
         self._changes: dict[str, CurvatureMap] = {}
@@ -87,28 +89,24 @@ class Quantities:
 
     def at_rest(self, name: str) -> float:
         """The value of a skin at rest, in SI units."""
-        of = skin_colours()[name].at_rest
+        of = self._colours[name].at_rest
         return 0.0 if of is None else of(self.layout.patch.base_curvature)
 
     def on_surface(self, name: str, estimate: Estimate) -> Array:
         """The values (ny, nx) in SI units; NaN off the skin and where they are not known."""
-        of = skin_colours()[name].on_surface
+        of = self._colours[name].on_surface
         if of is None:
             raise Refusal(f"expected a quantity that a surface has, got {name!r}; use of_elements")
         return of(Reported(estimate, skin=self))
 
     def of_elements(self, name: str, estimate: Estimate) -> Array:
-        """The values (P,) in SI units: of curvature as each element reads it; NaN where missing.
+        """The values (P,) in SI units: as each element reads it, else as the fit has it there.
 
-        Where the elements read other than xx, yy and xy, as the fit has it there.
+        NaN where missing, and of readings that the layout does not have.
         """
-        colour = skin_colours()[name]
-        of, on_surface = colour.of_elements, colour.on_surface is not None
-        if self.layout.reads and (colour.row >= 0 or on_surface):
-            of = None  # what elements read as xx, yy and xy
-            if not on_surface:
-                return np.full(len(self.layout), np.nan)
-        if of is not None:
+        if name not in self._colours:
+            return np.full(len(self.layout), np.nan)
+        if (of := self._colours[name].of_elements) is not None:
             return of(Reported(estimate, skin=self))
         corners, weights = self._interpolation
         values = self.on_surface(name, estimate).ravel()[corners]
@@ -137,6 +135,23 @@ class Quantities:
         if component not in self._changes:
             self._changes[component] = CurvatureMap(self.basis, component, *self.grid)
         return self._changes[component](estimate.coefficients)
+
+    @cached_property
+    def _slopes(self) -> list[ValueMap]:
+        """The derivatives along x and y; on a bent skin the integral along the arc too."""
+        orders = [(1, 0), (0, 1)] + [(-1, 0)] * bool(self.layout.patch.base_curvature)
+        return [self.basis.on_grid(*self.grid, *order) for order in orders]
+
+    def reading(self, quantity: str, direction: float, estimate: Estimate) -> Array:
+        """What a small element at each point (ny, nx) would read of the fit, in SI units."""
+        c, s = math.cos(direction), math.sin(direction)
+        if quantity == "height":
+            return estimate.surface
+        if quantity == "slope":
+            p, q, *along = (of(estimate.coefficients) for of in self._slopes)
+            return c * sum((self.layout.patch.base_curvature**2 * v for v in along), p) + s * q
+        xx, yy, xy = (self.change(name, estimate) for name in COMPONENTS)
+        return xy if quantity == "twist" else c * c * xx + s * s * yy + 2 * c * s * xy
 
     def form_at_elements(self, curvature: Array) -> Array:
         """The curvature form (3, P) in 1/m as the elements read it, where slopes are small."""

@@ -57,6 +57,8 @@ _SUFFIX = {
     "1/m": "_per_m",
     "1/m^2": "_per_m2",
 }
+# The least range of colours of readings in a unit over that in 1/m, on the screen's scales.
+_LEAST = {"m": 20.0, "m/m": 2.0, "1/m": 1.0}
 _SD, _INTERVAL = "standard deviation", "Student's t, half width of the 95 % interval"
 
 
@@ -368,6 +370,30 @@ class ReportedQuantity:
                 row=row if self.parts[0] == COMPONENTS else -1,
             )
 
+    def read_by(self, layout: SensorLayout) -> Iterator[SkinColour]:
+        """Its colours of each quantity and direction that a `layout` reads."""
+        first, get, is_read = self.colours[0], _got(self.value), self.name == "curvature"
+        kinds = zip(layout.kinds, layout.kind_names, layout.kind_units, strict=True)
+        for row, (kind, name, unit) in enumerate(kinds):
+            quantity, at, degrees = name.partition("@")
+            angle = degrees.replace("-", "\N{MINUS SIGN}") + "\N{DEGREE SIGN}" * bool(at)
+            words = f"{quantity} {angle}".rstrip()
+            label = words.capitalize() if is_read else f"{self.name.capitalize()} {words}"
+            symbol = first.symbol.replace(COMPONENTS[0], angle if is_read else words)
+            yield replace(
+                first,
+                name=name if is_read else f"{self.name}_{name}",
+                label=label,
+                symbol=label if is_read and quantity != "curvature" else symbol,
+                tip=f"{label} of the skin, as elements read it." if is_read else first.tip,
+                on_surface=partial(_of_fit, *kind) if is_read else None,
+                of_elements=partial(_of_kind, get, row),
+                least=_LEAST[unit] * first.least,
+                group=first.group if unit == self.unit else f"{first.group} in {unit}",
+                unit=unit,
+                row=row,
+            )
+
 
 def _listed(get: Getter) -> Getter:
     return lambda reported: np.asarray(get(reported)).ravel().tolist()
@@ -375,6 +401,14 @@ def _listed(get: Getter) -> Getter:
 
 def _row(get: Getter, row: int, reported: Reported) -> Array:
     return np.atleast_2d(get(reported))[row].astype(float, copy=False)
+
+
+def _of_kind(get: Getter, row: int, reported: Reported) -> Array:
+    return _skin(reported).layout.by_kind(get(reported))[row]
+
+
+def _of_fit(quantity: str, direction: float, reported: Reported) -> Array:
+    return _skin(reported).reading(quantity, direction, reported.estimate)
 
 
 def numbers_of(quantities: Iterable[ReportedQuantity]) -> Callable[[Reported], list[float]]:
@@ -576,9 +610,9 @@ _FIT = (
         element_head="reading",
         traced="Curvature",
         colours=_changes(
-            ("Curvature xx", "Curvature along x, as elements read it: w_xx (Eq. 3)."),
-            ("Curvature yy", "Curvature along y, as elements read it: w_yy (Eq. 4)."),
-            ("Twist xy", "Twist, as elements read it: w_xy (Eq. 5)."),
+            ("Curvature xx", "Curvature along x, beyond that at rest: w_xx (Eq. 3)."),
+            ("Curvature yy", "Curvature along y, beyond that at rest: w_yy (Eq. 4)."),
+            ("Twist xy", "Twist, beyond that at rest: w_xy (Eq. 5)."),
         ),
     ),
     _invariant(
@@ -637,8 +671,8 @@ _FIT = (
                 f"residual_{name}",
                 f"Residual {name}",
                 f"r<sub>{name}</sub>",
-                f"Residual of each reading of {name}: reading minus fitted value. Noise alone "
-                "has no pattern; a lasting pattern indicates too few functions or a wrong edge.",
+                "Residual of each reading: reading minus fitted value. Noise alone has no "
+                "pattern; a lasting pattern indicates too few functions or a wrong edge.",
                 least=0.1,
                 group="residual",
             )
@@ -699,7 +733,7 @@ _FIT = (
                 "health",
                 "Health",
                 "Health",
-                "Fault of each element (F3): the reason why any of its three channels is excluded.",
+                "Fault of each element (F3): the reason why any of its readings is excluded.",
                 signed=False,
             ),
         ),
@@ -1123,6 +1157,25 @@ def stored() -> dict[str, ReportedQuantity]:
 def skin_colours() -> dict[str, SkinColour]:
     """All that the skin may be coloured by, by name."""
     return {colour.name: colour for quantity in REPORTED for colour in quantity.shaded()}
+
+
+def colours_of(layout: SensorLayout) -> dict[str, SkinColour]:
+    """All that the skin of a sensor may be coloured by, by name.
+
+    Where it reads other than xx, yy and xy, these are of the fit, beside what is read.
+    """
+    if not layout.reads:
+        return skin_colours()
+    found: list[SkinColour] = []
+    for quantity in REPORTED:
+        if quantity.colours and quantity.of_readings:
+            found += quantity.read_by(layout)
+        found += [
+            replace(colour, of_elements=None if colour.on_surface else colour.of_elements, row=-1)
+            for colour in quantity.shaded()
+            if colour.on_surface or colour.row < 0
+        ]
+    return {colour.name: colour for colour in found}
 
 
 class Readout(NamedTuple):

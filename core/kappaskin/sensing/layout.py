@@ -537,7 +537,7 @@ class SensorLayout:
         if self.reads:
             names = ", ".join(dict.fromkeys(name for name, _ in self.kinds))
             raise Refusal(
-                f"expected a curvature sensor for {purpose}, xx, yy and xy of every element, got "
+                f"expected a curvature sensor for {purpose}: xx, yy and xy of every element; got "
                 f"readings of {names}"
             )
 

@@ -16,6 +16,7 @@ _OF = {
     float: st.floats(allow_nan=False),
     str: st.text(),
     tuple: st.lists(st.integers(0, 999)).map(tuple),
+    dict: st.dictionaries(st.text(), st.floats(allow_nan=False)),
     type(None): st.none() | st.builds(Written, st.text(), st.just(Path("/there/own.toml"))),
 }
 _ANY = {
@@ -47,6 +48,7 @@ def test_what_a_text_does_not_say_is_as_at_the_beginning() -> None:
         ('{"version": 1, "settings": {"written": 5}}', "written: expected text and file"),
         ('{"version": 1, "settings": {"written": {"text": ""}}}', "expected text and file"),
         ('{"version": 1, "settings": {"show_truth": 1}}', "show_truth: expected bool"),
+        ('{"version": 1, "settings": {"ranges": {"height": "low"}}}', "ranges: expected dict"),
     ],
 )
 def test_a_text_that_says_no_settings_is_refused(text: str, why: str) -> None:

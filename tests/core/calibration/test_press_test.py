@@ -291,6 +291,8 @@ def test_what_cannot_be_pressed_is_refused():
         PressTest(SENSOR, ())
     with pytest.raises(Refusal, match="1 to 400 elements"):
         PressTest.choose_elements(SensorLayout.regular(SCENE.plate.patch, 30, 30), quick=False)
+    with pytest.raises(Refusal, match="a test of the channel map: xx, yy and xy"):
+        PressTest.choose_elements(SCENE.layout.reading_each(["slope@0", "slope@90"]), quick=True)
     with pytest.raises(Refusal, match=r"readings \(300,\)"):
         PressTest(SENSOR, (1,)).take(0.0, np.zeros(3))
 

@@ -5,18 +5,28 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from kappaskin import Frame, Pipeline, Refusal, Setup, Simulator
+from kappaskin import (
+    Frame,
+    Patch,
+    Pipeline,
+    Refusal,
+    SensorLayout,
+    Setup,
+    Simulator,
+    basis_for,
+)
 from kappaskin.calibration import TareMeasurement
 from kappaskin.calibration.tare import Rest
 from kappaskin.contact import LoadDetector
 from kappaskin.estimation import FAULTS
 from kappaskin.health import HealthMonitor
 from kappaskin.live.ring import Ring, slot_type
-from kappaskin.pipeline import Quantities
+from kappaskin.pipeline import Quantities, colours_of
 from kappaskin.publish.message import EstimateMessage, MessageHeader
 from kappaskin.scenes import read_scene
 from navier import HingedPlate, Load
@@ -267,6 +277,39 @@ def test_colours_of_curvature_are_those_of_the_fit_where_none_is_read():
     np.testing.assert_allclose(found, xx, atol=0.02 * np.abs(xx).max())
     assert np.isnan(quantities.of_elements("residual_xx", estimate)).all()
     assert (quantities.of_elements("health", estimate) == 0).all()
+
+
+@pytest.mark.parametrize("patch", [Patch(A, 0.05), Patch(0.04, 0.03, 12.9e-3)])
+def test_colours_of_what_is_read_are_those_of_small_elements_all_over_the_skin(patch):
+    m, n = 9, 8
+    names = ["height", "slope@30", "slope@-90", "curvature@120", "twist"]
+    basis = basis_for(patch, "hinged", 4, 3)
+    c = np.random.default_rng(3).normal(scale=1e-4, size=basis.shape)
+    x, y = patch.grid(m, n)
+    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    layout = SensorLayout.scattered(patch, points).reading_each(names)
+    expected = (layout.operator(basis) @ c.ravel()).reshape(len(names), n, m)
+    quantities = Quantities(layout, basis, m, n)
+    none = dict.fromkeys(("contact", "second", "geometry"))
+    estimate = SimpleNamespace(coefficients=c, surface=basis.on_grid(x, y)(c), **none)
+    for name, values in zip(names, expected, strict=True):
+        found = quantities.on_surface(name, estimate)
+        np.testing.assert_allclose(found, values, atol=1e-9 * np.abs(values).max())
+
+
+def test_a_skin_may_be_coloured_by_what_it_reads_and_its_residuals_in_their_units():
+    colours = colours_of(scene_of("a mix").layout)
+    units = {name: colour.unit for name, colour in colours.items() if colour.row >= 0}
+    both = {"height": "m", "slope@30": "m/m"}
+    assert units == both | {f"residual_{name}": unit for name, unit in both.items()}
+    assert colours["residual_slope@30"].label == "Residual slope 30\N{DEGREE SIGN}"
+    scene = scene_of("a mix", PRESSED)
+    pipeline = Pipeline(scene.sensor(), SETUP)
+    estimate = pipeline(frame_of(scene))
+    quantities = Quantities(scene.layout, pipeline.basis, 13, 13)
+    for name, channels in (("height", slice(100)), ("slope@30", slice(100, 200))):
+        for key, values in ((name, estimate.curvature), (f"residual_{name}", estimate.residual)):
+            assert np.array_equal(quantities.of_elements(key, estimate), values[channels])
 
 
 def test_a_message_has_no_noise_in_1_m_of_heights():

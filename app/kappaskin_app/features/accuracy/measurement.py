@@ -13,6 +13,7 @@ from kappaskin.frames import Estimate
 from kappaskin.live import Status
 from kappaskin.scenes import Scene
 from kappaskin.scenes.effects import GaussianNoise, UniformNoise
+from kappaskin.sensing import SHOWN_UNITS, SensorLayout
 from kappaskin.studies import (
     Cost,
     EffectCosts,
@@ -272,7 +273,8 @@ class CostMeasurement(QObject):
             self.scene, self.about = session.scene, ""
         elif np.isfinite(noise):
             self.scene = scene_of_sensor(status.sensor, noise)
-            self.about = f"With a point load in the middle and the present noise, {noise:.2g} 1/m."
+            text = _noise_text(noise, status.sensor.layout)
+            self.about = f"With a point load in the middle and the present noise, {text}."
         if self.scene is not None:
             self._of = session.inside, status.connections, noise
             self._tried = self._to_try(self.scene)
@@ -291,7 +293,7 @@ class CostMeasurement(QObject):
         return tuple(replace(t, elements=own) if t.elements == first else t for t in tried)
 
     def _noise(self) -> float:
-        """The present noise of a reading, in 1/m."""
+        """The present noise of a reading, in its unit."""
         estimate = self._session.estimate
         return float("nan") if estimate is None else max(estimate.noise, 1e-9)
 
@@ -304,6 +306,13 @@ class CostMeasurement(QObject):
     def _refuse(self, error: Exception) -> None:
         self.refusal = str(error)
         self.changed.emit()
+
+
+def _noise_text(noise: float, layout: SensorLayout) -> str:
+    """The noise of a reading; of several units, over that stated."""
+    units = set(layout.kind_units)
+    times, unit = SHOWN_UNITS[units.pop()] if len(units) == 1 else (1.0, "times that stated")
+    return f"{times * noise:.2g}\N{NO-BREAK SPACE}{unit}"
 
 
 def _measurable(setting: Setting) -> bool:

@@ -17,6 +17,7 @@ from kappaskin.calibration import Procedure
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS
 from kappaskin.scenes.cylinders import ADVICE, CylinderStep, schedule
+from kappaskin.sensing import SensorLayout
 from kappaskin_app.features.calibration.controller import (
     CalibrationController,
     Result,
@@ -33,6 +34,7 @@ from kappaskin_app.widgets.parts import (
     in_a_row,
     number,
     seconds_box,
+    sentence,
     text_label,
 )
 
@@ -82,12 +84,15 @@ class StartPage(QWidget):
         around.addWidget(self.begin)
         self.radii.returnPressed.connect(self.begin.click)
 
-    def show_plan(self, strip: bool) -> None:
-        """Show the number of steps and their duration."""
+    def show_plan(self, layout: SensorLayout | None) -> None:
+        """Show the number of steps and their duration, or why there are none."""
+        strip = layout is not None and layout.patch.strip
         try:
+            if layout is not None:
+                layout.check_curvature_sensor("a calibration with cylinders")
             steps = schedule(parsed_radii(self.radii.text()), self.hold.value(), strip)
         except Refusal as refusal:
-            text = str(refusal)
+            text = sentence(str(refusal))
         else:
             total = sum(max(self.seconds.value(), step.hold) for step in steps)
             bent = "along x" if strip else "along x, along y and along the diagonal"
@@ -96,7 +101,7 @@ class StartPage(QWidget):
                 f"flat between. {_duration(total)} of readings."
             )
         if text != self.plan.text():
-            self.plan.setText(text[:1].upper() + text[1:])
+            self.plan.setText(text)
 
 
 def _duration(seconds: float) -> str:

@@ -158,7 +158,7 @@ class CalibratePanel(Panel):
 
     def _plan(self, *_: object) -> None:
         sensor = self._status.sensor
-        self.start.show_plan(sensor is not None and sensor.layout.patch.strip)
+        self.start.show_plan(None if sensor is None else sensor.layout)
 
     def _begin(self) -> None:
         if self._controller is None:

@@ -16,7 +16,7 @@ from kappaskin.frames import Estimate
 from kappaskin.live import Status
 from kappaskin.mechanics import Plate
 from kappaskin.pipeline import Setup
-from kappaskin.sensing import Sensor, SensorLayout
+from kappaskin.sensing import Sensor
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.widgets.parts import with_error
 
@@ -34,7 +34,7 @@ def curvature_text(estimate: Estimate) -> str:
     if not estimate.contact.present:
         return ""
     found = zip(estimate.geometry.principal, estimate.geometry.principal_sd, strict=True)
-    one, other = (with_error(value, sd, 1, sign="+") for value, sd in found)
+    one, other = (with_error(value, sd, 1 + (sd < 0.05), sign="+") for value, sd in found)
     return f"principal curvatures {one} and {other} 1/m"
 
 
@@ -64,7 +64,7 @@ class ObjectRecognition(QObject):
             self.described.emit("", "", "")
         elif self._key != (key := (status.connections, *_skin(sensor, status.setup))):
             self._key = key
-            self._preparation.run(_finder, sensor.layout, *key[1:])
+            self._preparation.run(_finder, sensor, *key[1:])
         elif self._preparation.running:
             self.described.emit(_PREPARING, "", "")
         elif estimate.generation == status.generation and not self._recognition.running:
@@ -90,10 +90,10 @@ def _skin(sensor: Sensor, setup: Setup) -> tuple[Plate, str, str, tuple[int, int
 
 
 def _finder(
-    layout: SensorLayout, plate: Plate, edge: str, method: str, functions: tuple[int, int]
+    sensor: Sensor, plate: Plate, edge: str, method: str, functions: tuple[int, int]
 ) -> ObjectFinder | ImprintObjects:
-    basis = basis_for(plate.patch, edge, *functions)
-    return object_finder(plate, layout, edge, estimator_for(method, basis, layout))
+    basis, layout = basis_for(plate.patch, edge, *functions), sensor.layout
+    return object_finder(plate, layout, edge, estimator_for(method, basis, layout, sensor.sigma))
 
 
 def _recognise(

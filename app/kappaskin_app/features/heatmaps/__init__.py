@@ -8,9 +8,8 @@ from kappaskin.frames import Estimate
 from kappaskin.live import Status
 from kappaskin_app.features.heatmaps.heatmap import Heatmap, HeatmapGrid
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.colouring import READ, SHADES, locked_at, reading_shades
 from kappaskin_app.shell.display import Display, Shown, of_row
-from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings import Settings, locked_at
 from kappaskin_app.shell.settings.shown import COLOURS
 from kappaskin_app.shell.window import MainWindow
 
@@ -24,7 +23,6 @@ class HeatmapsFeature:
 
     def install(self, shell: MainWindow) -> None:
         self._display: Display = shell.display
-        self._settings = Settings()
         self._next = 0.0
         self._names: tuple[str, ...] = ()
         self.maps = HeatmapGrid()
@@ -41,13 +39,13 @@ class HeatmapsFeature:
         display.numbers.connect(guarded(self._show_readings))
         display.shown.connect(guarded(self._show))
         shell.settings_shown.connect(guarded(self._show_settings))
-        self._selection = selection
-        for name, heatmap in self.heatmaps.items():
+        self._selection, self._requests = selection, shell.requests
+        for heatmap in self.heatmaps.values():
             self._connect(heatmap)
-            heatmap.lock_wanted.connect(guarded(partial(shell.requests.set, f"range_{name}")))
 
     def _connect(self, heatmap: Heatmap) -> None:
         selection, display = self._selection, self._display
+        heatmap.lock_wanted.connect(guarded(partial(self._requests.lock, heatmap.name)))
         heatmap.pointed.connect(guarded(selection.point))
         heatmap.pointed.connect(guarded(lambda *_: display.show_numbers_soon()))
         heatmap.chosen.connect(selection.chosen)
@@ -55,33 +53,23 @@ class HeatmapsFeature:
         selection.target_changed.connect(guarded(heatmap.show_target))
 
     def _show_settings(self, settings: Settings) -> None:
-        self._settings = settings
-        self._select()
+        self._names = settings.maps
+        self.maps.show_selected(settings.maps)
         for name, heatmap in self.heatmaps.items():
             heatmap.show_lock(locked_at(name, settings) > 0)
-
-    def _select(self) -> None:
-        """Show the selected heatmaps: for xx, yy and xy what the elements read instead."""
-        selected, read = self._settings.maps, self.maps.readings
-        if read:
-            others = tuple(name for name in selected if name not in READ)
-            selected = read + others if len(others) < len(selected) else others
-        self._names = selected
-        self.maps.show_selected(selected)
 
     def _limits(self) -> dict[str, float]:
         """Colour limits of the visible heatmaps, in SI units."""
         visible = [name for name in self._names if self.heatmaps[name].isVisible()]
-        return {name: self.heatmaps[name].limit for name in visible if name in SHADES}
+        return {name: self.heatmaps[name].limit for name in visible}
 
     def _restart(self, status: Status) -> None:
         if status.sensor is None:
             return
-        for heatmap in self.maps.read(reading_shades(status.sensor.layout)):
+        for heatmap in self.maps.add(self._display.colouring.shades):
             self._connect(heatmap)
         for heatmap in self.heatmaps.values():
             heatmap.show_layout(status.sensor.layout)
-        self._select()
 
     def _show_status(self, _: Status) -> None:
         for heatmap in self.heatmaps.values():

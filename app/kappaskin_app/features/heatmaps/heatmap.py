@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 from kappaskin.estimation import FAULTS
 from kappaskin.frames import Array, Indices, Mask
 from kappaskin.sensing import SensorLayout
-from kappaskin_app.shell.colouring import SHADES, ReadingShade, Shade
+from kappaskin_app.shell.colouring import SHADES, Shade
 from kappaskin_app.theme import DARK_INK, WANTED, Colours, current, follow_look
 from kappaskin_app.widgets.colour_bar import ColourBar, LockButton
 from kappaskin_app.widgets.line import Line
@@ -255,9 +255,7 @@ class Heatmap(QWidget):
         self.lock.setEnabled(name != "health")
         self.cells, self.bar = CellGrid(), ColourBar()
         self.cells.setToolTip(_LEGEND)
-        called = shade.label.lower() if shade else name.replace("_", " ")
-        self.cells.setAccessibleName(f"Heatmap of {called}")
-        self.lock.setVisible(shade is None)  # what is read has no range in the settings
+        self.cells.setAccessibleName(f"Heatmap of {self._shade.label.lower()}")
         self.cells.pointed.connect(self.pointed)
         self.cells.chosen.connect(self.chosen)
         self._tint, self._layout, self._element = self._shade.tint(1.0), None, -1
@@ -331,7 +329,7 @@ class Heatmap(QWidget):
         elif self._element >= 0:
             self.value.show_text(self._value_at(self._element, values[self._element], self._layout))
         else:
-            self.value.show_text(self._summary(values), "peak ")
+            self.value.show_text(self._summary(values), "peak ", f" {self._shade.unit_shown}")
 
     def _value_at(self, element: int, value: float, layout: SensorLayout) -> str:
         x, y = layout.positions[element] * 1e3
@@ -359,18 +357,16 @@ class HeatmapGrid(QScrollArea):
 
     def __init__(self) -> None:
         super().__init__()
-        self.heatmaps = {name: Heatmap(name) for name in SHADES}
+        self.heatmaps: dict[str, Heatmap] = {}
         self._none = Label("Select heatmaps under View.", alignment=Qt.AlignmentFlag.AlignCenter)  # pyright: ignore[reportCallIssue]
         self._shown: tuple[str, ...] | None = None
-        self.readings: tuple[str, ...] = ()
-        """The names of those of what the elements read, where that is not xx, yy and xy."""
         self._whole = whole = QWidget()
         self._grid = QGridLayout(whole)
         self._grid.setContentsMargins(0, 0, 0, 0)
         self._grid.setSpacing(0)
-        for widget in (*self.heatmaps.values(), self._none):
-            widget.setParent(whole)
-            widget.hide()
+        self._none.setParent(whole)
+        self._none.hide()
+        self.add(SHADES)
         self.setWidget(whole)
         self.setWidgetResizable(True)
         self.setFrameShape(QScrollArea.Shape.NoFrame)
@@ -378,13 +374,9 @@ class HeatmapGrid(QScrollArea):
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setMinimumWidth(_NARROWEST[0])
 
-    def read(self, shades: Mapping[str, ReadingShade]) -> list[Heatmap]:
-        """Have a heatmap for each of these, besides those of every sensor; returns the new ones."""
-        self.show_selected(())
-        for name in self.readings:
-            self.heatmaps.pop(name).deleteLater()
-        self.readings = tuple(shades)
-        made = [Heatmap(name, shade) for name, shade in shades.items()]
+    def add(self, shades: Mapping[str, Shade]) -> list[Heatmap]:
+        """Have a heatmap of each of these too; returns the new ones."""
+        made = [Heatmap(name, shade) for name, shade in shades.items() if name not in self.heatmaps]
         for heatmap in made:
             heatmap.setParent(self._whole)
             heatmap.hide()

@@ -29,9 +29,9 @@ def changed(settings: Settings) -> Iterator[str]:
         if isinstance(how, Range):
             yield f"{text} {value * how.scale:.6g} {how.unit}".strip()
         elif isinstance(how, Choice):
-            yield f"{text} {dict(how.options)[value].lower()}"
+            yield f"{text} {how.words(value).lower()}"
         elif isinstance(how, Several):
-            yield f"{text} {', '.join(dict(how.options)[one] for one in value)}"
+            yield f"{text} {', '.join(map(how.words, value))}"
         elif isinstance(how, Switch):
             yield f"{text} {'on' if value else 'off'}"
     if settings.written is not None:

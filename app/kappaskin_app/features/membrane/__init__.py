@@ -6,6 +6,7 @@ from kappaskin_app.features.membrane.skin_view import SkinView
 from kappaskin_app.features.membrane.view_actions import ViewActions, ViewPanel
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.pages import LIVE
+from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.window import MainWindow
 
 
@@ -26,6 +27,7 @@ class MembraneFeature:
     def _connect(self, shell: MainWindow) -> None:
         view, selection = self.view, shell.selection
         shell.settings_shown.connect(guarded(view.show_settings))
+        shell.settings_shown.connect(guarded(self._show_colours))
         shell.display.unit_changed.connect(guarded(self.scale.show_unit))
         shell.display.unit_changed.connect(guarded(self._enable_alarm))
         # Queued: the next update follows the drawing, without waiting for the timer.
@@ -41,8 +43,12 @@ class MembraneFeature:
         )
         self.scale.lock_wanted.connect(guarded(self.view_actions.lock))
         self.membrane.pointer.clicked.connect(guarded(self._click))
-        self._selection = selection
+        self._selection, self._colouring = selection, shell.display.colouring
         shell.closed.connect(guarded(self.membrane.close_plotter))
+
+    def _show_colours(self, settings: Settings) -> None:
+        self.panel.show_colours(self._colouring, settings)
+        self.view_actions.show_colours(self._colouring.shades)
 
     def _enable_alarm(self, unit: float) -> None:
         """In full screen the presenter shows the reason why no data arrives."""

@@ -29,6 +29,7 @@ from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, curre
 _LETTERS = 14  # px, of the caption
 _LIFT = 0.006  # of the skin's size above the surface, which would hide half of a line
 _POINT, _POINTS = 5, 80  # px of an element, and of many in a row: or they would hide the skin
+_PIN = 0.3  # of the skin's size, length of the mark of a contact
 _STRIDE = 8  # surface lines between two lines of the true surface's wireframe
 
 
@@ -98,10 +99,13 @@ class MembraneView(QWidget):
         # Visible on every colour.
         self.pointed = Marks(plotter, 17, DARK_INK), Marks(plotter, 12, LIGHT_INK)
         self._loads = DrawnLoads(plotter)
+        # A pin, whose upper end is seen where its head lies deep in a dent.
+        needle = pv.Cylinder(
+            center=(0, 0, _PIN / 2), direction=(0, 0, 1), radius=0.006, height=_PIN
+        )
+        pin = needle.append_polydata(pv.Sphere(radius=0.018))
         self._contacts = [
-            plotter.add_mesh(
-                pv.Sphere(radius=0.018), color="#1fd17a", reset_camera=False, render=False
-            )
+            plotter.add_mesh(pin, color="#1fd17a", ambient=0.6, reset_camera=False, render=False)
             for _ in range(2)
         ]
         self.sides = Sides(plotter)
@@ -136,7 +140,6 @@ class MembraneView(QWidget):
         self._wire = self._wireframe(skin)
         self._show_wire()
         self._positions = sensor.layout.positions
-        self._marked = (b"", -1)
         self.show_marked(np.empty(0, np.intp), -1)
         self.point(-1)
         self._place_elements(sensor.layout.positions[sensor.layout.alive])

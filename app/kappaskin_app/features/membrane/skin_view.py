@@ -12,12 +12,12 @@ from kappaskin_app.features.membrane.measuring import Measurement
 from kappaskin_app.features.membrane.membrane import MembraneView
 from kappaskin_app.features.membrane.overlays import Overlays
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.colouring import SHADES, locked_at
+from kappaskin_app.shell.colouring import Shade
 from kappaskin_app.shell.display import Display, Shown, of_row
 from kappaskin_app.shell.loads import loads_at
 from kappaskin_app.shell.selection import Selection
 from kappaskin_app.shell.session import Session
-from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings import Settings, locked_at
 from kappaskin_app.theme import DIVERGING, current, follow_look
 from kappaskin_app.widgets.colour_bar import SkinScale
 from kappaskin_app.widgets.tint import Tint
@@ -62,9 +62,13 @@ class SkinView(QObject):
         self.membrane.show_options(settings.show_elements, settings.show_truth)
         self.membrane.camera_control.show(settings.look, settings.camera)
 
+    @property
+    def _shade(self) -> Shade:
+        return self._display.colouring.shades[self._settings.colour_by]
+
     def limit_shown(self) -> float:
         """Limit of the skin's colour range, in SI units."""
-        return self.scale.bar.reach / SHADES[self._settings.colour_by].scale
+        return self.scale.bar.reach / self._shade.scale
 
     def _limits(self) -> dict[str, float]:
         """Colour limit by the name of the quantity."""
@@ -119,7 +123,7 @@ class SkinView(QObject):
 
     def _colour(self, shown: Shown) -> None:
         name, times, display = self._settings.colour_by, self._times(), self._display
-        estimate, mode, shade, beside = shown.estimate, self._selection.mode, SHADES[name], ()
+        estimate, mode, shade, beside = shown.estimate, self._selection.mode, self._shade, ()
         if mode is not None and mode.shape == estimate.surface.shape:
             tint, values = Tint(DIVERGING, (-1.0, 1.0), "shape"), mode
         elif shade.on_surface is not None and self._settings.colour_from == "smooth":
@@ -145,7 +149,7 @@ class SkinView(QObject):
         """Show in the view why there are no colours."""
         known = name == "health" or values.dtype == np.uint8 or bool(np.isfinite(values).any())
         if self._selection.mode is None:
-            self.membrane.show_caption("" if known else SHADES[name].unknown)
+            self.membrane.show_caption("" if known else self._shade.unknown)
 
     def _times(self) -> float:
         """Vertical exaggeration: the requested one, or the largest that fits."""

@@ -1,6 +1,6 @@
 """View settings of the skin, and actions for colours, exaggeration and camera."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 
 from PySide6.QtGui import QKeySequence, QShortcut
@@ -9,13 +9,12 @@ from kappaskin_app.features.membrane.camera import DIRECTIONS
 from kappaskin_app.features.membrane.skin_view import SkinView
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import WITHIN, Actions
-from kappaskin_app.shell.colouring import SHADES
+from kappaskin_app.shell.colouring import SHADES, Colouring, Shade
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.requests import Requests
-from kappaskin_app.shell.settings import form_field
-from kappaskin_app.shell.settings.shown import COLOURS
+from kappaskin_app.shell.settings import Settings, form_field, locked_at, locking
 
 
 class ViewPanel(Form):
@@ -32,6 +31,13 @@ class ViewPanel(Form):
             *("from_z", "to_z", "theme", "letters", "show_start"),
         )
         super().__init__("View", names)
+
+    def show_colours(self, colouring: Colouring, settings: Settings) -> None:
+        """Offer what may be shown of the sensor, and show what is."""
+        options = {name: shade.label for name, shade in colouring.shades.items()}
+        maps = tuple((name, options[name]) for name in colouring.maps)
+        self.show_options("colour_by", tuple(options.items()), settings.colour_by)
+        self.show_options("maps", maps, settings.maps)
 
 
 _MENU = "Sk&in"
@@ -63,6 +69,7 @@ _HIGHER = "Increase the vertical exaggeration by 1; colours do not change"
 _LOWER = "Decrease the vertical exaggeration by 1; colours do not change"
 _CAMERA = "View the whole skin from the initial direction"
 _MEASURE = "Measure the distance of two places that you click; Escape ends"
+_COLOUR = "colour-"  # begins the name of an action
 _DIGITS = 9  # actions that may have a digit for a shortcut
 
 
@@ -77,11 +84,9 @@ class ViewActions:
 
     def add_actions(self, actions: Actions) -> None:
         add, requests = actions.add, self._requests
-        for number, (value, words) in enumerate(COLOURS, 1):
-            colour = partial(requests.set, "colour_by", value)
-            key = f"Ctrl+{number}" if number <= _DIGITS else ""
-            words, tip = f"Colour by {words.lower()}", SHADES[value].tip
-            add(f"colour-{value}", _COLOURS, words, colour, key, tip)
+        self._actions = actions
+        for number, shade in enumerate(SHADES.values(), 1):
+            self._add_colour(shade, f"Ctrl+{number}" if number <= _DIGITS else "")
         add("lock-ranges", _MENU, "Fixed or a&utomatic ranges", self.lock_all, "Ctrl+Alt+L", _LOCK)
         add("higher", _MENU, "&Higher exaggeration", partial(self.exaggerate, 1), "Ctrl++", _HIGHER)
         add("lower", _MENU, "&Lower exaggeration", partial(self.exaggerate, -1), "Ctrl+-", _LOWER)
@@ -106,6 +111,22 @@ class ViewActions:
         self._escape.activated.connect(guarded(measurement.end))
         measurement.changed.connect(guarded(self._show_measuring))
 
+    def _add_colour(self, shade: Shade, key: str = "") -> None:
+        words = f"Colour by {shade.label.lower()}"
+        act = partial(self._requests.set, "colour_by", shade.name)
+        self._actions.add(f"{_COLOUR}{shade.name}", _COLOURS, words, act, key, shade.tip)
+
+    def show_colours(self, shades: Mapping[str, Shade]) -> None:
+        """Allow the colours of these quantities only."""
+        entries = self._actions.entries
+        for name, shade in shades.items():
+            if f"{_COLOUR}{name}" not in entries:
+                self._add_colour(shade)
+        for name in entries:
+            if name.startswith(_COLOUR):
+                there = name.removeprefix(_COLOUR) in shades
+                self._actions.allow(name, "" if there else "this sensor does not read it")
+
     def _show_measuring(self, on: bool) -> None:
         self._measure.setChecked(on)
         self._escape.setEnabled(on)
@@ -128,11 +149,12 @@ class ViewActions:
     def lock(self, locked: bool) -> None:
         """Fix the colour range of the skin at its present limit, or let it follow the data."""
         limit = self._view.limit_shown() if locked else 0.0
-        self._requests.set(f"range_{self._history.settings.colour_by}", limit)
+        self._requests.lock(self._display.settings.colour_by, limit)
 
     def lock_all(self) -> None:
         """Fix all visible colour ranges, or make them automatic if all are fixed."""
         settings, ranges = self._history.settings, self._display.limits_shown()
-        locked = all(getattr(settings, name) for name in ranges)
+        locked = all(locked_at(name, settings) for name in ranges)
         words = "Automatic ranges" if locked else "Fixed ranges"
-        self._history.change(words, -1, **{n: 0.0 if locked else v for n, v in ranges.items()})
+        limits = {name: 0.0 if locked else limit for name, limit in ranges.items()}
+        self._history.change(words, -1, **locking(limits, settings))

@@ -8,8 +8,7 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from kappaskin.frames import COMPONENTS, Array
 from kappaskin.pipeline import REPORTED, ReportedQuantity
-from kappaskin.sensing import SensorLayout
-from kappaskin_app.shell.colouring import READING_UNITS
+from kappaskin.sensing import SHOWN_UNITS, SensorLayout
 from kappaskin_app.widgets.parts import Label
 from kappaskin_app.widgets.plots import Curve, CurvePlot
 
@@ -25,12 +24,12 @@ _SPECTRUM = (
 
 def screen_unit(layout: SensorLayout, unit: str) -> str:
     """The unit on the screen of readings in a `unit`; curvature is in 1/m."""
-    return READING_UNITS[unit][1] if layout.reads else unit
+    return SHOWN_UNITS[unit][1] if layout.reads else unit
 
 
 def scales_of(layout: SensorLayout) -> tuple[Array, str]:
     """The scale (k,) from SI units to the screen's of each kind of reading, and all units."""
-    scales = np.array([READING_UNITS[unit][0] for unit in layout.kind_units])
+    scales = np.array([SHOWN_UNITS[unit][0] for unit in layout.kind_units])
     units = dict.fromkeys(screen_unit(layout, unit) for unit in layout.kind_units)
     return scales, ", ".join(units)
 

@@ -31,6 +31,8 @@ from kappaskin_app.shell.settings.shown import METHOD_SHORT as METHOD_SHORT
 from kappaskin_app.shell.settings.shown import Camera, TextSize, View
 from kappaskin_app.shell.settings.shown import ComparedSettings as ComparedSettings
 from kappaskin_app.shell.settings.shown import EstimatorSettings as EstimatorSettings
+from kappaskin_app.shell.settings.shown import locked_at as locked_at
+from kappaskin_app.shell.settings.shown import locking as locking
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,8 @@ def calibration_text(calibration: Calibration) -> str:
 
 def change_text(name: str, before: Settings, after: Settings) -> str:
     """The change of the setting `name`, as the history shows it."""
+    if name.startswith("range_"):
+        return "colour range"
     if name in _NAMES:
         return _NAMES[name]
     field = next(f for f in fields(Settings) if f.name == name)
@@ -105,7 +109,7 @@ def change_text(name: str, before: Settings, after: Settings) -> str:
 def _change_text(name: str, form: FormField | None, before: Any, after: Any) -> str:
     """The label of the setting `name`, with both its values: "noise RMS 1.000 to 2.000"."""
     if form is None:
-        return "colour range" if name.startswith("range_") else name
+        return name
     panel = next((w for kind, w in _PANELS.items() if name in {f.name for f in fields(kind)}), "")
     label = form.label if form.label.isupper() else form.label[:1].lower() + form.label[1:]
     words = f"{panel} {label}" if panel and panel != label else label
@@ -121,5 +125,5 @@ def _value(form: Range | Choice | Text, value: Any) -> str:
     """A value as its editor shows it."""
     if isinstance(form, Range):
         return f"{value * form.scale:.{form.decimals}f}"
-    words = dict(form.options)[value] if isinstance(form, Choice) else value or "nothing"
+    words = form.words(value) if isinstance(form, Choice) else value or "nothing"
     return words if len(words) <= _LONGEST else f"{words[: _LONGEST - 1]}\N{HORIZONTAL ELLIPSIS}"

@@ -32,17 +32,22 @@ class Range(FormField):
 
 
 @dataclass(frozen=True)
-class Choice(FormField):
-    """One of several values: `options` are (value, label) pairs."""
+class Options(FormField):
+    """Several values: `options` are (value, label) pairs."""
 
     options: tuple[tuple[str, str], ...]
 
+    def words(self, value: str) -> str:
+        """The label of a value; of a quantity that only some sensors read, its name."""
+        return dict(self.options).get(value, value)
 
-@dataclass(frozen=True)
-class Several(FormField):
-    """A subset of several values, in their order: `options` are (value, label) pairs."""
 
-    options: tuple[tuple[str, str], ...]
+class Choice(Options):
+    """One of several values."""
+
+
+class Several(Options):
+    """A subset of several values, in their order."""
 
 
 class Switch(FormField):

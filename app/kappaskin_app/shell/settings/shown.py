@@ -1,6 +1,7 @@
 """Settings of the estimator, the comparison and the view."""
 
-from dataclasses import dataclass, make_dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, make_dataclass
 from typing import Any
 
 from kappaskin.pipeline import SETUP, skin_colours
@@ -101,6 +102,18 @@ ColourRanges: Any = make_dataclass(
 """Limits of the colour scales, in SI units, one-sided or symmetric; 0 is automatic."""
 
 
+def locked_at(name: str, settings: Any) -> float:
+    """The limit in SI units that the range of the quantity `name` is locked to, or zero."""
+    return getattr(settings, f"range_{name}", settings.ranges.get(name, 0.0))
+
+
+def locking(limits: Mapping[str, float], settings: Any) -> dict[str, Any]:
+    """The settings that lock the ranges of quantities at `limits` in SI units; 0 unlocks."""
+    own = {f"range_{n}": limit for n, limit in limits.items() if hasattr(settings, f"range_{n}")}
+    read = {n: limit for n, limit in limits.items() if f"range_{n}" not in own}
+    return own | {"ranges": {n: at for n, at in {**settings.ranges, **read}.items() if at}}
+
+
 @dataclass(frozen=True)
 class View(ColourRanges):
     """The view of the skin."""
@@ -109,9 +122,9 @@ class View(ColourRanges):
         "displacement",
         Choice(
             "Colour",
-            "Quantity shown by the colours of the skin: displacement, curvatures (Eqs. 3 to 5), "
-            "principal curvatures, residuals, standard deviation, error, or health of the "
-            "elements. The colour scale shows its name and equation.",
+            "Quantity shown by the colours of the skin: displacement, what the elements read, "
+            "curvatures (Eqs. 3 to 5), principal curvatures, residuals, standard deviation, error, "
+            "or health of the elements. The colour scale shows its name and equation.",
             COLOURS,
         ),
     )
@@ -223,3 +236,4 @@ class View(ColourRanges):
         ),
     )
     traced: tuple[int, ...] = ()  # elements whose last seconds are drawn
+    ranges: Mapping[str, float] = field(default_factory=dict)  # of readings but xx, yy and xy

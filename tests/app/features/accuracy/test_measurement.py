@@ -1,10 +1,15 @@
 """When costs are measured, and of what: the setting in use, this skin, a real sensor's."""
 
+import math
 import multiprocessing
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 
+from kappaskin import Patch, SensorLayout
+from kappaskin.sensing import DigitalReadings
 from kappaskin.studies import Setting
 from kappaskin_app.features.accuracy.measurement import setting_text
 from kappaskin_app.shell.settings import Settings
@@ -93,3 +98,18 @@ def test_a_real_sensor_is_reckoned_with_its_own_skin_and_noise() -> None:
     assert [effect.rms for effect in scene.effects] == [0.3]
     (load,) = scene.loads
     assert load.centre().tolist() == pytest.approx([0.05, 0.05])
+
+
+def test_a_sensor_of_several_units_is_reckoned_with_its_noise_over_that_stated() -> None:
+    noise = (("height", 5e-6), ("slope", 5e-4))
+    sensor = replace(
+        scene_of(Settings()).sensor(),
+        layout=SensorLayout.regular(Patch(0.1, 0.1), 6, 6).reading(
+            np.repeat(np.arange(36)[::-1], 2), ["slope", "height"] * 36, math.radians(30)
+        ),
+        transduction=DigitalReadings(noise=noise),
+    )
+    scene = scene_of_sensor(sensor, 2.0)
+    assert scene.layout.each_reads == ["height", "slope@30"]
+    assert dict(scene.transduction.noise) == pytest.approx({"height": 1e-5, "slope": 1e-3})
+    assert scene.effects == ()

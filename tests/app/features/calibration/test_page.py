@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kappaskin import Calibration
+from kappaskin import Calibration, Patch, SensorLayout
 from kappaskin.calibration.calibration import fingerprint
+from kappaskin_app.features.calibration.pages import StartPage
 from kappaskin_app.shell.window import MainWindow
 
 
@@ -16,6 +17,16 @@ def test_a_refused_file_is_told_where_files_are_loaded(window, tmp_path: Path) -
     window.calibration.load(tmp_path / "none.toml")
     assert "none.toml" in window.in_use.message.text()
     assert not window.calibrate.message.text()
+
+
+def test_cylinders_are_refused_for_a_sensor_of_heights_in_one_sentence(qapp) -> None:
+    page = StartPage()
+    page.show_plan(SensorLayout.regular(Patch(0.06, 0.06), 4, 4).reading_each(["height"]))
+    assert page.plan.text() == (
+        "Expected a curvature sensor for a calibration with cylinders: xx, yy and xy of every "
+        "element; got readings of height."
+    )
+    page.deleteLater()
 
 
 def _error(window: MainWindow, until: Callable[..., None]) -> float:

@@ -6,7 +6,18 @@ from dataclasses import replace
 
 import pytest
 
-from kappaskin import ObjectFinder, Pipeline, PointLoad, Setup, Simulator, load_scene
+from kappaskin import (
+    ObjectFinder,
+    Patch,
+    Pipeline,
+    PointLoad,
+    SensorLayout,
+    Setup,
+    Simulator,
+    load_scene,
+)
+from kappaskin.contact import ImprintObjects
+from kappaskin.sensing import DigitalReadings
 from kappaskin_app.features.contact import recognition
 from kappaskin_app.features.contact.recognition import curvature_text
 from kappaskin_app.shell.settings import Settings
@@ -71,6 +82,16 @@ def test_simulated_point_loads_are_those_of_the_plate_that_objects_are_recognise
         described.add(words.partition(",")[0])
 
     assert described == {"sphere"}
+
+
+def test_an_object_is_told_by_the_shape_from_readings_of_several_units():
+    sensor = replace(
+        scene_of(Settings()).sensor(),
+        layout=SensorLayout.regular(Patch(0.1, 0.1), 8, 8).reading_each(["height", "slope@30"]),
+        transduction=DigitalReadings(noise=(("height", 5e-6), ("slope", 5e-4))),
+    )
+    args = sensor.plate, "hinged", "least-squares", (6, 6)
+    assert isinstance(recognition._finder(sensor, *args), ImprintObjects)  # noqa: SLF001
 
 
 def test_the_line_does_without_what_is_spare_where_room_is_short(qapp):

@@ -123,6 +123,12 @@ def test_what_is_found_is_shown_in_the_list_on_the_heatmap_and_on_the_skin(
     assert failing.minimumSizeHint().height() <= 800
 
 
+def test_marks_of_excluded_elements_go_with_their_skin(failing: MainWindow, until) -> None:
+    until(lambda: failing.membrane.excluded.actor.visibility)
+    failing.session.request_source("sim:circle")
+    until(lambda: not failing.membrane.excluded.actor.visibility)
+
+
 def test_a_simulated_skin_is_pressed_by_dragging_its_load(window: MainWindow, until) -> None:
     window.actions_by_name["dock-health"].trigger()
     page = window.health.press

@@ -6,6 +6,7 @@ import signal
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QImage
 
 from kappaskin.scenes import scene_file
 from kappaskin_app.features.scene.gallery import MEASURED
@@ -157,3 +158,12 @@ def test_what_others_measured_is_replayed(window, panel, until, number) -> None:
     until(lambda: np.isnan(window.session.estimate.contact.force))
     until(lambda: window.session.estimate.contact.present)
     assert window.session.estimate.surface.max() > 0.9e-3
+    until(lambda: _green(window) > 30)  # of the contact's mark, in a dent that hides its place
+
+
+def _green(window) -> int:
+    """How many pixels of the window are green, which no colour of the skin is."""
+    picture = window.grab().toImage().convertToFormat(QImage.Format.Format_RGB888)
+    rows = np.frombuffer(picture.constBits(), np.uint8).reshape(picture.height(), -1)
+    r, g, b = rows[:, : 3 * picture.width()].reshape(-1, 3).T.astype(float)
+    return int(np.sum((g > 2.5 * r) & (g > 1.2 * b) & (g > 80)))
