@@ -30,7 +30,7 @@ UNITS = {
 """What one of each unit that an answer may have is in SI units."""
 
 _PLAIN = {
-    field.name: field.default
+    field.name: getattr(kind(), field.name)
     for kind in (SceneSettings, EstimatorSettings, Scanning, View)
     for field in fields(kind)
     if field.name != "theme"
