@@ -450,6 +450,12 @@ class SensorLayout:
         return [QUANTITIES[quantity] for quantity, _ in self.kinds]
 
     @property
+    def noise_unit(self) -> tuple[float, str]:
+        """How the noise of a reading is shown: by how many times a unit, and its name."""
+        units = set(self.kind_units)
+        return SHOWN_UNITS[units.pop()] if len(units) == 1 else (1.0, "times that stated")
+
+    @property
     def each_reads(self) -> list[str]:
         """The names of the k readings of every element, reading k P + p that of element p.
 

@@ -13,7 +13,6 @@ from kappaskin.frames import Estimate
 from kappaskin.live import Status
 from kappaskin.scenes import Scene
 from kappaskin.scenes.effects import GaussianNoise, UniformNoise
-from kappaskin.sensing import SHOWN_UNITS, SensorLayout
 from kappaskin.studies import (
     Cost,
     EffectCosts,
@@ -273,7 +272,8 @@ class CostMeasurement(QObject):
             self.scene, self.about = session.scene, ""
         elif np.isfinite(noise):
             self.scene = scene_of_sensor(status.sensor, noise)
-            text = _noise_text(noise, status.sensor.layout)
+            times, unit = status.sensor.layout.noise_unit
+            text = f"{times * noise:.2g}\N{NO-BREAK SPACE}{unit}"
             self.about = f"With a point load in the middle and the present noise, {text}."
         if self.scene is not None:
             self._of = session.inside, status.connections, noise
@@ -306,13 +306,6 @@ class CostMeasurement(QObject):
     def _refuse(self, error: Exception) -> None:
         self.refusal = str(error)
         self.changed.emit()
-
-
-def _noise_text(noise: float, layout: SensorLayout) -> str:
-    """The noise of a reading; of several units, over that stated."""
-    units = set(layout.kind_units)
-    times, unit = SHOWN_UNITS[units.pop()] if len(units) == 1 else (1.0, "times that stated")
-    return f"{times * noise:.2g}\N{NO-BREAK SPACE}{unit}"
 
 
 def _measurable(setting: Setting) -> bool:

@@ -48,7 +48,7 @@ if __name__ == "__main__":  # the engine is a separate process that imports this
         force, deepest = 1e3 * e.contact.force, 1e3 * abs(e.surface).max()
         print(
             f"{e.device_time:9.3f} s  contact {x:6.2f}, {y:6.2f} mm  force {force:7.1f} mN  "
-            f"deepest {deepest:6.3f} mm  noise {e.noise:.3f} 1/m"
+            f"deepest {deepest:6.3f} mm  noise {$noise:.3f} $unit"
         )
 ''')
 
@@ -80,16 +80,24 @@ def script_of(session: Session, settings: Settings, folder: Path) -> Script:
     if session.inside:
         made.append(f"SCENE = {_scene(session, settings)}")
         requests += ["engine.play(planned(SCENE))", "engine.seek(0.0)"]
-    return Script(_composed("\n".join(made), requests), files)
+    sensor = session.status.sensor
+    times, unit = sensor.layout.noise_unit if sensor else (1.0, "1/m")
+    noise = "e.noise" if times == 1 else f"{times:g} * e.noise"
+    return Script(_composed("\n".join(made), requests, noise, unit), files)
 
 
-def _composed(made: str, requests: list[str]) -> str:
+def _composed(made: str, requests: list[str], noise: str, unit: str) -> str:
     used = f"{made}{requests}"
     names = ["Engine", *(name for name in _NAMES if f"{name}(" in used)]
     paths = "from pathlib import Path\n" if "Path(" in made else ""
     between = "\n        "
     return _SCRIPT.substitute(
-        paths=paths, names=", ".join(names), setup=f"{made}\n", requests=between.join(requests)
+        paths=paths,
+        names=", ".join(names),
+        setup=f"{made}\n",
+        requests=between.join(requests),
+        noise=noise,
+        unit=unit,
     )
 
 

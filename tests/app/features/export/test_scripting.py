@@ -250,3 +250,11 @@ def test_the_action_puts_a_script_on_the_clipboard(window: MainWindow) -> None:
     text = QGuiApplication.clipboard().text()
     assert _names(text) == {"Engine", "Setup", "planned", "read_scene"}
     assert window.statusBar().currentMessage().startswith("Copied a script of")
+
+
+def test_a_script_prints_the_noise_in_the_unit_of_what_is_read(
+    asked: Asked, until, tmp_path: Path
+) -> None:
+    asked.session.connect_to("sim:tilts")
+    until(lambda: (it := asked.session.status.sensor) is not None and it.layout.reads is not None)
+    assert "noise {1000 * e.noise:.3f} mrad" in asked.text(tmp_path)
