@@ -28,8 +28,8 @@ LIMITS = {
     # Sensors with a line format of their own: its decoders and encoders, and their description.
     # Any reading in scenes, pipeline, files and window; described readings, their noise, zero and
     # calibration; datagrams, standard input and files. What others measured, in the gallery.
-    # Studies and plans of any reading; its colours, ranges and residuals in the window.
-    "statements": 40_520,
+    # Studies, plans and hard cases of any reading; its colours, ranges and residuals in the window.
+    "statements": 40_530,
     # _files: one way to read and write files; _text: text from outside. For all rooms and the app.
     "loose modules of core": 10,
     "loose modules of the app": 8,

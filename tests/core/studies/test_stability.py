@@ -70,6 +70,7 @@ def test_eq_6_as_printed_breaks_where_it_must_and_nobody_else_does(rows):
     assert broken - {"Ni > m, Nj > n"} == {
         "Ni > m, Nj > n, exact",
         "Ni = 2m, Nj = 2n",
+        "heights, Ni > m",
         "pairs 1e-09 m apart",
         "pairs 1e-16 m apart",
     }

@@ -46,9 +46,10 @@ class CaseKind(Enum):
 class HardCase:
     """`curvature` (T, 3, P) in 1/m, read of the shape with coefficients `truth` in m.
 
+    Or other readings (T, R), in their units.
     `truth` is (Ri, Rj), or (T, Ri, Rj) of a shape that moves, of the functions of `true_basis`.
     `hard` is one sentence on what is hard; `announced` why an answer may be less than exact, or
-    none; empty where nothing excuses it. `sigma` in 1/m is the noise that is given, if any.
+    none; empty where nothing excuses it. `sigma` in 1/m, or (R,), is the noise, where it is given.
     """
 
     name: str
@@ -60,7 +61,7 @@ class HardCase:
     curvature: Array
     announced: str = ""
     kind: CaseKind = CaseKind.ANY
-    sigma: float | None = None
+    sigma: float | Array | None = None
 
     @property
     def in_reach(self) -> bool:
@@ -75,13 +76,13 @@ def case_of(
     functions: tuple[int, int],
     *,
     announced: str = "",
-    noise: float = TABLE_1_NOISE,
+    noise: float | Array = TABLE_1_NOISE,
     kind: CaseKind = CaseKind.ANY,
     basis: Basis | None = None,
     true_basis: Basis | None = None,
     truth: Array | None = None,
     spoilt: Callable[[Array], Array] = lambda K: K,
-    sigma: float | None = None,
+    sigma: float | Array | None = None,
 ) -> HardCase:
     """A case of `functions` on a `layout`; `spoilt` makes of clean, noisy readings what comes."""
     rng = np.random.default_rng(SEED)
@@ -89,9 +90,9 @@ def case_of(
     true_basis = basis if true_basis is None else true_basis
     M = layout.operator(true_basis)
     c = _even(true_basis, M, rng) if truth is None else truth
-    clean = np.dot(c.reshape(-1, true_basis.size), M.T).reshape(-1, 3, len(layout))
-    frames = (FRAMES if len(clean) == 1 else len(clean)) if noise else 1
-    K = clean + rng.normal(0.0, noise, (frames, 3, len(layout)))
+    clean = np.dot(c.reshape(-1, true_basis.size), M.T).reshape(-1, *layout.frame_shape)
+    frames = (FRAMES if len(clean) == 1 else len(clean)) if np.any(noise) else 1
+    K = clean + rng.normal(0.0, noise, (frames, *layout.frame_shape))
     return HardCase(name, hard, basis, layout, true_basis, c, spoilt(K), announced, kind, sigma)
 
 
@@ -395,6 +396,22 @@ def _readings() -> Iterator[HardCase]:
                   _TENS, (8, 8), truth=dent, noise=noise)  # fmt: skip
 
 
+def _other_readings() -> Iterator[HardCase]:
+    heights, slopes = _TENS.reading_each(["height"]), _TENS.reading_each(["slope@0"])
+    yield case_of("heights", "fine functions hardly move the skin: 5 um of noise hides them",
+                  heights, (8, 8), truth=_dent(8), noise=5e-6)  # fmt: skip
+    yield case_of("heights, Ni > m", "at every element function 11 is function 9, and 12 is 8",
+                  heights, (12, 8), truth=_dent(12)[:, :8], noise=5e-6,
+                  announced="80 of 96 coefficients are determined")  # fmt: skip
+    yield case_of("slopes along x", "no reading is of the slope along y", slopes, (8, 8),
+                  truth=_dent(8), noise=5e-4)  # fmt: skip
+    both = _TENS.reading_each(["height", "slope@0", "slope@90"])
+    sigma = np.repeat([5e-6, 5e-4, 5e-4], len(_TENS))
+    yield case_of("heights and slopes", "in their units slopes are a hundred times as large: "
+                  "unweighted, heights would count for nothing", both, (8, 8), truth=_dent(8),
+                  noise=sigma, sigma=sigma)  # fmt: skip
+
+
 def _drifted(K: Array) -> Array:
     """Readings with a level and slopes along x and y of their own in each channel."""
     u, v = (_TENS.positions / (_SQUARE.a, _SQUARE.b) - 0.5).T
@@ -469,7 +486,7 @@ def _large(count: int) -> HardCase:
 
 def gallery(long: bool = False) -> Iterator[HardCase]:
     """Every case, made on demand; the largest only when `long`."""
-    for room in (_sizes, _arcs, _loads, _elements, _scales, _readings, _slopes):
+    for room in (_sizes, _arcs, _loads, _elements, _scales, _readings, _other_readings, _slopes):
         yield from room()
     yield _sequence(1000, 6, 4)
     yield _large(64)

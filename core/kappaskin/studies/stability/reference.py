@@ -151,7 +151,8 @@ class Reference:
     `free` W (N, F) and `length` (F,) of the columns of M W; `condition` of the scaled M W and
     `unscaled` of M as Eq. 6 has it, infinite where not all is determined; `norm` of the scaled M W.
     `readings` is the norm in 1/m of the `count` R readings, `left` that of what least squares
-    leaves of them. `answer` (N,) in m is that of least squares without rounding, if there is one.
+    leaves of them; of readings that differ in unit, over their sigma. `answer` (N,) in m is that of
+    least squares without rounding, if there is one.
     """
 
     free: Array | None
@@ -209,11 +210,13 @@ def reference_of(case: HardCase) -> Reference:
     if case.kind is CaseKind.LARGE:
         return _by_transforms(case)
     used = case.layout.live & np.isfinite(case.curvature[0])
-    M = case.layout.operator(case.basis)[used.ravel()]
-    b, W = case.curvature[0][used], case.basis.free
+    scale = None if case.sigma is None or not case.layout.reads else 1 / case.sigma
+    layout = replace(case.layout, live=used, scale=scale)
+    M = layout.operator(case.basis)[used.ravel()]
+    b, W = (case.curvature[0] * (1.0 if scale is None else scale))[used], case.basis.free
     A = M if W is None else M @ W
     length = column_lengths(A)
-    values = singular_values(case.basis, replace(case.layout, live=used))[0][: len(length)]
+    values = singular_values(case.basis, layout)[0][: len(length)]
     k = _condition(values, A.shape)
     bare = _condition(np.linalg.svd(M, compute_uv=False).astype(float), M.shape)
     R, size = len(b), float(np.linalg.norm(b))
