@@ -43,6 +43,7 @@ def _lives(process: psutil.Process) -> bool:
     return False
 
 
+@pytest.mark.cases("2-shown", "15-loading")
 @pytest.mark.parametrize("pause", [0.0, 3.0], ids=["loading", "shown"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_closes_the_app_and_leaves_nothing(number: int, pause: float) -> None:

@@ -130,8 +130,8 @@ class WeightFit:
         How far an elastic edge gives is never known; stiffening must show itself in an F test.
         """
         usual, spare = _Curve.constant(told), len(weights) - 2
-        curve, second = self._second(readings)
-        if curve is None or second is None or spare < 2:
+        curve, second = self._second(readings) if spare > 1 else (None, None)
+        if curve is None or second is None:
             return usual, None
         near = np.clip(curve.fitted(weights, sd).u * _NEAR, curve.least, curve.u[-1])
         curve = curve.with_more(self._curve(readings, near, second))

@@ -65,6 +65,7 @@ def test_the_thickness_by_which_a_held_sheet_stiffens_is_found(masses) -> None:
 
 
 @pytest.mark.truth
+@pytest.mark.cases("500.0")
 @pytest.mark.parametrize("springs", [500.0, 20000.0])
 def test_of_an_edge_that_gives_the_rigidity_is_within_its_standard_error(springs) -> None:
     sensor = replace(SENSOR, edge="elastic")

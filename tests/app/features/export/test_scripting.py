@@ -122,7 +122,7 @@ def _of_another_skin() -> Settings:
     return replace(settings, **changed, foam=20e3)
 
 
-@pytest.mark.cases("_of_another_skin", "_pressed")
+@pytest.mark.cases("_pressed")
 @pytest.mark.parametrize("make", [lambda: Settings(**_STILL), _of_another_skin, _pressed])
 def test_of_what_stands_still_a_script_computes_the_same_bits(
     asked: Asked, until, tmp_path: Path, make: Callable[[], Settings]
