@@ -46,12 +46,12 @@ def _engine_of(process: subprocess.Popen[str]) -> psutil.Process | None:
 
 @contextmanager
 def _recording(path: Path) -> Iterator[tuple[subprocess.Popen[str], psutil.Process]]:
-    """A command that records to `path`, and its engine."""
+    """A command that records to `path` for about a second already, and its engine."""
     command = [sys.executable, "-m", "kappaskin", "record", "sim:circle", str(path)]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
-        _until(lambda: part_of(path).exists() and part_of(path).stat().st_size > 20_000)
+        _until(lambda: part_of(path).exists() and part_of(path).stat().st_size > 2_000_000)
         engine = _engine_of(process)
         assert engine is not None
         yield process, engine
