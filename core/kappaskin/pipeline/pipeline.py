@@ -33,9 +33,10 @@ REVISION = 4
 _LOOSE = 100.0  # times the error bars with every reading: beyond it a shape is undetermined
 
 
-# Numbers held at most, as measured: for each point of the surface, each product of a channel and a
-# function, and each pair of functions, if it tracks them or not.
-_PER_POINT, _PER_PRODUCT, _PER_TRACKED, _PER_PAIR = 6, 4, 24, 4
+# Numbers held, as measured: for each of a few hundred channels by the contact; and at most for each
+# point of the surface, each product of a channel and a function, and each pair of functions, if it
+# tracks them or not.
+_PER_CHANNEL, _PER_POINT, _PER_PRODUCT, _PER_TRACKED, _PER_PAIR = 1_300, 6, 4, 24, 4
 
 
 class FrameAssembly(Stateful):
@@ -385,6 +386,7 @@ def _estimator_settings(pipeline: Pipeline) -> tuple[object, ...]:
 def _check_size(sensor: Sensor, setup: Setup, budget: Budget | None) -> None:
     check_method(setup.method)
     method, numbers = METHODS[setup.method], _PER_POINT * setup.nx * setup.ny
+    numbers += _PER_CHANNEL * sensor.channels
     if method.has_matrix:
         N = setup.Ni * (1 if sensor.layout.patch.strip else setup.Nj)
         pairs = _PER_TRACKED if method.has_memory else _PER_PAIR
