@@ -80,7 +80,7 @@ class _OfFunctions:
         self._basis = basis_for(plate.patch, edge, functions, 1 if plate.patch.strip else functions)
         compliance = plate.compliance(self._basis)
         self._readings = compliance.after(layout.operator(self._basis, plate)).T.copy()
-        self._C, self._out = compliance.after(np.eye(self._basis.size)), out
+        self._compliance, self._out = compliance, out
         self.sized = layout.reads is not None and not plate.patch.strip
 
     def at(self, x: float, y: float, s: float) -> None:
@@ -100,8 +100,8 @@ class _OfFunctions:
         return None
 
     def gives(self, x: float, y: float) -> float:
-        f = self._basis.jet(x, y)[0]
-        return float(f.dot(self._C).dot(f))
+        f = self._basis.jet(x, y)[:1]
+        return float(np.vdot(self._compliance.after(f), f))
 
 
 # A point load bends a plate without bound around itself, which no sum of few waves follows. So the

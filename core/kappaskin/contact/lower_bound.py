@@ -1,6 +1,7 @@
 """Lower bounds of force: contacts on a skin that may stretch more than its force accounts for."""
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -41,6 +42,7 @@ class LowerBound:
         return replace(contact, force_is_lower_bound=True) if change > contact.force_sd else contact
 
 
+@lru_cache(8)  # settings that change make it anew
 def _stiffening(plate: Plate, edge: str) -> float:
     """What stretching adds to the force in the middle of `plate` pressed in by its thickness."""
     patch, h = plate.patch, plate.thickness or USUAL_THICKNESS
