@@ -42,7 +42,7 @@ class LowerBound:
         return replace(contact, force_is_lower_bound=True) if change > contact.force_sd else contact
 
 
-@lru_cache(8)  # settings that change make it anew
+@lru_cache(8)  # asked for again whenever a setting changes
 def _stiffening(plate: Plate, edge: str) -> float:
     """What stretching adds to the force in the middle of `plate` pressed in by its thickness."""
     patch, h = plate.patch, plate.thickness or USUAL_THICKNESS
