@@ -6,6 +6,7 @@ import sys
 import tomllib
 from pathlib import Path
 
+import pytest
 from packaging.requirements import Requirement
 
 PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text("utf-8"))
@@ -81,6 +82,7 @@ def test_every_extra_is_tried_here():
     assert set(EXTRAS) - DEVELOPERS == {*ASKS, "film"}
 
 
+@pytest.mark.full
 def test_without_any_extra_the_library_works_and_says_what_installs_what_is_asked_for(
     recording, tmp_path
 ):

@@ -7,6 +7,8 @@ from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
 PACKAGES = {"kappaskin": ROOT / "core" / "kappaskin", "kappaskin_app": ROOT / "app/kappaskin_app"}
 ROOMS = (
@@ -127,6 +129,7 @@ def written(tree: ast.Module) -> Iterator[str]:
             yield f"{name}, line {node.lineno}"
 
 
+@pytest.mark.full
 def test_a_file_is_written_whole_by_one_helper() -> None:
     found = {module: list(written(tree)) for module, tree in modules().items()}
     assert {

@@ -43,7 +43,7 @@ def _lives(process: psutil.Process) -> bool:
     return False
 
 
-@pytest.mark.cases("2-shown", "15-loading")
+@pytest.mark.cases("15-loading")
 @pytest.mark.parametrize("pause", [0.0, 3.0], ids=["loading", "shown"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_closes_the_app_and_leaves_nothing(number: int, pause: float) -> None:
@@ -64,6 +64,7 @@ def test_a_signal_closes_the_app_and_leaves_nothing(number: int, pause: float) -
     assert left == []
 
 
+@pytest.mark.full
 def test_a_picture_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
     done = run("--seconds", "1", "--screenshot", str(tmp_path / "nowhere" / "a.png"))
     assert done.returncode == 2
@@ -101,6 +102,7 @@ def demo(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
 
 
+@pytest.mark.full
 def test_the_demonstration_opens_fills_the_picture_and_closes(tmp_path: Path) -> None:
     picture = tmp_path / "demo.png"
     done = demo("--seconds", "4", "--screenshot", str(picture))

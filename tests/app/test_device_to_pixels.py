@@ -93,6 +93,7 @@ def test_every_number_spent_is_decoded_and_the_contact_follows(
         again.stop(signal.SIGKILL)
 
 
+@pytest.mark.full
 def test_a_killed_device_is_lost_within_a_second(opened, until, device: Device) -> None:
     window = opened(device.port)
     until(lambda: window.display.badge.state == "SIM")

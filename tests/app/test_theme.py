@@ -237,6 +237,7 @@ def say_much(window: MainWindow) -> None:
         panel.show_message("A message", hint=number % 2 == 0)
 
 
+@pytest.mark.cases("dark")
 @pytest.mark.slow
 @pytest.mark.parametrize("theme", THEMES)
 def test_a_window_that_is_switched_is_as_one_that_began_so(

@@ -58,6 +58,7 @@ def test_a_formula_becomes_text_in_a_cell(sign: str) -> None:
 _NUMBER = re.compile(r"-?[\d.]+(e[+-]?\d+)?[\]}]*$")
 
 
+@pytest.mark.full
 @given(
     st.recursive(
         st.none() | st.booleans() | st.floats(allow_nan=False, allow_infinity=False)

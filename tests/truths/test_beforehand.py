@@ -29,6 +29,7 @@ frames = pytest.mark.parametrize("frames", [FEW, pytest.param(ALL, marks=pytest.
 # The scatter of estimates
 
 
+@pytest.mark.cases("6 x 6 elements", "8 x 8 functions")
 @pytest.mark.parametrize("planned", PLANNED, ids=str)
 @frames
 def test_bayes_scatters_as_predicted_within_a_tenth(planned, frames):
@@ -97,6 +98,7 @@ def test_table_1_gives_the_errors_beside_a_plate_too(name):
 # A sigma that is given
 
 
+@pytest.mark.cases("bayes-15-2.0", "least-squares-8-0.5")
 @pytest.mark.parametrize("given", [0.5, 2.0])
 @pytest.mark.parametrize(("method", "functions"), SIGMA_FITS)
 @frames

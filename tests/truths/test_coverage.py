@@ -44,6 +44,7 @@ def slack(frames):
 # A flat skin: points, discs and Gaussians anywhere from 0.2 to 0.8 of a side
 
 
+@pytest.mark.cases("point", "disc of 3 mm, gages")
 @each(FLAT)
 @frames
 def test_intervals_on_a_flat_skin_cover_the_truth(case, frames):
@@ -73,6 +74,7 @@ def test_the_place_on_a_flat_skin_is_near_the_cramer_rao_bound(case, frames):
 UNBOUND = [replace(case, bound=False) for case in BENT]  # no test asks for the bound
 
 
+@pytest.mark.cases("half round")
 @each(UNBOUND)
 @frames
 def test_the_force_on_a_bent_skin_is_right(case, frames):
@@ -93,6 +95,7 @@ HELD, OTHERS = STRETCHED[:2], STRETCHED[2:]
 EACH_STRETCHED = [*HELD, *(pytest.param(case, marks=pytest.mark.full) for case in OTHERS)]
 
 
+@pytest.mark.cases("1.7 thicknesses")
 @each(EACH_STRETCHED)
 @frames
 def test_the_force_on_a_stretched_skin_is_right(case, frames):
@@ -180,6 +183,7 @@ def test_no_second_contact_is_invented_beside_a_single_one(case, frames):
     assert found.single > 0.99
 
 
+@pytest.mark.cases("30 mm")
 @each(LONG)
 @frames
 def test_a_line_is_neither_one_contact_nor_two(case, frames):
@@ -189,6 +193,7 @@ def test_a_line_is_neither_one_contact_nor_two(case, frames):
     assert found.single < 0.05
 
 
+@pytest.mark.cases("40 mm apart, forces as 1 to 0.3")
 @each(CLEAR)
 @frames
 def test_two_contacts_are_told_as_two(case, frames):
@@ -202,6 +207,7 @@ def test_two_contacts_are_told_as_two(case, frames):
 # Drifts of all readings
 
 
+@pytest.mark.cases("200-2")
 @pytest.mark.parametrize("noises", [2, 3, 4, 6])
 @frames
 def test_a_drift_is_told_as_one_and_contacts_are_found_beside_it(noises, frames):

@@ -60,6 +60,7 @@ def ball_told(method, functions):
     return contact, there, find(HEIGHT, float(shape.noise), contact)
 
 
+@pytest.mark.cases("fast-functions1")
 @pytest.mark.parametrize("functions", [(40, 30), (30, 22)])
 @pytest.mark.parametrize("method", ["fast", "least-squares"])
 def test_a_ball_in_a_gel_has_its_shape(method, functions):
@@ -171,6 +172,7 @@ def test_errors_cover_a_ball_in_an_elastomer(reads, functions, frames):
     assert other == forces == 0
 
 
+@pytest.mark.full
 def test_healthy_heights_are_not_accused_under_an_imprint():
     accused = looks = 0
     for across, kind in product((20, 40), ("sphere", "punch", "cone")):

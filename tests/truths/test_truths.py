@@ -170,6 +170,7 @@ def test_a_line_load_bends_a_long_half_round_as_an_arc():
     assert v == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.full
 def test_a_shell_that_is_hardly_bent_is_a_plate():
     shell, plate = CylinderShell(0.1, 0.08, 1e3), HingedPlate(0.1, 0.08)
     load, x = Load(0.043, 0.052, radius=3e-3), (np.arange(10) + 0.5) / 10

@@ -1,6 +1,7 @@
 from collections.abc import Iterator
 from itertools import pairwise
 
+import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -76,6 +77,7 @@ def test_every_control_has_a_name(window: MainWindow) -> None:
     assert nameless == []
 
 
+@pytest.mark.full
 def test_tab_goes_through_every_panel_as_it_is_read(window: MainWindow) -> None:
     wrong, seen = [], 0
     for number in range(window.panels.count()):

@@ -277,6 +277,7 @@ def test_what_the_engine_computes_is_told_and_cannot_be_cancelled(bench: Bench) 
     assert not bench.tasks.may_cancel
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_closing_the_window_ends_what_runs(window: MainWindow) -> None:
     slots = [Slot(window.tasks) for _ in ENDLESS]
@@ -287,6 +288,7 @@ def test_closing_the_window_ends_what_runs(window: MainWindow) -> None:
     assert not any(slot.task.running for slot in slots)
 
 
+@pytest.mark.full
 def test_what_is_told_at_the_foot_of_the_window_can_be_cancelled_there(
     window: MainWindow, until
 ) -> None:
@@ -301,6 +303,7 @@ def test_what_is_told_at_the_foot_of_the_window_can_be_cancelled_there(
     assert not window.measurement.refusal
 
 
+@pytest.mark.full
 def test_a_plan_that_was_cancelled_is_made_at_the_next_look(window: MainWindow) -> None:
     window.planner.set_active(True)
     assert window.planner.waiting

@@ -113,6 +113,7 @@ def test_a_map_of_health_tells_which_element_is_what(qapp: QApplication) -> None
     assert heatmap.value.text() == "dead at (75, 25) mm"
 
 
+@pytest.mark.full
 def test_only_maps_that_are_shown_are_computed(window: MainWindow, until, monkeypatch) -> None:
     asked, found = set[str](), window.display.colouring.of_elements
     monkeypatch.setattr(
@@ -134,6 +135,7 @@ def test_only_maps_that_are_shown_are_computed(window: MainWindow, until, monkey
     assert window.heatmaps["xy"].isVisible()
 
 
+@pytest.mark.full
 def test_every_colour_is_drawn_smooth_and_per_element(window: MainWindow, until) -> None:
     for name in ALL:
         for how in ("smooth", "elements"):
@@ -147,6 +149,7 @@ def test_every_colour_is_drawn_smooth_and_per_element(window: MainWindow, until)
     assert window.membrane.caption.input == ""
 
 
+@pytest.mark.full
 def test_all_ranges_are_locked_in_one_step_and_freed_in_another(window: MainWindow, until) -> None:
     until(lambda: window.scale.bar.limits == (0.0, 5.0))
     time.sleep(0.1)
@@ -163,6 +166,7 @@ def test_all_ranges_are_locked_in_one_step_and_freed_in_another(window: MainWind
     assert window.history.settings.range_displacement == 0
 
 
+@pytest.mark.full
 def test_only_ranges_that_are_seen_are_locked(window: MainWindow, until) -> None:
     window.docks["curvature"].hide()
     window.selection.show_mode(np.zeros(window.session.estimate.surface.shape), "A shape")
@@ -180,6 +184,7 @@ def test_only_ranges_that_are_seen_are_locked(window: MainWindow, until) -> None
     assert window.history.settings.range_xx == 0
 
 
+@pytest.mark.full
 def test_a_difference_that_nobody_knows_is_said_not_drawn(window: MainWindow, until) -> None:
     unknown = np.full(window.session.estimate.surface.shape, np.nan)
     window.history.change("Colour", -1, colour_by="difference", colour_from="smooth")

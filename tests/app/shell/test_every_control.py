@@ -82,6 +82,7 @@ def _sizes(window: MainWindow) -> list[float]:
     return [size for _, place in layout.docks for size in (place.share, place.along)]
 
 
+@pytest.mark.full
 def test_every_action_can_be_taken_undone_and_redone(
     window: MainWindow, nothing_chosen, until
 ) -> None:

@@ -107,6 +107,7 @@ def test_nothing_found_says_so(finder: Finder, qtbot) -> None:
     assert "fewer letters" in finder.hint.text()
 
 
+@pytest.mark.full
 def test_ctrl_k_finds_every_kind_of_thing_in_the_window(
     window: MainWindow, until, qtbot, tmp_path: Path
 ) -> None:

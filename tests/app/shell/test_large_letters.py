@@ -72,6 +72,7 @@ def _cut_now(inside: QWidget) -> list[str]:
     ]
 
 
+@pytest.mark.full
 def test_the_header_is_read_whole(large: MainWindow) -> None:
     large.readouts.show_health(501.0, 42.0, 0.0123, 0.0004, lost=1234, skipped=5678)
     lines = [line for line in large.readouts.findChildren(Line) if not line.whole]

@@ -67,6 +67,7 @@ KEPT = st.builds(
 )
 
 
+@pytest.mark.full
 @given(KEPT)
 def test_whatever_is_kept_comes_back_from_its_text(kept: WindowState) -> None:
     assert from_text(to_text(kept)) == kept
@@ -181,6 +182,7 @@ def test_a_window_comes_back_on_a_screen_that_is_there(place, seen) -> None:
     assert clamped(QRect(*place), screens) == QRect(*seen)
 
 
+@pytest.mark.full
 def test_a_window_is_kept_and_comes_back(opened, until, tmp_path: Path, qapp) -> None:
     path = tmp_path / "deep" / "window.toml"
     window = opened("sim:")
@@ -234,12 +236,14 @@ def test_a_dock_of_another_version_is_passed_over(bare) -> None:
     assert seen == ["cost"]
 
 
+@pytest.mark.full
 def test_a_window_that_was_not_asked_to_keeps_nothing(window: MainWindow, tmp_path: Path) -> None:
     window.layouts.save("Mine")
     window.saver.finish()
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.full
 def test_each_ready_layout_shows_its_panels_and_a_bad_name_is_refused(window: MainWindow) -> None:
     assert set(window.docks.by_name()) == set(DOCKS)
     assert not window.presenter.on
@@ -260,6 +264,7 @@ def test_each_ready_layout_shows_its_panels_and_a_bad_name_is_refused(window: Ma
     assert not window.presenter.on
 
 
+@pytest.mark.full
 def test_the_skin_is_not_drawn_while_the_window_is_arranged(window: MainWindow) -> None:
     assert not window.presenter.on
     drawn = []

@@ -28,6 +28,7 @@ def _drop(window: MainWindow, file: Path) -> None:
     QApplication.sendEvent(window, QDropEvent(QPointF(9, 9), copy, data, some, none))
 
 
+@pytest.mark.full
 def test_each_kind_of_file_is_taken_and_others_are_passed_over(window: MainWindow) -> None:
     dropped_on = window.opening.drops.dropped_on
     for name in ("a.mcap", "a.mcap.part", "a.toml", "A.STL", "a.ply", "a.obj"):
@@ -48,6 +49,7 @@ def _write_obj(file: Path) -> Path:
     return file
 
 
+@pytest.mark.full
 def test_scenes_and_meshes_dropped_are_played_and_listed_until_cleared(
     window: MainWindow, tmp_path: Path, until
 ) -> None:
@@ -74,6 +76,7 @@ def test_scenes_and_meshes_dropped_are_played_and_listed_until_cleared(
     assert window.opening.recent == []
 
 
+@pytest.mark.full
 def test_what_cannot_be_opened_says_why_and_is_not_listed(
     window: MainWindow, tmp_path: Path
 ) -> None:
@@ -106,6 +109,7 @@ def test_a_calibration_given_at_the_start_waits_for_the_sensor_it_is_of(
     assert "no sensor" not in window.statusBar().currentMessage()
 
 
+@pytest.mark.full
 def test_a_scene_given_at_the_start_is_played_at_once(
     opened: Callable[..., MainWindow], tmp_path: Path
 ) -> None:

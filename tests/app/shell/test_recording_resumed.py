@@ -37,6 +37,7 @@ def folder() -> Iterator[Path]:
         yield Path(place)
 
 
+@pytest.mark.full
 def test_the_next_window_goes_on_as_the_last_one_was(
     opened, abandoned, folder: Path, tmp_path: Path, until, monkeypatch: pytest.MonkeyPatch
 ) -> None:

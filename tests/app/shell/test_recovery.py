@@ -23,6 +23,7 @@ def leave(folder: Path, last: LastSession = LAST) -> None:
     file.write_text(json.dumps({**said, "recording": last.recording}))
 
 
+@pytest.mark.full
 def test_a_window_that_is_killed_leaves_what_it_was_at_once(tmp_path: Path) -> None:
     lines = (
         "import os, pathlib; from kappaskin_app.shell.recovery import *;"
@@ -52,6 +53,7 @@ def test_what_cannot_be_read_is_forgotten(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.full
 def test_after_a_crash_its_settings_are_offered_and_can_be_undone(
     window: MainWindow, tmp_path: Path, until
 ) -> None:
@@ -69,12 +71,14 @@ def test_after_a_crash_its_settings_are_offered_and_can_be_undone(
     recovering.close()
 
 
+@pytest.mark.full
 def test_after_an_orderly_end_nothing_is_offered(window: MainWindow, tmp_path: Path) -> None:
     recovering = Recovery(window, tmp_path)
     assert not window.display.centre.banner.isVisible()
     recovering.close()
 
 
+@pytest.mark.cases(".part")
 @pytest.mark.parametrize("suffix", ["", ".part"])
 def test_a_recording_that_is_left_is_offered(
     window: MainWindow, tmp_path: Path, recording: Path, suffix: str, until
@@ -91,6 +95,7 @@ def test_a_recording_that_is_left_is_offered(
     recovering.close()
 
 
+@pytest.mark.full
 def test_a_disk_that_hangs_leaves_the_window_live(
     window: MainWindow, tmp_path: Path, until, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -114,6 +119,7 @@ def test_a_disk_that_hangs_leaves_the_window_live(
     assert not list((tmp_path / "open").iterdir())
 
 
+@pytest.mark.full
 def test_where_the_state_cannot_be_saved_it_is_said_once(
     window: MainWindow, tmp_path: Path, until
 ) -> None:

@@ -212,6 +212,7 @@ def test_a_free_load_presses_every_shape_so_that_it_shows() -> None:
         assert 3 < np.abs(scene.transduction.curvature(counts)).max() < 38
 
 
+@pytest.mark.full
 @given(
     st.sampled_from([case for case in CASES if case not in SPREAD_CASES]),
     st.sampled_from(list(SHAPES)),

@@ -74,6 +74,7 @@ def _texts(window: MainWindow) -> list[str]:
     return [stack.text(index) for index in range(stack.count())]
 
 
+@pytest.mark.full
 def test_each_turn_of_the_view_is_one_step_and_turns_of_the_wheel_are_one(
     here: MainWindow, qtbot
 ) -> None:
@@ -121,6 +122,7 @@ def test_another_skin_is_seen_from_where_the_last_one_was(here: MainWindow, unti
     assert [a - f for a, f in zip(at, focus, strict=True)] == pytest.approx([0.0, -side, side])
 
 
+@pytest.mark.full
 def test_a_dock_that_is_closed_and_a_tab_that_is_clicked_come_back(here: MainWindow, qtbot) -> None:
     for name in ("cost", "numbers"):
         here.actions_by_name[f"dock-{name}"].trigger()
@@ -146,6 +148,7 @@ def test_a_dock_that_is_closed_and_a_tab_that_is_clicked_come_back(here: MainWin
     assert here.docks["cost"].visibleRegion().isEmpty()
 
 
+@pytest.mark.full
 def test_a_dock_that_is_moved_comes_back(here: MainWindow) -> None:
     curvature, left = here.docks["curvature"], Qt.DockWidgetArea.LeftDockWidgetArea
     was = here.dockWidgetArea(curvature)
@@ -158,6 +161,7 @@ def test_a_dock_that_is_moved_comes_back(here: MainWindow) -> None:
     assert here.actions_by_name["redo"].text() == "&Redo: move By element"
 
 
+@pytest.mark.full
 def test_an_edge_that_is_dragged_is_one_step(here: MainWindow, qtbot) -> None:
     dock = here.docks["settings"]
     wide, edge = dock.width(), QPoint(dock.geometry().right() + 3, dock.geometry().center().y())
@@ -174,6 +178,7 @@ def test_an_edge_that_is_dragged_is_one_step(here: MainWindow, qtbot) -> None:
     assert abs(dock.width() - wide) <= 2
 
 
+@pytest.mark.full
 def test_a_window_that_grows_for_a_dock_has_that_as_a_step(here: MainWindow) -> None:
     here.resize(here.minimumSizeHint())
     _settle()
@@ -185,6 +190,7 @@ def test_a_window_that_grows_for_a_dock_has_that_as_a_step(here: MainWindow) -> 
     assert _texts(here) == ["show Cost of accuracy"]
 
 
+@pytest.mark.full
 def test_what_is_undone_at_once_is_what_was_done_last(here: MainWindow) -> None:
     here.requests.set("letters", 110.0)
     _settle()
@@ -212,6 +218,7 @@ def test_a_list_of_files_that_was_cleared_comes_back(here: MainWindow) -> None:
     assert here.opening.recent == files
 
 
+@pytest.mark.full
 def test_with_nothing_to_undo_the_action_says_so(here: MainWindow) -> None:
     undo: Callable[[], bool] = here.actions_by_name["undo"].isEnabled
     assert not undo()
@@ -249,6 +256,7 @@ def test_places_beside_the_skin_that_there_is_now_do_not_come_back(here: MainWin
     measuring.set_places(None)
 
 
+@pytest.mark.full
 def test_the_element_that_was_picked_before_comes_back_and_then_its_dock_goes(
     here: MainWindow,
 ) -> None:
@@ -276,6 +284,7 @@ def test_an_element_that_the_skin_has_no_more_is_not_picked_again(here: MainWind
     assert here.selected_element.element == -1
 
 
+@pytest.mark.full
 def test_the_place_in_a_lesson_comes_back_with_its_settings(here: MainWindow) -> None:
     teaching, undo, before = here.teaching, here.actions_by_name["undo"], here.history.settings
     teaching.look()

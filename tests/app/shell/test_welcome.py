@@ -92,6 +92,7 @@ def test_it_goes_by_itself_but_not_while_somebody_is_at_it(bench: Bench, until) 
     until(lambda: not bench.offer.isVisible())
 
 
+@pytest.mark.full
 def test_ways_to_begin_never_cover_the_skin_and_are_not_shown_again_where_unwanted(
     window: MainWindow, tmp_path: Path, until, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -123,6 +124,7 @@ def test_ways_to_begin_never_cover_the_skin_and_are_not_shown_again_where_unwant
     until(lambda: window.lesson.isVisible())
 
 
+@pytest.mark.full
 def test_ways_to_begin_go_when_something_is_begun_and_give_way_to_what_a_crash_left(
     window: MainWindow, tmp_path: Path
 ) -> None:

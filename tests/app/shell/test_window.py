@@ -22,6 +22,7 @@ def test_no_view_is_blank(window: MainWindow, until, colours_in) -> None:
         until(lambda cells=heatmap.cells: colours_in(window, cells) > 20)
 
 
+@pytest.mark.full
 def test_nothing_is_cut_off_at_1280_by_800(window: MainWindow) -> None:
     assert window.minimumSizeHint().width() <= 1280
     assert window.minimumSizeHint().height() <= 800
@@ -30,6 +31,7 @@ def test_nothing_is_cut_off_at_1280_by_800(window: MainWindow) -> None:
             assert button.width() >= button.sizeHint().width()
 
 
+@pytest.mark.full
 def test_every_dock_below_has_room_for_all_that_is_in_it(window: MainWindow, until, qtbot) -> None:
     window.docks.reveal("cost")
     until(lambda: window.cost.effects.rowCount() > 0)
@@ -54,6 +56,7 @@ def test_a_line_too_long_for_its_place_begins_its_tooltip(qapp) -> None:
     assert line.tip() == "as short as can be\n\nWhat it is."
 
 
+@pytest.mark.cases("dark")
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_both_themes_draw(window: MainWindow, until, colours_in, theme: str) -> None:
     window.history.change("Theme", -1, theme=theme, colour_by="xy")
@@ -65,6 +68,7 @@ def test_both_themes_draw(window: MainWindow, until, colours_in, theme: str) -> 
     assert bar.color() == bar_palette(THEMES[theme]).button().color()
 
 
+@pytest.mark.full
 def test_a_picture_is_saved(window: MainWindow, tmp_path: Path) -> None:
     window.picture(tmp_path / "a.png")
     with pytest.raises(Refusal, match=r"nowhere/a\.png: cannot be written \(No such file"):
@@ -72,6 +76,7 @@ def test_a_picture_is_saved(window: MainWindow, tmp_path: Path) -> None:
     assert QImage(str(tmp_path / "a.png")).size() == window.size()
 
 
+@pytest.mark.full
 def test_every_number_is_whole_beside_the_mark_of_a_recording(
     window: MainWindow, tmp_path: Path, until
 ) -> None:
@@ -87,6 +92,7 @@ def test_every_number_is_whole_beside_the_mark_of_a_recording(
     until(lambda: not window.recorder.recording)
 
 
+@pytest.mark.full
 def test_every_action_is_in_a_menu_and_no_shortcut_is_used_twice(window: MainWindow) -> None:
     entries = window.actions_by_name.entries
     shortcuts = [entry.action.shortcut().toString() for entry in entries.values()]
@@ -103,6 +109,7 @@ def test_every_action_is_in_a_menu_and_no_shortcut_is_used_twice(window: MainWin
     assert registered == in_menus
 
 
+@pytest.mark.full
 def test_every_shortcut_is_read_on_a_small_screen_under_its_menu(window: MainWindow, until) -> None:
     window.actions_by_name["shortcuts"].trigger()
     sheet = window.menus.shortcuts
@@ -118,12 +125,14 @@ def test_every_shortcut_is_read_on_a_small_screen_under_its_menu(window: MainWin
     sheet.close()
 
 
+@pytest.mark.full
 def test_every_dock_has_a_name_for_saved_layouts(window: MainWindow) -> None:
     names = [dock.objectName() for dock in window.findChildren(QDockWidget)]
     assert all(names)
     assert window.restoreState(window.saveState())
 
 
+@pytest.mark.full
 def test_pages_are_turned_with_the_keyboard_and_every_title_is_whole(
     window: MainWindow, qtbot
 ) -> None:
@@ -140,6 +149,7 @@ def test_pages_are_turned_with_the_keyboard_and_every_title_is_whole(
     assert bar.sizeHint().width() <= panels.width()
 
 
+@pytest.mark.full
 def test_the_heatmaps_keep_their_share_of_a_wider_window(window: MainWindow, until) -> None:
     was = window.heatmaps["xx"].width()
     window.resize(1920, 1100)

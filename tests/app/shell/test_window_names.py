@@ -15,6 +15,7 @@ from kappaskin_app.shell.window import MainWindow
 STORED = json.loads(Path(__file__).parents[1].joinpath("window_names.json").read_text("utf-8"))
 
 
+@pytest.mark.full
 def test_names_in_the_windows_file_are_those_that_were_promised(
     window: MainWindow, pytestconfig
 ) -> None:

@@ -20,6 +20,7 @@ from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.window import MainWindow
 
 
+@pytest.mark.full
 def test_ctrl_z_takes_back_a_change_of_settings(window: MainWindow, until, qtbot) -> None:
     window.history.change("Basis functions in x", -1, functions_x=5)
     until(lambda: window.session.estimate.coefficients.shape == (5, 8))
@@ -28,6 +29,7 @@ def test_ctrl_z_takes_back_a_change_of_settings(window: MainWindow, until, qtbot
     until(lambda: window.session.estimate.coefficients.shape == (8, 8))
 
 
+@pytest.mark.full
 def test_ctrl_z_works_while_an_editor_has_the_focus(window: MainWindow, qtbot) -> None:
     box = window.basis.editor("functions_x")
     box.setFocus()
@@ -37,6 +39,7 @@ def test_ctrl_z_works_while_an_editor_has_the_focus(window: MainWindow, qtbot) -
     assert window.history.settings.functions_x == 8
 
 
+@pytest.mark.full
 def test_the_wheel_changes_no_editor_without_the_focus(window: MainWindow, qtbot) -> None:
     box = window.noise.editor("noise_seed")
     window.basis.editor("functions_x").setFocus()
@@ -55,6 +58,7 @@ def test_the_wheel_changes_no_editor_without_the_focus(window: MainWindow, qtbot
     assert window.history.settings.noise_seed == 0
 
 
+@pytest.mark.full
 def test_a_basis_the_readings_do_not_decide_is_refused_in_its_panel(
     window: MainWindow, until
 ) -> None:
@@ -66,6 +70,7 @@ def test_a_basis_the_readings_do_not_decide_is_refused_in_its_panel(
     until(lambda: not message.text())
 
 
+@pytest.mark.full
 def test_noise_turned_off_leaves_only_what_the_basis_cannot_follow(
     window: MainWindow, until
 ) -> None:
@@ -94,6 +99,7 @@ def test_steps_of_one_setting_in_a_row_are_one_to_undo(window: MainWindow, qtbot
     assert window.history.settings.functions_x == 8
 
 
+@pytest.mark.full
 def test_a_locked_range_stays_and_an_undone_one_follows_again(window: MainWindow, until) -> None:
     heatmap = window.heatmaps["xx"]
     heatmap.lock.click()
@@ -107,6 +113,7 @@ def test_a_locked_range_stays_and_an_undone_one_follows_again(window: MainWindow
     assert not heatmap.lock.isChecked()
 
 
+@pytest.mark.full
 def test_a_wrong_belief_about_the_edge_costs(window: MainWindow, until) -> None:
     window.history.change("Still", -1, load_case="centre", noise_kind="none")
     until(lambda: window.session.estimate.error_rms < 3e-5)
@@ -117,6 +124,7 @@ def test_a_wrong_belief_about_the_edge_costs(window: MainWindow, until) -> None:
     until(lambda: window.session.estimate and window.session.estimate.error_rms < 3e-5)
 
 
+@pytest.mark.full
 def test_the_colours_of_the_skin_can_be_locked_and_undone(window: MainWindow, until) -> None:
     scale = window.scale
     until(lambda: scale.bar.limits == (0.0, 5.0))
@@ -135,6 +143,7 @@ def test_the_colours_of_the_skin_can_be_locked_and_undone(window: MainWindow, un
     assert window.heatmaps["xy"].lock.isChecked()
 
 
+@pytest.mark.full
 def test_every_button_and_editor_explains_itself(window: MainWindow) -> None:
     kinds = (QAbstractSpinBox, QComboBox, QAbstractButton)
     for panel in window.panels.all():

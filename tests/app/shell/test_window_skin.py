@@ -19,6 +19,7 @@ def _shown(window: MainWindow) -> bool:
     return drawn and np.allclose(contact, [settings.x, settings.y])
 
 
+@pytest.mark.full
 def test_a_load_dragged_on_the_skin_is_where_the_mouse_let_go(
     window: MainWindow, until, qtbot
 ) -> None:
@@ -55,6 +56,7 @@ def test_a_load_cannot_be_dragged_when_nothing_comes_in(window: MainWindow, unti
     assert not window.load.editor("load_case").isEnabled()
 
 
+@pytest.mark.full
 def test_two_points_are_not_called_one(window: MainWindow, until) -> None:
     window.history.change("Two", -1, load_case="two-points", x=0.03, y=0.03, x_end=0.07, y_end=0.07)
     until(lambda: window.readouts.text("contact").count("(") == 2)
@@ -73,6 +75,7 @@ def test_turning_the_camera_does_not_move_the_load(window: MainWindow, qtbot) ->
     assert replace(window.history.settings, camera=settings.camera) == settings
 
 
+@pytest.mark.full
 def test_a_load_too_near_the_rim_is_warned_of_and_no_more_further_inside(
     window: MainWindow, until
 ) -> None:
@@ -92,6 +95,7 @@ def test_a_load_over_the_rim_is_explained_where_it_is_placed(window: MainWindow,
     until(lambda: not window.load.message.text())
 
 
+@pytest.mark.full
 def test_only_edges_that_the_skin_can_have_are_offered(window: MainWindow, until) -> None:
     def offered(panel, name: str) -> list[str]:
         box = panel.editor(name)
@@ -120,6 +124,7 @@ def _met(window: MainWindow, until) -> None:
     until(drawn)
 
 
+@pytest.mark.full
 def test_another_skin_is_drawn_bent_and_undone_flat_again(
     window: MainWindow, until, qtbot, colours_in
 ) -> None:
@@ -140,6 +145,7 @@ def test_another_skin_is_drawn_bent_and_undone_flat_again(
     assert not window.membrane.skin.patch.base_curvature
 
 
+@pytest.mark.full
 def test_a_skin_that_cannot_be_is_refused_in_its_panel_and_the_last_one_stays(
     window: MainWindow, until
 ) -> None:
@@ -156,6 +162,7 @@ def test_a_skin_that_cannot_be_is_refused_in_its_panel_and_the_last_one_stays(
     until(lambda: not message.text())
 
 
+@pytest.mark.full
 def test_too_few_elements_for_the_basis_are_said_where_they_are_chosen(
     window: MainWindow, until
 ) -> None:
@@ -167,6 +174,7 @@ def test_too_few_elements_for_the_basis_are_said_where_they_are_chosen(
     assert len(window.heatmaps["xx"].cells.grab().toImage().size().toTuple()) == 2
 
 
+@pytest.mark.full
 def test_a_round_skin_is_made_beside_the_window_and_drawn_round(
     window: MainWindow, until, colours_in
 ) -> None:
@@ -183,6 +191,7 @@ def test_a_round_skin_is_made_beside_the_window_and_drawn_round(
     assert window.session.scene.edge == "hinged"
 
 
+@pytest.mark.full
 def test_a_load_dragged_on_a_bent_skin_is_where_the_mouse_let_go(
     window: MainWindow, until, qtbot
 ) -> None:
@@ -203,6 +212,7 @@ def test_a_load_dragged_on_a_bent_skin_is_where_the_mouse_let_go(
     assert (end - start - QPoint(-72, 32)).manhattanLength() <= 12
 
 
+@pytest.mark.full
 def test_escape_puts_a_dragged_load_back_and_leaves_nothing_to_redo(
     window: MainWindow, until, qtbot
 ) -> None:
@@ -222,6 +232,7 @@ def test_escape_puts_a_dragged_load_back_and_leaves_nothing_to_redo(
     assert not window.history.stack.canRedo()
 
 
+@pytest.mark.full
 def test_no_height_leaves_the_picture_and_the_true_one_is_written(
     window: MainWindow, until
 ) -> None:
@@ -235,6 +246,7 @@ def test_no_height_leaves_the_picture_and_the_true_one_is_written(
     assert written == pytest.approx(view.skin.deepest / window.display.ranges.deepest(), rel=5e-3)
 
 
+@pytest.mark.full
 def test_the_whole_skin_is_seen_from_every_side(window: MainWindow, until) -> None:
     window.requests.set("shape", "cylinder")
     _met(window, until)

@@ -11,6 +11,7 @@ from kappaskin_app.shell.settings.scene import READY_CASES
 from kappaskin_app.shell.window import MainWindow
 
 
+@pytest.mark.full
 def test_the_simulation_is_shown_as_a_simulation(window: MainWindow, until) -> None:
     until(lambda: window.display.badge.state == "SIM")
     units = {"contact": " mm", "rms": " mm", "age": " ms", "force": " mN"}
@@ -25,6 +26,7 @@ def test_a_port_typed_is_the_port_meant(window: MainWindow, qtbot) -> None:
     assert window.connection.source() == "/dev/ttyACM1"
 
 
+@pytest.mark.full
 def test_an_absent_port_says_why_and_the_simulation_comes_back(window: MainWindow, until) -> None:
     window.connection.sources.setCurrentText("/dev/ttyNOWHERE")
     window.connection.connect_button.click()
@@ -36,6 +38,7 @@ def test_an_absent_port_says_why_and_the_simulation_comes_back(window: MainWindo
     assert not window.connection.message.isVisible()
 
 
+@pytest.mark.full
 def test_a_scene_of_its_own_is_shown_as_it_is_and_leaves_the_load_to_itself(opened, until) -> None:
     window = opened("sim:calibration")
     until(lambda: window.session.estimate is not None)
@@ -67,11 +70,13 @@ def test_an_unknown_scene_is_refused_with_those_there_are(opened, until, name: s
     assert window.history.settings.load_case == "circle"
 
 
+@pytest.mark.full
 def test_disconnecting_is_said(window: MainWindow, until) -> None:
     window.actions_by_name["disconnect"].trigger()
     until(lambda: window.display.badge.state == "OFF")
 
 
+@pytest.mark.full
 def test_a_killed_engine_is_started_again_and_what_was_chosen_simulated(
     window: MainWindow, until
 ) -> None:
@@ -84,6 +89,7 @@ def test_a_killed_engine_is_started_again_and_what_was_chosen_simulated(
     until(lambda: len(window.membrane.ages) > drawn + 5)
 
 
+@pytest.mark.full
 def test_connecting_is_called_waiting(window: MainWindow, until) -> None:
     window.session.status = replace(window.session.status, state="waiting")
     assert window.session.badge() == "WAITING"

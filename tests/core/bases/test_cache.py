@@ -53,6 +53,7 @@ def test_a_damaged_file_is_computed_anew_and_mended(folder: Path, cut: int):
     assert np.array_equal(answer["roots"], np.sqrt(np.arange(4)))
 
 
+@pytest.mark.full
 def test_whichever_byte_is_spoilt_it_is_computed_anew(folder: Path):
     compute = Asked()
     cached("roots", compute)

@@ -166,6 +166,7 @@ def coverage(found, sd, true):
 FOUR_SIGMA = 4 * math.sqrt(0.95 * 0.05 / 300)
 
 
+@pytest.mark.full
 def test_without_loops_gains_and_offsets_lie_within_their_standard_errors(plain):
     gain, offset = TOLERANCE.errors((300,))
     assert plain.passed.all()
@@ -183,6 +184,7 @@ def test_without_loops_almost_no_channel_is_given_any(plain):
     assert np.abs(errors).max() < 0.25
 
 
+@pytest.mark.full
 def test_with_loops_gains_and_offsets_lie_within_their_standard_errors(second):
     gain, offset = TOLERANCE.errors((300,))
     assert second.passed.all()
@@ -209,6 +211,7 @@ def test_the_report_shows_the_loops_and_what_is_left_of_them(second):
     assert np.median(second.noise) == pytest.approx(0.23, rel=0.05)
 
 
+@pytest.mark.full
 def test_a_skin_that_was_bent_before_is_calibrated_as_well_as_one_at_rest():
     class Used(ReadingEffect):
         """The second prototype's loops, with a past."""
@@ -404,6 +407,7 @@ def creeping():
     return report_of(*effects, steps=schedule(hold=20.0))
 
 
+@pytest.mark.full
 def test_a_hold_tells_the_creep(creeping):
     creep = creeping.calibration.creep
     assert creep.time_constant == pytest.approx(4.0, rel=0.03)

@@ -162,6 +162,7 @@ def test_a_shift_of_the_bridge_is_undone_inside_the_loops():
     assert np.allclose(corrected, rising, atol=3 * SENSOR.transduction.resolution)
 
 
+@pytest.mark.full
 def test_what_loops_still_hold_of_a_bend_is_not_in_it():
     scene = replace(SCENE, effects=())
     pipeline = Pipeline(SENSOR, Setup(calibration=calibration_of(hysteresis=LOOPS)))
@@ -208,7 +209,7 @@ def test_a_corrector_that_remembers_nothing_leaves_nothing():
 # Refused
 
 
-@pytest.mark.cases("demo", "fingertip", "line", "on-foam", "tapping", "two-contacts")
+@pytest.mark.cases("demo", "fingertip", "on-foam", "tapping")
 @pytest.mark.parametrize("name", [name for name in SCENES if not load_scene(name).laid])
 def test_every_ready_scene_is_refused_while_it_presses_and_tared_when_it_does_not(name):
     scene = load_scene(name)
@@ -436,6 +437,7 @@ def test_noise_is_no_drift():
     assert drift.displacement < 1e-5
 
 
+@pytest.mark.full
 def test_drift_tells_the_displacement_that_it_looks_like():
     warm = Temperature(rise=10.0, time_constant=0.01, offset=0.2)
     drift = drift_after(replace(SCENE, effects=(GaussianNoise(0.1), warm)))

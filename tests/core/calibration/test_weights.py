@@ -41,6 +41,7 @@ def found(masses=MASSES, skin=None, sensor=SENSOR) -> KnownWeights:
     return WeightFit(sensor)(newtons(masses), readings(skin or HINGED, masses))
 
 
+@pytest.mark.full
 @pytest.mark.truth
 def test_the_rigidity_of_a_hinged_plate_is_found_within_its_standard_error() -> None:
     known = found()
@@ -53,6 +54,7 @@ def test_the_rigidity_of_a_hinged_plate_is_found_within_its_standard_error() -> 
     assert known.lines()[-1].startswith("passed")
 
 
+@pytest.mark.cases("masses0")
 @pytest.mark.truth
 @pytest.mark.parametrize("masses", [(2, 5, 10, 4, 8, 12), (2, 5, 20, 4, 15, 30)])
 def test_the_thickness_by_which_a_held_sheet_stiffens_is_found(masses) -> None:
@@ -77,6 +79,7 @@ def test_of_an_edge_that_gives_the_rigidity_is_within_its_standard_error(springs
     assert known.passed
 
 
+@pytest.mark.full
 def test_a_weight_that_is_wrong_is_named() -> None:
     weights = list(newtons(MASSES))
     bent = readings(HINGED)
@@ -86,6 +89,7 @@ def test_a_weight_that_is_wrong_is_named() -> None:
     assert "failed: weight 3 is told -9." in known.lines()[-1]
 
 
+@pytest.mark.full
 def test_a_wrong_boundary_condition_fails() -> None:
     masses = (10.0,) * 5
     clamped = ArgyrisPlate(rigidity=RIGIDITY, edge="clamped")
@@ -147,6 +151,7 @@ def test_masses_in_kilograms_are_noticed_at_the_first_weight() -> None:
         weighing.take(HINGED.readings(Load(0.05, 0.05, heavy, radius=4e-3), at).reshape(1, -1))
 
 
+@pytest.mark.full
 def test_weights_make_measured_gains_no_younger() -> None:
     later, known = NOW + timedelta(days=170), found()
     nominal = Calibration.nominal(SENSOR, NOW)
@@ -161,6 +166,7 @@ def test_a_drum_head_is_refused() -> None:
         WeightFit(drum)
 
 
+@pytest.mark.full
 def test_each_step_says_what_it_found_and_can_be_repeated() -> None:
     weighing, bent = Weighing(SENSOR, MASSES), readings(HINGED)
 
@@ -191,6 +197,7 @@ def test_each_step_says_what_it_found_and_can_be_repeated() -> None:
     assert known.rigidity == pytest.approx(RIGIDITY, rel=0.005)
 
 
+@pytest.mark.cases("stretching")
 @pytest.mark.parametrize("skin", ["stretching", "on-foam", "sphere"])
 def test_a_simulation_lays_the_weights_on_itself(skin) -> None:
     told: list[str] = []
@@ -201,6 +208,7 @@ def test_a_simulation_lays_the_weights_on_itself(skin) -> None:
     assert known.rigidity == pytest.approx(sensor.plate.rigidity, rel=0.04)
 
 
+@pytest.mark.full
 def test_the_force_then_needs_no_modulus() -> None:
     """The sensor tells a rigidity that is 27 % too low, and its forces are as much too low."""
     known = found()
@@ -215,6 +223,7 @@ def test_the_force_then_needs_no_modulus() -> None:
     assert force == pytest.approx([true / 1.37, true], rel=0.01)
 
 
+@pytest.mark.full
 def test_what_weights_found_is_kept_in_the_file(tmp_path) -> None:
     known = found()
     nominal = replace(Calibration.nominal(SENSOR, NOW), weights=known)
@@ -226,6 +235,7 @@ def test_what_weights_found_is_kept_in_the_file(tmp_path) -> None:
     assert replace(nominal, weights=None).plate(SENSOR.plate) == SENSOR.plate
 
 
+@pytest.mark.full
 def test_all_that_resists_grows_by_the_same_share() -> None:
     known = replace(found(), thickness=0.0)
     told = Plate(SENSOR.plate.patch, rigidity=RIGIDITY / 2, tension=10.0, foundation=1e5)
@@ -234,6 +244,7 @@ def test_all_that_resists_grows_by_the_same_share() -> None:
     assert (plate.tension, plate.foundation) == (10.0 * ratio, 1e5 * ratio)
 
 
+@pytest.mark.cases("change1")
 @pytest.mark.parametrize(
     "change",
     [
@@ -249,6 +260,7 @@ def test_what_no_weights_can_find_is_refused(change) -> None:
         replace(found(), **change)
 
 
+@pytest.mark.full
 @pytest.mark.truth
 def test_weights_on_heights_and_slopes_of_an_unknown_zero_give_the_rigidity() -> None:
     layout = SENSOR.layout.reading_each(["height", "slope@0", "slope@90"])

@@ -341,6 +341,7 @@ def serving(dwell: float, steps=STEPS) -> Iterator[PseudoDevice]:
         device.close()
 
 
+@pytest.mark.full
 def test_a_device_on_the_line_is_calibrated_within_the_standard_errors(run, tmp_path) -> None:
     out = tmp_path / "s.toml"
     with serving(dwell=0.05, steps=schedule()) as device:
@@ -360,6 +361,7 @@ def test_a_device_on_the_line_is_calibrated_within_the_standard_errors(run, tmp_
 WEIGHTS = ("--weights", "5,10,20,10,5")
 
 
+@pytest.mark.full
 def test_known_weights_extend_a_calibration_and_their_figures_are_printed(run, tmp_path) -> None:
     first, out = tmp_path / "first.toml", tmp_path / "s.toml"
     assert run("calibrate", "sim:calibration", "--out", first, *FAST)[0] == 0
@@ -373,6 +375,7 @@ def test_known_weights_extend_a_calibration_and_their_figures_are_printed(run, t
     assert found.weights.rigidity == pytest.approx(SCENE.plate.rigidity, rel=0.03)
 
 
+@pytest.mark.full
 def test_without_a_calibration_known_weights_take_the_readings_as_they_are(run, tmp_path) -> None:
     out = tmp_path / "s.toml"
     code, printed, told = run("calibrate", "sim:centre", "--out", out, *WEIGHTS)

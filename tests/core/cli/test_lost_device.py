@@ -46,6 +46,7 @@ def port(tmp_path_factory) -> Iterator[str]:
     thread.join()
 
 
+@pytest.mark.cases("record", "tare")
 @pytest.mark.parametrize(
     ("command", "code", "why"),
     [

@@ -36,6 +36,7 @@ def recorded(tmp_path_factory) -> Path:
     return path
 
 
+@pytest.mark.full
 def test_stopped_it_ends_its_file(tmp_path) -> None:
     path = tmp_path / "a.mcap"
     command = [sys.executable, "-m", "kappaskin", "record", "sim:circle", str(path)]
@@ -68,6 +69,7 @@ def engine_of(process: subprocess.Popen[str], begun: Callable[[], bool]) -> psut
     raise AssertionError("no engine was begun")
 
 
+@pytest.mark.full
 def test_an_engine_that_is_killed_is_told_and_what_it_recorded_is_completed(tmp_path) -> None:
     path = tmp_path / "a.mcap"
     command = [sys.executable, "-m", "kappaskin", "record", "sim:circle", str(path)]
@@ -87,6 +89,7 @@ def test_an_engine_that_is_killed_is_told_and_what_it_recorded_is_completed(tmp_
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.full
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="no process can be stopped")
 def test_an_engine_that_hangs_is_ended_and_what_it_recorded_is_completed(tmp_path) -> None:
     path = tmp_path / "a.mcap"
@@ -108,6 +111,7 @@ def test_an_engine_that_hangs_is_ended_and_what_it_recorded_is_completed(tmp_pat
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.full
 def test_publishing_ends_where_its_engine_is_killed_again_and_again() -> None:
     command = [sys.executable, "-m", "kappaskin", "publish", "sim:circle", "--udp", "127.0.0.1:9"]
     with subprocess.Popen(
@@ -145,6 +149,7 @@ def test_no_file_is_written_over(tmp_path, capsys) -> None:
     assert out.read_bytes() == b"mine"
 
 
+@pytest.mark.full
 def test_info_tells_what_is_in_it(recorded, capsys) -> None:
     assert main(["info", str(recorded)]) == 0
     told = capsys.readouterr().out

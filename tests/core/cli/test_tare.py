@@ -45,6 +45,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path / "tares"
 
 
+@pytest.mark.full
 @pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 def test_a_recording_has_its_settings_before_and_with_the_tare_once_each(tmp_path) -> None:
@@ -59,6 +60,7 @@ def test_a_recording_has_its_settings_before_and_with_the_tare_once_each(tmp_pat
     assert setups[-1]
 
 
+@pytest.mark.full
 def test_a_tare_is_told_and_kept_and_undone(folder, capsys):
     with device_of(AT_REST) as port:
         assert main(["tare", port]) == 0
@@ -87,6 +89,7 @@ def test_a_loaded_skin_is_refused_with_the_reason_and_nothing_is_kept(folder, ca
     assert not folder.exists()
 
 
+@pytest.mark.full
 def test_a_simulated_sensor_s_is_only_told(folder, capsys):
     code = main(["tare", "sim:centre"])
     assert code == 2

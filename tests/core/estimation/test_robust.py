@@ -94,6 +94,7 @@ def test_one_element_in_twenty_bad_costs_no_more_than_one_in_twenty_dead(name, s
     assert rms(answer, name) <= 1.2 * rms(known, name)
 
 
+@pytest.mark.cases("line")
 @pytest.mark.parametrize("name", CASES)
 def test_good_frames_are_answered_by_plain_least_squares(name):
     K = frames(name, 300)

@@ -65,6 +65,7 @@ def assert_scaled(found, expected, k, off=1e-9):
         np.testing.assert_allclose(back, np.where(known, value, 0.0), 0, off * size, err_msg=name)
 
 
+@pytest.mark.cases("fast", "bayes", "finite-slope", "tracking")
 @every_method
 @pytest.mark.parametrize("missing", [(), (4, 5, 6)], ids=["whole", "missing"])
 @settings(max_examples=25, deadline=None)

@@ -247,6 +247,7 @@ def test_tracking_a_moving_shape_beats_fitting_each_frame():
     assert tracked < 0.7 * alone
 
 
+@pytest.mark.full
 def test_readings_at_their_own_times_beat_one_time_for_all():
     errors = []
     for seed in range(3):
@@ -480,6 +481,7 @@ def test_more_functions_than_readings_have_wide_error_bars_and_no_refusal():
     assert 0.85 < np.mean(np.abs(scores) < 1.96) <= 1
 
 
+@pytest.mark.cases("float32")
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_twenty_thousand_steps_leave_the_covariance_definite_and_where_it_was(dtype):
     rng = np.random.default_rng(0)

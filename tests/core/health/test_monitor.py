@@ -347,7 +347,7 @@ def test_a_channel_that_recovers_is_trusted_again_in_two_turns_of_the_load(spoil
     assert not looks[-1][1].any()
 
 
-@pytest.mark.cases("demo", "fingertip", "line", "on-foam", "tapping", "two-contacts")
+@pytest.mark.cases("demo", "fingertip", "line", "on-foam")
 @pytest.mark.parametrize("name", [n for n in SCENES if n not in ("failing-elements", "saturation")])
 def test_no_healthy_scene_has_a_finding(name) -> None:
     scene = load_scene(name)
@@ -380,6 +380,7 @@ def after_jumps(seed):
     return np.any([kinds > 0 for _, kinds in looks], axis=0)
 
 
+@pytest.mark.full
 def test_a_point_that_jumps_anywhere_and_rests_there_accuses_hardly_any_channel() -> None:
     assert sum(after_jumps(seed).sum() for seed in range(4)) <= 2  # of 1200
 
@@ -394,6 +395,7 @@ def test_what_the_device_calls_dead_is_told_at_once_and_on_a_strip_no_more_than_
     assert (finding.channel, finding.kind, finding.figure) == (4, "dead", "reported by the device")
 
 
+@pytest.mark.full
 def test_frames_that_hold_a_tenth_of_the_channels_in_turn_are_enough() -> None:
     parts = np.arange(300).reshape(10, 30)
 

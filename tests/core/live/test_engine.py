@@ -113,6 +113,7 @@ def test_a_steep_shape_is_warned_of_until_the_method_knows_slopes(engine) -> Non
     assert wait_for(lambda: engine.status().slope == 0)
 
 
+@pytest.mark.full
 def test_failing_channels_are_told_with_what_leaving_them_out_costs(engine) -> None:
     engine.connect("sim:failing-elements")
     assert wait_for(lambda: {f.element for f in engine.status().health.findings} >= {44, 45, 63})
@@ -251,6 +252,7 @@ def test_another_skin_is_met_as_another_device_is(engine) -> None:
     assert after.true_contact.tolist() == [0.02, 0.015]
 
 
+@pytest.mark.full
 def test_between_two_skins_there_is_nothing_to_show(engine) -> None:
     engine.connect("sim:centre")
     next_estimate(engine)
@@ -575,6 +577,7 @@ def parent(tmp_path, request) -> Iterator[tuple[subprocess.Popen[str], int, Path
         process.kill()
 
 
+@pytest.mark.cases("parent0")
 @pytest.mark.parametrize("parent", [[], ["computing"]], indirect=True)
 def test_an_engine_whose_parent_was_killed_ends_within_a_second(parent) -> None:
     process, pid, block = parent
@@ -587,6 +590,7 @@ def test_an_engine_whose_parent_was_killed_ends_within_a_second(parent) -> None:
     assert wait_for(lambda: not block.exists())
 
 
+@pytest.mark.full
 def test_a_parent_that_ends_as_it_should_leaves_nothing_and_says_nothing(parent) -> None:
     process, pid, block = parent
     _, errors = process.communicate("", timeout=30)
@@ -653,6 +657,7 @@ def tared(engine: Engine) -> TareStatus:
     return news
 
 
+@pytest.mark.full
 def test_a_tare_is_taken_used_and_its_drift_told(engine: Engine) -> None:
     engine.connect("sim:centre")
     engine.play(AT_REST)
@@ -763,6 +768,7 @@ def test_one_that_hangs_is_said_to_and_connecting_replaces_it(own_engine, monkey
     assert state(engine, STREAMING).message == ""
 
 
+@pytest.mark.full
 @pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="no process can be stopped")
 def test_one_that_hangs_while_it_prepares_a_setup_is_said_to(own_engine, monkeypatch) -> None:
     engine = own_engine

@@ -75,6 +75,7 @@ def target(engine: Engine, within: float = 30.0) -> TargetStatus:
 # The engine
 
 
+@pytest.mark.full
 def test_nothing_is_sent_before_it_is_asked_for_nor_after(engine, receiver, port) -> None:
     engine.connect("sim:centre")
     receiver.settimeout(1.0)
@@ -237,6 +238,7 @@ def test_publish_sends_what_listen_tells(start) -> None:
     assert re.search(r"\d+ contacts received, \d+ lost", told.splitlines()[-1])
 
 
+@pytest.mark.full
 @pytest.mark.skipif(sys.platform == "win32", reason="signals as POSIX has them")
 def test_both_end_quietly_when_stopped(start, receiver, port) -> None:
     publishing = start("publish", "sim:centre", "--udp", f"127.0.0.1:{port}")
@@ -291,6 +293,7 @@ def serving(port: int) -> bool:
         return one.connect_ex(("127.0.0.1", port)) == 0
 
 
+@pytest.mark.full
 def test_a_web_page_reads_with_the_option_that_its_refusal_names(start) -> None:
     page, port = "https://app.foxglove.dev", free_port()
     words = ("publish", "sim:centre", "--foxglove", f"127.0.0.1:{port}")
@@ -310,6 +313,7 @@ def test_a_web_page_reads_with_the_option_that_its_refusal_names(start) -> None:
     assert "serverInfo" not in knocks(port, "https://evil.example")
 
 
+@pytest.mark.cases("0123456789abcdef")
 @pytest.mark.parametrize("token", ["0123456789abcdef", ""])
 def test_publish_to_other_machines_prints_the_url_with_the_token(start, monkeypatch, token) -> None:
     monkeypatch.setenv("KAPPASKIN_TOKEN", token)
@@ -323,6 +327,7 @@ def test_publish_to_other_machines_prints_the_url_with_the_token(start, monkeypa
     assert not any(printed in word for word in psutil.Process(publishing.pid).cmdline())
 
 
+@pytest.mark.full
 def test_a_token_that_is_too_short_is_refused(start, monkeypatch) -> None:
     monkeypatch.setenv("KAPPASKIN_TOKEN", "secret")
     publishing = start("publish", "sim:", "--foxglove", f"0.0.0.0:{free_port()}")
@@ -348,6 +353,7 @@ def test_other_origins_open_the_server_again_and_leave_the_rest(engine, receiver
     until(lambda: "--allow-origin" in knocks(served, "https://a"))
 
 
+@pytest.mark.full
 def test_publish_fails_where_there_is_nothing_to_send(run, port) -> None:
     code, said, _ = run("publish", "/dev/nowhere", "--udp", f"127.0.0.1:{port}", "--seconds", 3)
     assert code == 1
@@ -359,6 +365,7 @@ def test_listen_refuses_what_is_no_port_or_no_time(run) -> None:
     assert run("listen", "--seconds", "nan")[0] == 2
 
 
+@pytest.mark.full
 def test_listen_fails_where_nothing_came_and_prints_json_if_asked(run, start) -> None:
     port = free_port()
     assert run("listen", "--udp", port, "--seconds", 0.2)[0] == 1

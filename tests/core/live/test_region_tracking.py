@@ -112,6 +112,7 @@ def test_a_load_elsewhere_is_seen_through_the_elements_in_turn():
     assert seen[-1][1].contact.position == pytest.approx([0.08, 0.075], abs=1e-3)
 
 
+@pytest.mark.full
 def test_without_a_share_of_the_others_a_contact_is_off_by_no_more_than_it_moved_meanwhile():
     loop = Loop(Region("skin", radius=0.015, share=0.0, rate=RATE))
 

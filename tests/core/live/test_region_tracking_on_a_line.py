@@ -135,6 +135,7 @@ def test_a_region_off_the_skin_is_refused_and_everything_scanned(source):
     read_until(source, scans(*range(100)))
 
 
+@pytest.mark.full
 def test_a_device_that_began_anew_scans_the_region_again(source, device):
     track_region(source, Region("elements", elements=ELEMENTS, share=0.0))
     before = read_until(source, lambda f: scans(*ELEMENTS)(f) and f.sequence > 40)
@@ -198,6 +199,7 @@ def wait_for(holds, within=30.0):
         time.sleep(0.01)
 
 
+@pytest.mark.full
 def test_a_deaf_device_is_told_of_and_goes_on(device, monkeypatch):
     monkeypatch.setattr(PseudoDevice, "_listen", lambda self: None)
     source = SerialSource(device.port)

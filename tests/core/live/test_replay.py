@@ -187,6 +187,7 @@ def test_another_setup_is_seen_of_a_recording_that_stands(engine: Engine) -> Non
     assert b.coefficients.shape == (3, 3)
 
 
+@pytest.mark.full
 def test_a_recording_goes_on_through_a_replay_which_is_not_recorded(
     recording: Path, tmp_path: Path
 ) -> None:

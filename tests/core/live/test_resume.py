@@ -140,6 +140,7 @@ def test_a_recording_outlives_a_killed_parent_and_is_adopted_without_a_gap(
     assert ((died < contacts) & (contacts < came)).sum() > 10  # of as many as there was time for
 
 
+@pytest.mark.full
 def test_adopted_it_is_revived_as_any_other_when_it_dies(abandoned, folder, tmp_path) -> None:
     engine_alone = abandoned(folder, tmp_path / "x.mcap")
     assert wait_for(lambda: list(folder.glob("*.note")))
@@ -157,6 +158,7 @@ def test_adopted_it_is_revived_as_any_other_when_it_dies(abandoned, folder, tmp_
     assert wait_for(lambda: not any(block.exists() for block in engine_alone.blocks))
 
 
+@pytest.mark.full
 def test_one_for_whom_nobody_comes_ends_its_file_and_leaves_nothing(
     abandoned, folder, tmp_path
 ) -> None:
@@ -170,6 +172,7 @@ def test_one_for_whom_nobody_comes_ends_its_file_and_leaves_nothing(
     assert not any(block.exists() for block in engine_alone.blocks)
 
 
+@pytest.mark.full
 def test_one_that_does_not_record_ends_with_its_parent(abandoned, folder) -> None:
     engine_alone = abandoned(folder, None)
     assert wait_for(lambda: engine_alone.gone, within=10.0)  # where its patience is 20 s

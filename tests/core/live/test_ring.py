@@ -225,6 +225,7 @@ def all_of(number: float) -> Estimate:
     return Estimate(**parts | {"contact": contact, "second": contact, "geometry": geometry})
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_another_process_never_shows_half_an_estimate_or_half_a_status(ring, monkeypatch) -> None:
     monkeypatch.setattr("kappaskin.live.ring._MOST_SLOTS", 2)
@@ -381,6 +382,7 @@ time.sleep(60)
 """
 
 
+@pytest.mark.full
 @LINUX
 @pytest.mark.slow
 def test_blocks_that_another_process_uses_stay_until_it_ended() -> None:

@@ -95,6 +95,7 @@ def harm(tree: ast.AST) -> Iterator[str]:
                     yield keyword.arg
 
 
+@pytest.mark.full
 def test_nothing_that_comes_from_elsewhere_is_run() -> None:
     found = {
         (file.name, what)

@@ -95,6 +95,7 @@ class Truth:
         return Frame(0, 0.0, 0.0, np.arange(true.size), counts)
 
 
+@pytest.mark.cases("heights")
 @pytest.mark.slow
 @every_kind
 def test_intervals_of_a_contact_hold_the_truth_as_often_as_they_say(kind):
@@ -117,6 +118,7 @@ def test_intervals_of_a_contact_hold_the_truth_as_often_as_they_say(kind):
     assert force < 0.01
 
 
+@pytest.mark.cases("rosettes", "heights")
 @pytest.mark.slow
 @every_kind
 def test_error_bars_of_the_shape_hold_the_truth(kind):

@@ -273,6 +273,7 @@ print(json.dumps({name: bool(whether) for name, whether in found.items()}))
 """
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_quantities_added_to_the_table_are_in_every_file_message_and_slot(
     recording: Path, tmp_path: Path

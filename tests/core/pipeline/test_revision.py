@@ -12,6 +12,7 @@ import estimates
 from kappaskin.pipeline import REVISION
 
 
+@pytest.mark.full
 def test_the_revision_is_raised_where_an_estimate_of_the_same_readings_changed() -> None:
     revision, kept = estimates.kept()
     found = revision, estimates.changed(estimates.computed(), kept)

@@ -442,6 +442,7 @@ def test_who_replies_to_no_ping_is_let_go(server, monkeypatch) -> None:
     until(lambda: not server.receivers)
 
 
+@pytest.mark.full
 def test_who_replies_stays_with_or_without_subscriptions(client, server, monkeypatch) -> None:
     shortened(monkeypatch)
     quiet, subscribed = client(), client("/contact")
@@ -451,6 +452,7 @@ def test_who_replies_stays_with_or_without_subscriptions(client, server, monkeyp
         assert one.ping().wait(PATIENCE)
 
 
+@pytest.mark.full
 def test_who_reads_slowly_stays(server, message, deaf, monkeypatch) -> None:
     shortened(monkeypatch)
     end = time.monotonic() + 3
@@ -464,6 +466,7 @@ def test_who_reads_slowly_stays(server, message, deaf, monkeypatch) -> None:
     assert slow.sent > 0
 
 
+@pytest.mark.full
 def test_a_server_that_was_stopped_after_a_ping_reads_the_replies_first(
     client, server, monkeypatch
 ) -> None:

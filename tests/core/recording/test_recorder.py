@@ -123,6 +123,7 @@ SETUPS = {
 }
 
 
+@pytest.mark.cases("least squares", "calibrated")
 @pytest.mark.parametrize("name", SETUPS)
 def test_what_was_live_comes_out_of_its_bytes_again_bit_for_bit(name, engine, tmp_path) -> None:
     """Begun in the middle, with all that is remembered; then with other settings."""
@@ -150,6 +151,7 @@ def test_what_was_live_comes_out_of_its_bytes_again_bit_for_bit(name, engine, tm
     assert setups == [SETUPS[name], replace(SETUPS[name], Nj=7, hold=0.2)]
 
 
+@pytest.mark.full
 def test_so_does_a_part_of_the_skin_scanned_at_a_time(engine, tmp_path) -> None:
     path = tmp_path / "a.mcap"
     engine.connect("sim:circle")
@@ -161,6 +163,7 @@ def test_so_does_a_part_of_the_skin_scanned_at_a_time(engine, tmp_path) -> None:
     assert verdict_of(path).same
 
 
+@pytest.mark.full
 def test_so_does_a_scene_that_becomes_another_skin(engine, tmp_path) -> None:
     path = tmp_path / "a.mcap"
     engine.record(path)
@@ -180,6 +183,7 @@ def test_so_does_a_scene_that_becomes_another_skin(engine, tmp_path) -> None:
         assert recording.counts[m.DEVICE.name] == 3
 
 
+@pytest.mark.cases("True")
 @pytest.mark.parametrize("from_the_beginning", [True, False])
 def test_so_does_a_device_on_a_bad_line(from_the_beginning, engine, tmp_path) -> None:
     pytest.importorskip("pty", reason="no pseudo-terminals on this system")
@@ -250,6 +254,7 @@ def theirs(path: Path) -> dict[str, list[Any]]:
     return found
 
 
+@pytest.mark.full
 def test_every_channel_is_read_by_the_decoders_of_others(recorded) -> None:
     found = theirs(recorded)
     silent = {m.LEFT_OUTS.name, m.SECONDS.name}  # of a healthy skin, touched in one place
@@ -375,6 +380,7 @@ def test_killed_at_any_moment_half_a_second_is_lost_at_most(tmp_path) -> None:
     assert np.median(lost) < 0.5  # once a busy machine may have stood still
 
 
+@pytest.mark.full
 def test_after_it_died_it_goes_on_beside_what_it_had(engine, tmp_path) -> None:
     engine.connect("sim:circle")
     engine.record(tmp_path / "a.mcap")
@@ -389,6 +395,7 @@ def test_after_it_died_it_goes_on_beside_what_it_had(engine, tmp_path) -> None:
     assert verdict_of(tmp_path / "a-2.mcap").same
 
 
+@pytest.mark.full
 def test_one_whose_parent_is_gone_ends_its_file(tmp_path) -> None:
     path = tmp_path / "a.mcap"
     command = [sys.executable, "-m", "kappaskin", "record", "sim:circle", str(path)]

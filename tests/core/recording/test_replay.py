@@ -85,6 +85,7 @@ def one(source):
     return frames[0].sequence
 
 
+@pytest.mark.full
 def test_it_is_as_long_as_it_was_with_its_gap_and_events(source) -> None:
     replay = source.replay
     assert replay.length == pytest.approx((FRAMES - 1) / RATE + GAP, abs=0.02)
@@ -95,6 +96,7 @@ def test_it_is_as_long_as_it_was_with_its_gap_and_events(source) -> None:
     assert (replay.at, replay.speed, replay.looped) == (0.0, 1.0, False)
 
 
+@pytest.mark.full
 def test_a_word_about_the_clock_ends_no_gap(tmp_path, clock, written_out) -> None:
     path = tmp_path / "gap.mcap"
     recorder = Recorder(path, 0.0)

@@ -331,6 +331,7 @@ def scenes(draw) -> Scene:
     return replace(scene, choice=draw(choices(scene)))
 
 
+@pytest.mark.full
 @pytest.mark.slow
 @settings(max_examples=80)
 @given(scenes())

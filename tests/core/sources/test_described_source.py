@@ -137,6 +137,7 @@ def test_a_recording_begun_amid_unnumbered_lines_verifies(tmp_path, columns):
     assert not verdict.missing
 
 
+@pytest.mark.full
 def test_a_board_of_other_numbers_is_said_to_be(tmp_path):
     file = written(tmp_path, "text")
     other = tmp_path / "other.toml"

@@ -87,6 +87,7 @@ def test_a_device_that_is_well_is_told_of_whole(served):
     assert [event.kind for event in found.events] == ["met"]
 
 
+@pytest.mark.full
 def test_looking_twice_finds_the_same(served):
     first, second = Diagnosis.of(served), Diagnosis.of(served)
     assert (first.device, first.why) == (second.device, second.why)
@@ -137,6 +138,7 @@ def test_a_busy_port_is_told(served):
         assert "busy" in Diagnosis.of(served).why
 
 
+@pytest.mark.full
 def test_the_command_says_in_words_and_in_json_that_a_port_is_well(served, capsys):
     assert main(["doctor", served]) == 0
     words = capsys.readouterr().out

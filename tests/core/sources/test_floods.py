@@ -298,6 +298,7 @@ def test_a_port_that_takes_long_to_open_holds_nobody_up(door: threading.Event) -
         assert source.trouble == ""
 
 
+@pytest.mark.full
 def test_a_port_that_is_refused_late_is_tried_again(door, monkeypatch) -> None:
     with closing(SerialSource("a port")) as source:
         door.refusal = "a port: no server listens at this address"

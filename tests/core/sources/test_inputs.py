@@ -255,6 +255,7 @@ def test_standard_input_is_read_until_it_is_closed(tmp_path, piped):
     assert dict(told.discarded) == {"cut off": 5}
 
 
+@pytest.mark.full
 def test_of_what_is_piped_fast_nothing_is_lost(tmp_path, piped):
     count = 60_000
     data = b"".join(line(n) for n in range(count))
@@ -279,6 +280,7 @@ def recorded(folder, source, piped=b""):
     return ran.stdout, verdict
 
 
+@pytest.mark.full
 def test_what_is_piped_reaches_the_engine(tmp_path):
     said, verdict = recorded(tmp_path, "-", b"".join(line(n) for n in range(200)))
 
@@ -286,6 +288,7 @@ def test_what_is_piped_reaches_the_engine(tmp_path):
     assert verdict.frames == 200
 
 
+@pytest.mark.full
 def test_a_file_is_recorded_to_its_end_and_replayed_the_same(tmp_path):
     data = tmp_path / "data.csv"
     data.write_bytes(b"".join(line(n, every=20) for n in range(200)))

@@ -159,6 +159,7 @@ def test_every_number_spent_is_received() -> None:
     assert (seen.bytes_discarded, seen.buffered, device.unsent, device.samples) == (0, 0, 0, 501)
 
 
+@pytest.mark.full
 def test_a_link_that_fails_spoils_messages_which_the_receiver_tells() -> None:
     clock = Clock()
     device = PseudoDevice(replace(SCENE, effects=(DroppedFrames(0.1), CorruptedFrames(0.2))), clock)
@@ -179,6 +180,7 @@ def test_a_link_that_fails_spoils_messages_which_the_receiver_tells() -> None:
     assert seen.bytes_in == seen.bytes_good + seen.bytes_discarded + seen.buffered
 
 
+@pytest.mark.full
 def test_a_listener_that_never_reads_holds_nothing_up_and_finds_out_what_it_lost() -> None:
     clock = Clock()
     device = PseudoDevice(SCENE, clock)
@@ -540,6 +542,7 @@ def test_an_engine_on_a_real_port_loses_nothing_and_follows_the_contact(device) 
     assert all(np.isnan(e.true_contact).all() for e in estimates.values())
 
 
+@pytest.mark.full
 def test_a_killed_device_is_lost_within_a_second_and_another_can_take_over(device) -> None:
     with Engine() as engine:
         engine.connect(device.port)

@@ -390,6 +390,7 @@ def test_a_plug_is_found_by_its_serial_number_under_another_name(plug, opened, m
     assert reader.told("back")
 
 
+@pytest.mark.full
 def test_a_hundred_cycles_leave_no_thread_and_no_descriptor_and_count_every_gap(plug, opened):
     device = plug()
     reader = Reader(opened(device))

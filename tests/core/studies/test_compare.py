@@ -39,6 +39,7 @@ def of(rows, work):
     return {row.by: row for row in rows if row.work.startswith(work)}
 
 
+@pytest.mark.full
 def test_the_guides_table_has_the_errors_of_a_fresh_run(rows, same_but_for_the_last_digit):
     page = PAGE.read_text("utf-8").splitlines()
     table = [line[4:] for line in page if line.startswith("    ")]

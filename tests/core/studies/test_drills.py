@@ -110,6 +110,7 @@ def test_a_frame_that_was_never_sent_so_is_found(stand) -> None:
     assert f"{outcome.wrong} wrong frames were accepted" in judged(outcome, math.inf)
 
 
+@pytest.mark.full
 def test_a_byte_that_is_nowhere_counted_is_found(stand) -> None:
     stand.settle()
     stand.relay.written += 1
@@ -133,6 +134,7 @@ def test_a_line_that_does_not_recover_is_found(stand) -> None:
     ]
 
 
+@pytest.mark.full
 def test_reads_that_take_long_again_and_again_are_found_and_one_is_not(stand, monkeypatch) -> None:
     stand.settle()
     read, naps = stand.source.read, [0.5]
@@ -178,6 +180,7 @@ def test_a_drill_that_cannot_be_done_fails_with_the_reason(device) -> None:
 # The command
 
 
+@pytest.mark.full
 def test_the_command_prints_rows_and_fails_with_them(monkeypatch, capsys) -> None:
     rows = [row | {"verdict": "failed"} for row in run_drills(chosen=())] or [
         {

@@ -62,6 +62,7 @@ def tracked():
     return [measured(FAST, region, 0.3, "tracking") for region in TRACKED]
 
 
+@pytest.mark.full
 def test_tracked_regions_at_a_fifth_of_the_channels_are_no_worse_than_tracked_full_scans(tracked):
     full, skin, _, _ = tracked
 

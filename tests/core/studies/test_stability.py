@@ -41,6 +41,7 @@ def verdicts(rows, **wanted):
 # The gallery
 
 
+@pytest.mark.full
 def test_there_is_a_row_for_every_case_method_and_precision(rows):
     assert len(rows) >= 40
     assert max(Counter((r["case"], r["method"], r["precision"]) for r in rows).values()) == 1
@@ -355,6 +356,7 @@ def test_double_double_knows_what_the_edges_decide():
     assert off_by(found, product, b) < 1e-25
 
 
+@pytest.mark.full
 def test_a_wrong_sigma_is_wrong_unless_the_answer_says_so(monkeypatch):
     case = CASES["sigma half the noise"]
     methods = {name: METHODS[name] for name in ("least-squares", "fast", "bayes", "robust")}

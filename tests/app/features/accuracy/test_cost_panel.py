@@ -15,6 +15,7 @@ from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.widgets.text import duration, length
 
 
+@pytest.mark.full
 def test_every_method_and_basis_is_measured_and_what_is_refused_is_not_drawn(
     measured: MainWindow, colours_in
 ) -> None:
@@ -175,6 +176,7 @@ def test_the_error_that_is_had_now_is_bold(measured: MainWindow, until) -> None:
         ]
 
 
+@pytest.mark.full
 def test_effects_are_judged_with_the_setting_in_use(measured: MainWindow, until) -> None:
     until(lambda: measured.measurement.effect_costs() is not None)
     was = measured.measurement.effect_costs()
@@ -249,6 +251,7 @@ def test_measuring_anew_forgets_what_was_wanted_of_the_skin_before(
 
 
 # The last on the shared window, which it leaves measured on another skin.
+@pytest.mark.full
 def test_another_basis_is_measured_too_and_another_skin_only_when_asked(
     measured: MainWindow, until
 ) -> None:

@@ -26,6 +26,7 @@ def _processes() -> list[str]:
     return [name for name in names if name == "kappaskin-cost_steps"]
 
 
+@pytest.mark.full
 def test_the_panel_is_hidden_until_f9_and_then_measures_by_itself(
     window: MainWindow, until, qtbot
 ) -> None:
@@ -41,6 +42,7 @@ def test_the_panel_is_hidden_until_f9_and_then_measures_by_itself(
     until(lambda: len(window.membrane.ages) > drawn + 2)
 
 
+@pytest.mark.full
 def test_nobody_looking_ends_the_measuring_and_a_look_takes_it_up_again(
     window: MainWindow, until
 ) -> None:
@@ -56,6 +58,7 @@ def test_nobody_looking_ends_the_measuring_and_a_look_takes_it_up_again(
     assert all(window.measurement.costs[setting] is cost for setting, cost in kept.items())
 
 
+@pytest.mark.full
 def test_the_setting_in_use_is_measured_first(window: MainWindow, until) -> None:
     window.history.change("Odd", -1, method="bayes", functions_x=7, functions_y=5)
     until(lambda: window.session.status.setup.Ni == 7)
@@ -70,6 +73,7 @@ def test_how_many_elements_there_are_is_told_once_it_is_known() -> None:
     assert setting_text(setting, 92).endswith("functions, 92 elements")
 
 
+@pytest.mark.full
 def test_a_skin_without_a_load_is_refused_in_words(window: MainWindow, until) -> None:
     window.session.scene = scene_of(Settings(load_case="point", force=0.0))
     window.actions_by_name["dock-cost"].trigger()
@@ -79,6 +83,7 @@ def test_a_skin_without_a_load_is_refused_in_words(window: MainWindow, until) ->
     assert not window.measurement.running
 
 
+@pytest.mark.full
 def test_a_real_sensor_has_no_effects_to_leave_out(window: MainWindow, until) -> None:
     window.session.source = "/dev/real"
     window.actions_by_name["dock-cost"].trigger()

@@ -236,6 +236,7 @@ def test_a_hold_is_requested_only_with_its_capture(bench: Bench) -> None:
     assert not controller.capturing
 
 
+@pytest.mark.full
 def test_unattended_steps_make_a_calibration_that_can_be_used_undone_saved_and_loaded(
     bench: Bench, until: Callable[..., None], tmp_path: Path
 ) -> None:

@@ -13,6 +13,7 @@ from kappaskin_app.features.calibration.pages import StartPage
 from kappaskin_app.shell.window import MainWindow
 
 
+@pytest.mark.full
 def test_a_refused_file_is_told_where_files_are_loaded(window, tmp_path: Path) -> None:
     window.calibration.load(tmp_path / "none.toml")
     assert "none.toml" in window.in_use.message.text()
@@ -69,6 +70,7 @@ def test_a_calibration_taken_in_the_window_mends_the_shape(
     assert _error(window, until) > 0.8 * nominal
 
 
+@pytest.mark.full
 def test_a_calibration_rests_while_another_skin_is_connected(
     window: MainWindow, until: Callable[..., None]
 ) -> None:

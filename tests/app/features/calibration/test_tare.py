@@ -273,6 +273,7 @@ def test_a_time_that_passed_is_one_number(seconds, words):
     assert ago(seconds) == words
 
 
+@pytest.mark.full
 def test_a_window_tares_a_skin_at_rest_and_refuses_a_loaded_one(window, until):
     window.history.change("Centre", -1, load_case="centre")
     until(lambda: not window.session.scene.moves and not window.session.status.computing)
@@ -294,6 +295,7 @@ def test_a_window_tares_a_skin_at_rest_and_refuses_a_loaded_one(window, until):
     assert panel.drift.text() == ""
 
 
+@pytest.mark.full
 def test_the_age_has_its_error_bar(window, until):
     def reported(age, sd):
         window.readouts.show_health(500, 60, age, sd)
@@ -306,6 +308,7 @@ def test_the_age_has_its_error_bar(window, until):
     assert reported(np.nan, np.inf) == "–"
 
 
+@pytest.mark.full
 def test_large_counts_are_told_in_few_digits(window):
     def reported(lost, discarded, skipped):
         counts = {"lost": lost, "discarded": discarded, "skipped": skipped}

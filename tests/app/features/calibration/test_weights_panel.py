@@ -18,6 +18,7 @@ def weighing(window: MainWindow, until: Callable[..., None]) -> MainWindow:
     return window
 
 
+@pytest.mark.full
 def test_weights_laid_on_in_the_window_give_the_rigidity_and_what_lay_there_returns(
     weighing: MainWindow, until: Callable[..., None], tmp_path: Path
 ) -> None:
@@ -65,6 +66,7 @@ def test_masses_that_cannot_be_are_refused_in_the_panel(
     assert weighing.weights.start.begin.isVisible()
 
 
+@pytest.mark.full
 def test_a_step_without_a_weight_is_repeated(
     weighing: MainWindow, until: Callable[..., None]
 ) -> None:
@@ -79,6 +81,7 @@ def test_a_step_without_a_weight_is_repeated(
     assert weighing.weighing.procedure.step == 1
 
 
+@pytest.mark.full
 def test_what_is_changed_meanwhile_ends_the_procedure(
     weighing: MainWindow, until: Callable[..., None]
 ) -> None:

@@ -23,6 +23,7 @@ def pairs(window: MainWindow, until) -> list[Pair]:
     return found
 
 
+@pytest.mark.full
 def test_both_are_of_the_same_frame_and_the_difference_is_theirs(
     window: MainWindow, pairs: list[Pair], until
 ) -> None:
@@ -35,6 +36,7 @@ def test_both_are_of_the_same_frame_and_the_difference_is_theirs(
     assert np.abs(pairs[-1].difference).max() > 0
 
 
+@pytest.mark.full
 def test_equal_settings_differ_by_nothing(window: MainWindow, pairs: list[Pair], until) -> None:
     window.history.change("Equal", -1, other_x=8, other_y=8)
     until(lambda: pairs[-1].b.coefficients.shape == (8, 8))
@@ -43,6 +45,7 @@ def test_equal_settings_differ_by_nothing(window: MainWindow, pairs: list[Pair],
     until(lambda: table.item(0, 3).text().startswith("+0.00"))
 
 
+@pytest.mark.full
 def test_every_figure_has_its_error_bar(window: MainWindow, pairs: list[Pair], until) -> None:
     table = window.compare.table
     until(lambda: table.rowCount() == 6)
@@ -60,6 +63,7 @@ def test_a_difference_has_the_errors_of_both() -> None:
     assert math.isnan(b.less(a._replace(value=math.nan))[0])
 
 
+@pytest.mark.full
 def test_b_is_undone_like_any_setting(window: MainWindow, pairs: list[Pair], until, qtbot) -> None:
     box = window.compare.form.editor("other_x")
     box.setValue(4)
@@ -68,6 +72,7 @@ def test_b_is_undone_like_any_setting(window: MainWindow, pairs: list[Pair], unt
     until(lambda: pairs[-1].b.coefficients.shape == (6, 6))
 
 
+@pytest.mark.full
 def test_a_and_b_change_places_in_one_step(window: MainWindow, pairs: list[Pair], until) -> None:
     count = window.history.stack.count()
     window.compare.form.swap.click()
@@ -78,6 +83,7 @@ def test_a_and_b_change_places_in_one_step(window: MainWindow, pairs: list[Pair]
     assert window.history.settings.functions_x == 8
 
 
+@pytest.mark.full
 def test_a_basis_that_the_readings_do_not_decide_is_refused_for_b_alone(
     window: MainWindow, pairs: list[Pair], until
 ) -> None:
@@ -86,6 +92,7 @@ def test_a_basis_that_the_readings_do_not_decide_is_refused_for_b_alone(
     assert window.basis.message.text() == ""
 
 
+@pytest.mark.full
 def test_ending_it_leaves_the_window_as_it_was_and_the_engine_to_a_alone(
     window: MainWindow, until
 ) -> None:
@@ -99,6 +106,7 @@ def test_ending_it_leaves_the_window_as_it_was_and_the_engine_to_a_alone(
     assert window.size() == size
 
 
+@pytest.mark.full
 def test_it_works_on_a_recording_that_stands(
     window: MainWindow, recording: Path, pairs: list[Pair], until
 ) -> None:

@@ -25,6 +25,7 @@ def described(tmp_path):
     return file
 
 
+@pytest.mark.full
 def test_a_description_is_opened_at_the_only_port(window, described):
     panel = window.connection
     panel.show_ports([Port("/dev/ttyACM7")])
@@ -56,6 +57,7 @@ def test_another_description_keeps_the_port(window, described, tmp_path):
     assert panel.source() == f"sensor:{other}:{os.devnull}"
 
 
+@pytest.mark.full
 def test_a_wrong_description_is_reported_with_its_line(window, described):
     described.write_text(TEXT.replace("xx:0..35", "xx:0..36"))
 
@@ -64,6 +66,7 @@ def test_a_wrong_description_is_reported_with_its_line(window, described):
     assert "line 9" in window.statusBar().currentMessage()
 
 
+@pytest.mark.full
 def test_a_scene_is_still_a_scene(window, tmp_path):
     scene = tmp_path / "own.toml"
     scene.write_text(TEXT.partition("[line]")[0])

@@ -3,6 +3,7 @@
 import logging
 from pathlib import Path
 
+import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import Qt as RichText
 
@@ -26,6 +27,7 @@ def test_a_tooltip_shows_markup_as_it_is() -> None:
     assert "\x1b" not in plain_tip(NAME)
 
 
+@pytest.mark.full
 def test_a_passing_message_and_a_recent_file_are_text(window) -> None:
     window.notify(NAME)
     assert window.statusBar().currentMessage() == SHOWN

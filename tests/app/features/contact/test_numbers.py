@@ -30,6 +30,7 @@ def test_the_table_has_what_the_picture_shows_and_can_be_copied(window: MainWind
     until(lambda: numbers.elements.rowCount() == 0)  # what is old is no reading
 
 
+@pytest.mark.full
 def test_larger_letters_enlarge_the_window_and_are_taken_back(
     window: MainWindow, qapp: QApplication, until
 ) -> None:

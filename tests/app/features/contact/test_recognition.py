@@ -42,6 +42,7 @@ def test_the_text_is_empty_without_a_contact():
     assert curvature_text(_estimate()) == ""
 
 
+@pytest.mark.full
 def test_the_window_describes_the_object_in_contact(window, until):
     ends = {"x": 0.04, "y": 0.05, "x_end": 0.06, "y_end": 0.05}  # of a rigid blade
     window.history.change("Blade", -1, load_case="two-points", force=0.2, **ends)
@@ -120,6 +121,7 @@ def test_no_object_is_named_while_readings_drift():
     assert curvatures.startswith("; principal")
 
 
+@pytest.mark.full
 def test_a_new_skin_shows_that_the_finder_is_being_computed(window, until, monkeypatch):
     until(lambda: "curvatures" in window.display.status_bar.object.text())
     made, seen = recognition.object_finder, threading.Event()
@@ -132,12 +134,14 @@ def test_a_new_skin_shows_that_the_finder_is_being_computed(window, until, monke
     until(lambda: "curvatures" in window.display.status_bar.object.text())
 
 
+@pytest.mark.full
 def test_a_skin_without_object_recognition_shows_the_reason(window, until):
     window.history.change("Elements", -1, elements_x=50, elements_y=50)
 
     until(lambda: "at most 2000 elements" in window.display.status_bar.object.text())
 
 
+@pytest.mark.full
 @pytest.mark.fails_inside
 def test_a_failure_is_reported_once_and_the_next_estimate_is_described(
     window, until, monkeypatch

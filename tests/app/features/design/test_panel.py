@@ -92,6 +92,7 @@ def test_a_slider_reaches_both_ends_and_stands_where_its_value_is(name):
         )
 
 
+@pytest.mark.full
 def test_a_design_is_predicted_checked_undone_and_saved(
     window: MainWindow, until, qtbot, tmp_path: Path, monkeypatch
 ):
@@ -123,6 +124,7 @@ def test_a_design_is_predicted_checked_undone_and_saved(
     )
 
 
+@pytest.mark.full
 def test_what_cannot_be_designed_is_told_and_mended(window: MainWindow, until):
     prediction = window.prediction
     window.docks.reveal("design")
@@ -136,6 +138,7 @@ def test_what_cannot_be_designed_is_told_and_mended(window: MainWindow, until):
     until(lambda: prediction.prospect is not None and not prediction.refusal)
 
 
+@pytest.mark.full
 def test_what_elements_read_is_selected_placed_checked_and_saved(
     window: MainWindow, until, tmp_path: Path
 ):
@@ -164,6 +167,7 @@ def test_what_elements_read_is_selected_placed_checked_and_saved(
     assert "at least one reading" in window.design.words.text()
 
 
+@pytest.mark.full
 def test_placing_takes_a_while_and_can_be_ended(window: MainWindow, until):
     prediction = window.prediction
     window.docks.reveal("design")

@@ -39,7 +39,7 @@ def recording(window: MainWindow, until, tmp_path) -> Path:
     return path
 
 
-@pytest.mark.cases("the window", "curvature xx")
+@pytest.mark.cases("the window")
 @pytest.mark.parametrize("name", ["the window", "the skin", "the map of curvature xx"])
 def test_a_png_is_what_was_seen_with_what_it_is(
     name: str, window, until, named, tmp_path, colours_of
@@ -59,12 +59,14 @@ def test_a_png_is_what_was_seen_with_what_it_is(
     assert colours_of(pixels[-26:]) > 5  # the line below
 
 
+@pytest.mark.full
 def test_a_png_that_cannot_be_written_is_told(window, until, named, tmp_path) -> None:
     named(tmp_path / "nowhere" / "out.png")
     window.actions_by_name["picture-of-the window"].trigger()
     until(lambda: "cannot be written" in window.statusBar().currentMessage())
 
 
+@pytest.mark.full
 def test_the_picture_is_whole_where_the_window_closes_at_once(
     window, tmp_path, monkeypatch, colours_of
 ):
@@ -76,6 +78,7 @@ def test_the_picture_is_whole_where_the_window_closes_at_once(
         assert colours_of(np.asarray(image.convert("RGB"))) > 100
 
 
+@pytest.mark.full
 def test_an_svg_of_a_heatmap_has_its_cells_and_a_title(window, named, tmp_path) -> None:
     named(tmp_path / "out.svg")
     window.actions_by_name["picture-of-the map of curvature xx"].trigger()
@@ -87,6 +90,7 @@ def test_an_svg_of_a_heatmap_has_its_cells_and_a_title(window, named, tmp_path) 
     assert any("functions" in text for text in texts)
 
 
+@pytest.mark.full
 def test_the_skin_in_three_dimensions_is_no_drawing(window, tmp_path) -> None:
     with pytest.raises(Refusal, match=r"expected a file name that ends in \.png, since"):
         save_view(window.centralWidget(), tmp_path / "out.svg", "skin", "", flat=False)
@@ -97,6 +101,7 @@ def test_the_skin_in_three_dimensions_is_no_drawing(window, tmp_path) -> None:
             save_view(window.heatmaps["xx"], tmp_path / f"no/out{suffix}", "map", "")
 
 
+@pytest.mark.full
 def test_what_is_hidden_has_no_picture(window, named, tmp_path) -> None:
     named(tmp_path / "out.png")
     window.actions_by_name["picture-of-cost of accuracy"].trigger()
@@ -104,6 +109,7 @@ def test_what_is_hidden_has_no_picture(window, named, tmp_path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.full
 def test_a_film_shows_the_skin_for_as_long_as_it_was_filmed(
     window, until, named, tmp_path, colours_of
 ) -> None:
@@ -123,6 +129,7 @@ def test_a_film_shows_the_skin_for_as_long_as_it_was_filmed(
     frames.close()
 
 
+@pytest.mark.full
 def test_without_ffmpeg_the_line_that_installs_it_is_told(window, named, monkeypatch, tmp_path):
     named(tmp_path / "out.mp4")
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
@@ -131,6 +138,7 @@ def test_without_ffmpeg_the_line_that_installs_it_is_told(window, named, monkeyp
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.full
 def test_where_ffmpeg_cannot_be_started_nothing_is_left(window, named, monkeypatch, tmp_path):
     named(tmp_path / "films" / "out.mp4")
     (tmp_path / "films").mkdir()
@@ -149,6 +157,7 @@ def test_a_film_ends_whole_with_the_window(window, until, named, tmp_path) -> No
     assert [path.name for path in tmp_path.iterdir()] == ["out.mp4"]
 
 
+@pytest.mark.full
 def test_a_recording_is_exported_from_the_dialog(window, until, recording) -> None:
     window.actions_by_name["export"].trigger()
     dialog = window.exports.dialog
@@ -166,6 +175,7 @@ def test_a_recording_is_exported_from_the_dialog(window, until, recording) -> No
     assert sorted(path.name for path in recording.parent.iterdir()) == ["out.npz", "rec.mcap"]
 
 
+@pytest.mark.full
 def test_enter_exports_and_leaves_the_questions_for_files_alone(
     window, until, recording, qtbot
 ) -> None:
@@ -190,6 +200,7 @@ def test_enter_exports_and_leaves_the_questions_for_files_alone(
     assert not dialog.bar.isVisible()
 
 
+@pytest.mark.full
 def test_an_export_is_cancelled_with_nothing_left(window, recording) -> None:
     window.actions_by_name["export"].trigger()
     dialog = window.exports.dialog
@@ -235,6 +246,7 @@ def test_a_name_without_an_ending_gets_that_of_the_format_chosen(
     assert dialog.to.text() == str(tmp_path / "out.npz")
 
 
+@pytest.mark.full
 def test_what_is_refused_is_said_in_the_dialog(window, tmp_path) -> None:
     dialog = window.exports.dialog
     dialog.recording.setText(str(tmp_path / "none.mcap"))

@@ -133,6 +133,7 @@ def test_of_what_stands_still_a_script_computes_the_same_bits(
     assert _same_bits(_numbers(asked.text(tmp_path), tmp_path), asked.session.estimate)
 
 
+@pytest.mark.full
 def test_with_noise_a_script_computes_as_well(asked: Asked, until, tmp_path: Path) -> None:
     asked.show(Settings())  # its noise is drawn from when a scene begins: not the same bits
     until(asked.shown)
@@ -142,6 +143,7 @@ def test_with_noise_a_script_computes_as_well(asked: Asked, until, tmp_path: Pat
     assert found["rms"] < 1e-4  # 18 um in the median, 78 um at most of 8,000 frames
 
 
+@pytest.mark.full
 def test_a_script_of_a_recording_computes_the_same_bits_of_the_same_frame(
     asked: Asked, until, recording: Path, tmp_path: Path
 ) -> None:
@@ -245,6 +247,7 @@ def test_a_tare_in_use_is_in_a_file_that_the_script_reads(
     assert made["SETUP"] == asked.session.engine.requested.setup
 
 
+@pytest.mark.full
 def test_the_action_puts_a_script_on_the_clipboard(window: MainWindow) -> None:
     window.actions_by_name["copy-python"].trigger()
     text = QGuiApplication.clipboard().text()

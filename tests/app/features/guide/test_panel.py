@@ -60,6 +60,7 @@ def test_a_heading_is_brought_to_the_top(shown: GuidePanel, qapp: QApplication) 
     assert "Feed a robot" in (at_top.text(), at_top.next().text())
 
 
+@pytest.mark.full
 def test_pages_fit_into_the_window_and_pictures_into_their_lines(shown: GuidePanel) -> None:
     for page in pages():
         shown.read(page)
@@ -95,6 +96,7 @@ def test_a_page_has_the_colours_of_the_theme(shown: GuidePanel, qapp: QApplicati
     assert {theme.base, theme.window, QColor(theme.text).name()} <= colours
 
 
+@pytest.mark.full
 def test_a_heading_is_found_and_read_in_the_window(window: MainWindow, until) -> None:
     finder = window.menus.finder
     finder.open_empty()

@@ -109,6 +109,7 @@ def failing(opened, until) -> MainWindow:
     return window
 
 
+@pytest.mark.full
 def test_what_is_found_is_shown_in_the_list_on_the_heatmap_and_on_the_skin(
     failing: MainWindow, until, qtbot
 ) -> None:
@@ -123,12 +124,14 @@ def test_what_is_found_is_shown_in_the_list_on_the_heatmap_and_on_the_skin(
     assert failing.minimumSizeHint().height() <= 800
 
 
+@pytest.mark.full
 def test_marks_of_excluded_elements_go_with_their_skin(failing: MainWindow, until) -> None:
     until(lambda: failing.membrane.excluded.actor.visibility)
     failing.session.request_source("sim:circle")
     until(lambda: not failing.membrane.excluded.actor.visibility)
 
 
+@pytest.mark.full
 def test_a_simulated_skin_is_pressed_by_dragging_its_load(window: MainWindow, until) -> None:
     window.actions_by_name["dock-health"].trigger()
     page = window.health.press
@@ -159,6 +162,7 @@ def test_a_simulated_skin_is_pressed_by_dragging_its_load(window: MainWindow, un
     assert not window.membrane.target.actor.visibility or window.selection.target == -1
 
 
+@pytest.mark.full
 def test_a_test_that_is_over_has_a_verdict_and_ends_with_its_device(
     window: MainWindow, until
 ) -> None:

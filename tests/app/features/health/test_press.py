@@ -2,6 +2,7 @@
 
 from collections import Counter
 
+import pytest
 from PySide6.QtGui import QKeySequence
 from PySide6.QtWidgets import QPushButton, QTabBar
 
@@ -9,6 +10,7 @@ from kappaskin.scenes import scene_file
 from kappaskin_app.shell.settings.scene import Written
 
 
+@pytest.mark.full
 def test_no_key_of_the_page_is_that_of_a_menu_or_of_a_page_of_settings(window) -> None:
     window.actions_by_name["dock-health"].trigger()
     page = window.health.press
@@ -23,6 +25,7 @@ def test_no_key_of_the_page_is_that_of_a_menu_or_of_a_page_of_settings(window) -
     assert [key for key, count in keys.items() if count > 1] == []
 
 
+@pytest.mark.full
 def test_a_scene_that_is_chosen_meanwhile_does_not_press_by_itself(window, until) -> None:
     window.press_test.begin(quick=True)
     until(lambda: window.session.status.playing.speed == 0)

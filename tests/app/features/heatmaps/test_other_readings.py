@@ -25,6 +25,7 @@ def test_each_quantity_and_direction_has_a_heatmap_in_its_unit(opened, until) ->
     assert "mrad" in window.selected_element.panel.facts.text()
 
 
+@pytest.mark.full
 def test_another_skin_has_its_own_heatmaps_again(opened, until) -> None:
     window: MainWindow = opened("sim:camera")
     until(lambda: "height" in window.heatmaps and window.heatmaps["height"].isVisible())
@@ -36,6 +37,7 @@ def test_another_skin_has_its_own_heatmaps_again(opened, until) -> None:
     assert not window.heatmaps["xx"].isVisible()
 
 
+@pytest.mark.full
 def test_ranges_and_colours_of_readings_are_kept_while_another_sensor_is_shown(
     opened, until
 ) -> None:

@@ -122,6 +122,7 @@ def test_an_expression_that_is_anything_else_is_refused(text: str) -> None:
         expression(text, KINDS, TRUTH)
 
 
+@pytest.mark.full
 @given(st.text(max_size=60))
 def test_no_text_is_an_expression_that_breaks(text: str) -> None:
     try:

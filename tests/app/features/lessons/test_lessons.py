@@ -91,6 +91,7 @@ def test_every_lesson_can_be_played_through(window: MainWindow, until) -> None:
     assert all(dock.isHidden() for dock in below)
 
 
+@pytest.mark.full
 def test_steps_are_undone_one_by_one_and_back_gives_them_again(window: MainWindow) -> None:
     history, teaching = window.history, window.teaching
     before = history.settings
@@ -123,6 +124,7 @@ def test_settings_and_source_from_before_come_back_and_a_theme_stays(window: Mai
     assert not window.pointing.rings
 
 
+@pytest.mark.full
 def test_closing_the_lessons_leaves_the_lesson_and_covering_them_does_not(
     window: MainWindow,
 ) -> None:
@@ -138,6 +140,7 @@ def test_closing_the_lessons_leaves_the_lesson_and_covering_them_does_not(
     assert window.history.settings == before
 
 
+@pytest.mark.full
 def test_a_lesson_is_taken_answered_and_left_with_the_keyboard(window: MainWindow, qtbot) -> None:
     window.actions_by_name["dock-lesson"].trigger()
     lessons = window.lesson.list.list
@@ -155,6 +158,7 @@ def test_a_lesson_is_taken_answered_and_left_with_the_keyboard(window: MainWindo
     assert window.teaching.progress.answer.outcome() == "right at try 2"
 
 
+@pytest.mark.full
 def test_twice_wrong_is_explained_and_shown_and_progress_is_kept(window: MainWindow, until) -> None:
     take(window, "04-how-many-functions")
     until(lambda: window.teaching.figures()["error_rms"] > 1e-5)
@@ -175,6 +179,7 @@ def test_twice_wrong_is_explained_and_shown_and_progress_is_kept(window: MainWin
     assert "each way make the dent sharper" in window.lesson.step.question_view.feedback.text()
 
 
+@pytest.mark.full
 def test_what_is_said_to_an_answer_is_scrolled_to(window: MainWindow, until) -> None:
     take(window, "07-silent-mode")
     window.teaching.go(4)
@@ -185,6 +190,7 @@ def test_what_is_said_to_an_answer_is_scrolled_to(window: MainWindow, until) -> 
     until(lambda: not asking.feedback.visibleRegion().isEmpty())
 
 
+@pytest.mark.full
 def test_the_figure_holds_the_name_and_the_window(
     window: MainWindow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

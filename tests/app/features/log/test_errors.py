@@ -58,6 +58,7 @@ def test_the_log_never_grows_beyond_its_files(tmp_path: Path) -> None:
     assert max(sizes) <= 1_000_000
 
 
+@pytest.mark.full
 @pytest.mark.fails_inside
 def test_a_failure_is_counted_and_listed_while_the_session_goes_on(
     window: MainWindow, until
@@ -81,6 +82,7 @@ def test_a_failure_is_counted_and_listed_while_the_session_goes_on(
     until(lambda: len(window.membrane.ages) > drawn + 2)
 
 
+@pytest.mark.cases("True")
 @pytest.mark.parametrize("ticked", [False, True])
 def test_a_report_holds_readings_only_if_that_is_ticked(
     window: MainWindow, tmp_path: Path, until, ticked: bool

@@ -23,6 +23,7 @@ def test_distances_are_told_with_their_units() -> None:
     assert distances_text(Distances(0.0421, 0.0421, -1e-6)).endswith("height +0.00 mm")
 
 
+@pytest.mark.full
 def test_two_clicks_measure_a_third_begins_anew_and_escape_ends(
     window: MainWindow, until, qtbot
 ) -> None:
@@ -46,6 +47,7 @@ def test_two_clicks_measure_a_third_begins_anew_and_escape_ends(
     assert ruler.text.input == ""
 
 
+@pytest.mark.full
 def test_what_is_beyond_the_box_is_cut_away_and_comes_back(
     window: MainWindow, until, colours_in
 ) -> None:
@@ -58,6 +60,7 @@ def test_what_is_beyond_the_box_is_cut_away_and_comes_back(
     until(lambda: colours_in(window, window.membrane) > 0.7 * whole)
 
 
+@pytest.mark.full
 def test_what_is_above_a_level_is_cut_away(window: MainWindow, until, colours_in) -> None:
     whole = colours_in(window, window.membrane)
 

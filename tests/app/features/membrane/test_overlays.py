@@ -35,6 +35,7 @@ def test_an_object_touches_the_drawn_skin_and_enters_it_nowhere(patch: Patch, ti
         np.testing.assert_allclose(sag, times * (20 - np.sqrt(400 - far**2)), atol=1e-9)
 
 
+@pytest.mark.full
 def test_nothing_is_drawn_over_the_skin_until_it_is_wanted_and_then_all_of_it(
     opened, until
 ) -> None:

@@ -44,6 +44,7 @@ def layout_of(window):
     )
 
 
+@pytest.mark.full
 def test_leaving_gives_the_window_back_as_it_was(window, until, qtbot) -> None:
     window.actions_by_name["dock-cost"].trigger()
     window.actions_by_name["dock-scene"].trigger()
@@ -82,6 +83,7 @@ def test_escape_during_a_drag_gives_it_up_and_stays(demo, qtbot) -> None:
     assert not demo.presenter.on
 
 
+@pytest.mark.full
 def test_a_drag_on_the_pad_moves_the_contact_and_the_cue_follows(demo, until, qtbot) -> None:
     pad, count = demo.presenter.view.controls.pad, demo.history.stack.count()
     until(lambda: abs(demo.presenter.feedback.position[0] - 0.05) < 0.002)
@@ -101,6 +103,7 @@ def test_a_drag_on_the_pad_moves_the_contact_and_the_cue_follows(demo, until, qt
     until(lambda: abs(demo.presenter.feedback.position[0] - 0.05) < 0.002)
 
 
+@pytest.mark.full
 def test_pressing_harder_is_felt(demo, until, qtbot) -> None:
     presenter = demo.presenter
     pad, force = presenter.view.controls.pad, lambda: presenter.feedback.force
@@ -115,6 +118,7 @@ def test_pressing_harder_is_felt(demo, until, qtbot) -> None:
     until(lambda: presenter.view.force.value.endswith(" N"))
 
 
+@pytest.mark.full
 def test_no_hand_presses_the_skin_out_of_the_picture(demo, until, qtbot) -> None:
     pad = demo.presenter.view.controls.pad
     for _ in range(60):
@@ -125,6 +129,7 @@ def test_no_hand_presses_the_skin_out_of_the_picture(demo, until, qtbot) -> None
     until(lambda: demo.presenter.feedback and 0.5 < demo.presenter.feedback.force < 0.8)
 
 
+@pytest.mark.full
 def test_another_object_is_chosen_and_felt_at_the_same_place(demo, until, qtbot) -> None:
     view = demo.presenter.view
     objects = view.controls.objects
@@ -156,6 +161,7 @@ def test_the_estimate_drives_the_cue_and_not_the_truth(demo, until) -> None:
     until(told)
 
 
+@pytest.mark.full
 def test_a_lost_line_says_what_to_do_and_what_is_felt_comes_back(demo, until) -> None:
     view = demo.presenter.view
     demo.session.connect_to("/dev/ttyNOWHERE")
@@ -171,6 +177,7 @@ def test_a_lost_line_says_what_to_do_and_what_is_felt_comes_back(demo, until) ->
     until(lambda: demo.presenter.feedback is not None)
 
 
+@pytest.mark.full
 def test_a_recording_that_stands_is_felt_where_it_stands(opened, recording, until) -> None:
     window = opened(f"replay:{recording}")
     until(lambda: window.display.badge.state.startswith("REPLAY"))
@@ -187,6 +194,7 @@ def test_a_recording_that_stands_is_felt_where_it_stands(opened, recording, unti
     assert (view.strip.age, view.radius.name) == ("", "Radius of the object")
 
 
+@pytest.mark.full
 def test_nothing_that_touches_is_said_to_be_nothing(demo, until) -> None:
     text = demo.history.settings.written.text
     demo.editing.write(text[: text.index("[[touch]]")])
@@ -210,6 +218,7 @@ def test_a_moving_simulation_of_the_panels_is_held_and_pressed_too(window, until
     until(lambda: not pad.holding)
 
 
+@pytest.mark.full
 def test_the_3d_arrow_is_still_dragged_while_presenting(demo, until, qtbot) -> None:
     until(lambda: len(demo.membrane.drag.handles) == 1)
     view = demo.membrane
@@ -223,6 +232,7 @@ def test_the_3d_arrow_is_still_dragged_while_presenting(demo, until, qtbot) -> N
     qtbot.mouseRelease(view.plotter, LEFT, pos=start)
 
 
+@pytest.mark.full
 def test_a_scene_that_is_refused_says_so_beside_the_pad_until_it_is_taken_back(
     demo, until, qtbot
 ) -> None:
@@ -237,6 +247,7 @@ def test_a_scene_that_is_refused_says_so_beside_the_pad_until_it_is_taken_back(
     until(lambda: "expected" not in told.words()[1].text)
 
 
+@pytest.mark.full
 def test_two_points_pressed_harder_keep_their_share(window, until, qtbot) -> None:
     window.history.change("Two", -1, load_case="two-points", force=0.1)
     window.presenter.enter()
@@ -247,6 +258,7 @@ def test_two_points_pressed_harder_keep_their_share(window, until, qtbot) -> Non
     until(lambda: not pad.holding)
 
 
+@pytest.mark.full
 def test_the_page_on_the_demonstration_names_what_is_there(demo) -> None:
     page = (files("kappaskin_resources") / "demonstration" / "demonstration.md").read_text("utf-8")
     for button in demo.presenter.view.controls.objects.buttons():

@@ -77,6 +77,7 @@ def test_without_a_player_it_is_said(monkeypatch, tmp_path):
     assert not heard.on
 
 
+@pytest.mark.full
 def test_the_window_says_why_there_is_no_sound(window, monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     window.actions_by_name["sound"].trigger()
@@ -84,6 +85,7 @@ def test_the_window_says_why_there_is_no_sound(window, monkeypatch, tmp_path):
     assert not window.actions_by_name["sound"].isChecked()
 
 
+@pytest.mark.full
 def test_the_window_sounds_only_while_something_is_felt(window, player, until):
     action = window.actions_by_name["sound"]
     action.trigger()
@@ -102,6 +104,7 @@ def test_the_window_sounds_only_while_something_is_felt(window, player, until):
     assert not action.isChecked()
 
 
+@pytest.mark.full
 def test_sound_that_was_switched_on_or_off_comes_back_and_none_that_never_was(
     window, player, monkeypatch, tmp_path_factory
 ):

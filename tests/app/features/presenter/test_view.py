@@ -151,6 +151,7 @@ print([w.text for b in view.indicators if b.isVisible() for w in b.words() if no
 """
 
 
+@pytest.mark.full
 def test_every_text_fits_at_150_per_cent() -> None:
     scaled = {**os.environ, "QT_SCALE_FACTOR": "1.5"}
     code = _AT_150.format(here=os.path.dirname(__file__))

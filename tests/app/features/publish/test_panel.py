@@ -122,6 +122,7 @@ def test_what_comes_of_it_is_in_sight_of_who_asked(qtbot, until) -> None:
     assert panel.counts.visibleRegion().boundingRect() == panel.counts.rect()
 
 
+@pytest.mark.full
 def test_the_window_publishes_when_asked_and_undo_ends_it(window, until) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("127.0.0.1", 0))
@@ -138,6 +139,7 @@ def test_the_window_publishes_when_asked_and_undo_ends_it(window, until) -> None
         assert window.session.status.publishing.targets == ()
 
 
+@pytest.mark.full
 def test_what_is_no_address_is_refused_in_the_panel_and_nothing_is_sent(window, until) -> None:
     panel = window.publish
     window.requests.set("send_udp", True)
@@ -151,6 +153,7 @@ def test_what_is_no_address_is_refused_in_the_panel_and_nothing_is_sent(window, 
     until(lambda: panel.message.text() == "")
 
 
+@pytest.mark.full
 def test_a_page_that_was_refused_connects_once_it_is_allowed(window, until) -> None:
     with socket.socket() as found:
         found.bind(("127.0.0.1", 0))
@@ -175,6 +178,7 @@ def test_a_page_that_was_refused_connects_once_it_is_allowed(window, until) -> N
     until(lambda: panel.message.text() == "")
 
 
+@pytest.mark.full
 def test_resetting_settings_leaves_receivers_alone(window) -> None:
     window.requests.set("serve_foxglove", True)
     window.requests.set("functions_x", 5)

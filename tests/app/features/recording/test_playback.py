@@ -52,6 +52,7 @@ def _at(window: MainWindow) -> float:
     return window.session.status.replay.at
 
 
+@pytest.mark.full
 def test_a_recording_is_never_called_live_and_names_its_day(player: MainWindow, until) -> None:
     until(lambda: "Recorded" in player.connection.device.text())
     assert f"{datetime.now():%Y-%m-%d}" in player.connection.device.text()
@@ -61,6 +62,7 @@ def test_a_recording_is_never_called_live_and_names_its_day(player: MainWindow, 
     assert not player.timeline.isVisible()
 
 
+@pytest.mark.full
 def test_one_that_stands_is_paused_and_not_stale(standing: MainWindow, qtbot, until) -> None:
     qtbot.wait(700)
     assert standing.display.badge.state == "REPLAY \N{MIDDLE DOT} paused"
@@ -68,6 +70,7 @@ def test_one_that_stands_is_paused_and_not_stale(standing: MainWindow, qtbot, un
     until(lambda: standing.readouts.text("contact").endswith(" mm"))
 
 
+@pytest.mark.full
 def test_where_nothing_came_it_is_grey(standing: MainWindow, until) -> None:
     standing.playback.seek(1.4)
     until(lambda: standing.display.badge.state == "REPLAY \N{MIDDLE DOT} gap")
@@ -78,6 +81,7 @@ def test_where_nothing_came_it_is_grey(standing: MainWindow, until) -> None:
     assert standing.presenter.view.banner.isVisible()
 
 
+@pytest.mark.full
 def test_the_settings_recorded_are_used_and_can_be_undone(
     window: MainWindow, recording: Path, until
 ) -> None:
@@ -91,6 +95,7 @@ def test_the_settings_recorded_are_used_and_can_be_undone(
     until(lambda: window.session.estimate.coefficients.shape == (3, 8))
 
 
+@pytest.mark.full
 def test_settings_changed_in_the_recording_are_marked_and_may_be_used(
     standing: MainWindow, until
 ) -> None:
@@ -101,6 +106,7 @@ def test_settings_changed_in_the_recording_are_marked_and_may_be_used(
     until(lambda: standing.session.estimate.coefficients.shape == (6, 7))
 
 
+@pytest.mark.full
 def test_other_settings_show_while_it_stands(standing: MainWindow, until) -> None:
     sequence = standing.session.estimate.sequence
     standing.history.change("Fewer", -1, functions_x=4)
@@ -108,6 +114,7 @@ def test_other_settings_show_while_it_stands(standing: MainWindow, until) -> Non
     assert standing.session.estimate.sequence == sequence
 
 
+@pytest.mark.full
 def test_keys_left_over_go_to_the_transport(standing: MainWindow, qtbot, until) -> None:
     view = standing.membrane.plotter
     view.setFocus()
@@ -152,6 +159,7 @@ def test_scrubbing_ends_where_the_mouse_let_go(standing: MainWindow, qtbot, unti
     until(lambda: abs(standing.session.estimate.device_time - wanted) < 0.03)
 
 
+@pytest.mark.full
 def test_it_ends_paused_and_plays_again_from_the_beginning(player: MainWindow, until) -> None:
     player.playback.seek(2.3)
     # It stands at its beginning too, until the settings recorded are in use.
@@ -162,6 +170,7 @@ def test_it_ends_paused_and_plays_again_from_the_beginning(player: MainWindow, u
     until(lambda: player.display.badge.state == "REPLAY" and _at(player) < 1.0)
 
 
+@pytest.mark.full
 def test_one_that_loops_begins_anew(player: MainWindow, until) -> None:
     player.actions_by_name["replay-loop"].trigger()
     player.playback.play_at(10.0)
@@ -177,6 +186,7 @@ def test_events_are_jumped_to(standing: MainWindow, until) -> None:
         until(lambda at=at: _at(standing) == pytest.approx(at, abs=0.02))
 
 
+@pytest.mark.full
 def test_where_it_is_to_go_is_told_until_a_slow_engine_is_there(
     standing: MainWindow, until, qtbot
 ) -> None:
@@ -201,6 +211,7 @@ def test_speeds_are_asked_for_by_keys(standing: MainWindow, until) -> None:
     assert standing.transport.speed.currentData() == 0.25
 
 
+@pytest.mark.full
 def test_the_simulation_comes_back_without_a_trace(player: MainWindow, until) -> None:
     player.actions_by_name["simulate"].trigger()
     until(lambda: player.display.badge.state == "SIM")
@@ -211,6 +222,7 @@ def test_the_simulation_comes_back_without_a_trace(player: MainWindow, until) ->
     assert player.session.base is None
 
 
+@pytest.mark.full
 def test_calibration_and_tare_are_the_live_ones_again(
     window: MainWindow, recording: Path, until
 ) -> None:
@@ -235,6 +247,7 @@ def test_nothing_is_recorded_of_a_recording(player: MainWindow, until) -> None:
 # Opening.
 
 
+@pytest.mark.full
 def test_a_recording_dropped_on_the_window_is_played(
     window: MainWindow, recording: Path, until
 ) -> None:
@@ -260,6 +273,7 @@ def test_another_file_dropped_is_not_taken(window: MainWindow, tmp_path: Path) -
     assert not window.membrane.plotter.acceptDrops()
 
 
+@pytest.mark.full
 def test_one_is_opened_by_the_dialog_and_is_recent_then(
     window: MainWindow, recording: Path, until, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -272,6 +286,7 @@ def test_one_is_opened_by_the_dialog_and_is_recent_then(
     assert window.connection.source() == f"replay:{recording}"
 
 
+@pytest.mark.full
 def test_one_typed_as_a_source_is_played_with_its_settings(
     window: MainWindow, recording: Path, until
 ) -> None:
@@ -306,6 +321,7 @@ def test_what_is_no_recording_is_refused_and_the_session_goes_on(
     assert window.session.source == "sim:"
 
 
+@pytest.mark.full
 def test_one_of_a_later_version_is_refused(
     window: MainWindow, recording: Path, tmp_path: Path, until
 ) -> None:
@@ -318,6 +334,7 @@ def test_one_of_a_later_version_is_refused(
     until(lambda: window.display.badge.state == "SIM")
 
 
+@pytest.mark.full
 def test_one_never_ended_is_played_up_to_where_it_breaks_off(
     window: MainWindow, recording: Path, tmp_path: Path, until
 ) -> None:
@@ -332,6 +349,7 @@ def test_one_never_ended_is_played_up_to_where_it_breaks_off(
     until(lambda: "unfinished" in window.connection.device.text())
 
 
+@pytest.mark.full
 def test_one_that_goes_while_it_is_played_leaves_the_session(
     window: MainWindow, recording: Path, tmp_path: Path, until
 ) -> None:
@@ -348,6 +366,7 @@ def test_one_that_goes_while_it_is_played_leaves_the_session(
     until(lambda: window.display.badge.state == "SIM")
 
 
+@pytest.mark.full
 def test_estimates_are_those_recorded_until_they_are_to_be_recomputed(
     standing: MainWindow, until
 ) -> None:

@@ -47,6 +47,7 @@ def _mark(window: MainWindow) -> RecordingMark:
     return window.mark
 
 
+@pytest.mark.full
 def test_a_recording_is_begun_shown_and_ended(
     window: MainWindow, asked: list[Path], until, folder: Path
 ) -> None:
@@ -66,6 +67,7 @@ def test_a_recording_is_begun_shown_and_ended(
         assert recorded.whole
 
 
+@pytest.mark.full
 def test_it_goes_on_when_the_source_changes(window: MainWindow, asked: list[Path], until) -> None:
     window.actions_by_name["record"].trigger()
     until(lambda: window.recorder.written.messages > 0)
@@ -79,6 +81,7 @@ def test_it_goes_on_when_the_source_changes(window: MainWindow, asked: list[Path
     assert _mark(window).isVisible()
 
 
+@pytest.mark.full
 def test_a_note_goes_into_the_recording_and_the_list(
     window: MainWindow, asked: list[Path], until
 ) -> None:
@@ -98,6 +101,7 @@ def test_a_note_goes_into_the_recording_and_the_list(
     assert [event.text for event in window.playback.events] == ["another object"]
 
 
+@pytest.mark.full
 def test_one_that_ends_by_itself_says_so_until_it_is_seen(
     window: MainWindow, asked: list[Path], until
 ) -> None:
@@ -113,6 +117,7 @@ def test_one_that_ends_by_itself_says_so_until_it_is_seen(
     until(lambda: not _mark(window).isVisible())
 
 
+@pytest.mark.full
 def test_one_that_breaks_off_with_the_engine_is_said_to_while_the_next_goes_on(
     window: MainWindow, until, tmp_path: Path
 ) -> None:
@@ -132,6 +137,7 @@ def test_one_that_breaks_off_with_the_engine_is_said_to_while_the_next_goes_on(
     until(lambda: not _mark(window).isVisible())  # the error was of the one before
 
 
+@pytest.mark.full
 def test_nothing_is_ever_written_over(window: MainWindow, tmp_path: Path, until) -> None:
     there = tmp_path / "there.mcap"
     there.write_bytes(b"mine")
@@ -153,6 +159,7 @@ def test_a_place_that_cannot_be_written_to_is_refused(
     until(lambda: window.display.badge.state == "SIM")
 
 
+@pytest.mark.full
 def test_a_folder_that_cannot_be_made_is_told_and_another_asked_for(
     window: MainWindow,
     folder: Path,
@@ -168,6 +175,7 @@ def test_a_folder_that_cannot_be_made_is_told_and_another_asked_for(
     assert asked[0].name == str(asked[0])
 
 
+@pytest.mark.full
 def test_what_was_never_ended_is_offered_to_be_repaired(opened, until, folder: Path) -> None:
     folder.mkdir(parents=True)
     (folder / "it's mine.mcap.part").write_bytes(b"")
@@ -216,6 +224,7 @@ def _boxes(window: MainWindow) -> list[QMessageBox]:
     return [box for box in window.findChildren(QMessageBox) if box.isVisible()]
 
 
+@pytest.mark.full
 def test_closing_while_recording_asks_once_by_mouse_and_keyboard(
     taped: MainWindow, qtbot, until
 ) -> None:
@@ -236,6 +245,7 @@ def test_closing_while_recording_asks_once_by_mouse_and_keyboard(
     assert taped.isVisible()
 
 
+@pytest.mark.full
 def test_the_answer_to_end_it_closes_and_leaves_a_whole_file(
     taped: MainWindow, tmp_path: Path, qtbot, until
 ) -> None:
@@ -248,6 +258,7 @@ def test_the_answer_to_end_it_closes_and_leaves_a_whole_file(
         assert recorded.whole
 
 
+@pytest.mark.full
 def test_a_run_that_closes_by_itself_asks_nothing(taped: MainWindow, tmp_path: Path) -> None:
     taped.close()
     assert not _boxes(taped)

@@ -36,6 +36,7 @@ def dialog(qapp, qtbot) -> RepairDialog:
     return dialog
 
 
+@pytest.mark.full
 def test_one_that_breaks_off_is_repaired_beside_it_and_played(
     window: MainWindow, broken: Path, until
 ) -> None:
@@ -56,6 +57,7 @@ def test_one_that_breaks_off_is_repaired_beside_it_and_played(
     dialog.close()
 
 
+@pytest.mark.full
 def test_damage_found_while_it_is_played_is_offered_to_be_repaired(
     window: MainWindow, recording: Path, tmp_path: Path, until
 ) -> None:
@@ -72,6 +74,7 @@ def test_damage_found_while_it_is_played_is_offered_to_be_repaired(
     assert "is damaged at byte" in panel.message.text()
 
 
+@pytest.mark.full
 def test_a_file_of_another_kind_is_not_offered(window: MainWindow, tmp_path: Path, until) -> None:
     path, panel = tmp_path / "picture.mcap", window.recording
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(500))
@@ -80,6 +83,7 @@ def test_a_file_of_another_kind_is_not_offered(window: MainWindow, tmp_path: Pat
     assert not panel.offer.isVisibleTo(panel)
 
 
+@pytest.mark.full
 def test_one_without_readings_is_not_offered(window: MainWindow, tmp_path: Path, until) -> None:
     path, panel = tmp_path / "empty.mcap", window.recording
     with closing(Recorder(path, 0.0)) as recorder:

@@ -34,6 +34,7 @@ def test_every_ready_scene_is_there_and_a_new_one_comes_last():
     assert in_order(("b-new", "hum", "a-new", "sphere")) == ["sphere", "hum", "b-new", "a-new"]
 
 
+@pytest.mark.full
 def test_names_are_there_at_once_and_titles_and_pictures_come(gallery, until):
     assert gallery.items["two-contacts"].text() == "Two contacts"
     assert gallery.items["sphere"].text() == "Sphere"
@@ -74,6 +75,7 @@ def test_the_scene_that_is_played_is_marked(gallery):
     assert gallery.file.text() == "sphere.toml"
 
 
+@pytest.mark.full
 def test_another_theme_makes_other_pictures(gallery, until):
     gallery.show()
     first = gallery.items["sphere"]
@@ -96,6 +98,7 @@ def test_the_cards_fill_the_width(gallery, width):
     assert gallery.width() == width
 
 
+@pytest.mark.full
 def test_it_closes_while_it_works(gallery, until):
     gallery.show()
     until(lambda: gallery.items["sphere"].data(PICTURE) is not None)

@@ -47,6 +47,7 @@ def save(window, file: Path, monkeypatch) -> str:
     return window.statusBar().currentMessage()
 
 
+@pytest.mark.full
 def test_a_mesh_that_was_dropped_is_copied_beside_the_scene_that_is_saved(
     dropped, until, monkeypatch, mesh, tmp_path
 ) -> None:
@@ -61,6 +62,7 @@ def test_a_mesh_that_was_dropped_is_copied_beside_the_scene_that_is_saved(
     assert save(dropped, file, monkeypatch) == f"Saved {file}"  # over itself, copies and all
 
 
+@pytest.mark.full
 def test_a_scene_that_is_saved_above_its_mesh_names_it_there(
     dropped, monkeypatch, mesh, tmp_path
 ) -> None:
@@ -72,6 +74,7 @@ def test_a_scene_that_is_saved_above_its_mesh_names_it_there(
     assert not (tmp_path / mesh.name).exists()
 
 
+@pytest.mark.full
 def test_no_other_file_is_overwritten_by_a_copy(dropped, monkeypatch, mesh, tmp_path) -> None:
     file = tmp_path / "out" / "a.toml"
     file.parent.mkdir()
@@ -82,6 +85,7 @@ def test_no_other_file_is_overwritten_by_a_copy(dropped, monkeypatch, mesh, tmp_
     assert (file.parent / mesh.name).read_text() == "mine"
 
 
+@pytest.mark.full
 def test_a_ready_scene_is_saved_with_its_mesh(window, panel, until, monkeypatch, tmp_path) -> None:
     panel.gallery.chosen.emit("bolt")
     until(lambda: plays(window, "bolt"))
@@ -100,6 +104,7 @@ def hostile(tmp_path: Path) -> Path:
     return file
 
 
+@pytest.mark.full
 def test_a_scene_names_files_elsewhere_only_if_it_is_trusted(
     window, panel, until, monkeypatch, mesh, tmp_path
 ) -> None:

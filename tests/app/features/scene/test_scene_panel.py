@@ -15,6 +15,7 @@ from kappaskin_app.shell.settings import Settings
 from .conftest import EDIT, EFFECTS_PAGE, GALLERY, plays
 
 
+@pytest.mark.full
 def test_a_scene_of_the_gallery_plays_from_its_beginning_until_it_is_undone(
     window, panel, until, qtbot
 ) -> None:
@@ -33,6 +34,7 @@ def test_a_scene_of_the_gallery_plays_from_its_beginning_until_it_is_undone(
     until(lambda: window.load.editor("load_case").isEnabled())
 
 
+@pytest.mark.full
 def test_the_simulated_skin_comes_back_to_the_panels(window, panel, until, qtbot) -> None:
     panel.gallery.chosen.emit("hum")
     until(lambda: plays(window, "hum"))
@@ -55,6 +57,7 @@ def test_a_scene_that_there_is_not_is_said(opened, until) -> None:
     assert window.history.settings == Settings()
 
 
+@pytest.mark.full
 def test_text_and_forms_change_the_scene_and_each_other_while_it_plays(
     window, panel, until, qtbot
 ) -> None:
@@ -76,6 +79,7 @@ def test_text_and_forms_change_the_scene_and_each_other_while_it_plays(
     assert text.toPlainText() == scene_file("tapping").read_text()
 
 
+@pytest.mark.full
 def test_text_that_is_no_scene_leaves_the_last_one_and_says_where(window, panel, until) -> None:
     panel.gallery.chosen.emit("tapping")
     until(lambda: plays(window, "tapping"))
@@ -99,6 +103,7 @@ def test_text_that_is_no_scene_leaves_the_last_one_and_says_where(window, panel,
     assert not panel.editor.text.extraSelections()
 
 
+@pytest.mark.full
 def test_a_text_that_was_emptied_is_written_anew(window, panel, until, qtbot) -> None:
     panel.setCurrentIndex(EDIT)
     text = panel.editor.text
@@ -110,6 +115,7 @@ def test_a_text_that_was_emptied_is_written_anew(window, panel, until, qtbot) ->
     assert window.history.settings.written.text == "format = 1"
 
 
+@pytest.mark.full
 def test_the_keys_of_undo_in_the_text_undo_what_the_window_did(window, panel, until, qtbot) -> None:
     panel.gallery.chosen.emit("hum")
     until(lambda: plays(window, "hum"))
@@ -150,6 +156,7 @@ def row_of(panel, name: str) -> list[str]:
     return [panel.effects.table.item(number, column).text() for column in (2, 3, 4, 5, 6)]
 
 
+@pytest.mark.full
 def test_effects_are_planned_and_forced_while_the_scene_plays(window, panel, until) -> None:
     panel.gallery.chosen.emit("tapping")
     until(lambda: plays(window, "tapping"))
@@ -179,6 +186,7 @@ def test_effects_are_planned_and_forced_while_the_scene_plays(window, panel, unt
     until(lambda: row_of(panel, "gaussian-noise")[0] == "yes", 60.0)
 
 
+@pytest.mark.full
 def test_scenes_are_opened_from_files_and_saved_into_them(
     window, panel, until, tmp_path, monkeypatch
 ) -> None:
@@ -219,6 +227,7 @@ def test_the_pages_have_their_keys_and_nothing_is_clipped(window, panel, until) 
         assert panel.mapTo(window, QPoint(0, 0)).x() + panel.width() <= window.width()
 
 
+@pytest.mark.full
 def test_a_scene_that_is_chosen_while_one_types_is_played_as_it_is_written(
     window, panel, until
 ) -> None:
@@ -236,6 +245,7 @@ def test_a_scene_that_is_chosen_while_one_types_is_played_as_it_is_written(
     assert window.history.settings.written.file == scene_file("hum")
 
 
+@pytest.mark.full
 def test_on_another_source_only_the_gallery_leads_back(window, panel, until) -> None:
     panel.gallery.chosen.emit("tapping")
     until(lambda: plays(window, "tapping"))

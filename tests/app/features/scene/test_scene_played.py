@@ -15,6 +15,7 @@ from kappaskin_app.shell.loads import loads_at
 from .conftest import EDIT, EFFECTS_PAGE, plays
 
 
+@pytest.mark.full
 def test_the_timeline_stops_seeks_and_goes_on(window, panel, until, qtbot) -> None:
     panel.gallery.chosen.emit("tapping")
     until(lambda: plays(window, "tapping"))
@@ -34,6 +35,7 @@ def test_the_timeline_stops_seeks_and_goes_on(window, panel, until, qtbot) -> No
     until(lambda: window.session.status.playing.speed == 1)
 
 
+@pytest.mark.full
 def test_the_time_to_go_to_is_told_until_a_slow_engine_is_there(
     window, panel, until, qtbot
 ) -> None:
@@ -54,6 +56,7 @@ def test_where_nothing_moves_there_is_no_timeline(window, panel, until) -> None:
     until(lambda: not window.timeline.isVisible())
 
 
+@pytest.mark.full
 def test_a_touch_of_a_written_scene_is_dragged_in_the_picture_and_in_the_text(
     window, panel, until
 ) -> None:
@@ -89,6 +92,7 @@ def test_a_touch_of_a_written_scene_is_dragged_in_the_picture_and_in_the_text(
     assert window.history.settings.written == written
 
 
+@pytest.mark.full
 def test_every_touch_is_drawn_however_many_there_are(window, panel, until) -> None:
     head = scene_file("tapping").read_text().split("[[touch]]")[0]
     places = [(0.02 + 0.02 * (n % 4), 0.02 + 0.02 * (n // 4)) for n in range(12)]
@@ -106,6 +110,7 @@ def _is_red(actor) -> bool:
     return getattr(actor, "prop", None) is not None and actor.prop.color == "#e8543f"
 
 
+@pytest.mark.full
 def test_what_is_played_is_neither_dragged_nor_forced_while_the_text_is_no_scene(
     window, panel, until
 ) -> None:
@@ -132,6 +137,7 @@ def test_what_is_played_is_neither_dragged_nor_forced_while_the_text_is_no_scene
     assert panel.effects.table.isEnabled()
 
 
+@pytest.mark.full
 def test_connecting_again_goes_on_with_the_scene_that_was_played(window, panel, until) -> None:
     panel.gallery.chosen.emit("tapping")
     until(lambda: plays(window, "tapping"))
@@ -147,6 +153,7 @@ def test_connecting_again_goes_on_with_the_scene_that_was_played(window, panel, 
     until(lambda: window.display.badge.text() == "SIM" and plays(window, "hum"))
 
 
+@pytest.mark.cases("0")
 @pytest.mark.parametrize("number", [0, 1])
 def test_what_others_measured_is_replayed(window, panel, until, number) -> None:
     file = list(MEASURED.values())[number]

@@ -24,6 +24,7 @@ def dots(image) -> np.ndarray:
     return rows.reshape(image.height(), image.width(), 4).copy()
 
 
+@pytest.mark.full
 def test_every_ready_scene_has_a_picture_that_is_not_blank(reliefs, colours_of):
     for name, made in reliefs.items():
         light, dark = (picture(made, theme, SIZE, 1.0) for theme in (LIGHT, DARK))

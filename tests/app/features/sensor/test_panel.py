@@ -49,6 +49,7 @@ def test_until_elements_are_chosen_all_are_scanned():
     assert region_of(Settings(region="elements", region_elements=(3,))).elements == (3,)
 
 
+@pytest.mark.full
 def test_a_click_chooses_an_element_and_another_lets_it_go(window):
     window.requests.set("region", "elements")
     for _ in range(3):
@@ -60,12 +61,14 @@ def test_a_click_chooses_an_element_and_another_lets_it_go(window):
     assert window.history.settings.region_elements == ()
 
 
+@pytest.mark.full
 def test_a_click_chooses_nothing_while_no_elements_are_asked_for(window):
     window.heatmaps["yy"].chosen.emit(44)
 
     assert window.history.settings.region_elements == ()
 
 
+@pytest.mark.full
 def test_a_region_shows_its_frame_rate_and_accuracy(window, until):
     window.requests.set("electronics", "second")
     window.requests.set("region", "skin")
@@ -109,6 +112,7 @@ def test_a_share_is_shown_in_per_cent(window, name):
     assert panel.editor(name).text() == "15 %"
 
 
+@pytest.mark.full
 def test_elements_bent_beyond_their_limit_are_crossed_out(window, until):
     until(lambda: window.session.estimate is not None)
     estimate = window.session.estimate

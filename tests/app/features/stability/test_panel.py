@@ -89,6 +89,7 @@ def test_dead_elements_read_nothing_and_are_refused_where_there_are_none() -> No
         scene_of(Settings(elements_x=5, elements_y=5, dead_elements=(99,)))
 
 
+@pytest.mark.full
 def test_other_elements_or_another_shape_are_all_alive(window: MainWindow) -> None:
     for name, value in (("elements_x", 9), ("shape", "disk")):
         window.history.change("Dead", -1, dead_elements=(50,))
@@ -102,6 +103,7 @@ def _opened(window: MainWindow, until) -> MainWindow:
     return window
 
 
+@pytest.mark.full
 def test_the_panel_is_hidden_until_f10_and_then_shows_what_is_asked_for(
     window: MainWindow, until, qtbot, colours_in
 ) -> None:
@@ -115,6 +117,7 @@ def test_the_panel_is_hidden_until_f10_and_then_shows_what_is_asked_for(
     until(lambda: len(window.membrane.ages) > drawn + 3)
 
 
+@pytest.mark.full
 def test_what_the_sensor_refuses_is_shown_all_the_same(window: MainWindow, until) -> None:
     panel = _opened(window, until).stability
     panel.buttons[3].click()
@@ -128,6 +131,7 @@ def test_what_the_sensor_refuses_is_shown_all_the_same(window: MainWindow, until
     until(lambda: not panel.refused.text())
 
 
+@pytest.mark.full
 def test_a_demonstration_is_one_step_and_back_undoes_it(window: MainWindow, until) -> None:
     panel, was = _opened(window, until).stability, window.history.settings
     assert not panel.undo.isEnabled()
@@ -143,6 +147,7 @@ def test_a_demonstration_is_one_step_and_back_undoes_it(window: MainWindow, unti
     assert not panel.undo.isEnabled()
 
 
+@pytest.mark.full
 def test_sliding_ends_are_refused_of_a_fingertip_that_is_seen_and_all_of_it_is_one_step(
     window: MainWindow, until
 ) -> None:
@@ -157,6 +162,7 @@ def test_sliding_ends_are_refused_of_a_fingertip_that_is_seen_and_all_of_it_is_o
     assert window.history.settings == was
 
 
+@pytest.mark.full
 def test_a_demonstration_that_is_overtaken_does_not_go_on(window: MainWindow, until) -> None:
     panel = _opened(window, until).stability
     panel.buttons[6].click()
@@ -167,6 +173,7 @@ def test_a_demonstration_that_is_overtaken_does_not_go_on(window: MainWindow, un
     assert window.history.settings.fit_edge == ""
 
 
+@pytest.mark.full
 def test_how_things_are_shown_stays_through_a_demonstration(window: MainWindow, until) -> None:
     window.history.change("Look", -1, theme="light", exaggeration=3.0, colour_by="xx")
     _opened(window, until).stability.buttons[0].click()
@@ -174,6 +181,7 @@ def test_how_things_are_shown_stays_through_a_demonstration(window: MainWindow, 
     assert (s.theme, s.exaggeration, s.colour_by) == ("light", 3.0, "xx")
 
 
+@pytest.mark.full
 def test_the_worst_seen_shape_colours_the_skin_while_it_is_looked_at(
     window: MainWindow, until
 ) -> None:
@@ -197,6 +205,7 @@ def test_the_worst_seen_shape_colours_the_skin_while_it_is_looked_at(
     until(lambda: bar.limits != (-1.0, 1.0))
 
 
+@pytest.mark.full
 def test_a_shape_is_chosen_by_a_click_the_arrows_or_its_number(
     window: MainWindow, until, qtbot
 ) -> None:
@@ -214,6 +223,7 @@ def test_a_shape_is_chosen_by_a_click_the_arrows_or_its_number(
     assert "mode 10 of 64" in window.membrane.caption.input  # it was selected
 
 
+@pytest.mark.full
 def test_very_many_functions_are_not_waited_for(window: MainWindow, until) -> None:
     panel = _opened(window, until).stability
     window.history.change("Many", -1, functions_x=64, functions_y=64)
@@ -224,6 +234,7 @@ def test_very_many_functions_are_not_waited_for(window: MainWindow, until) -> No
     until(lambda: window.observability.spectrum is not None)
 
 
+@pytest.mark.full
 def test_a_real_sensor_leaves_the_demonstrations_to_the_simulation(
     window: MainWindow, until
 ) -> None:
@@ -233,6 +244,7 @@ def test_a_real_sensor_leaves_the_demonstrations_to_the_simulation(
     assert "Ctrl+M" in panel.explanation.text()
 
 
+@pytest.mark.full
 def test_both_panels_below_the_skin_share_a_place_and_fit_a_small_window(
     window: MainWindow, until
 ) -> None:
@@ -257,6 +269,7 @@ def test_both_panels_below_the_skin_share_a_place_and_fit_a_small_window(
     until(lambda: seen() == (False, True))
 
 
+@pytest.mark.full
 def test_everything_below_the_skin_explains_itself(window: MainWindow) -> None:
     own = (QTabBar, QTableWidget)  # have buttons of their own, which are never seen
     for panel in (window.cost, window.stability, window.scene):
@@ -265,6 +278,7 @@ def test_everything_below_the_skin_explains_itself(window: MainWindow) -> None:
                 assert widget.toolTip() or isinstance(widget.parent(), own), widget
 
 
+@pytest.mark.full
 def test_the_shortcuts_are_on_the_cheat_sheet_and_meant_once(window: MainWindow) -> None:
     window.actions_by_name["shortcuts"].trigger()
     listed = window.menus.shortcuts.list
@@ -283,6 +297,7 @@ def test_singular_values_are_those_of_the_scaled_operator() -> None:
     assert spectrum.values == pytest.approx(values)
 
 
+@pytest.mark.full
 def test_the_panels_below_the_skin_cannot_be_dropped_into_a_column(window: MainWindow) -> None:
     beside = Qt.DockWidgetArea.LeftDockWidgetArea, Qt.DockWidgetArea.RightDockWidgetArea
     for dock in (window.docks["cost"], window.docks["stability"]):
@@ -290,6 +305,7 @@ def test_the_panels_below_the_skin_cannot_be_dropped_into_a_column(window: MainW
         assert not any(dock.isAreaAllowed(area) for area in beside)
 
 
+@pytest.mark.full
 def test_what_is_in_use_is_said_where_the_method_is_refused(window: MainWindow, until) -> None:
     window.history.change("Fast", -1, method="fast", functions_x=12, functions_y=12)
     message = window.basis.message

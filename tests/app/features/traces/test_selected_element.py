@@ -105,6 +105,7 @@ def test_a_curve_is_pointed_at_where_it_is_drawn_and_broken_where_nothing_is(
     plot.close()
 
 
+@pytest.mark.full
 def test_pointing_at_an_element_marks_it_in_every_view(
     window: MainWindow, until, points_at
 ) -> None:
@@ -119,6 +120,7 @@ def test_pointing_at_an_element_marks_it_in_every_view(
     assert not any(marks.actor.visibility for marks in window.membrane.pointed)
 
 
+@pytest.mark.full
 def test_a_click_on_the_skin_opens_the_panel_which_plots_the_element(
     window: MainWindow, until, qtbot
 ) -> None:
@@ -140,6 +142,7 @@ def test_a_click_on_the_skin_opens_the_panel_which_plots_the_element(
     until(lambda: "Element 44" in panel.title.text())
 
 
+@pytest.mark.full
 def test_a_click_in_a_heatmap_selects_no_element_while_it_sets_the_scan_region(
     window: MainWindow,
 ) -> None:
@@ -149,6 +152,7 @@ def test_a_click_in_a_heatmap_selects_no_element_while_it_sets_the_scan_region(
     assert window.history.settings.region_elements == (44,)
 
 
+@pytest.mark.full
 def test_another_sensor_of_as_many_elements_starts_with_an_empty_buffer(
     window: MainWindow, until
 ) -> None:

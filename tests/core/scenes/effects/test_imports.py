@@ -80,6 +80,7 @@ def test_describing_and_sizing_every_effect_imports_none_at_work():
     assert modules(SIZED) == [[]]
 
 
+@pytest.mark.cases("cross-talk", "quantisation")
 @pytest.mark.parametrize(
     ("name", "room", "own"),
     [

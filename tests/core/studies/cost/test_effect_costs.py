@@ -247,6 +247,7 @@ def test_a_setting_that_gives_no_answer_is_refused() -> None:
         effect_costs(CENTRE, replace(EIGHT, functions=(12, 12)))
 
 
+@pytest.mark.full
 def test_the_setting_decides_what_is_read_and_how() -> None:
     every = told(CENTRE, EIGHT)
     six = replace(EIGHT, functions=(4, 4))

@@ -101,6 +101,7 @@ def started(tmp_path):
         process.wait()
 
 
+@pytest.mark.full
 @NEEDS_DASK
 def test_a_cluster_gives_the_numbers_of_this_process_though_a_worker_is_killed(
     study_of, tmp_path, started

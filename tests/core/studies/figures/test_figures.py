@@ -107,6 +107,7 @@ def test_each_figure_is_a_png_of_300_dots_per_inch(folder, name) -> None:
     assert int.from_bytes(content[16:20], "big") == int(DOUBLE_COLUMN * 300)
 
 
+@pytest.mark.full
 def test_another_process_writes_the_same_bytes_without_pyplot(folder, tmp_path) -> None:
     code = (
         "import sys; from kappaskin.cli import main\n"
