@@ -20,8 +20,9 @@ ROOMS = (
 # to have 340 modules and 32,000 statements. A feature that raises a count says why beside it.
 LIMITS = {
     # mechanics: shell and stretching; contact: influence, stretched, lower_bound, imprint;
-    # studies: summed; sources: interpreter, lines of other formats, a sensor's description, inputs.
-    "modules": 340,
+    # studies: summed; sources: interpreter, lines of other formats, a sensor's description, inputs,
+    # readings that a program pushes; live: the loop of a program.
+    "modules": 342,
     # Shells and plates that stretch, a load's size, slopes on shells, revisions of estimates;
     # ovals beside objects, and whether an object fits; errors told beforehand, of calibrations on
     # other paths, and of effects that act on one another.
@@ -31,7 +32,8 @@ LIMITS = {
     # Any reading in scenes, pipeline, files and window; described readings, their noise, zero and
     # calibration; datagrams, standard input and files. What others measured, in the gallery.
     # Studies, plans and hard cases of any reading; its colours, ranges and residuals in the window.
-    "statements": 40_530,
+    # From Python: readings that a program pushes, and estimates in its loop.
+    "statements": 40_790,
     # _files: one way to read and write files; _text: text from outside. For all rooms and the app.
     "loose modules of core": 10,
     "loose modules of the app": 8,

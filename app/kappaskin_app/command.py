@@ -67,7 +67,7 @@ def run(
     file
         A recording or a scene to play, a calibration of the sensor, or a mesh as the object.
     source
-        `sim:`, `sim:SCENE`, `replay:FILE`, or a port or URL for pyserial.
+        `sim:`, `sim:SCENE`, `replay:FILE`, `feed:NAME`, or a port or URL for pyserial.
     seconds
         Close after this many seconds; the window opens with the default theme and layout.
     screenshot

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from kappaskin.frames import Frame as Frame
     from kappaskin.live import Engine as Engine
     from kappaskin.live import Status as Status
+    from kappaskin.live import stream as stream
     from kappaskin.mechanics import DiscLoad as DiscLoad
     from kappaskin.mechanics import GaussianLoad as GaussianLoad
     from kappaskin.mechanics import LineLoad as LineLoad
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
     from kappaskin.skin import Disk as Disk
     from kappaskin.skin import Patch as Patch
     from kappaskin.skin import Polygon as Polygon
+    from kappaskin.sources import feed as feed
 else:
     __getattr__, __dir__, __all__ = lazy_names(
         __name__,
@@ -73,11 +75,12 @@ else:
             "estimator_for place_elements predicted_sd",
         ),
         ("frames", "Contact Estimate Event Frame"),
-        ("live", "Engine Status"),
+        ("live", "Engine Status stream"),
         ("mechanics", "DiscLoad GaussianLoad LineLoad Plate PointLoad RectangleLoad"),
         ("pipeline", "Pipeline Setup setup_from_text"),
         ("recording", "Recording"),
         ("scenes", "Scene Simulator Stimulus load_scene planned read_scene write_scene"),
         ("sensing", "Sensor SensorLayout Transduction"),
         ("skin", "Disk Patch Polygon"),
+        ("sources", "feed"),
     )

@@ -1,6 +1,8 @@
 """Files: written whole or not at all, read within limits, in use or left behind."""
 
+import hashlib
 import os
+import platform
 import secrets
 import shutil
 import stat
@@ -35,6 +37,17 @@ def user_folder(folder: Callable[..., Path]) -> Path:
         return folder("kappaskin", appauthor=False)
     except RuntimeError:  # no HOME, and no entry of this user among the system's
         return _NO_HOME
+
+
+def machine_folder(name: str) -> Path:
+    """Folder of this user's sockets and notes of one kind on this machine.
+
+    Short, whatever the machine is called: the path of a socket may have some 100 characters.
+    """
+    import platformdirs  # needed by few
+
+    machine = hashlib.sha256(platform.node().encode(errors="surrogatepass")).hexdigest()[:8]
+    return user_folder(platformdirs.user_state_path) / name / machine
 
 
 def open_file(path: Path) -> BinaryIO:

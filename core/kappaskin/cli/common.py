@@ -105,10 +105,9 @@ def of_sensor(source: str, sensor: Path | None) -> str:
         raise Refusal("expected a source, but standard input (-) is closed; pipe something to it")
     from kappaskin.sources import described_source, load_description
 
-    if source.startswith(("sim:", "replay:")):
-        raise Refusal(f"expected a port or URL with --sensor, got {source}")
+    described = described_source(sensor, source)
     load_description(sensor)  # or refused here
-    return described_source(sensor, source)
+    return described
 
 
 def stops() -> list[int]:

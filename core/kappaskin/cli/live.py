@@ -56,7 +56,7 @@ def publish(
     Parameters
     ----------
     source
-        `sim:`, `sim:SCENE`, or a port or URL for pyserial.
+        `sim:`, `sim:SCENE`, `feed:NAME`, or a port or URL for pyserial.
     udp
         HOST:PORT to send JSON datagrams to; may be given several times.
     foxglove

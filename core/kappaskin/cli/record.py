@@ -62,7 +62,7 @@ def record(
     Parameters
     ----------
     source
-        `sim:`, `sim:SCENE`, or a port or URL for pyserial.
+        `sim:`, `sim:SCENE`, `feed:NAME`, or a port or URL for pyserial.
     out
         The file; it must not exist yet.
     seconds

@@ -87,7 +87,7 @@ def calibrate(
     Parameters
     ----------
     source
-        `sim:`, `sim:SCENE`, or a port or URL for pyserial.
+        `sim:`, `sim:SCENE`, `feed:NAME`, or a port or URL for pyserial.
     out
         The file to write.
     radii
@@ -188,7 +188,7 @@ def tare(
     Parameters
     ----------
     source
-        `sim:`, `sim:SCENE`, or a port or URL for pyserial.
+        `sim:`, `sim:SCENE`, `feed:NAME`, or a port or URL for pyserial.
     undo
         Stop using this sensor's tare instead of taking one.
     trust
@@ -281,7 +281,7 @@ def press(
     Parameters
     ----------
     source
-        `sim:`, `sim:SCENE`, or a port or URL for pyserial.
+        `sim:`, `sim:SCENE`, `feed:NAME`, or a port or URL for pyserial.
     quick
         On a grid, press two elements in each row and column only: enough to see whether rows,
         columns or components are exchanged, but not every pair of elements.

@@ -9,3 +9,5 @@ from kappaskin.live.resume import resume_folder as resume_folder
 from kappaskin.live.status import LOST as LOST
 from kappaskin.live.status import STREAMING as STREAMING
 from kappaskin.live.status import Status as Status
+from kappaskin.live.streaming import Stream as Stream
+from kappaskin.live.streaming import stream as stream

@@ -69,7 +69,7 @@ class PipelineHost:
         if self._sensor is None:
             self.status = replace(self.status, setup=self._requested, refusal="")
         elif self._building is None:
-            job = (_built, self._sensor, self._requested, self.status.generation + 1, smaller)
+            job = (built, self._sensor, self._requested, self.status.generation + 1, smaller)
             self._building = self._builder.submit(*job)
             self.status = replace(self.status, computing=True)
 
@@ -149,7 +149,7 @@ class _Built:
     refusal: str = ""
 
 
-def _built(sensor: Sensor, requested: Setup, generation: int, smaller: bool) -> _Built:
+def built(sensor: Sensor, requested: Setup, generation: int, smaller: bool) -> _Built:
     """A pipeline as requested, or if it may be `smaller` with as many functions as possible."""
     refusal = ""
     most = max(requested.Ni, requested.Nj)

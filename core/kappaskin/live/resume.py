@@ -4,9 +4,7 @@ The engine without a window listens at the address in a file, with a key that on
 Nothing is unpickled before both sides have proved that they have the key.
 """
 
-import hashlib
 import os
-import platform
 import secrets
 import signal
 import threading
@@ -27,9 +25,7 @@ from pathlib import Path
 from pickle import UnpicklingError
 from typing import Any, cast
 
-import platformdirs
-
-from kappaskin._files import user_folder
+from kappaskin._files import machine_folder
 from kappaskin.live.requests import Action, Requested, Update
 
 _LARGEST = 4096  # bytes of a note
@@ -63,12 +59,8 @@ class ResumeInfo:
 
 
 def resume_folder() -> Path:
-    """Folder of the notes of this user's and machine's engines without a window.
-
-    Short, whatever the machine is called: the path of a socket may have some 100 characters.
-    """
-    machine = hashlib.sha256(platform.node().encode(errors="surrogatepass")).hexdigest()[:8]
-    return user_folder(platformdirs.user_state_path) / "left-alone" / machine
+    """Folder of the notes of this user's and machine's engines without a window."""
+    return machine_folder("left-alone")
 
 
 def _address(note: Path) -> str:

@@ -336,6 +336,10 @@ class ReplayedSource:
         return self._sensor or self._frames.sensor
 
     @property
+    def patient(self) -> bool:
+        return True
+
+    @property
     def trouble(self) -> str:
         return self._frames.trouble
 

@@ -22,6 +22,9 @@ from kappaskin.sources.ports import BAUD_RATES as BAUD_RATES
 from kappaskin.sources.ports import Port as Port
 from kappaskin.sources.ports import SerialConnection as SerialConnection
 from kappaskin.sources.pseudo_device import PseudoDevice as PseudoDevice
+from kappaskin.sources.pushed import FEED as FEED
+from kappaskin.sources.pushed import Feed as Feed
+from kappaskin.sources.pushed import feed as feed
 from kappaskin.sources.serial_source import SerialSource as SerialSource
 from kappaskin.sources.simulated import SimulatedSource as SimulatedSource
 from kappaskin.sources.simulated import VirtualClock as VirtualClock

@@ -203,10 +203,16 @@ class Description:
 
 SCHEME = "sensor:"
 """Prefix of the names of sources of described sensors."""
+_DESCRIBED = ("sim:", "replay:", "feed:", SCHEME)
 
 
 def described_source(file: Path, source: str) -> str:
-    """The name of a `source` of a sensor with the description in a `file`, for `open_source`."""
+    """The name of a `source` of a sensor with the description in a `file`, for `open_source`.
+
+    A `Refusal` for a source that has a description of its own.
+    """
+    if source.startswith(_DESCRIBED):
+        raise Refusal(f"expected a port or URL with a sensor's description, got {source}")
     return f"{SCHEME}{file}:{source}"
 
 
@@ -270,6 +276,20 @@ def _with_calibration(text: str, file: Path) -> str:
     return f"{text}{toml_table(_CALIBRATION.rstrip(), values)}"
 
 
+_VALUES = "\n[values]  # a record: sequence number, time in s, and the numbers of the columns\n"
+_VALUES_SYNC, _VALUES_CHECKSUM = "b55e", "crc32"
+
+
+def of_values(description: Description) -> Description:
+    """The description of records of values, in the order of the columns of `description`.
+
+    They are what a program pushes or a file holds, not bytes of the device. Where the columns have
+    a sequence number or the time these are used, else those in front of the values.
+    """
+    sensor = description.sensor
+    return description_of(f"{sensor.description}{_VALUES}", sensor.name, sensor.serial_number)
+
+
 @lru_cache(8)
 def description_of(text: str, name: str, serial_number: str = "") -> Description:
     """The description with this `text`, of the file `name`.
@@ -290,6 +310,15 @@ def description_of(text: str, name: str, serial_number: str = "") -> Description
     line = top.table("line")
     kind = LINE.value(line, "kind")
     names, paths = _names(line, kind)
+    settings = {key: LINE.value(line, key) for key in ("rate", "separator", "struct", "checksum")}
+    sync = LINE.value(line, "sync")
+    if "values" in top:
+        top.table("values").done()
+        kind, sync = "binary", _VALUES_SYNC
+        settings |= {"struct": f"<Id{len(names)}d", "checksum": _VALUES_CHECKSUM}
+        sequence = "" if _SEQUENCE in names else _SEQUENCE
+        time = "" if set(names) & set(TIMES) else "time"
+        names = (sequence, time, *names)
     readings = _Conversion(top.table("readings"))
     with line.blamed("fields" if kind == "json" else "columns"):
         layout, columns = _columns(names, layout, readings)
@@ -311,16 +340,15 @@ def description_of(text: str, name: str, serial_number: str = "") -> Description
     )
     with top.blamed("readings"):
         _ = sensor.sigma  # or refused here
-    settings = {key: LINE.value(line, key) for key in ("rate", "separator", "struct", "checksum")}
     try:
-        sync = bytes.fromhex(LINE.value(line, "sync"))
+        start = bytes.fromhex(sync)
     except ValueError as error:
         raise line.refusal(f"expected bytes in hex such as aa55: {error}", "sync") from error
     baud = LINE.value(line, "baud")
     line.done()
     readings.done()
     top.done()
-    found = Description(text, sensor, baud, columns, kind, paths, sync=sync, **settings)
+    found = Description(text, sensor, baud, columns, kind, paths, sync=start, **settings)
     with line.blamed("struct" if kind == "binary" else "kind"):
         found.decoder()
     return found

@@ -33,12 +33,13 @@ class Input(ABC):
     """Where bytes come from, as from an open port; nothing can be sent there.
 
     A `patient` one waits until its bytes are taken, so that none are lost. `silence` says what to
-    check when nothing comes for seconds; nothing where that may be. Those of an input by `records`
-    come in whole ones.
+    check when nothing comes for seconds; nothing where that may be; `lost` why no more comes of one
+    that broke off. Those of an input by `records` come in whole ones.
     """
 
     patient: ClassVar[bool] = True
     silence: ClassVar[str] = ""
+    lost: ClassVar[str] = "the device was unplugged or stopped; plug it in to continue"
     by_records: ClassVar[bool] = False
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:

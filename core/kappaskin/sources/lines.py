@@ -378,6 +378,10 @@ class BinaryDecoder(LineDecoder):
             _as(code, number, self._body.format[0], wraps=place in counters)
             for place, (code, number) in enumerate(zip(self._codes, numbers, strict=True))
         ]
+        return self.record(values)
+
+    def record(self, values: Sequence[float]) -> bytes:
+        """The record with these `values` of its struct."""
         body = self._body.pack(*values)
         check = self._check.pack(self._sum(body)) if self._check.size else b""
         return self._sync + body + check

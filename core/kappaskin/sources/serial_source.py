@@ -38,6 +38,7 @@ from kappaskin.sources.ports import (
     SerialConnection,
     holders,
 )
+from kappaskin.sources.pushed import FEED, FedInput, fed_description
 from kappaskin.sources.source import InputRecorder, register_scheme
 from kappaskin.sources.wire import (
     VERSION,
@@ -135,10 +136,7 @@ class SerialSource:
         self._pending.clear()
         self._lost_at = self._clock()
         self._recording.disconnected(self._lost_at)
-        self._disconnected = (
-            f"{self.url}: connection lost: the device was unplugged or stopped; plug it in to "
-            "continue"
-        )
+        self._disconnected = f"{self.url}: connection lost: {(connection.input or Input).lost}"
         self._events.add("gone", self._disconnected)
 
     def _reconnect(self, timeout: float) -> None:
@@ -348,6 +346,12 @@ class SerialSource:
         return self._decoder.accounting(overrun=overrun)
 
     @property
+    def patient(self) -> bool:
+        """Whether it is a file, or standard input."""
+        by = self._connection.input if self._connection else None
+        return by is not None and by.patient
+
+    @property
     def trouble(self) -> str:
         """Why no frames come; empty when they do, or may be expected to."""
         if self._connection is None:
@@ -409,7 +413,8 @@ def connected(
 ) -> tuple[SerialConnection, Decoder | LineDecoder]:
     """A connection to a device, and a decoder of what it sends.
 
-    A described one may also be datagrams, standard input, or a file, which begin with whole lines.
+    A described one may also be datagrams, standard input, a feed, or a file, which begin with whole
+    records.
     """
     if description is None:
         return SerialConnection(url, clock), Decoder()
@@ -418,6 +423,8 @@ def connected(
         opened = partial(StandardInput, clock)
     elif url.startswith(UDP):
         opened = partial(Datagrams, url, clock)
+    elif url.startswith(FEED):
+        opened = partial(FedInput, url, description, clock)
     elif Path(url).is_file():
         records = description.decoder(whole=True)
         opened = partial(PlayedFile, Path(url), records, description.rate, clock)
@@ -593,3 +600,6 @@ def _described(name: str) -> SerialSource:
 
 
 register_scheme(SCHEME, lambda name, _: _described(name))
+
+
+register_scheme(FEED, lambda name, _: SerialSource(FEED + name, description=fed_description(name)))

@@ -185,6 +185,10 @@ class SimulatedSource:
         return arrived
 
     @property
+    def patient(self) -> bool:
+        return False
+
+    @property
     def trouble(self) -> str:
         return ""
 

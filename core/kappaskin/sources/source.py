@@ -54,6 +54,11 @@ class Source(Protocol):
         ...
 
     @property
+    def patient(self) -> bool:
+        """Whether what is not read waits, however long; a live source goes on meanwhile."""
+        ...
+
+    @property
     def trouble(self) -> str:
         """Why no frames come at present, and what to do; empty when nothing is wrong."""
         ...
@@ -90,14 +95,14 @@ def register_scheme(scheme: str, opened: Callable[[str, bool], Source]) -> None:
 
 
 def open_source(name: str, trust: bool = False) -> Source:
-    """The source called `name`: `sim:`, `sim:SCENE`, `replay:FILE`, or what pyserial opens.
+    """The source called `name`: `sim:SCENE`, `replay:FILE`, `feed:NAME`, or what pyserial opens.
 
     With `trust` a scene may name files outside its folder.
     `replay:` is registered by the room `recording`, as soon as that is imported.
     """
     if not name.strip():
         raise SourceError(
-            "expected a source: sim:, sim:SCENE, replay:FILE, a port or a URL; got an empty name"
+            "expected a source: sim:SCENE, replay:FILE, feed:NAME, a port or a URL; got no name"
         )
     scheme = max((scheme for scheme in _schemes if name.startswith(scheme)), key=len)
     return _schemes[scheme](name.removeprefix(scheme), trust)

@@ -293,7 +293,7 @@ def test_a_scene_that_is_refused_is_said_and_the_last_one_plays_on(engine) -> No
     [
         ("/dev/ttyABSENT7", "there is no such port"),
         ("sim:nowhere", "expected a scene among"),
-        ("", "got an empty name"),
+        ("", "got no name"),
         ("hwgrep://(", "cannot be opened"),
     ],
 )

@@ -219,7 +219,7 @@ def test_any_scene_plays_a_board_that_reads_other_quantities(tmp_path, what):
 
 
 def test_a_simulated_skin_has_no_description(tmp_path):
-    with pytest.raises(Refusal, match="a port or URL with --sensor, got sim:"):
+    with pytest.raises(Refusal, match="a port or URL with a sensor's description, got sim:"):
         of_sensor("sim:", written(tmp_path, "text"))
 
 

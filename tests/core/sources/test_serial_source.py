@@ -396,8 +396,8 @@ def test_an_unplugged_device_is_noticed_after_its_last_frame(line, opened, monke
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("", "expected a source: sim:, sim:SCENE, replay:FILE, a port or a URL; got an empty name"),
-        ("  ", "got an empty name"),
+        ("", "expected a source: sim:SCENE, replay:FILE, feed:NAME, a port or a URL; got no name"),
+        ("  ", "got no name"),
         ("/dev/ttyABSENT7", "there is no such port; plug the sensor in, or choose one"),
         ("COM77", "there is no such port"),
         (__file__, "cannot be opened"),

@@ -53,7 +53,7 @@ class PortSearch(QObject):
 
 
 _SIMULATED = ("sim:", "Simulated skin")
-_NO_PORTS = ("sim:", "replay:", "sensor:")
+_NO_PORTS = ("sim:", "replay:", "feed:", "sensor:")
 _TIP = (
     "The simulated skin, a serial port found on this machine, or a port or URL typed here, such as "
     "/dev/ttyACM0, COM3 or socket://host:port."

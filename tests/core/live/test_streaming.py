@@ -1,0 +1,139 @@
+"""Estimates in a loop of a program: those of the pipeline, in order, until the source ends."""
+
+import gc
+import os
+import threading
+import time
+from itertools import islice, pairwise
+
+import numpy as np
+import pytest
+
+from kappaskin import Refusal, Setup, SourceError, feed, stream
+
+pytestmark = pytest.mark.slow
+BOARD = """
+format = 1
+title = "Board"
+[skin]
+size = [0.06, 0.06]
+rigidity = 3.7e-3
+[elements]
+grid = [4, 4]
+[line]
+kind = "text"
+columns = ["sequence", "time", "height:0..15"]
+[readings]
+noise = 1e-6
+"""
+
+
+@pytest.fixture
+def board(tmp_path):
+    file = tmp_path / "board.toml"
+    file.write_text(BOARD)
+    return file
+
+
+def line(n):
+    return f"{n},{n / 1000},{','.join(['0.0001'] * 16)}\n"
+
+
+def test_estimates_are_those_of_the_pipeline(tmp_path, board) -> None:
+    file = tmp_path / "readings.csv"
+    file.write_text("".join(map(line, range(200))))
+
+    with stream(str(file), sensor=board, setup=Setup(3, 3)) as found:
+        estimates = list(found)
+
+    assert [each.sequence for each in estimates] == list(range(200))
+    assert found.dropped == 0
+    assert estimates[0].coefficients.shape == (3, 3)
+    # A plane of 0.1 mm, by sines that end at zero: least squares of its own.
+    at = (np.arange(4) + 0.5) / 4 * np.pi
+    sines = np.sin(np.outer(at, np.arange(1, 4)))
+    own = np.linalg.lstsq(np.kron(sines, sines), np.full(16, 1e-4), rcond=None)[0]
+    np.testing.assert_allclose(estimates[9].coefficients.ravel(), own, atol=1e-9)
+
+
+def test_without_a_setup_there_are_as_many_functions_as_the_sensor_determines(board) -> None:
+    with feed("glove", board) as glove, stream("feed:glove") as found:
+        glove.push([0, 0, *[1e-4] * 16])
+        assert next(found).coefficients.shape == (4, 4)
+
+
+def test_a_setup_that_the_sensor_does_not_allow_is_refused(board) -> None:
+    with feed("glove", board), pytest.raises(Refusal, match="coefficients"):
+        stream("feed:glove", setup=Setup(9, 9))
+
+
+def test_of_frames_that_wait_the_newest_are_given_and_the_others_counted(board) -> None:
+    with feed("glove", board) as glove, stream("feed:glove") as found:
+        for n in range(200):
+            glove.push([n, n / 1000, *[1e-4] * 16])
+            time.sleep(1e-3)  # so that none is dropped on the way
+        time.sleep(0.3)
+        sequences = [next(found).sequence for _ in range(64)]
+
+    assert glove.dropped == 0
+    assert sequences == list(range(136, 200))
+    assert found.dropped == 136
+
+
+def test_a_lost_connection_is_raised_and_what_came_before_is_given(board) -> None:
+    glove, found = feed("glove", board), stream("feed:glove")
+    for n in range(5):
+        glove.push([n, n / 1000, *[1e-4] * 16])
+    time.sleep(0.1)
+    glove.close()
+
+    with pytest.raises(SourceError, match="the program that feeds it ended"):  # noqa: PT012
+        for count, estimate in enumerate(found):
+            assert estimate.sequence == count
+    assert count == 4
+    assert list(found) == []
+
+
+def test_a_simulation_and_a_recording_are_streamed(recording) -> None:
+    with stream("sim:centre") as simulated:
+        forces = [each.contact.force for each in islice(simulated, 20)]
+    with stream(f"replay:{recording}") as replayed:
+        again = list(islice(replayed, 20))
+
+    assert np.isfinite(forces).all()
+    assert all(later.device_time > one.device_time for one, later in pairwise(again))
+    assert replayed.sensor is not None
+
+
+def test_a_device_that_is_unplugged_raises(board) -> None:
+    tty = pytest.importorskip("tty", reason="no pseudo-terminals on this system")
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    with stream(os.ttyname(theirs), sensor=board) as found:
+        os.write(ours, "".join(map(line, range(9))).encode())
+        assert next(found).sequence == 1  # the first line may be half of one
+        os.close(ours)
+        with pytest.raises(SourceError, match="connection lost: the device was unplugged"):
+            list(found)
+    os.close(theirs)
+
+
+def test_a_loop_that_is_left_closes_its_source(board) -> None:
+    before = set(threading.enumerate())
+    with feed("glove", board) as glove:
+        glove.push([0, 0, *[0.0] * 16])
+        for _ in stream("sim:"):
+            break
+        found = stream("feed:glove")
+        del found
+        gc.collect()
+    assert set(threading.enumerate()) == before
+
+
+def test_a_source_that_cannot_be_opened_says_why(board) -> None:
+    with pytest.raises(SourceError, match="no program feeds it"):
+        stream("feed:nobody")
+    with pytest.raises(Refusal, match="a port or URL with a sensor's description, got sim:"):
+        stream("sim:", sensor=board)
+    with pytest.raises(SourceError, match="no such port"):
+        stream(os.path.join(os.sep, "dev", "ttyNOT"))
