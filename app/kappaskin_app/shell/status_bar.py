@@ -1,7 +1,7 @@
 """The status bar: messages, warnings, the object in contact, background tasks."""
 
 import numpy as np
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QEvent, Signal
 from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QHBoxLayout, QStatusBar, QToolButton, QWidget
 
@@ -145,8 +145,19 @@ class StatusBar(QStatusBar):
         self._corner = row(self.activity)
         self._grow(self._corner)
         self.addPermanentWidget(self._corner)
-        # What it takes of the bar, all that the rest leaves, a passing message needs.
-        self.messageChanged.connect(lambda text: self.object.setHidden(bool(text)))
+        self._beneath = (notice, self.object)  # the bar hides the first alone, until it grows
+        self.messageChanged.connect(self._make_room)
+
+    def event(self, event: QEvent) -> bool:
+        done = super().event(event)
+        if event.type() == QEvent.Type.LayoutRequest:
+            self._make_room(self.currentMessage())
+        return done
+
+    def _make_room(self, message: str) -> None:
+        """Hide what a passing `message` takes the room of, while there is one."""
+        for widget in self._beneath:
+            widget.setHidden(bool(message))
 
     def add(self, widget: QWidget) -> None:
         """Show a widget at the end."""

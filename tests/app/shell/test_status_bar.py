@@ -8,7 +8,7 @@ import pytest
 from kappaskin import Pipeline, Setup, Simulator, load_scene
 from kappaskin.estimation import FAULTS
 from kappaskin.frames import Contact
-from kappaskin_app.shell.status_bar import Notice, SteadySlope, warnings
+from kappaskin_app.shell.status_bar import Notice, StatusBar, SteadySlope, warnings
 from kappaskin_app.theme import DARK, LIGHT, apply_look
 
 INSIDE = Contact(np.full(2, 0.05), np.full(2, 1e-4), 0.1, 1e-3, 4e-3, 1e-5, 297, True, False)
@@ -97,3 +97,21 @@ def test_a_slope_that_wavers_is_shown_as_one() -> None:
     shown = SteadySlope()
     slopes = [(0.12, 0.0), (0.125, 0.2), (0.2, 0.4), (0.0, 0.6), (0.2, 0.8), (0.0, 2.7), (0.0, 2.9)]
     assert [shown(*one) for one in slopes] == [0.12, 0.12, 0.2, 0.2, 0.2, 0.2, 0.0]
+
+
+def test_a_message_is_alone_even_where_the_bar_grows_meanwhile(qapp) -> None:
+    notice = Notice("F1: shortcuts")
+    bar = StatusBar(notice)
+    bar.show()
+    qapp.processEvents()
+    bar.showMessage("connected")
+    notice.setMinimumHeight(2 * bar.height())
+    for _ in range(3):
+        qapp.processEvents()
+    hidden = not notice.isVisible()
+    bar.clearMessage()
+    back = notice.isVisible()
+    bar.close()
+
+    assert hidden
+    assert back
