@@ -8,6 +8,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -18,6 +19,9 @@ from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from kappaskin.live import Engine, Status
+    from kappaskin.pipeline import Setup
 
 _Kind = TypeVar("_Kind")
 
@@ -108,6 +112,29 @@ def of_sensor(source: str, sensor: Path | None) -> str:
     described = described_source(sensor, source)
     load_description(sensor)  # or refused here
     return described
+
+
+class UsedTare:
+    """Lets an `engine` use the saved tare of each sensor; called with every status.
+
+    `connections` are those whose tare is in use.
+    """
+
+    def __init__(self, engine: "Engine") -> None:
+        self._engine, self.connections = engine, 0
+        self._usual: Setup | None = None
+
+    def __call__(self, status: "Status") -> None:
+        from kappaskin.pipeline import usual_setup
+
+        if status.connections != self.connections and status.sensor is not None:
+            self.connections, self._usual = status.connections, usual_setup(status.sensor)
+            if not status.sensor.simulated:
+                self._engine.set_up(self._usual)
+        usual, used = self._usual, status.setup
+        if usual and status.refusal and used == replace(usual, Ni=used.Ni, Nj=used.Nj) != usual:
+            self._engine.set_up(used)  # as many as the elements determine: nobody asked for more
+            self._usual = None
 
 
 def stops() -> list[int]:

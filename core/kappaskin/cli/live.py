@@ -12,6 +12,7 @@ from kappaskin.cli.common import (
     Described,
     SourceName,
     Switch,
+    UsedTare,
     Whole,
     check_time,
     of_sensor,
@@ -105,7 +106,7 @@ def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
     from kappaskin.estimation import slope_warning
 
     printed, line, slope = time.monotonic(), "", 0.0
-    noticed = set[str]()
+    noticed, tared = set[str](), UsedTare(engine)
     status = engine.status()
     while not (stopped or status.ended) and time.monotonic() < end:
         time.sleep(_POLL)
@@ -113,6 +114,7 @@ def _watched(engine: "Engine", end: float, stopped: list[int]) -> "Status":
         status = engine.status()
         if engine.given_up or engine.silent > _PATIENCE:
             raise Refusal(status.message)
+        tared(status)
         for target in status.publishing.targets:
             if target.refusal:
                 raise Refusal(target.refusal)

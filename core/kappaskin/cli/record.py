@@ -2,7 +2,6 @@
 
 import math
 import time
-from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,6 +16,7 @@ from kappaskin.cli.common import (
     ProgressLine,
     SourceName,
     Switch,
+    UsedTare,
     allow,
     check_output,
     check_time,
@@ -33,9 +33,7 @@ from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
     from kappaskin.live import Engine, Status
-    from kappaskin.pipeline import Setup
     from kappaskin.recording import Recording
-    from kappaskin.sensing import Sensor
 
 _POLL = 0.05  # s
 _BEGIN = 10.0  # s within which something must come
@@ -124,8 +122,7 @@ def _recorded(
     from kappaskin.live import LOST, STREAMING
 
     began = recording = time.monotonic()
-    known, slope = 0, 0.0  # connections whose tare is in use
-    usual: Setup | None = None
+    tared, slope = UsedTare(engine), 0.0
     while True:
         status, now = engine.status(), time.monotonic()
         slope = max(slope, status.slope)
@@ -135,21 +132,15 @@ def _recorded(
             return slope
         if written.trouble and not written.seconds:
             raise Refusal(written.trouble)
-        if status.connections != known and status.sensor is not None:
-            known, usual = status.connections, _usual_setup(status.sensor)
-            if not status.sensor.simulated:
-                engine.set_up(usual)
-        if usual and status.refusal and _has_fewer_functions(status.setup, usual):
-            engine.set_up(status.setup)  # as many as the elements determine: nobody asked for more
-            usual = None
+        tared(status)
         over = max(written.seconds, now - recording) >= seconds
         if stopped or written.trouble or over:
             return slope
         if status.ended and status.accounting.accepted:
             return slope
-        if status.state == LOST and not known:
+        if status.state == LOST and not tared.connections:
             raise Refusal(status.message)
-        if status.state != STREAMING and not known and now - began > _BEGIN:
+        if status.state != STREAMING and not tared.connections and now - began > _BEGIN:
             raise Refusal(f"{status.source}: no readings within {_BEGIN:g} s")
         show_progress(_line(status))
         time.sleep(_POLL)
@@ -174,22 +165,6 @@ def _broken_off(out: Path, ended: str) -> int:
     part.unlink()
     show(f"kappaskin: {ended}; saved up to then: {out}: {done.words}", error=True)
     return FAILED
-
-
-def _has_fewer_functions(setup: "Setup", usual: "Setup") -> bool:
-    """Whether nothing else of a `setup` is different."""
-    return setup == replace(usual, Ni=setup.Ni, Nj=setup.Nj) != usual
-
-
-def _usual_setup(sensor: "Sensor") -> "Setup":
-    """The default setup with the tare of a real `sensor`."""
-    from kappaskin.calibration import TareStore
-    from kappaskin.pipeline import Setup
-
-    if sensor.simulated:
-        return Setup()
-    tare = TareStore(TareStore.user_folder()).load(sensor.serial_number).fit_for(sensor)
-    return replace(Setup(), tare=tare)
 
 
 def _line(status: "Status") -> str:

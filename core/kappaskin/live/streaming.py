@@ -9,7 +9,7 @@ from kappaskin.errors import EndedSource, Refusal, SourceError
 from kappaskin.frames import Estimate, Frame
 from kappaskin.health import HealthMonitor
 from kappaskin.live.pipelines import built
-from kappaskin.pipeline import Pipeline, Setup
+from kappaskin.pipeline import Pipeline, Setup, usual_setup
 from kappaskin.sensing import Sensor
 from kappaskin.sources import described_source, open_source
 
@@ -76,7 +76,8 @@ class Stream:
             return
         self.dropped += len(self._waiting)
         self._waiting.clear()
-        made = built(sensor, self._setup or Setup(), 1, smaller=self._setup is None)
+        usual = self._setup is None
+        made = built(sensor, self._setup or usual_setup(sensor), 1, smaller=usual)
         if made.pipeline is None:
             raise Refusal(made.refusal)
         self.sensor, self._pipeline, self._health = sensor, made.pipeline, HealthMonitor(sensor)
@@ -100,8 +101,9 @@ def stream(
 ) -> Stream:
     """The estimates of a `source`: `sim:SCENE`, `replay:FILE`, `feed:NAME`, a port or a URL.
 
-    `sensor` is a file that describes a sensor with a line format of its own. Without a `setup`, of
-    the usual basis as many functions as the sensor determines. With `trust` a scene may name files
+    `sensor` is a file that describes a sensor with a line format of its own. Without a `setup`, it
+    is the usual one with the tare that is saved of this sensor, and as many functions as the sensor
+    determines. With `trust` a scene may name files
     outside its folder. Raises a `SourceError` where the source cannot be opened, and a `Refusal`
     for a setup that the sensor does not allow.
     """

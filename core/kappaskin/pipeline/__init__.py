@@ -31,3 +31,4 @@ from kappaskin.pipeline.setup import SETUP as SETUP
 from kappaskin.pipeline.setup import Setup as Setup
 from kappaskin.pipeline.setup import setup_from_text as setup_from_text
 from kappaskin.pipeline.setup import setup_to_text as setup_to_text
+from kappaskin.pipeline.setup import usual_setup as usual_setup

@@ -11,6 +11,7 @@ from kappaskin.bases import EDGES
 from kappaskin.calibration import Calibration, Tare, TareStore
 from kappaskin.errors import Refusal
 from kappaskin.estimation import METHODS, Estimator
+from kappaskin.sensing import Sensor
 
 
 @dataclass(frozen=True)
@@ -103,6 +104,13 @@ def setup_to_text(setup: Setup) -> tuple[str, dict[str, bytes]]:
             keys[name] = f"{name}-{made.digest[:16]}.toml"
             files[keys[name]] = to_toml(made).encode()
     return json.dumps(keys), files
+
+
+def usual_setup(sensor: Sensor) -> Setup:
+    """The default setup; of a real `sensor` with the tare that is saved and in use."""
+    if sensor.simulated:
+        return Setup()
+    return Setup(tare=TareStore(TareStore.user_folder()).load(sensor.serial_number).fit_for(sensor))
 
 
 def setup_from_text(text: str, file: Callable[[str], bytes]) -> Setup:

@@ -4,12 +4,16 @@ import gc
 import os
 import threading
 import time
-from itertools import islice, pairwise
+from contextlib import contextmanager
+from itertools import count, islice, pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from kappaskin import Refusal, Setup, SourceError, feed, stream
+from kappaskin import Refusal, Setup, SourceError, Status, feed, stream
+from kappaskin.cli import main
+from kappaskin.cli.common import UsedTare
 
 pytestmark = pytest.mark.slow
 BOARD = """
@@ -88,9 +92,9 @@ def test_a_lost_connection_is_raised_and_what_came_before_is_given(board) -> Non
     glove.close()
 
     with pytest.raises(SourceError, match="the program that feeds it ended"):  # noqa: PT012
-        for count, estimate in enumerate(found):
-            assert estimate.sequence == count
-    assert count == 4
+        for number, estimate in enumerate(found):
+            assert estimate.sequence == number
+    assert number == 4
     assert list(found) == []
 
 
@@ -137,3 +141,45 @@ def test_a_source_that_cannot_be_opened_says_why(board) -> None:
         stream("sim:", sensor=board)
     with pytest.raises(SourceError, match="no such port"):
         stream(os.path.join(os.sep, "dev", "ttyNOT"))
+
+
+@contextmanager
+def pushed(board, numbers, every=0.005):
+    """A feed of these numbers again and again."""
+    over = threading.Event()
+    with feed("glove", board) as glove:
+
+        def push() -> None:
+            for n in count():
+                glove.push([n, n * every, *numbers[n % len(numbers)]])
+                if over.wait(every):
+                    return
+
+        pushing = threading.Thread(target=push)
+        pushing.start()
+        try:
+            yield
+        finally:
+            over.set()
+            pushing.join()
+
+
+def test_the_saved_tare_is_used_by_a_loop_and_by_publishing(board) -> None:
+    rng = np.random.default_rng(3)
+    offset = rng.normal(0, 1e-5, 16)
+    with pushed(board, offset + rng.normal(0, 1e-6, (500, 16))):
+        with stream("feed:glove") as found:
+            untared = np.mean([each.curvature for each in islice(found, 50)], axis=0)
+            sensor = found.sensor
+        assert main(["tare", "feed:glove"]) == 0
+        with stream("feed:glove") as found:
+            tared = np.mean([each.curvature for each in islice(found, 50)], axis=0)
+        used = list[Setup]()
+        publishing = UsedTare(SimpleNamespace(set_up=used.append))
+        publishing(Status(connections=1, sensor=sensor))
+        publishing(Status(connections=1, sensor=sensor))
+        assert main(["tare", "feed:glove", "--undo"]) == 0
+
+    assert np.sqrt(np.mean(untared**2)) > 5e-6
+    assert np.sqrt(np.mean(tared**2)) < 1e-6
+    assert [each.tare is not None for each in used] == [True]
