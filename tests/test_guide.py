@@ -11,6 +11,7 @@ import doctest
 import importlib.util
 import io
 import json
+import os
 import re
 import runpy
 import shlex
@@ -71,6 +72,8 @@ class Shell:
 
     stack: ExitStack
     said_as: dict[str, str] = field(default_factory=dict)
+    plugged: bool = False
+    """Whether plug-ins are installed, which processes of their own find."""
     names: dict[str, object] = field(default_factory=lambda: {"__name__": "__main__"})
 
     def run(self, block: Block) -> str:
@@ -83,6 +86,9 @@ class Shell:
         asked = 1 if "# exit code 1" in line else 2 if "# refused" in line else 0
         words = [self._here(word) for word in shlex.split(line, comments=True)]
         match words:
+            case ["pip", "install", what] if what.startswith("./"):
+                self._install(what)
+                return ""
             case ["pip", "install", what]:
                 assert re.fullmatch(r"kappaskin\[(\w+)\]", what)[1] in _extras()
                 return ""
@@ -92,16 +98,26 @@ class Shell:
             case ["kappaskin", *_, "&"]:
                 return self._beside(words[1:-1])
             case ["kappaskin", name, *rest] if name in WINDOWS:
-                if SHOWN and line not in _OPENED:
+                if SHOWN and (line not in _OPENED or self.plugged):
                     _OPENED.add(line)
                     _open(name, *rest)
                 return ""
+            case ["kappaskin", *rest] if self.plugged:
+                return _ran(sys.executable, "-m", "kappaskin", *rest)
             case ["kappaskin", *rest]:
                 codes: list[int] = []
                 printed = _printed(lambda: codes.append(main(rest)))
                 assert codes == [asked], f"{line}: exit code {codes}\n{printed}"
                 return self._said(printed)
         raise AssertionError(f"{line}: expected kappaskin, pip or packaging/start.py")
+
+    def _install(self, package: str) -> None:
+        """Install a plug-in where processes that are started from now on find it."""
+        self.plugged, there = True, Path("plugged", package).absolute()
+        alone = ("--no-index", "--no-deps", "--no-build-isolation", "-q", "--target", str(there))
+        _ran(sys.executable, "-m", "pip", "install", *alone, package)
+        patch = self.stack.enter_context(pytest.MonkeyPatch.context())
+        patch.setenv("PYTHONPATH", str(there), prepend=os.pathsep)
 
     def _here(self, word: str) -> str:
         """A word of a command with the ports of this machine for those that a page names."""
@@ -125,6 +141,14 @@ class Shell:
             self.said_as = {here: there for here, there in self.said_as.items() if there != SENSOR}
             self.said_as[json.loads(printed)["port"]] = SENSOR
         return self._said(printed)
+
+
+def _ran(*words: str) -> str:
+    """What a command that ends well prints."""
+    both = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+    done = subprocess.run(words, text=True, check=False, timeout=ENOUGH, **both)
+    assert done.returncode == 0, done.stdout
+    return done.stdout
 
 
 def _printed(act) -> str:
@@ -162,9 +186,8 @@ def _free_port() -> int:
 
 def _open(*words: str) -> None:
     """Open a window as a page says, for a second."""
-    call = [sys.executable, "-m", "kappaskin", *words, "--seconds", "1"]
-    done = subprocess.run(call, capture_output=True, text=True, check=False, timeout=ENOUGH)
-    assert (done.returncode, done.stderr) == (0, ""), words
+    printed = _ran(sys.executable, "-m", "kappaskin", *words, "--seconds", "1")
+    assert not printed, words
 
 
 @cache
@@ -191,8 +214,9 @@ def _without_numbers(text: str) -> str:
 
 def _keep(block: Block) -> None:
     """Write the file that a block is."""
-    name = re.match(r"# (\S+\.toml)\n", block.text)
+    name = re.match(r"# (\S+\.(?:toml|py))\n", block.text)
     assert name, f"line {block.line}: expected the file's name in a comment at its head"
+    Path(name[1]).parent.mkdir(exist_ok=True)
     Path(name[1]).write_text(block.text, "utf-8")
 
 
@@ -223,6 +247,8 @@ def test_what_a_page_shows_runs_and_prints_what_it_says(
         for block in blocks_of(page):
             where = f"{page.name}, line {block.line}"
             match block.kind:
+                case "python" if re.match(r"# \S+/\S+\.py\n", block.text):
+                    _keep(block)
                 case "sh" | "python":
                     printed = shell.run(block)
                 case "toml":

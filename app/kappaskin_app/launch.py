@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kappaskin._files import user_folder
+from kappaskin._plugins import found_plug_ins
 from kappaskin._processes import preload_library
 from kappaskin.errors import Refusal
 
@@ -70,16 +71,20 @@ def opened(
         engine = starting.result()
     _stand_behind()
     try:
-        from kappaskin_app.features import FEATURES
+        from kappaskin_app.features import all_features
         from kappaskin_app.shell.window import MainWindow
 
         if splash is not None:
             splash.say("Building the window")
-        window = MainWindow([made() for made in FEATURES], source, engine, trusted)
+        window = MainWindow(all_features(), source, engine, trusted)
     except BaseException:
         engine.close()
         raise
     window.show()
+    for plug_in in found_plug_ins():
+        if plug_in.trouble:
+            log.warning("plug-in %s", plug_in.text)
+            window.notify(f"Plug-in {plug_in.text}.")
     if kept is not None:
         window.saver.begin(kept)
     if splash is not None:

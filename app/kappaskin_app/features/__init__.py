@@ -5,8 +5,12 @@ each other. Removing a line of `FEATURES` leaves an app without that feature. Th
 order in which their panels, docks and actions do.
 """
 
+import logging
 from collections.abc import Callable
+from typing import Any
 
+from kappaskin._plugins import FEATURES as GROUP
+from kappaskin._plugins import plug_ins
 from kappaskin_app.features.accuracy import AccuracyFeature
 from kappaskin_app.features.calibration import CalibrationFeature
 from kappaskin_app.features.compare import CompareFeature
@@ -28,7 +32,9 @@ from kappaskin_app.features.scene import SceneFeature
 from kappaskin_app.features.sensor import SensorFeature
 from kappaskin_app.features.stability import StabilityFeature
 from kappaskin_app.features.traces import TracesFeature
-from kappaskin_app.shell.window import Feature
+from kappaskin_app.shell.window import Feature, MainWindow
+
+log = logging.getLogger("kappaskin")
 
 FEATURES: tuple[Callable[[], Feature], ...] = (
     ConnectionFeature,
@@ -53,3 +59,32 @@ FEATURES: tuple[Callable[[], Feature], ...] = (
     PresenterFeature,
     ExportFeature,
 )
+
+
+class PluggedFeature:
+    """A feature of a plug-in; where it cannot be installed the window goes on without it."""
+
+    def __init__(self, name: str, made: Callable[[], Feature]) -> None:
+        self.name, self._made = name, made
+
+    def install(self, shell: MainWindow) -> None:
+        try:
+            self.feature = self._made()  # kept: Qt holds none of the slots of a Python object
+            self.feature.install(shell)
+        except Exception as error:  # a plug-in may raise anything
+            text = f"Plug-in feature {self.name} left out: {type(error).__name__}: {error}."
+            log.warning(text, exc_info=error)
+            shell.notify(text)
+
+
+def _check(name: str, made: Any) -> None:
+    """Raise a `TypeError` for what is no feature of this `name`."""
+    if not callable(getattr(made, "install", None)) or getattr(made, "name", "") != name:
+        raise TypeError(f"expected a class with the name {name!r} and install, got {made!r:.60}")
+
+
+def all_features() -> list[Feature]:
+    """Every feature, those of plug-ins last."""
+    ours = [made() for made in FEATURES]
+    plugged = plug_ins(GROUP, _check, {feature.name for feature in ours})
+    return [*ours, *(PluggedFeature(name, made) for name, made in plugged.items())]

@@ -72,6 +72,16 @@ def _typed(arguments: list[str] | None) -> str:
     return first if first in app and not first.startswith("-") else ""
 
 
+def _report_plug_ins() -> None:
+    """Print which plug-ins were left out, and why."""
+    if "kappaskin._plugins" in sys.modules:  # else no room was loaded that has any
+        from kappaskin._plugins import found_plug_ins
+
+        for plug_in in found_plug_ins():
+            if plug_in.trouble:
+                show(f"kappaskin: plug-in {plug_in.text}", error=True)
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; the exit code is 0 when done, 1 or 2 as `FAILED` and `REFUSED` say."""
     if reconfigure := getattr(sys.stdout, "reconfigure", None):
@@ -83,6 +93,8 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
+        if typed != "app":  # the window shows them
+            _report_plug_ins()
         return int(code or 0)
     except Refusal as refusal:
         show(f"kappaskin: {refusal}", error=True)

@@ -14,6 +14,7 @@ from kappaskin.cli.common import FAILED, ProgressLine, Switch, lined, print_resu
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
+    from kappaskin._plugins import PlugIn
     from kappaskin.sources import Diagnosis
 
 PACKAGES = (
@@ -80,6 +81,19 @@ def _display() -> str:
     return os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or ""
 
 
+def _plug_ins() -> "list[PlugIn]":
+    """Every plug-in of every group, loaded."""
+    # Those of the app are found in its process: here they need not be whole.
+    from kappaskin import _plugins
+    from kappaskin import estimation as estimation
+    from kappaskin import scenes as scenes
+    from kappaskin.sources import plugged_source
+
+    plugged_source(":", None)
+    _plugins.plug_ins(_plugins.FEATURES, lambda name, made: None)
+    return _plugins.found_plug_ins()
+
+
 def examine() -> dict[str, Any]:
     """Everything that `kappaskin doctor` shows, as JSON values."""
     from kappaskin.sources import Port
@@ -91,6 +105,7 @@ def examine() -> dict[str, Any]:
         "python": platform.python_version(),
         "system": platform.platform(),
         "packages": {package: _version(package) for package in PACKAGES},
+        "plug_ins": [asdict(one) for one in _plug_ins()],
         "display": _display(),
         "serial_ports": [asdict(port) for port in Port.found()],
         "missing": missing,
@@ -150,11 +165,14 @@ def _line(name: str, text: str) -> str:
 
 def _machine_text(found: dict[str, Any]) -> str:
     """What `examine` found, for people."""
+    from kappaskin._plugins import PlugIn
     from kappaskin.sources import Port
 
     lines = [_line(name, found[name]) for name in ("kappaskin", "python", "system")]
     for package, version in found["packages"].items():
         lines.append(_line(package, version or "not installed"))
+    for one in (PlugIn(**one) for one in found["plug_ins"]):
+        lines.append(_line("plug-in", f"{one.text}  {one.file}".rstrip()))
     lines.append(_line("display", found["display"] or "none (`xvfb-run` provides a virtual one)"))
     for port in (Port(**port) for port in found["serial_ports"]):
         may = "" if port.opened else f"  no permission. {port.permission_help}"

@@ -1,8 +1,11 @@
 """Estimation: readings to coefficients with error bars; element placement; regions; spectra."""
 
+from inspect import isabstract
+
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
+from kappaskin import _plugins
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
 from kappaskin.estimation.bayes import Bayes as Bayes
@@ -35,7 +38,7 @@ from kappaskin.estimation.spectrum import amplitude_spectrum as amplitude_spectr
 from kappaskin.estimation.tracking import Tracking as Tracking
 from kappaskin.sensing import SensorLayout
 
-METHODS: dict[str, type[Estimator]] = {
+_OURS: dict[str, type[Estimator]] = {
     "least-squares": LeastSquares,
     "as-printed": AsPrinted,
     "direct": Direct,
@@ -45,13 +48,26 @@ METHODS: dict[str, type[Estimator]] = {
     "robust": Robust,
     "tracking": Tracking,
 }
-"""Estimators by name, the default first."""
+
+
+def _check(name: str, made: object) -> None:
+    """Raise a `TypeError` for what is no estimator."""
+    if not (isinstance(made, type) and issubclass(made, Estimator)) or isabstract(made):
+        raise TypeError(f"expected a class of Estimator with all its methods, got {made!r:.60}")
+
+
+METHODS: dict[str, type[Estimator]] = {
+    **_OURS,
+    **_plugins.plug_ins(_plugins.ESTIMATORS, _check, _OURS),
+}
+"""Estimators by name, the default first, those of plug-ins last."""
 
 
 def check_method(method: str) -> None:
     """Raise a `Refusal` for an unknown `method`."""
     if method not in METHODS:
-        raise Refusal(f"expected a method among {', '.join(METHODS)}, got {method!r}")
+        why = _plugins.left_out(_plugins.ESTIMATORS, method)
+        raise Refusal(f"expected a method among {', '.join(METHODS)}, got {method!r}{why}")
 
 
 def estimator_for(

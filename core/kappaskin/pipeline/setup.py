@@ -40,6 +40,17 @@ class Setup:
 _COUNT = Within(1, 4096, whole=True)
 _SHOWN = 64  # functions along one side that an editor offers at most
 
+_METHODS = {
+    "least-squares": "Least squares",
+    "as-printed": "As printed (Eq. 6)",
+    "direct": "Direct, solved in each frame",
+    "fast": "Fast, for regular grids",
+    "tracking": "Tracking, from frame to frame",
+    "bayes": "Bayes, with a plate's prior",
+    "finite-slope": "Finite slope",
+    "robust": "Robust, excludes faulty elements",
+}  # on the screen, where that is not the name
+
 SETUP = Part(
     "Setup",
     {
@@ -76,14 +87,8 @@ SETUP = Part(
             "Method that computes the shape from the readings. All report error bars; "
             "Cost of accuracy (F9) compares their errors and computing times.",
             choices=(
-                ("least-squares", "Least squares"),
-                ("as-printed", "As printed (Eq. 6)"),
-                ("direct", "Direct, solved in each frame"),
-                ("fast", "Fast, for regular grids"),
-                ("tracking", "Tracking, from frame to frame"),
-                ("bayes", "Bayes, with a plate's prior"),
-                ("finite-slope", "Finite slope"),
-                ("robust", "Robust, excludes faulty elements"),
+                *_METHODS.items(),
+                *((name, name.capitalize()) for name in METHODS if name not in _METHODS),
             ),
         ),
         "calibration": Key("Calibration", "File of the calibration of the readings.", kind=str),

@@ -11,6 +11,7 @@ from typing import Any, cast, get_type_hints
 
 import numpy as np
 
+from kappaskin import _plugins
 from kappaskin._files import read_file, why_unread
 from kappaskin._schema import Within
 from kappaskin._toml import TomlTable, parsed
@@ -347,6 +348,10 @@ def _effects(
         EffectSelection(accuracy=accuracy)
     with table.blamed("choose"):
         choice = _choice(table, accuracy)
+    for name in table:
+        if name not in EFFECTS and table.is_table(name):
+            why = _plugins.left_out(_plugins.EFFECTS, name)
+            raise table.refusal(f"expected effects among {', '.join(EFFECTS)}{why}", name)
     table.done(*EFFECTS)
     return choice, tuple(found)
 

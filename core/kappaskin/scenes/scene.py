@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kappaskin import _plugins
 from kappaskin.bases import Basis, basis_for
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
@@ -43,7 +44,8 @@ class EffectSelection:
             raise Refusal(f"expected an accuracy between 0 and 1 of the peak, got {self.accuracy}")
         for name in sorted(self.on | self.off):
             if name not in EFFECTS:
-                raise Refusal(f"expected effects among {', '.join(EFFECTS)}; got {name!r}")
+                why = _plugins.left_out(_plugins.EFFECTS, name)
+                raise Refusal(f"expected effects among {', '.join(EFFECTS)}; got {name!r}{why}")
         if both := sorted(self.on & self.off):
             raise Refusal(f"expected an effect to be on or off, got {', '.join(both)} as both")
 

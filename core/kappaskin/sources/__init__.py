@@ -16,6 +16,8 @@ from kappaskin.sources.diagnosis import Diagnosis as Diagnosis
 from kappaskin.sources.diagnosis import WireMonitor as WireMonitor
 from kappaskin.sources.information import sensor_from_json as sensor_from_json
 from kappaskin.sources.information import sensor_to_json as sensor_to_json
+from kappaskin.sources.inputs import EndOfInput as EndOfInput
+from kappaskin.sources.inputs import Input as Input
 from kappaskin.sources.interpreter import Interpreter as Interpreter
 from kappaskin.sources.lines import LineDecoder as LineDecoder
 from kappaskin.sources.ports import BAUD_RATES as BAUD_RATES
@@ -31,4 +33,5 @@ from kappaskin.sources.simulated import VirtualClock as VirtualClock
 from kappaskin.sources.source import InputRecorder as InputRecorder
 from kappaskin.sources.source import Source as Source
 from kappaskin.sources.source import open_source as open_source
+from kappaskin.sources.source import plugged_source as plugged_source
 from kappaskin.sources.source import register_scheme as register_scheme

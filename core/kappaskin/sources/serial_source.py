@@ -39,7 +39,12 @@ from kappaskin.sources.ports import (
     holders,
 )
 from kappaskin.sources.pushed import FEED, FedInput, fed_description
-from kappaskin.sources.source import InputRecorder, register_scheme
+from kappaskin.sources.source import (
+    InputRecorder,
+    Source,
+    plugged_source,
+    register_scheme,
+)
 from kappaskin.sources.wire import (
     VERSION,
     Command,
@@ -69,7 +74,8 @@ class SerialSource:
     Opening raises a `SourceError` where it cannot be; thereafter `trouble` says why no frames come.
     A thread of its own reads, so that no byte waits for arithmetic. A device with a line format of
     its own has a `description` in place of its information, and is sent nothing; its lines may also
-    come as datagrams, on standard input, or from a file, which end with an `EndedSource`.
+    come as datagrams, on standard input, or from a file, which end with an `EndedSource`, or from
+    an `Input` that `opened` returns.
     """
 
     def __init__(
@@ -77,11 +83,12 @@ class SerialSource:
         url: str,
         clock: Callable[[], float] = time.monotonic,
         description: Description | None = None,
+        opened: Callable[[], Input] | None = None,
     ) -> None:
-        self.url, self._clock = url, clock
+        self.url, self._clock, self._opened_by = url, clock, opened
         self._plug = Port.named(url)
         self._description = description
-        connection, self._decoder = connected(url, description, clock)
+        connection, self._decoder = connected(url, description, clock, opened)
         self._interpreter = Interpreter(url)
         self._events = _EventQueue(self._decoder.sequence, clock)
         self._scan_control = ScanControl()
@@ -147,7 +154,8 @@ class SerialSource:
             return
         self._next_try = now + _RETRY
         try:
-            self._connect(connected(self._present_url(), self._description, self._clock)[0])
+            url, opened = self._present_url(), self._opened_by
+            self._connect(connected(url, self._description, self._clock, opened)[0])
         except SourceError as error:
             self._disconnected = f"{error}; retrying"
 
@@ -409,27 +417,37 @@ class SerialSource:
 
 
 def connected(
-    url: str, description: Description | None, clock: Callable[[], float]
+    url: str,
+    description: Description | None,
+    clock: Callable[[], float],
+    opened: Callable[[], Input] | None = None,
 ) -> tuple[SerialConnection, Decoder | LineDecoder]:
     """A connection to a device, and a decoder of what it sends.
 
-    A described one may also be datagrams, standard input, a feed, or a file, which begin with whole
-    records.
+    A described one is read from the input that `opened` returns, if that is given; it may also be
+    datagrams, standard input, a feed, or a file, which begin with whole records.
     """
     if description is None:
         return SerialConnection(url, clock), Decoder()
-    opened: Callable[[], Input] | None = None
-    if url == STANDARD_INPUT:
-        opened = partial(StandardInput, clock)
-    elif url.startswith(UDP):
-        opened = partial(Datagrams, url, clock)
-    elif url.startswith(FEED):
-        opened = partial(FedInput, url, description, clock)
-    elif Path(url).is_file():
-        records = description.decoder(whole=True)
-        opened = partial(PlayedFile, Path(url), records, description.rate, clock)
+    opened = opened or _input_of(url, description, clock)
     connection = SerialConnection(url, clock, description.baud_rate, opened)
     return connection, description.decoder(whole=opened is not None)
+
+
+def _input_of(
+    url: str, description: Description, clock: Callable[[], float]
+) -> Callable[[], Input] | None:
+    """What opens the input at `url`; None for a port."""
+    if url == STANDARD_INPUT:
+        return partial(StandardInput, clock)
+    if url.startswith(UDP):
+        return partial(Datagrams, url, clock)
+    if url.startswith(FEED):
+        return partial(FedInput, url, description, clock)
+    if Path(url).is_file():
+        records = description.decoder(whole=True)
+        return partial(PlayedFile, Path(url), records, description.rate, clock)
+    return None
 
 
 def taken(
@@ -587,7 +605,7 @@ class _RecordingTap:
 register_scheme("", lambda name, _: SerialSource(name))
 
 
-def _described(name: str) -> SerialSource:
+def _described(name: str) -> Source:
     """The source of a name as `described_source` makes it, without its scheme."""
     file, url = parts_of(f"{SCHEME}{name}")
     if not url:
@@ -595,6 +613,8 @@ def _described(name: str) -> SerialSource:
             f"expected {SCHEME}FILE{SUFFIX}:PORT, a sensor's description and where it is "
             f"connected; got {SCHEME}{name}"
         )
+    if (plugged := plugged_source(url, Path(file))) is not None:
+        return plugged
     description = load_description(Path(file), Port.named(url).serial_number)
     return SerialSource(url, description=description)
 

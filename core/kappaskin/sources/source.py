@@ -1,8 +1,11 @@
 """Interface of sources, their recorders, and opening by name."""
 
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from typing import Protocol
 
+from kappaskin._plugins import SOURCES, plug_ins
 from kappaskin.errors import SourceError
 from kappaskin.frames import Event, Frame
 from kappaskin.sensing import Sensor
@@ -94,10 +97,28 @@ def register_scheme(scheme: str, opened: Callable[[str, bool], Source]) -> None:
     _schemes[scheme] = opened
 
 
+@cache
+def _plugged() -> dict[str, Callable[[str, Path | None], Source]]:
+    ours = {scheme.removesuffix(":") for scheme in _schemes} | {"replay", "udp"}
+    return plug_ins(SOURCES, _check, ours)
+
+
+def _check(name: str, made: object) -> None:
+    """Raise a `TypeError` for what cannot open a source."""
+    if not callable(made):
+        raise TypeError(f"expected a function of a URL and a sensor's file, got {made!r:.60}")
+
+
+def plugged_source(url: str, sensor: Path | None) -> Source | None:
+    """The source that a plug-in opens of a `url` and a `sensor`'s description, if one does."""
+    scheme, found, _ = url.partition(":")
+    return _plugged()[scheme](url, sensor) if found and scheme in _plugged() else None
+
+
 def open_source(name: str, trust: bool = False) -> Source:
     """The source called `name`: `sim:SCENE`, `replay:FILE`, `feed:NAME`, or what pyserial opens.
 
-    With `trust` a scene may name files outside its folder.
+    A plug-in may open others. With `trust` a scene may name files outside its folder.
     `replay:` is registered by the room `recording`, as soon as that is imported.
     """
     if not name.strip():
@@ -105,4 +126,6 @@ def open_source(name: str, trust: bool = False) -> Source:
             "expected a source: sim:SCENE, replay:FILE, feed:NAME, a port or a URL; got no name"
         )
     scheme = max((scheme for scheme in _schemes if name.startswith(scheme)), key=len)
+    if not scheme and (plugged := plugged_source(name, None)) is not None:
+        return plugged
     return _schemes[scheme](name.removeprefix(scheme), trust)

@@ -47,7 +47,7 @@ def test_json_is_one_object_on_one_line(capsys) -> None:
     found = json.loads(printed)
     assert printed.count("\n") == 1
     assert found.keys() == {
-        *("kappaskin", "python", "system", "packages", "display"),
+        *("kappaskin", "python", "system", "packages", "plug_ins", "display"),
         *("serial_ports", "missing", "install"),
     }
     assert found["packages"]["numpy"].split(".")[0] == "2"

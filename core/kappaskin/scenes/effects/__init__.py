@@ -1,5 +1,9 @@
 """Effects on readings: in the skin, its gages, the electronics and on the link."""
 
+from inspect import isabstract
+
+from kappaskin import _plugins
+from kappaskin._schema import fields_of
 from kappaskin.scenes.effects.effect import NOTHING as NOTHING
 from kappaskin.scenes.effects.effect import Effect as Effect
 from kappaskin.scenes.effects.effect import LayoutEffect as LayoutEffect
@@ -47,8 +51,23 @@ _ELECTRONICS = (
 )
 _LINK = (DroppedFrames, CorruptedFrames)
 
+_OURS = {effect.name for effect in (*_SKIN, *_GAGES, *_ELECTRONICS, *_LINK)}
+
+
+def _check(name: str, made: object) -> None:
+    """Raise a `TypeError` for what is no effect of this `name`."""
+    if not (isinstance(made, type) and issubclass(made, Effect)) or isabstract(made):
+        raise TypeError(f"expected a class of Effect with all its methods, got {made!r:.60}")
+    if made.name != name or not made.formula:
+        raise TypeError(f"expected the name {name!r} and a formula, got {made.name!r:.60}")
+    if not set(made.example) <= set(fields_of(made)):
+        raise TypeError(f"expected an example of its fields, got {made.example!r:.60}")
+
+
+_PLUGGED = _plugins.plug_ins(_plugins.EFFECTS, _check, _OURS).values()
+
 EFFECTS: dict[str, type[Effect]] = {
-    effect.name: effect for effect in (*_SKIN, *_GAGES, *_ELECTRONICS, *_LINK)
+    effect.name: effect for effect in (*_SKIN, *_GAGES, *_PLUGGED, *_ELECTRONICS, *_LINK)
 }
-"""Every known effect by name, in the order in which they act: in the skin, in its gages, in
-the electronics, on the link."""
+"""Every known effect by name, in the order in which they act: in the skin, in its gages, of
+plug-ins, in the electronics, on the link."""

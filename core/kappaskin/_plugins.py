@@ -1,0 +1,80 @@
+"""Plug-ins: what other packages add by entry points in groups of ours."""
+
+import sys
+from collections.abc import Callable, Container
+from dataclasses import dataclass
+from importlib import metadata
+from typing import Any
+
+SOURCES, EFFECTS, ESTIMATORS, FEATURES = GROUPS = (
+    "kappaskin.sources",
+    "kappaskin.effects",
+    "kappaskin.estimators",
+    "kappaskin.features",
+)
+"""Groups of entry points."""
+
+
+@dataclass(frozen=True)
+class PlugIn:
+    """What a `package` of this `version` adds to a `group` by `name`, in a `file`.
+
+    It is not used where there is `trouble` with it.
+    """
+
+    group: str
+    name: str
+    package: str
+    version: str
+    file: str
+    trouble: str = ""
+
+    @property
+    def text(self) -> str:
+        """What it is and where from, with its trouble."""
+        kind = self.group.rpartition(".")[2].removesuffix("s")
+        trouble = f", left out: {self.trouble}" if self.trouble else ""
+        return f"{kind} {self.name} of {self.package} {self.version}{trouble}"
+
+
+_found: dict[tuple[str, str, str], PlugIn] = {}
+
+
+def plug_ins(
+    group: str, check: Callable[[str, Any], None], ours: Container[str] = ()
+) -> dict[str, Any]:
+    """What plug-ins add to a `group`, by name, loaded.
+
+    One that cannot be loaded, that the `check` of name and object raises for, or whose name is one
+    of `ours` or taken is left out; `found_plug_ins` tells why.
+    """
+    loaded: dict[str, Any] = {}
+    for point in metadata.entry_points(group=group):
+        made, trouble = None, ""
+        try:
+            if point.name in ours or point.name in loaded:
+                raise ValueError("the name is taken")
+            check(point.name, made := point.load())
+            loaded[point.name] = made
+        except Exception as error:  # a plug-in may raise anything
+            trouble = f"{type(error).__name__}: {error}"
+        module = sys.modules.get(getattr(made, "__module__", point.module))
+        package = point.dist.name if point.dist else "an unknown package"
+        version = point.dist.version if point.dist else ""
+        file = getattr(module, "__file__", None) or ""
+        _found[group, point.name, package] = PlugIn(
+            group, point.name, package, version, file, trouble
+        )
+    return loaded
+
+
+def found_plug_ins() -> list[PlugIn]:
+    """Every plug-in that was looked for so far in this process."""
+    return list(_found.values())
+
+
+def left_out(group: str, name: str) -> str:
+    """Why a plug-in `name` is not there, for the end of a refusal."""
+    here = (one for one in _found.values() if (one.group, one.name) == (group, name))
+    found = next(here, None)
+    return f"; plug-in {found.text}" if found else "; a plug-in may be missing"

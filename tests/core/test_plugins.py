@@ -1,0 +1,144 @@
+"""Plug-ins of other packages: found, checked, and left out by name where they are broken."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from kappaskin import _plugins
+from kappaskin._plugins import EFFECTS, ESTIMATORS, SOURCES, found_plug_ins, left_out, plug_ins
+
+ESTIMATOR = """
+from kappaskin.estimation import LeastSquares
+
+class Own(LeastSquares):
+    pass
+"""
+
+
+@pytest.fixture
+def installed(tmp_path, monkeypatch):
+    """Puts a package with entry points where this process and those it starts find it."""
+    monkeypatch.setattr(_plugins, "_found", {})
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+
+    def install(name, code, **points):
+        (tmp_path / f"{name}.py").write_text(code)
+        there = tmp_path / f"{name}-1.5.dist-info"
+        there.mkdir()
+        (there / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.5\n")
+        groups = (
+            f"[kappaskin.{group}]\n" + "\n".join(lines) + "\n" for group, lines in points.items()
+        )
+        (there / "entry_points.txt").write_text("\n".join(groups))
+
+    return install
+
+
+def accept(name, made):
+    """Anything will do."""
+
+
+def command(*words):
+    done = subprocess.run(
+        [sys.executable, "-m", "kappaskin", *words], capture_output=True, text=True, check=False
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_what_is_installed_is_loaded_with_its_package_version_and_file(installed, tmp_path) -> None:
+    installed(
+        "lone_package", "made = 7\ndef opened(url, sensor): ...", sources=["x=lone_package:opened"]
+    )
+
+    assert plug_ins(SOURCES, accept).keys() == {"x"}
+    (found,) = found_plug_ins()
+    assert (found.package, found.version, found.trouble) == ("lone_package", "1.5", "")
+    assert found.file == str(tmp_path / "lone_package.py")
+    assert found.text == "source x of lone_package 1.5"
+
+
+@pytest.mark.parametrize(
+    ("code", "point", "why"),
+    [
+        ("raise RuntimeError('no licence')", "x=broken_one:made", "RuntimeError: no licence"),
+        ("import no_such_module", "x=broken_one:made", "ModuleNotFoundError"),
+        ("made = 1", "x=broken_one:other", "AttributeError"),
+        ("def (", "x=broken_one:made", "SyntaxError"),
+        ("made = 1", "x=broken_two:made", "ModuleNotFoundError"),
+        ("made = 1", "taken=broken_one:made", "ValueError: the name is taken"),
+        ("made = 1", "odd=broken_one:made", "TypeError: odd"),
+    ],
+)
+def test_a_broken_one_is_left_out_and_named(installed, code, point, why) -> None:
+    installed("broken_one", code, effects=[point])
+    sys.modules.pop("broken_one", None)
+
+    def check(name, made):
+        if name == "odd":
+            raise TypeError(name)
+
+    assert plug_ins(EFFECTS, check, {"taken"}) == {}
+    (found,) = found_plug_ins()
+    assert f"of broken_one 1.5, left out: {why}" in found.text
+    assert why in left_out(EFFECTS, found.name)
+    assert left_out(ESTIMATORS, found.name) == "; a plug-in may be missing"
+
+
+@pytest.mark.slow
+def test_an_estimator_is_used_by_name_and_broken_ones_are_reported_once(
+    installed, tmp_path
+) -> None:
+    points = ["own=good_one:Own", "robust=good_one:Own", "number=good_one:__name__"]
+    installed("good_one", ESTIMATOR, estimators=points, effects=["creep=good_one:Own"])
+
+    code, printed, complaint = command("tables", "--method", "own", "--json")
+    assert code == 0
+    assert json.loads(printed)
+    taken, what = (
+        "ValueError: the name is taken",
+        "kappaskin: plug-in {} of good_one 1.5, left out: ",
+    )
+    assert complaint.splitlines() == [
+        what.format("estimator robust") + taken,
+        what.format("estimator number")
+        + "TypeError: expected a class of Estimator with all its methods, got 'good_one'",
+        what.format("effect creep") + taken,
+    ]
+    least_squares = json.loads(command("tables", "--json")[1])
+    assert [row["rms_mm"] for row in json.loads(printed)] == [
+        row["rms_mm"] for row in least_squares
+    ]
+
+
+@pytest.mark.slow
+def test_the_doctor_lists_them(installed, tmp_path) -> None:
+    installed("good_one", ESTIMATOR, estimators=["own=good_one:Own"], sources=["y=good_one:none"])
+
+    code, printed, _ = command("doctor", "--json")
+    found = {one["name"]: one for one in json.loads(printed)["plug_ins"]}
+    assert code == 0
+    assert found["own"]["file"] == str(tmp_path / "good_one.py")
+    assert found["y"]["trouble"].startswith("AttributeError")
+    lines = [line for line in command("doctor")[1].splitlines() if line.startswith("plug-in")]
+    assert (
+        lines[0] == f"plug-in             estimator own of good_one 1.5  {tmp_path / 'good_one.py'}"
+    )
+    assert "source y of good_one 1.5, left out: AttributeError" in lines[1]
+
+
+@pytest.mark.slow
+def test_what_needs_a_missing_one_says_so(installed, tmp_path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        "format = 1\n[skin]\nsize = [0.1, 0.1]\n[elements]\ngrid = [4, 4]\n[effects.lag]\ntau = 1\n"
+    )
+
+    code, _, complaint = command("plan", str(scene))
+    assert code == 2
+    assert "expected effects among tension" in complaint
+    assert "a plug-in may be missing" in complaint
+    assert "a plug-in may be missing" in command("tables", "--method", "own")[2]
