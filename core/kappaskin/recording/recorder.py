@@ -1,6 +1,7 @@
 """Recorder: bytes, frames, estimates and events of the engine to a recording."""
 
 import math
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from kappaskin.pipeline import Pipeline, setup_to_text
 from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import MessageLayout, encode
 from kappaskin.recording.disk import ReservedFile
-from kappaskin.recording.writing import RecordingFile, RecordingStatus
+from kappaskin.recording.writing import BACKLOG, RecordingFile, RecordingStatus
 from kappaskin.scenes import Scene, write_scene
 from kappaskin.sources import ClockState
 
@@ -22,6 +23,7 @@ _CONTACTS = 1000.0  # a second at most
 _HEAVY = 50.0  # a second at most, of what is as large as a frame
 _BYTES = 4e6  # a second at most, of that
 _BURST = 5  # that may come at once, as frames do
+_WAIT = 0.01  # s
 _INFO = 20  # what a log calls what is no warning
 _FLOAT32 = 7  # what a point cloud calls it
 _NO_TRUTH = Truth(np.empty((0, 0)), np.full(2, math.nan), "")
@@ -31,13 +33,18 @@ _COLUMNS = ("x", "y", "z", "displacement")
 class Recorder:
     """Writes the recording `path`: bytes and events of a source, and the results of its frames.
 
-    A `Refusal` where no file can be made. No call waits for the disk.
+    A `Refusal` where no file can be made. No call but `close` and `wait` waits for the disk. Times
+    are in s since `zero`, in ns since 1970; by default on the monotonic clock.
     """
 
     def __init__(
-        self, path: Path, now: float, disk: Callable[[Path], ReservedFile] = ReservedFile
+        self,
+        path: Path,
+        now: float,
+        disk: Callable[[Path], ReservedFile] = ReservedFile,
+        zero: int | None = None,
     ) -> None:
-        self._file = RecordingFile(path, disk)
+        self._file = RecordingFile(path, disk, zero)
         self._now = now  # host time in s of what came last
         # The one recorded last, and its layout.
         self._truth, self._truths = _NO_TRUTH, _truths_like(_NO_TRUTH)
@@ -48,6 +55,11 @@ class Recorder:
     @property
     def written(self) -> RecordingStatus:
         return self._file.written
+
+    def wait(self) -> None:
+        """Wait until the disk has taken enough for more, for what comes faster than a device."""
+        while self._file.waiting > BACKLOG // 2 and self.written.active:
+            time.sleep(_WAIT)
 
     def end(self) -> None:
         """Begin to end the file, once all waiting messages are written."""
