@@ -181,7 +181,8 @@ class _Placement:
         if columns.sequence >= 0 and columns.sequence not in self._places:
             numbers[:, columns.sequence] = np.arange(first, first + count)
         for row, time in zip(numbers.tolist(), times.tolist(), strict=True):
-            yield Row(row, time, 0.0)
+            usable = math.isfinite(time) or not self._needs_time
+            yield Row(row if usable else "time or sequence: no time", time, 0.0)
 
 
 NO_TIME = "give a column of time, or rate = 100, in records per second, in [line]"
@@ -352,7 +353,7 @@ class _McapBag:
     """Topics and messages of an MCAP file of any program."""
 
     def __init__(self, path: Path) -> None:
-        self._file = open_file(path)
+        self._path, self._file = path, open_file(path)
         self._size = self._file.seek(0, 2)
         self._budget = Budget(path, self._size)
         self._schemas: dict[int, str] = {}
@@ -365,9 +366,9 @@ class _McapBag:
                 self._learn(record.code, record.body)
         except CorruptRecord:
             self._topics.clear()
-        if not self._topics:
-            for _ in self.messages():
-                pass
+        faults = [] if self._topics else [m.fault for m in self.messages() if m.fault]
+        if faults and not self._topics:
+            raise Refusal(f"{self._path}: is {faults[0]}")
         return set(self._topics.values())
 
     def _learn(self, code: int, body: bytes) -> None:
@@ -391,7 +392,8 @@ class _McapBag:
                 yield from self._messages_in(record)
                 at = record.end
         except CorruptRecord as fault:
-            yield _Message(_Topic("", "", ""), 0, b"", 1.0, f"damaged from here on: {fault}")
+            why = f"damaged from here on: {fault}; `kappaskin repair` saves the intact messages"
+            yield _Message(_Topic("", "", ""), 0, b"", 1.0, why)
 
     def _messages_in(self, record: McapRecord) -> Iterator[_Message]:
         inside: Iterator[tuple[int, bytes]] = iter([(record.code, record.body)])
@@ -460,17 +462,12 @@ def _message_rows(
 
 def _chosen(file: Path, topics: set[_Topic], description: Description, name: str) -> _Topic:
     """The topic called `name`, or the only one that fits."""
-    text = (STRING.name, _JSON)[: 1 + (description.kind == "json")]
-    fitting = [
-        topic
-        for topic in sorted(topics)
-        if (topic.encoding == "cdr" and topic.kind in _ARRAYS)
-        or (
-            description.kind != "binary"
-            and (topic.kind, topic.encoding)[topic.encoding == _JSON] in text
-        )
-    ]
-    found = [topic for topic in fitting if name in ("", topic.name)]
+    named = [topic for topic in sorted(topics) if name in ("", topic.name)]
+    arrays = [topic for topic in named if topic.encoding == "cdr" and topic.kind in _ARRAYS]
+    if description.kind == _JSON:
+        arrays += [topic for topic in named if topic.encoding == _JSON]
+    texts = [t for t in named if t.kind == STRING.name and description.kind != "binary"]
+    found = arrays or texts
     if len(found) == 1:
         return found[0]
     there = ", ".join(f"{t.name} ({t.kind or t.encoding})" for t in (found or sorted(topics))[:20])

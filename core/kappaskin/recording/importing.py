@@ -33,7 +33,8 @@ from kappaskin.sources.wire import Samples
 _EVERY, _THEN = 10_000, 100  # first frames that have a recorded estimate; then one of so many
 _TRIED = 1000  # rows, of which one must be a record
 _REPORT = 0.05  # s between two reports
-_DATES = 1e9  # s: later times are since 1970, others since any beginning
+_DATES = 1e9, 4e9  # s: times from 2001 to 2096 are since 1970, others since any beginning
+_LONGEST = 1e9  # s of a recording
 _SHOWN = 60  # characters of a bad row
 _COMMA = re.compile(rb"\d,\d+\s*[;\t]")
 _FIELDS = re.compile(rb"[,;\t]|\s+")
@@ -110,11 +111,11 @@ class Imported(NamedTuple):
         """Counts of what was imported, as text."""
         parts = [f"{self.frames:,} of {self.rows:,} rows, {self.seconds:.6g} s"]
         if self.headings:
-            parts.append(f"{self.headings:,} headings, comments or empty lines")
+            parts.append(f"headings, comments, empty lines: {self.headings:,}")
         if self.lost:
             parts.append(f"{self.lost:,} sequence numbers are missing")
         if self.back:
-            parts.append(f"time goes back {self.back:,} times; it continues there")
+            parts.append(f"time goes back {self.back:,} times, and continues from there")
         return "; ".join(parts)
 
 
@@ -178,7 +179,7 @@ class _Import:
             self._discard(reason, first)
         elif not self._is_heading(data):
             self._feed(data, row.time)
-        if not self._frames and self.rows >= _TRIED:
+        if not self._frames and self._bad.total() >= _TRIED:
             self._refuse()
 
     def _is_heading(self, line: bytes) -> bool:
@@ -223,11 +224,8 @@ class _Import:
             seconds = self._frames / rate
         # The interpreter unwraps it once more, which changes nothing.
         at = self._clock.unwrap(samples.time) if self._timed else seconds
-        if not math.isfinite(at):
-            self._discard("time or sequence", "no time")
-            return
-        recorder = self._recorder or self._begin(at)
-        if at < self._last:
+        recorder = self._recorder or self._begin(at, seconds)
+        if at < self._last or at - self._base > _LONGEST:
             self._back += 1
             self._shift(recorder, at)
         self._last, self._now = at, at - self._base
@@ -240,11 +238,12 @@ class _Import:
         if not recorder.written.active:
             raise Refusal(f"{self._request.to}: {recorder.written.trouble}")
 
-    def _begin(self, at: float) -> Recorder:
-        """Begin a recording whose first record is of the time `at` in s."""
+    def _begin(self, at: float, seconds: float) -> Recorder:
+        """Begin a recording whose first record is of the time `at`, in a row of `seconds`, in s."""
         self._base = at
-        zero = round(at * 1e9) if at > _DATES else time.time_ns()
-        recorder = self._recorder = Recorder(self._to, 0.0, zero=zero)
+        first, last = _DATES
+        dated = next((s for s in (at, seconds) if first < s < last), time.time())
+        recorder = self._recorder = Recorder(self._to, 0.0, zero=round(dated * 1e9))
         self._interpreter.learn(text := sensor_to_json(self.description.sensor))
         recorder.connected(text)
         self._map(recorder, at)
