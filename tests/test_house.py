@@ -100,12 +100,12 @@ _WRITE = {"write_text", "write_bytes", "rename", "mkstemp", "touch"}
 _WRITERS = {
     "kappaskin.bases.argyris": "touches a file of the cache that it has read",
     "kappaskin.live.resume": "makes a key that only this user can read",
-    "kappaskin.recording.disk": "a live recording is written as it comes, under its name and .part",
+    "kappaskin.recording.disk": "a live recording is written as it comes, under its name and .part; and "
+    "gives all files of an export or import their names at once",
     "kappaskin.recording.writing": "the same",
     "kappaskin.recording.repair": "the same",
     "kappaskin.recording.export.surfaces": "in a scratch folder, which export.writing empties",
     "kappaskin.recording.export.tables": "the same",
-    "kappaskin.recording.export.writing": "gives all files of an export their names at once",
     "kappaskin_app.features.export.filming": "FFmpeg writes the film, which is named once whole",
     "kappaskin_app.shell.log_files": "a log grows",
 }

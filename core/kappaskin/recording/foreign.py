@@ -1,13 +1,14 @@
 """Files of other programs: lines, tables and messages to rows of a described sensor."""
 
 import importlib
-import io
 import math
 import re
 import sqlite3
 import zipfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
+from functools import cache
+from itertools import chain, count
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,7 +17,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 from numpy.typing import NDArray
 
-from kappaskin._files import Budget, check_memory, open_file
+from kappaskin._files import Budget, open_file
 from kappaskin.errors import Refusal, lacking
 from kappaskin.frames import Array
 from kappaskin.recording.cdr import MessageType, decode
@@ -26,12 +27,10 @@ from kappaskin.recording.reading import (
     MAGIC,
     MESSAGE_HEADER,
     CorruptRecord,
-    McapRecord,
     cost,
     parsed,
     record_at,
     records_in,
-    summary_of,
     unpacked,
 )
 from kappaskin.sources import Description
@@ -57,8 +56,7 @@ _ARRAYS = {
 }
 _JSON = "json"
 _TIME = "time"
-_BLOCK = 2**20  # bytes of a table that are read at once
-_MEMBER_HEAD = 2**16  # bytes of an array in an NPZ that say what it holds
+_STEP = 1000  # rows of a table that are read at once
 _QUOTED = re.compile(rb'"([^",;\t]*)"')
 
 
@@ -73,10 +71,11 @@ class Row(NamedTuple):
     share: float
 
 
-def rows_of(file: Path, description: Description, topic: str) -> Iterator[Row]:
+def rows_of(file: Path, description: Description, topic: str, scratch: Path) -> Iterator[Row]:
     """The rows of a `file`, or of a folder with a bag of ROS 2; of messages those of a `topic`.
 
-    A `Refusal` where it is no file of that kind, or does not fit; other errors as the libraries
+    Arrays are unpacked in the folder `scratch`. A `Refusal` where it is no file of that kind, or
+    does not fit; other errors as the libraries
     that read it raise them.
     """
     if file.is_dir():
@@ -110,7 +109,8 @@ def rows_of(file: Path, description: Description, topic: str) -> Iterator[Row]:
     if kind in (MAGIC, _SQLITE):
         yield from _message_rows(file, [file], description, topic)
     elif kind:
-        yield from (_npz_rows if kind == _ZIP else _parquet_rows)(file, description)
+        made = _parquet_rows(file, description)
+        yield from _npz_rows(file, description, scratch) if kind == _ZIP else made
     else:
         yield from _line_rows(file, description)
 
@@ -194,7 +194,7 @@ def _table_rows(
     description: Description,
     names: Sequence[str],
     total: int,
-    blocks: Iterator[Mapping[str, NDArray[Any]]],
+    blocks: Iterable[Mapping[str, NDArray[Any]]],
 ) -> Iterator[Row]:
     """The rows of a table of `total` rows with columns of these names, some at a time."""
     timed = _TIME in names
@@ -219,91 +219,45 @@ def _seconds(times: NDArray[Any]) -> Array:
     return times.astype(float)
 
 
-class _Member:
-    """An array in an NPZ, read from its first row on."""
-
-    def __init__(self, archive: zipfile.ZipFile, name: str) -> None:
-        with archive.open(f"{name}.npy") as member:
-            head = io.BytesIO(member.read(_MEMBER_HEAD))
-        first = np.lib.format.read_magic(head) == (1, 0)
-        read = (
-            np.lib.format.read_array_header_1_0 if first else (np.lib.format.read_array_header_2_0)
-        )
-        self.shape: tuple[int, ...]
-        self.shape, columnwise, self.kind = read(head)
-        if self.kind.hasobject or not self.kind.itemsize:
-            raise Refusal(f"expected numbers in {name!r:.60}, got {self.kind}, which is never read")
-        self.size = math.prod(self.shape) * self.kind.itemsize
-        self._file, self._whole = archive.open(f"{name}.npy"), None
-        self._file.read(head.tell())
-        if columnwise and len(self.shape) > 1:
-            check_memory(self.size, f"{name} in Fortran order")
-            self._whole = self._read(self.size).reshape(self.shape, order="F")
-        self._at = 0
-
-    def _read(self, size: int) -> NDArray[Any]:
-        data = self._file.read(size)
-        if len(data) < size:
-            raise EOFError("it is cut off")
-        return np.frombuffer(data, self.kind)
-
-    def next_rows(self, count: int) -> NDArray[Any]:
-        """The next `count` rows."""
-        self._at += count
-        if self._whole is not None:
-            return self._whole[self._at - count : self._at]
-        each = self.shape[1:]
-        return self._read(count * math.prod(each) * self.kind.itemsize).reshape(count, *each)
-
-
 _VALUES = "values"
 
 
-def _npz_rows(file: Path, description: Description) -> Iterator[Row]:
-    columns = description.columns
+def _npz_rows(file: Path, description: Description, scratch: Path) -> Iterator[Row]:
+    own = description.columns
     with open_file(file) as opened, zipfile.ZipFile(opened) as archive:
         there = [name.removesuffix(".npy") for name in archive.namelist()]
-        wanted = (_VALUES,) if _VALUES in there else tuple(filter(None, columns.names))
-        wanted = (*(name for name in dict.fromkeys((*wanted, _TIME)) if name in there),)
-        if not set(wanted) - {_TIME}:
+        wanted = (_VALUES,) if _VALUES in there else tuple(filter(None, own.names))
+        wanted = [
+            name for name in dict.fromkeys((*wanted, _TIME)) if f"{name}.npy" in archive.NameToInfo
+        ]
+        if not {*wanted} - {_TIME}:
             raise Refusal(
                 f"{file}: expected arrays values (T, columns) and time (T,), or one for each "
-                f"column such as {columns.names[columns.places[0]]!r}, got "
+                f"column such as {own.names[own.places[0]]!r}, got "
                 f"{', '.join(there)[:200] or 'none'}"
             )
-        members = {name: _Member(archive, name) for name in wanted}
-        budget = Budget(file, opened.seek(0, 2))
-        for name, member in members.items():
-            budget.take(member.size, f"{name} of shape {member.shape}")
-        shapes = {name: member.shape for name, member in members.items()}
-        total = next(iter(shapes.values()))[:1]
-        if any(
-            len(shape) != 1 + (name == _VALUES) or shape[:1] != total
-            for name, shape in shapes.items()
-        ):
-            raise Refusal(f"{file}: expected arrays with a row for each time, got shapes {shapes}")
-        yield from _npz_table(file, description, members, total[0])
-
-
-def _npz_table(
-    file: Path, description: Description, members: dict[str, _Member], total: int
-) -> Iterator[Row]:
-    wide = members[_VALUES].shape[1] if _VALUES in members else 0
-    if wide == len(description.columns) and description.columns.time >= 0:
-        members.pop(_TIME, None)  # it is among the values
-    names = [f"column {n}" for n in range(wide)] or [name for name in members if name != _TIME]
-    names += [_TIME] * (_TIME in members)
-    step = max(_BLOCK // (8 * len(names)), 1)
-
-    def blocks() -> Iterator[dict[str, NDArray[Any]]]:
-        for first in range(0, total, step):
-            count = min(step, total - first)
-            block = {name: member.next_rows(count) for name, member in members.items()}
-            if (values := block.pop(_VALUES, None)) is not None:
-                block |= dict(zip(names, values.T, strict=False))
-            yield block
-
-    yield from _table_rows(file, description, names, total, blocks())
+        size = sum(archive.getinfo(f"{name}.npy").file_size for name in wanted)
+        Budget(file, opened.seek(0, 2)).take(size, f"its arrays {', '.join(wanted)[:40]}")
+        # Mapped, since all of them may be more than the memory; pickles are refused.
+        arrays: dict[str, NDArray[Any]] = {
+            name: np.load(archive.extract(f"{name}.npy", scratch), mmap_mode="r") for name in wanted
+        }
+    shapes = {name: array.shape for name, array in arrays.items()}
+    if len({shape[:1] for shape in shapes.values()}) > 1 or any(
+        len(shape) != 1 + (name == _VALUES) for name, shape in shapes.items()
+    ):
+        raise Refusal(f"{file}: expected arrays with a row for each time, got shapes {shapes}")
+    if _VALUES in arrays:
+        values = arrays.pop(_VALUES)
+        if values.shape[1] == len(own) and own.time >= 0:
+            arrays.clear()  # the time is among the values
+        arrays = {f"column {n}": column for n, column in enumerate(values.T)} | arrays
+    total = len(next(iter(arrays.values()), ()))
+    blocks = (
+        {name: array[first : first + _STEP] for name, array in arrays.items()}
+        for first in range(0, total, _STEP)
+    )
+    yield from _table_rows(file, description, [*arrays], total, blocks)
 
 
 def _parquet_rows(file: Path, description: Description) -> Iterator[Row]:
@@ -318,14 +272,14 @@ def _parquet_rows(file: Path, description: Description) -> Iterator[Row]:
             raise Refusal(f"{file}: expected columns of different names, got one twice")
         Budget(file, opened.seek(0, 2)).take(8 * total * len(names), f"{total} rows")
         own = [name for name in names if not name.startswith("__index_level_")]  # those of pandas
-        step = max(_BLOCK // (8 * max(len(own), 1)), 1)
-
-        def blocks() -> Iterator[dict[str, NDArray[Any]]]:
-            for batch in table.iter_batches(step, columns=own):
-                arrays = (column.to_numpy(zero_copy_only=False) for column in batch.columns)
-                yield dict(zip(own, arrays, strict=True))
-
-        yield from _table_rows(file, description, own, total, blocks())
+        blocks = (
+            {
+                name: column.to_numpy(zero_copy_only=False)
+                for name, column in zip(own, batch.columns, strict=True)
+            }
+            for batch in table.iter_batches(_STEP, columns=own)
+        )
+        yield from _table_rows(file, description, own, total, blocks)
 
 
 # Messages
@@ -349,115 +303,74 @@ class _Message(NamedTuple):
     fault: str = ""
 
 
-class _McapBag:
-    """Topics and messages of an MCAP file of any program."""
-
-    def __init__(self, path: Path) -> None:
-        self._path, self._file = path, open_file(path)
-        self._size = self._file.seek(0, 2)
-        self._budget = Budget(path, self._size)
-        self._schemas: dict[int, str] = {}
-        self._topics: dict[int, _Topic] = {}
-
-    def topics(self) -> set[_Topic]:
-        """Those of its summary, or without one of all its parts."""
+def _mcap_messages(path: Path) -> Iterator[_Message]:
+    """All of an MCAP file, in its order, up to where it is damaged."""
+    schemas, topics, at = dict[int, str](), dict[int, _Topic](), len(MAGIC)
+    with open_file(path) as file:
+        size = file.seek(0, 2)
+        budget = Budget(path, size)
         try:
-            for record in summary_of(self._file, self._size):
-                self._learn(record.code, record.body)
-        except CorruptRecord:
-            self._topics.clear()
-        faults = [] if self._topics else [m.fault for m in self.messages() if m.fault]
-        if faults and not self._topics:
-            raise Refusal(f"{self._path}: is {faults[0]}")
-        return set(self._topics.values())
-
-    def _learn(self, code: int, body: bytes) -> None:
-        self._budget.take(cost(code, body), "its records")
-        if code == Opcode.SCHEMA:
-            schema = parsed(Schema, body)
-            self._schemas[schema.id] = schema.name
-        elif code == Opcode.CHANNEL:
-            found = parsed(Channel, body)
-            kind = self._schemas.get(found.schema_id, "")
-            self._topics[found.id] = _Topic(found.topic, kind, found.message_encoding)
-
-    def messages(self) -> Iterator[_Message]:
-        """All in the order of the file, up to where it is damaged."""
-        at = len(MAGIC)
-        try:
-            while at < self._size:
-                record = record_at(self._file, at, self._size)
+            while at < size:
+                record = record_at(file, at, size)
                 if record.code in (Opcode.DATA_END, Opcode.FOOTER):
                     return
-                yield from self._messages_in(record)
+                inside = iter([(record.code, record.body)])
+                if record.code == Opcode.CHUNK:
+                    inside = records_in(unpacked(record.body, budget))
+                for code, body in inside:
+                    budget.take(cost(code, body), "the number of its records")
+                    if code == Opcode.SCHEMA:
+                        schema = parsed(Schema, body)
+                        schemas[schema.id] = schema.name
+                    elif code == Opcode.CHANNEL:
+                        own = parsed(Channel, body)
+                        kind = schemas.get(own.schema_id, "")
+                        topics[own.id] = _Topic(own.topic, kind, own.message_encoding)
+                    elif code == Opcode.MESSAGE and len(body) >= MESSAGE_HEADER.size:
+                        channel, _, time, _ = MESSAGE_HEADER.unpack_from(body)
+                        if topic := topics.get(channel):
+                            yield _Message(topic, time, body[MESSAGE_HEADER.size :], at / size)
                 at = record.end
         except CorruptRecord as fault:
             why = f"damaged from here on: {fault}; `kappaskin repair` saves the intact messages"
             yield _Message(_Topic("", "", ""), 0, b"", 1.0, why)
 
-    def _messages_in(self, record: McapRecord) -> Iterator[_Message]:
-        inside: Iterator[tuple[int, bytes]] = iter([(record.code, record.body)])
-        if record.code == Opcode.CHUNK:
-            inside = records_in(unpacked(record.body, self._budget))
-        for code, body in inside:
-            if code != Opcode.MESSAGE or len(body) < MESSAGE_HEADER.size:
-                self._learn(code, body)
-                continue
-            channel, _, time, _ = MESSAGE_HEADER.unpack_from(body)
-            if topic := self._topics.get(channel):
-                data = body[MESSAGE_HEADER.size :]
-                yield _Message(topic, time, data, record.at / self._size)
 
-    def close(self) -> None:
-        self._file.close()
-
-
-class _SqliteBag:
-    """Topics and messages of a .db3 file of ROS 2."""
-
-    def __init__(self, path: Path) -> None:
-        uri = f"{path.absolute().as_uri()}?mode=ro&immutable=1"
-        self._database = sqlite3.connect(uri, uri=True)
-        self._database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST)
+def _sqlite_messages(path: Path) -> Iterator[_Message]:
+    """All of a .db3 file of ROS 2."""
+    uri = f"{path.absolute().as_uri()}?mode=ro&immutable=1"
+    with closing(sqlite3.connect(uri, uri=True)) as database:
+        database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST)
         tables = "SELECT name FROM sqlite_master WHERE type = 'table'"  # a view may never end
-        if not {"topics", "messages"} <= {name for (name,) in self._database.execute(tables)}:
-            raise Refusal(f"{path}: expected tables topics and messages, as in a bag of ROS 2")
-        found = self._database.execute("SELECT id, name, type, serialization_format FROM topics")
-        self._topics = {n: _Topic(*map(str, rest)) for n, *rest in found}
-
-    def topics(self) -> set[_Topic]:
-        return set(self._topics.values())
-
-    def messages(self) -> Iterator[_Message]:
-        ((total,),) = self._database.execute("SELECT count(*) FROM messages")
-        found = self._database.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY id")
+        if not {"topics", "messages"} <= {name for (name,) in database.execute(tables)}:
+            raise Refusal("expected tables topics and messages, as in a bag of ROS 2, got others")
+        found = database.execute("SELECT id, name, type, serialization_format FROM topics")
+        topics = {n: _Topic(*map(str, rest)) for n, *rest in found}
+        ((total,),) = database.execute("SELECT count(*) FROM messages")
+        found = database.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY id")
         for n, (topic, time, data) in enumerate(found):
-            if topic in self._topics and isinstance(time, int) and isinstance(data, bytes):
-                yield _Message(self._topics[topic], time, data, n / total)
-
-    def close(self) -> None:
-        self._database.close()
+            if topic in topics and isinstance(time, int) and isinstance(data, bytes):
+                yield _Message(topics[topic], time, data, n / total)
 
 
 def _message_rows(
     file: Path, parts: Sequence[Path], description: Description, name: str
 ) -> Iterator[Row]:
     """The rows of one topic of a bag, whose files follow one another."""
-    make: type[_McapBag | _SqliteBag] = _BAGS.get(parts[0].suffix, _McapBag)
-    topics = set[_Topic]()
-    for part in parts:
-        with closing(make(part)) as bag:
-            topics |= bag.topics()
+    make = _BAGS.get(parts[0].suffix, _mcap_messages)
+    found = list(dict.fromkeys((m.topic, m.fault) for m in chain.from_iterable(map(make, parts))))
+    topics = {topic for topic, fault in found if not fault}
+    if found and not topics:
+        raise Refusal(f"{file}: is {found[0][1]}")
     topic = _chosen(file, topics, description, name)
     read = _reader(topic, description)
     for n, part in enumerate(parts):
-        with closing(make(part)) as bag:
-            for message in bag.messages():
-                share = (n + message.share) / len(parts)
-                if message.fault:
-                    yield Row(message.fault, math.nan, share)
-                elif message.topic == topic:
-                    yield read(message)._replace(share=share)
+        for message in make(part):
+            share = (n + message.share) / len(parts)
+            if message.fault:
+                yield Row(message.fault, math.nan, share)
+            elif message.topic == topic:
+                yield read(message)._replace(share=share)
 
 
 def _chosen(file: Path, topics: set[_Topic], description: Description, name: str) -> _Topic:
@@ -482,8 +395,12 @@ def _chosen(file: Path, topics: set[_Topic], description: Description, name: str
 
 def _reader(topic: _Topic, description: Description) -> Callable[[_Message], Row]:
     """What makes a row of each message of a topic."""
-    kind, numbers = _ARRAYS.get(topic.kind), dict[int, int]()
-    placements: dict[int, _Placement | str] = {}
+    kind, numbers = _ARRAYS.get(topic.kind), count()
+
+    @cache
+    def placement(width: int) -> _Placement:
+        timed = width < len(description.columns) or description.columns.time < 0
+        return _Placement(description, [""] * width, timed)
 
     def row(message: _Message) -> Row:
         time = message.time * 1e-9
@@ -491,23 +408,12 @@ def _reader(topic: _Topic, description: Description) -> Callable[[_Message], Row
             return Row(_one_line(message.data), time, 0.0)
         try:
             found = decode(kind or STRING, message.data)
+            if kind is None:
+                return Row(_one_line(found["data"].encode()), time, 0.0)
+            values = found["data"][found["layout.data_offset"] :]
+            return next(placement(len(values)).rows(values[None], np.array([time]), next(numbers)))
         except Refusal as refusal:
-            return Row(str(refusal), time, 0.0)
-        if kind is None:
-            return Row(_one_line(found["data"].encode()), time, 0.0)
-        values = found["data"][found["layout.data_offset"] :]
-        count = len(values)
-        if count not in placements:
-            timed = count < len(description.columns) or description.columns.time < 0
-            try:
-                placements[count] = _Placement(description, [""] * count, timed)
-            except Refusal as refusal:
-                placements[count] = f"wrong number of columns: {refusal}"
-        placement = placements[count]
-        if isinstance(placement, str):
-            return Row(placement, time, 0.0)
-        number = numbers[0] = numbers.get(0, -1) + 1
-        return next(placement.rows(values[None], np.array([time]), number))
+            return Row(f"no record: {refusal}", time, 0.0)
 
     return row
 
@@ -518,4 +424,4 @@ def _one_line(data: bytes) -> bytes:
 
 _ZIP, _SQLITE = b"PK\3\4", b"SQLite format 3\0"
 _KINDS = {_ZIP: ".npz", b"PAR1": ".parquet", MAGIC: ".mcap", _SQLITE: ".db3"}
-_BAGS = {".mcap": _McapBag, ".db3": _SqliteBag}
+_BAGS = {".mcap": _mcap_messages, ".db3": _sqlite_messages}

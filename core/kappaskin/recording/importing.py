@@ -37,7 +37,7 @@ _DATES = 1e9, 4e9  # s: times from 2001 to 2096 are since 1970, others since any
 _LONGEST = 1e9  # s of a recording
 _SHOWN = 60  # characters of a bad row
 _COMMA = re.compile(rb"\d,\d+\s*[;\t]")
-_FIELDS = re.compile(rb"[,;\t]|\s+")
+_SEPARATORS = (b";", b"\t", b",")
 _NUMBER = re.compile(rb"[\s\"]*[-+]?\.?\d")
 _DAMAGES = (
     OSError,
@@ -128,7 +128,7 @@ def import_steps(request: ImportRequest, scratch: Path) -> Generator[float | Imp
     work, next_report = _Import(request, scratch / request.to.name), 0.0
     with closing(work):
         try:
-            for row in rows_of(request.file, work.description, request.topic):
+            for row in rows_of(request.file, work.description, request.topic, scratch):
                 work.take(row)
                 if time.monotonic() >= next_report:
                     next_report = time.monotonic() + _REPORT
@@ -137,9 +137,10 @@ def import_steps(request: ImportRequest, scratch: Path) -> Generator[float | Imp
             named = str(refusal).startswith(str(request.file))
             raise Refusal(f"{'' if named else f'{request.file}: '}{refusal}") from refusal
         except _DAMAGES as error:
+            after = f" after row {work.rows:,}" if work.rows else ""
+            why = getattr(error, "strerror", None) or str(error)
             raise Refusal(
-                f"{request.file}: cannot be read after row {work.rows:,} ({error!s:.100}); check "
-                "that it is whole"
+                f"{request.file}: cannot be read{after} ({why:.100}); check that it is whole"
             ) from error
         work.end()
     yield work.done()
@@ -189,7 +190,7 @@ class _Import:
         text = line.strip()
         found = not text or text.startswith((b"#", b"%", b"//")) or text == self._heading
         if not found and not (self._frames or self._heading):
-            fields = [field.strip(b' "') for field in _FIELDS.split(text)]
+            fields = [field.strip(b' "') for field in _fields(text)]
             counted = [b"%d" % n for n in range(len(fields))]
             found = fields in (counted, [b"", *counted[:-1]]) or not any(map(_NUMBER.match, fields))
             self._heading = text if found else b""
@@ -211,8 +212,11 @@ class _Import:
 
     def _discard(self, reason: str, first: str, data: bytes = b"") -> None:
         if reason not in self._bad:
+            fields = len(_fields(data.strip())) if self.description.kind == "text" else 0
             if _COMMA.search(data):
                 first += " (numbers have a decimal point, not a comma)"
+            elif data and fields not in (0, len(self.description.columns)):
+                first += f" ({fields} fields)"
             self._first[reason] = self.rows, first
         self._bad[reason] += 1
 
@@ -327,6 +331,11 @@ class _Import:
             accounting.lost,
             tuple(found),
         )
+
+
+def _fields(line: bytes) -> list[bytes]:
+    """The fields of a line, whichever separator it has."""
+    return line.split(next((separator for separator in _SEPARATORS if separator in line), None))
 
 
 def _usual_pipeline(sensor: Sensor) -> Pipeline:

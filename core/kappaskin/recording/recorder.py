@@ -1,7 +1,6 @@
 """Recorder: bytes, frames, estimates and events of the engine to a recording."""
 
 import math
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from kappaskin.pipeline import Pipeline, setup_to_text
 from kappaskin.recording import messages as m
 from kappaskin.recording.cdr import MessageLayout, encode
 from kappaskin.recording.disk import ReservedFile
-from kappaskin.recording.writing import BACKLOG, RecordingFile, RecordingStatus
+from kappaskin.recording.writing import RecordingFile, RecordingStatus
 from kappaskin.scenes import Scene, write_scene
 from kappaskin.sources import ClockState
 
@@ -23,7 +22,6 @@ _CONTACTS = 1000.0  # a second at most
 _HEAVY = 50.0  # a second at most, of what is as large as a frame
 _BYTES = 4e6  # a second at most, of that
 _BURST = 5  # that may come at once, as frames do
-_WAIT = 0.01  # s
 _INFO = 20  # what a log calls what is no warning
 _FLOAT32 = 7  # what a point cloud calls it
 _NO_TRUTH = Truth(np.empty((0, 0)), np.full(2, math.nan), "")
@@ -57,9 +55,8 @@ class Recorder:
         return self._file.written
 
     def wait(self) -> None:
-        """Wait until the disk has taken enough for more, for what comes faster than a device."""
-        while self._file.waiting > BACKLOG // 2 and self.written.active:
-            time.sleep(_WAIT)
+        """Wait for the disk where much waits: for what comes faster than from a device."""
+        self._file.wait()
 
     def end(self) -> None:
         """Begin to end the file, once all waiting messages are written."""

@@ -27,9 +27,8 @@ PROGRAM = f"kappaskin {VERSION}"
 _FLUSH = 0.1  # s between two times that all there is goes to the file: what a killed process loses
 _SYNC = 2.0  # s between two times that the file goes to the disk: what a loss of power takes
 _CHUNK = 2**20  # bytes
-BACKLOG = 2**26
-"""Bytes that may wait for the disk; of more, messages are lost."""
-
+_BACKLOG = 2**26  # bytes that may wait for the disk
+_WAIT = 0.01  # s
 _EACH = 128  # bytes of memory for each message in addition to its own
 _SUMMED = 512  # bytes of the end of the file for each chunk
 _UNDATED = 0
@@ -128,16 +127,16 @@ class RecordingFile:
         """Nanoseconds since 1970 at `time` in s on the monotonic clock."""
         return self._wall + round(time * 1e9)
 
-    @property
-    def waiting(self) -> int:
-        """Bytes that wait for the disk."""
-        return self._put - self._taken
+    def wait(self) -> None:
+        """Wait until the disk has taken so much that none of what comes next is lost."""
+        while self._put - self._taken > _BACKLOG // 2 and self.written.active:
+            time.sleep(_WAIT)
 
     def put(self, topic: Topic, time: float, data: bytes) -> None:
         """Write a message that belongs to `time` in s on the monotonic clock."""
         if not self.written.active:
             return
-        if self.waiting > BACKLOG:
+        if self._put - self._taken > _BACKLOG:
             self._lost += 1
             return
         self._put += len(data) + _EACH
