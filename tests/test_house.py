@@ -21,7 +21,8 @@ ROOMS = (
 LIMITS = {
     # mechanics: shell and stretching; contact: influence, stretched, lower_bound, imprint;
     # studies: summed; sources: interpreter, lines of other formats, a sensor's description, inputs.
-    "modules": 340,
+    # recording: foreign and importing, files of other programs.
+    "modules": 342,
     # Shells and plates that stretch, a load's size, slopes on shells, revisions of estimates;
     # ovals beside objects, and whether an object fits; errors told beforehand, of calibrations on
     # other paths, and of effects that act on one another.
@@ -31,7 +32,8 @@ LIMITS = {
     # Any reading in scenes, pipeline, files and window; described readings, their noise, zero and
     # calibration; datagrams, standard input and files. What others measured, in the gallery.
     # Studies, plans and hard cases of any reading; its colours, ranges and residuals in the window.
-    "statements": 40_530,
+    # Import of text, arrays, tables, bags of ROS 2 and MCAP files of others.
+    "statements": 41_011,
     # _files: one way to read and write files; _text: text from outside. For all rooms and the app.
     "loose modules of core": 10,
     "loose modules of the app": 8,
@@ -100,8 +102,8 @@ _WRITE = {"write_text", "write_bytes", "rename", "mkstemp", "touch"}
 _WRITERS = {
     "kappaskin.bases.argyris": "touches a file of the cache that it has read",
     "kappaskin.live.resume": "makes a key that only this user can read",
-    "kappaskin.recording.disk": "a live recording is written as it comes, under its name and .part; and "
-    "gives all files of an export or import their names at once",
+    "kappaskin.recording.disk": "a live recording is written as it comes, under its name and .part;"
+    " all files of an export or import get their names at once",
     "kappaskin.recording.writing": "the same",
     "kappaskin.recording.repair": "the same",
     "kappaskin.recording.export.surfaces": "in a scratch folder, which export.writing empties",

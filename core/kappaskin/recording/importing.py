@@ -32,6 +32,7 @@ from kappaskin.sources.wire import Samples
 
 _EVERY, _THEN = 10_000, 100  # first frames that have a recorded estimate; then one of so many
 _TRIED = 1000  # rows, of which one must be a record
+_HELD = 2**16  # bytes of bad rows that wait for a good one
 _REPORT = 0.05  # s between two reports
 _DATES = 1e9, 4e9  # s: times from 2001 to 2096 are since 1970, others since any beginning
 _LONGEST = 1e9  # s of a recording
@@ -109,14 +110,13 @@ class Imported(NamedTuple):
     @property
     def words(self) -> str:
         """Counts of what was imported, as text."""
-        parts = [f"{self.frames:,} of {self.rows:,} rows, {self.seconds:.6g} s"]
-        if self.headings:
-            parts.append(f"headings, comments, empty lines: {self.headings:,}")
-        if self.lost:
-            parts.append(f"{self.lost:,} sequence numbers are missing")
-        if self.back:
-            parts.append(f"time goes back {self.back:,} times, and continues from there")
-        return "; ".join(parts)
+        parts = (
+            f"{self.frames:,} of {self.rows:,} rows, {self.seconds:.6g} s",
+            f"headings, comments, empty lines: {self.headings:,}" if self.headings else "",
+            f"sequence numbers that are missing: {self.lost:,}" if self.lost else "",
+            f"times that go back, and continue from there: {self.back:,}" if self.back else "",
+        )
+        return "; ".join(filter(None, parts))
 
 
 def import_steps(request: ImportRequest, scratch: Path) -> Generator[float | Imported]:
@@ -209,6 +209,16 @@ class _Import:
         elif last and not samples:
             reason, _, first = last.partition(": ")
             self._discard(reason, first, data)
+        if self._recorder and len(self._pending) > _HELD:
+            self._record(self._recorder)
+
+    def _record(self, recorder: Recorder) -> None:
+        """Record the bytes that are pending, at the present time."""
+        recorder.received(self._now, self._pending)
+        self._pending = b""
+        recorder.wait()
+        if not recorder.written.active:
+            raise Refusal(f"{self._request.to}: {recorder.written.trouble}")
 
     def _discard(self, reason: str, first: str, data: bytes = b"") -> None:
         if reason not in self._bad:
@@ -231,16 +241,13 @@ class _Import:
         recorder = self._recorder or self._begin(at, seconds)
         if at < self._last or at - self._base > _LONGEST:
             self._back += 1
-            self._shift(recorder, at)
+            self._base = at - self._now
+            self._map(recorder, at)
         self._last, self._now = at, at - self._base
-        recorder.received(self._now, self._pending)
-        self._pending = b""
+        self._record(recorder)
         if frame := self._interpreter.frame(samples, self._now):
             self._estimate(recorder, frame)
             self._frames += 1
-        recorder.wait()
-        if not recorder.written.active:
-            raise Refusal(f"{self._request.to}: {recorder.written.trouble}")
 
     def _begin(self, at: float, seconds: float) -> Recorder:
         """Begin a recording whose first record is of the time `at`, in a row of `seconds`, in s."""
@@ -255,11 +262,6 @@ class _Import:
             self._pipeline = _usual_pipeline(self._interpreter.sensor)
             recorder.set_up(self._pipeline)
         return recorder
-
-    def _shift(self, recorder: Recorder, at: float) -> None:
-        """Let `at` be the time of now."""
-        self._base = at - self._now
-        self._map(recorder, at)
 
     def _map(self, recorder: Recorder, at: float) -> None:
         """Map the sensor's times exactly; how late they are is not known."""
@@ -307,7 +309,7 @@ class _Import:
         if (recorder := self._recorder) is None:
             return
         if self._pending:
-            recorder.received(self._now, self._pending)
+            self._record(recorder)
         recorder.disconnected(self._now)
         recorder.close()
         if recorder.written.trouble or recorder.written.lost:
@@ -320,16 +322,14 @@ class _Import:
 
     def done(self) -> Imported:
         """What came of it."""
-        found = (BadRows(reason, n, *self._first[reason]) for reason, n in self._bad.items())
-        accounting = self._decoder.accounting()
         return Imported(
             self.rows - self._headings,
             self._frames,
             self._now,
             self._headings,
             self._back,
-            accounting.lost,
-            tuple(found),
+            self._decoder.accounting().lost,
+            tuple(BadRows(reason, n, *self._first[reason]) for reason, n in self._bad.items()),
         )
 
 
