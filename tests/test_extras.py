@@ -26,7 +26,10 @@ ASKS = {
     "compare": ["compare"],
     "foxglove": ["publish", "sim:", "--seconds", "30", "--foxglove", "127.0.0.1:8765"],
 }
-"""What asks for each extra; `film` the app alone does: features/export/test_exports.py."""
+"""What asks for each extra but `film` and `parquet`, which need more than words.
+
+They are in app/features/export/test_exports.py and core/recording/test_importing.py.
+"""
 
 BARRED = """
 import sys
@@ -79,7 +82,7 @@ def without(barred: set[str], code: str, folder: Path, *arguments: str) -> str:
 
 
 def test_every_extra_is_tried_here():
-    assert set(EXTRAS) - DEVELOPERS == {*ASKS, "film"}
+    assert set(EXTRAS) - DEVELOPERS == {*ASKS, "film", "parquet"}
 
 
 @pytest.mark.full

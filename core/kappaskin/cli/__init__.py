@@ -3,6 +3,7 @@
 import os
 import sys
 from importlib import metadata
+from keyword import iskeyword
 
 # Before NumPy is loaded, as in the engine: small products lose by threading, and threads that spin
 # for each other on busy cores took twenty times as long.
@@ -33,7 +34,7 @@ app = App(
 # one of them runs, and their names.
 _PANELS = {
     "Live": ("live", "publish listen"),
-    "Recordings": ("record", "record info verify repair export reconstruct"),
+    "Recordings": ("record", "record info verify repair export import reconstruct"),
     "Sensor": ("sensor", "calibrate tare press monitor device"),
     "Studies": ("study", "plan simulate cost compare stability regions study report"),
     "Paper": ("study", "tables figures"),
@@ -43,7 +44,7 @@ _GROUPS = {panel: Group(panel, sort_key=place) for place, panel in enumerate(_PA
 for _panel, (_module, _names) in _PANELS.items():
     for _name in _names.split():
         app.command(
-            f"kappaskin.cli.{_module}:{_name}",
+            f"kappaskin.cli.{_module}:{_name}{'_' * iskeyword(_name)}",
             name=_name,
             group=_GROUPS[_panel],
             help_format="markdown",

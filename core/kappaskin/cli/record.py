@@ -1,4 +1,4 @@
-"""Commands on recordings: record, info, verify, repair, export, reconstruct."""
+"""Commands on recordings: record, info, verify, repair, export, import, reconstruct."""
 
 import math
 import time
@@ -345,6 +345,51 @@ def export(
         raise Refusal("stopped before the end; nothing was written") from None
     show(*exporting.files)
     show(done.words, error=True)
+
+
+def import_(
+    file: Path,
+    *,
+    sensor: Annotated[Path, Parameter(help="TOML file that describes the sensor and its lines.")],
+    out: Path,
+    topic: str = "",
+    limit: Limit = "",
+) -> int:
+    """Turn a file of another program into a recording of a described sensor.
+
+    FILE is text, JSON lines or binary records as the description has them; an .npz with `values`
+    (T, columns) and `time` (T,) in s, or an array for each column; a .parquet table; or an .mcap
+    or .db3 file, or a bag's folder, of ROS 2. Of a bag the messages of one topic are read:
+    std_msgs Float32MultiArray, Float64MultiArray or String, or JSON. Numbers are those of the
+    description's columns in order, of its readings alone, or of columns of these names. Headings,
+    comments and empty lines are passed over.
+
+    Exit code 1 if rows were left out that are no records; they are counted by reason. A file with
+    more of them than others is refused.
+
+    Example: `kappaskin import last-week.csv --sensor board.toml --out last-week.mcap`
+
+    Parameters
+    ----------
+    file
+        The file, or the folder of a bag.
+    out
+        The recording; it must not exist yet.
+    topic
+        The topic of a bag; the only one that fits when left out.
+    """
+    from kappaskin.recording import Imported, ImportRequest, ImportTask
+
+    allow(limit)
+    try:
+        with ImportTask(ImportRequest(file, out, sensor, topic)) as importing:
+            done = result_of(importing.wait(), Imported)
+    except KeyboardInterrupt:
+        raise Refusal("stopped before the end; nothing was written") from None
+    show(f"{out}: {done.words}")
+    for bad in done.bad:
+        _warn(bad.words)
+    return FAILED if done.bad else 0
 
 
 def reconstruct(

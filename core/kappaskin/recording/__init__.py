@@ -1,10 +1,13 @@
-"""Recordings: MCAP files written, read, replayed, verified, repaired and exported."""
+"""Recordings: MCAP files written, read, replayed, verified, repaired and exported, imported."""
 
 from kappaskin.recording.disk import ReservedFile as ReservedFile
 from kappaskin.recording.disk import is_written as is_written
 from kappaskin.recording.export.request import ExportRequest as ExportRequest
 from kappaskin.recording.export.writing import Exported as Exported
 from kappaskin.recording.export.writing import ExportTask as ExportTask
+from kappaskin.recording.importing import Imported as Imported
+from kappaskin.recording.importing import ImportRequest as ImportRequest
+from kappaskin.recording.importing import ImportTask as ImportTask
 from kappaskin.recording.reading import Recording as Recording
 from kappaskin.recording.reading import made_by as made_by
 from kappaskin.recording.recompute import RecordingSummary as RecordingSummary

@@ -1,12 +1,17 @@
 """Files on a disk that may fill up."""
 
 import os
+import shutil
 import sys
 import tempfile
+from collections.abc import Callable, Generator, Iterable
 from pathlib import Path
-from typing import IO, cast
+from typing import IO, Generic, Self, TypeVar, cast
 
+from kappaskin._processes import BackgroundProcess
 from kappaskin.errors import Refusal
+
+_Result = TypeVar("_Result")
 
 _RESERVE = 2**20  # bytes kept for the end of the file, which a full disk has no room for otherwise
 
@@ -131,6 +136,86 @@ def is_there(path: Path) -> bool:
         return path.exists() or path.is_symlink()
     except OSError as error:
         raise Refusal(f"{path}: cannot be accessed ({_why(error)}); {_ELSEWHERE}") from error
+
+
+class ScratchTask(Generic[_Result]):
+    """Makes `files` by `steps(about, folder)` in a process called `name`; only `wait` waits.
+
+    They are in a temporary folder beside the file `to` until complete. Steps yield the share that
+    is done now and then, and the `result` at the end. It ends when it is done, when `close` is
+    called, which leaves nothing of what is not whole, or when the process that started it is gone.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        to: Path,
+        files: tuple[Path, ...],
+        result: type[_Result],
+        steps: Callable[..., Iterable[float | _Result]],
+        about: object,
+    ) -> None:
+        self.files, self._to, self._result = files, to, result
+        try:
+            self._scratch = Path(tempfile.mkdtemp(prefix=f".{to.name}.", dir=to.parent))
+        except OSError as error:
+            raise _unwritable(to, error) from error
+        try:
+            self._task = BackgroundProcess[float | _Result](name, steps, about, self._scratch)
+        except BaseException:  # Ctrl+C, while it begins
+            shutil.rmtree(self._scratch, ignore_errors=True)
+            raise
+
+    @property
+    def done(self) -> bool:
+        return self._task.done
+
+    def poll(self) -> list[float | _Result]:
+        """The shares that are done since the last call, and in the end what came of it.
+
+        A `Refusal` where that is nothing.
+        """
+        over, found = self.done, self._task.poll()
+        if self.done and not over:
+            self._give()
+        return found
+
+    def wait(self) -> Generator[float | _Result]:
+        """Each share as soon as it is done, and in the end what came of it."""
+        for found in self._task.wait():
+            if isinstance(found, self._result):
+                self._give()
+            yield found
+
+    def _give(self) -> None:
+        """Give what is whole its place; nothing, where one is taken."""
+        given: list[tuple[Path, Path]] = []
+        try:
+            for place in self.files:
+                if place.exists():
+                    raise FileExistsError(17, "it has been created meanwhile")
+                made = self._scratch / place.name
+                made.rename(place)
+                given.append((place, made))
+        except OSError as error:
+            for place, made in given:
+                place.rename(made)
+            raise _unwritable(self._to, error) from error
+
+    def close(self) -> None:
+        """End it, done or not."""
+        self._task.close()
+        shutil.rmtree(self._scratch, ignore_errors=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _unwritable(path: Path, error: OSError) -> Refusal:
+    return Refusal(f"{path}: cannot be written ({_why(error)}); {_ELSEWHERE}")
 
 
 def _write(file: IO[bytes], data: bytes) -> None:

@@ -31,13 +31,18 @@ _COLUMNS = ("x", "y", "z", "displacement")
 class Recorder:
     """Writes the recording `path`: bytes and events of a source, and the results of its frames.
 
-    A `Refusal` where no file can be made. No call waits for the disk.
+    A `Refusal` where no file can be made. No call but `close` and `wait` waits for the disk. Times
+    are in s since `zero`, in ns since 1970; by default on the monotonic clock.
     """
 
     def __init__(
-        self, path: Path, now: float, disk: Callable[[Path], ReservedFile] = ReservedFile
+        self,
+        path: Path,
+        now: float,
+        disk: Callable[[Path], ReservedFile] = ReservedFile,
+        zero: int | None = None,
     ) -> None:
-        self._file = RecordingFile(path, disk)
+        self._file = RecordingFile(path, disk, zero)
         self._now = now  # host time in s of what came last
         # The one recorded last, and its layout.
         self._truth, self._truths = _NO_TRUTH, _truths_like(_NO_TRUTH)
@@ -48,6 +53,10 @@ class Recorder:
     @property
     def written(self) -> RecordingStatus:
         return self._file.written
+
+    def wait(self) -> None:
+        """Wait for the disk where much waits: for what comes faster than from a device."""
+        self._file.wait()
 
     def end(self) -> None:
         """Begin to end the file, once all waiting messages are written."""

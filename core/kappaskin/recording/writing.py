@@ -28,6 +28,7 @@ _FLUSH = 0.1  # s between two times that all there is goes to the file: what a k
 _SYNC = 2.0  # s between two times that the file goes to the disk: what a loss of power takes
 _CHUNK = 2**20  # bytes
 _BACKLOG = 2**26  # bytes that may wait for the disk
+_WAIT = 0.01  # s
 _EACH = 128  # bytes of memory for each message in addition to its own
 _SUMMED = 512  # bytes of the end of the file for each chunk
 _UNDATED = 0
@@ -64,11 +65,17 @@ class RecordingStatus:
 class RecordingFile:
     """A recording at `path`, called `path` + `.part` until it is closed.
 
-    The file is opened by `disk`. `put` and `attach` never wait; `written` is the state of
+    The file is opened by `disk`. Time 0 is `zero` in ns since 1970, by default that of the
+    monotonic clock. `put` and `attach` never wait; `written` is the state of
     it. One that ends by itself, as on a full disk, is closed as one that is asked to.
     """
 
-    def __init__(self, path: Path, disk: Callable[[Path], ReservedFile] = ReservedFile) -> None:
+    def __init__(
+        self,
+        path: Path,
+        disk: Callable[[Path], ReservedFile] = ReservedFile,
+        zero: int | None = None,
+    ) -> None:
         self.path, self.part = path, part_of(path)
         for there in (self.path, self.part):
             if is_there(there):
@@ -79,7 +86,7 @@ class RecordingFile:
         self._disk = disk(self.part)
         self._began = time.monotonic()
         # Wall-clock time is read once, so that a clock that is set does not reorder messages.
-        self._wall = time.time_ns() - time.monotonic_ns()
+        self._wall = time.time_ns() - time.monotonic_ns() if zero is None else zero
         self._waiting: deque[tuple[int, int, bytes]] = deque()
         self._attachments: deque[tuple[str, str, bytes]] = deque()
         self._put = self._taken = 0  # bytes: each counted by one thread only
@@ -119,6 +126,11 @@ class RecordingFile:
     def stamp(self, time: float) -> int:
         """Nanoseconds since 1970 at `time` in s on the monotonic clock."""
         return self._wall + round(time * 1e9)
+
+    def wait(self) -> None:
+        """Wait until the disk has taken so much that none of what comes next is lost."""
+        while self._put - self._taken > _BACKLOG // 2 and self.written.active:
+            time.sleep(_WAIT)
 
     def put(self, topic: Topic, time: float, data: bytes) -> None:
         """Write a message that belongs to `time` in s on the monotonic clock."""

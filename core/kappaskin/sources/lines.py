@@ -95,6 +95,13 @@ class LineDecoder(ABC):
         """The record that a device would send at `time` in s, of all `readings` (C,)."""
 
     @abstractmethod
+    def record(self, numbers: Sequence[float]) -> bytes:
+        """The record of these numbers, one for each column, to the last bit.
+
+        A `ValueError` where no record has them.
+        """
+
+    @abstractmethod
     def _records(self) -> Iterator[Samples]:
         """The records in the buffer, which are taken off it."""
 
@@ -234,6 +241,9 @@ class TextDecoder(_Lines):
         separator = self._separator or SEPARATORS[0]
         return f"{separator.join(f'{number:.12g}' for number in numbers.tolist())}\r\n".encode()
 
+    def record(self, numbers: Sequence[float]) -> bytes:
+        return f"{(self._separator or SEPARATORS[0]).join(map(repr, numbers))}\n".encode()
+
     def _recognised(self, text: bytes) -> str:
         """The separator by which `text` has a number, or nothing, for each column; or none."""
         for separator in SEPARATORS:
@@ -291,10 +301,11 @@ class JsonDecoder(_Lines):
         return np.array(numbers)
 
     def encoded(self, sequence: int, time: float, readings: Array) -> bytes:
-        values: list[float | None] = [
-            None if math.isnan(number) else float(f"{number:.12g}")
-            for number in self._columns.numbers(sequence, time, readings).tolist()
-        ]
+        numbers = self._columns.numbers(sequence, time, readings).tolist()
+        return self.record([float(f"{number:.12g}") for number in numbers])
+
+    def record(self, numbers: Sequence[float]) -> bytes:
+        values = [number if math.isfinite(number) else None for number in numbers]
         record, at = dict[str, Any](), 0
         for path, count in self._paths:
             *outer, last = path
@@ -378,13 +389,23 @@ class BinaryDecoder(LineDecoder):
             _as(code, number, self._body.format[0], wraps=place in counters)
             for place, (code, number) in enumerate(zip(self._codes, numbers, strict=True))
         ]
-        return self.record(values)
+        return self._packed(values)
 
-    def record(self, values: Sequence[float]) -> bytes:
-        """The record with these `values` of its struct."""
+    def _packed(self, values: Sequence[float]) -> bytes:
         body = self._body.pack(*values)
         check = self._check.pack(self._sum(body)) if self._check.size else b""
         return self._sync + body + check
+
+    def record(self, numbers: Sequence[float]) -> bytes:
+        each = zip(self._codes, numbers, strict=True)
+        try:
+            record = self._packed([n if code in "efd" else int(n) for code, n in each])
+        except (struct.error, OverflowError) as error:
+            raise ValueError(str(error)) from error
+        held = np.array(self._body.unpack_from(record, len(self._sync)), float)
+        if not np.array_equal(held, numbers, equal_nan=True):
+            raise ValueError("it would be rounded")
+        return record
 
     def next_of(self, file: BinaryIO) -> bytes:
         return file.read(self._size)

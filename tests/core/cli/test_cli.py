@@ -293,7 +293,7 @@ def test_every_subcommand_shows_an_example_in_its_help(run) -> None:
     ("panel", "commands"),
     [
         ("Live", {"app", "demo", "replay", "publish", "listen"}),
-        ("Recordings", {"record", "info", "verify", "repair", "export", "reconstruct"}),
+        ("Recordings", {"record", "info", "verify", "repair", "export", "import", "reconstruct"}),
         ("Sensor", {"calibrate", "tare", "press", "monitor", "device"}),
         ("Studies", {"plan", "simulate", "cost", "compare", "stability", "regions", "study",
                      "report"}),

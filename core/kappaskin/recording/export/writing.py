@@ -2,17 +2,16 @@
 
 import math
 import shutil
-import tempfile
 import time
 from collections.abc import Generator
 from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
 
-from kappaskin._processes import BackgroundProcess
 from kappaskin.errors import Refusal
 from kappaskin.estimation import slope_warning
 from kappaskin.frames import Frame
+from kappaskin.recording.disk import ScratchTask
 from kappaskin.recording.export.request import (
     ExportedFrame,
     ExportRequest,
@@ -187,80 +186,11 @@ class _ExportWork:
         return Exported(self._written, self._unsettled, self._shapeless, whole, self._slope)
 
 
-class ExportTask:
-    """Writes the requested files, in a temporary folder until complete; only `wait` waits.
-
-    Refused where there is no place. It ends when it is done, when `close` is called, which leaves
-    nothing of what is not whole, or when the process that started it is gone.
-    """
+class ExportTask(ScratchTask[Exported]):
+    """Writes the requested files; refused where there is no place."""
 
     def __init__(self, request: ExportRequest) -> None:
         self.request = request
-        try:
-            scratch = tempfile.mkdtemp(prefix=f".{request.to.name}.", dir=request.to.parent)
-        except OSError as error:
-            raise _unwritable(request.to, error) from error
-        self._scratch = Path(scratch)
-        try:
-            self._task = BackgroundProcess[float | Exported](
-                "kappaskin-export", export_steps, request, self._scratch
-            )
-        except BaseException:  # Ctrl+C, while it begins
-            shutil.rmtree(self._scratch, ignore_errors=True)
-            raise
-
-    @property
-    def done(self) -> bool:
-        return self._task.done
-
-    def poll(self) -> list[float | Exported]:
-        """The shares that are done since the last call, and in the end what came of it.
-
-        A `Refusal` where that is nothing.
-        """
-        over, found = self.done, self._task.poll()
-        if self.done and not over:
-            self._give()
-        return found
-
-    def wait(self) -> Generator[float | Exported]:
-        """Each share as soon as it is done, and in the end what came of it."""
-        for found in self._task.wait():
-            if isinstance(found, Exported):
-                self._give()
-            yield found
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """What is there when it is done: files, and the folder of a series."""
-        return self.request.files
-
-    def _give(self) -> None:
-        """Give what is whole its place; nothing, where one is taken."""
-        given: list[tuple[Path, Path]] = []
-        try:
-            for place in self.files:
-                if place.exists():
-                    raise FileExistsError(17, "it has been created meanwhile")
-                made = self._scratch / place.name
-                made.rename(place)
-                given.append((place, made))
-        except OSError as error:
-            for place, made in given:
-                place.rename(made)
-            raise _unwritable(self.request.to, error) from error
-
-    def close(self) -> None:
-        """End it, done or not."""
-        self._task.close()
-        shutil.rmtree(self._scratch, ignore_errors=True)
-
-    def __enter__(self) -> "ExportTask":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-
-def _unwritable(path: Path, error: OSError) -> Refusal:
-    return Refusal(f"{path}: cannot be written ({error.strerror or error}); choose another place")
+        super().__init__(
+            "kappaskin-export", request.to, request.files, Exported, export_steps, request
+        )

@@ -1,0 +1,427 @@
+"""Files of other programs: lines, tables and messages to rows of a described sensor."""
+
+import importlib
+import math
+import re
+import sqlite3
+import zipfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
+from functools import cache
+from itertools import chain, count
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from mcap.opcode import Opcode
+from mcap.records import Channel, Schema
+from numpy.typing import NDArray
+
+from kappaskin._files import Budget, open_file
+from kappaskin.errors import Refusal, lacking
+from kappaskin.frames import Array
+from kappaskin.recording.cdr import MessageType, decode
+from kappaskin.recording.messages import STRING
+from kappaskin.recording.reading import (
+    LARGEST,
+    MAGIC,
+    MESSAGE_HEADER,
+    CorruptRecord,
+    cost,
+    parsed,
+    record_at,
+    records_in,
+    unpacked,
+)
+from kappaskin.sources import Description
+
+_DIMENSION = MessageType(
+    "std_msgs/msg/MultiArrayDimension", "string label\nuint32 size\nuint32 stride"
+)
+_LAYOUT = MessageType(
+    "std_msgs/msg/MultiArrayLayout",
+    "std_msgs/MultiArrayDimension[] dim\nuint32 data_offset",
+    _DIMENSION,
+)
+_ARRAYS = {
+    kind.name: kind
+    for kind in (
+        MessageType(
+            f"std_msgs/msg/Float{bits}MultiArray",
+            f"std_msgs/MultiArrayLayout layout\nfloat{bits}[] data",
+            _LAYOUT,
+        )
+        for bits in (32, 64)
+    )
+}
+_JSON = "json"
+_TIME = "time"
+_STEP = 1000  # rows of a table that are read at once
+_QUOTED = re.compile(rb'"([^",;\t]*)"')
+
+
+class Row(NamedTuple):
+    """A row: its record as text or bytes, the numbers of one, or why it is none.
+
+    It is of the `time` in s, NaN where none comes with it; up to it a `share` of the file is read.
+    """
+
+    data: bytes | list[float] | str
+    time: float
+    share: float
+
+
+def rows_of(file: Path, description: Description, topic: str, scratch: Path) -> Iterator[Row]:
+    """The rows of a `file`, or of a folder with a bag of ROS 2; of messages those of a `topic`.
+
+    Arrays are unpacked in the folder `scratch`. A `Refusal` where it is no file of that kind, or
+    does not fit; other errors as the libraries
+    that read it raise them.
+    """
+    if file.is_dir():
+        parts = [part for part in file.iterdir() if part.suffix in _BAGS]
+        parts.sort(key=lambda part: (part.suffix, len(part.name), part.name))
+        if not parts or len({part.suffix for part in parts}) > 1:
+            raise Refusal(
+                f"{file}: expected a bag of ROS 2, with .mcap or .db3 files, got "
+                f"{', '.join(sorted(part.name for part in file.iterdir())[:5]) or 'nothing'}; "
+                "`ros2 bag convert` makes one of others"
+            )
+        yield from _message_rows(file, parts, description, topic)
+        return
+    with open_file(file) as opened:
+        head = opened.read(len(_SQLITE))
+    if head.startswith(b"#ROSBAG"):
+        raise Refusal(
+            f"{file}: expected a bag of ROS 2, got one of ROS 1; rosbags-convert mends it"
+        )
+    kind = next((kind for kind in _KINDS if head.startswith(kind)), b"")
+    expected = next(
+        (kind for kind, suffix in _KINDS.items() if suffix == file.suffix.lower()), kind
+    )
+    if kind != expected:
+        raise Refusal(
+            f"{file}: expected {_KINDS[expected]} contents, got "
+            f"{_KINDS.get(kind) or f'others, which begin with {head[:8]!r}'}; check the name"
+        )
+    if topic and kind not in (MAGIC, _SQLITE):
+        raise Refusal(f"{file}: expected no --topic, as it has no messages")
+    if kind in (MAGIC, _SQLITE):
+        yield from _message_rows(file, [file], description, topic)
+    elif kind:
+        made = _parquet_rows(file, description)
+        yield from _npz_rows(file, description, scratch) if kind == _ZIP else made
+    else:
+        yield from _line_rows(file, description)
+
+
+# Lines, or binary records
+
+
+def _line_rows(file: Path, description: Description) -> Iterator[Row]:
+    decoder, text = description.decoder(whole=True), description.kind != "binary"
+    with open_file(file) as opened:
+        size = max(opened.seek(0, 2), 1)
+        opened.seek(0)
+        if opened.read(2) in (b"\xff\xfe", b"\xfe\xff"):
+            raise Refusal(f"{file}: expected text in UTF-8, got UTF-16; save it as UTF-8")
+        opened.seek(0)
+        if text and opened.read(3) != b"\xef\xbb\xbf":
+            opened.seek(0)
+        while line := decoder.next_of(opened):
+            data: bytes | str = line
+            if text and not line.endswith(b"\n"):
+                data, more = line + b"\n", decoder.next_of(opened)
+                if more:
+                    data = "too long"
+                while more and not more.endswith(b"\n"):
+                    more = decoder.next_of(opened)
+            if description.kind == "text" and isinstance(data, bytes) and b'"' in data:
+                data = _QUOTED.sub(rb"\1", data)
+            yield Row(data, math.nan, opened.tell() / size)
+
+
+# Tables
+
+
+class _Placement:
+    """Where the numbers of tables stand in a record, by the `names` of their columns or in order.
+
+    A table that is `timed` has times in s beside them. A `Refusal` where they do not fit.
+    """
+
+    def __init__(self, description: Description, names: Sequence[str], timed: bool) -> None:
+        self._columns, self._rate = description.columns, description.rate
+        own, readings = self._columns.names, self._columns.places.tolist()
+        every = [n for n in range(len(own)) if not (timed and n == self._columns.time)]
+        if all(own[place] in names for place in readings):
+            self._places = [place for place in every if own[place] in names]
+            self._among = [names.index(own[place]) for place in self._places]
+        else:
+            fitting = (places for places in (every, readings) if len(places) == len(names))
+            if (found := next(fitting, None)) is None:
+                raise Refusal(
+                    f"expected {len(readings)} columns, one for each reading, or {len(every)}, for "
+                    f"all columns of the description, got {len(names)}"
+                )
+            self._places, self._among = found, list(range(len(found)))
+        self._needs_time = self._columns.time not in self._places
+        if self._needs_time and not (timed or self._rate):
+            raise Refusal(f"expected times in s in {_TIME!r}, got none; {NO_TIME}")
+
+    def rows(self, values: NDArray[Any], times: Array | None, first: int) -> Iterator[Row]:
+        """Those of `values` (n, K) at `times` (n,) in s, of which the first has a number."""
+        columns, count = self._columns, len(values)
+        numbers = np.zeros((count, len(columns)))
+        numbers[:, self._places] = values[:, self._among]
+        if times is None:
+            times = np.arange(first, first + count) / (self._rate or math.nan)
+        if self._needs_time and columns.time >= 0:
+            numbers[:, columns.time] = times / columns.time_unit
+        if columns.sequence >= 0 and columns.sequence not in self._places:
+            numbers[:, columns.sequence] = np.arange(first, first + count)
+        for row, time in zip(numbers.tolist(), times.tolist(), strict=True):
+            usable = math.isfinite(time) or not self._needs_time
+            yield Row(row if usable else "time or sequence: no time", time, 0.0)
+
+
+NO_TIME = "give a column of time, or rate = 100, in records per second, in [line]"
+"""What to do where a file has no times."""
+
+
+def _table_rows(
+    file: Path,
+    description: Description,
+    names: Sequence[str],
+    total: int,
+    blocks: Iterable[Mapping[str, NDArray[Any]]],
+) -> Iterator[Row]:
+    """The rows of a table of `total` rows with columns of these names, some at a time."""
+    timed = _TIME in names
+    rest = [name for name in names if name != _TIME]
+    placement, first = _Placement(description, rest, timed), 0
+    for block in blocks:
+        for name, values in block.items():
+            if values.dtype.kind not in ("fiuM" if name == _TIME else "fiu"):
+                raise Refusal(f"{file}: expected numbers in {name!r:.60}, got {values.dtype}")
+        times = _seconds(block[_TIME]) if timed else None
+        values = np.column_stack([block[name].astype(float) for name in rest])
+        for row in placement.rows(values, times, first):
+            yield row._replace(share=first / max(total, 1))
+        first += len(values)
+
+
+def _seconds(times: NDArray[Any]) -> Array:
+    """Times in s, of dates since 1970."""
+    if times.dtype.kind == "M":
+        missing = np.isnat(times)
+        return np.where(missing, math.nan, times.astype("M8[ns]").astype(np.int64) * 1e-9)
+    return times.astype(float)
+
+
+_VALUES = "values"
+
+
+def _npz_rows(file: Path, description: Description, scratch: Path) -> Iterator[Row]:
+    own = description.columns
+    with open_file(file) as opened, zipfile.ZipFile(opened) as archive:
+        there = [name.removesuffix(".npy") for name in archive.namelist()]
+        wanted = (_VALUES,) if _VALUES in there else tuple(filter(None, own.names))
+        wanted = [
+            name for name in dict.fromkeys((*wanted, _TIME)) if f"{name}.npy" in archive.NameToInfo
+        ]
+        if not {*wanted} - {_TIME}:
+            raise Refusal(
+                f"{file}: expected arrays values (T, columns) and time (T,), or one for each "
+                f"column such as {own.names[own.places[0]]!r}, got "
+                f"{', '.join(there)[:200] or 'none'}"
+            )
+        size = sum(archive.getinfo(f"{name}.npy").file_size for name in wanted)
+        Budget(file, opened.seek(0, 2)).take(size, f"its arrays {', '.join(wanted)[:40]}")
+        # Mapped, since all of them may be more than the memory; pickles are refused.
+        arrays: dict[str, NDArray[Any]] = {
+            name: np.load(archive.extract(f"{name}.npy", scratch), mmap_mode="r") for name in wanted
+        }
+    shapes = {name: array.shape for name, array in arrays.items()}
+    if len({shape[:1] for shape in shapes.values()}) > 1 or any(
+        len(shape) != 1 + (name == _VALUES) for name, shape in shapes.items()
+    ):
+        raise Refusal(f"{file}: expected arrays with a row for each time, got shapes {shapes}")
+    if _VALUES in arrays:
+        values = arrays.pop(_VALUES)
+        if values.shape[1] == len(own) and own.time >= 0:
+            arrays.clear()  # the time is among the values
+        arrays = {f"column {n}": column for n, column in enumerate(values.T)} | arrays
+    total = len(next(iter(arrays.values()), ()))
+    blocks = (
+        {name: array[first : first + _STEP] for name, array in arrays.items()}
+        for first in range(0, total, _STEP)
+    )
+    yield from _table_rows(file, description, [*arrays], total, blocks)
+
+
+def _parquet_rows(file: Path, description: Description) -> Iterator[Row]:
+    try:
+        parquet: Any = importlib.import_module("pyarrow.parquet")
+    except ImportError as error:
+        raise lacking("parquet", f"{file}: a .parquet file", error) from error
+    with open_file(file) as opened, closing(parquet.ParquetFile(opened)) as table:
+        names: list[str] = table.schema_arrow.names
+        total: int = table.metadata.num_rows
+        if len(set(names)) < len(names):
+            raise Refusal(f"{file}: expected columns of different names, got one twice")
+        Budget(file, opened.seek(0, 2)).take(8 * total * len(names), f"{total} rows")
+        own = [name for name in names if not name.startswith("__index_level_")]  # those of pandas
+        blocks = (
+            {
+                name: column.to_numpy(zero_copy_only=False)
+                for name, column in zip(own, batch.columns, strict=True)
+            }
+            for batch in table.iter_batches(_STEP, columns=own)
+        )
+        yield from _table_rows(file, description, own, total, blocks)
+
+
+# Messages
+
+
+class _Topic(NamedTuple):
+    """A topic, the type of its messages, and how they are encoded."""
+
+    name: str
+    kind: str
+    encoding: str
+
+
+class _Message(NamedTuple):
+    """A message of a topic, logged at `time` in ns since 1970, and its bytes; or only a fault."""
+
+    topic: _Topic
+    time: int
+    data: bytes
+    share: float
+    fault: str = ""
+
+
+def _mcap_messages(path: Path) -> Iterator[_Message]:
+    """All of an MCAP file, in its order, up to where it is damaged."""
+    schemas, topics, at = dict[int, str](), dict[int, _Topic](), len(MAGIC)
+    with open_file(path) as file:
+        size = file.seek(0, 2)
+        budget = Budget(path, size)
+        try:
+            while at < size:
+                record = record_at(file, at, size)
+                if record.code in (Opcode.DATA_END, Opcode.FOOTER):
+                    return
+                inside = iter([(record.code, record.body)])
+                if record.code == Opcode.CHUNK:
+                    inside = records_in(unpacked(record.body, budget))
+                for code, body in inside:
+                    budget.take(cost(code, body), "the number of its records")
+                    if code == Opcode.SCHEMA:
+                        schema = parsed(Schema, body)
+                        schemas[schema.id] = schema.name
+                    elif code == Opcode.CHANNEL:
+                        own = parsed(Channel, body)
+                        kind = schemas.get(own.schema_id, "")
+                        topics[own.id] = _Topic(own.topic, kind, own.message_encoding)
+                    elif code == Opcode.MESSAGE and len(body) >= MESSAGE_HEADER.size:
+                        channel, _, time, _ = MESSAGE_HEADER.unpack_from(body)
+                        if topic := topics.get(channel):
+                            yield _Message(topic, time, body[MESSAGE_HEADER.size :], at / size)
+                at = record.end
+        except CorruptRecord as fault:
+            why = f"damaged from here on: {fault}; `kappaskin repair` saves the intact messages"
+            yield _Message(_Topic("", "", ""), 0, b"", 1.0, why)
+
+
+def _sqlite_messages(path: Path) -> Iterator[_Message]:
+    """All of a .db3 file of ROS 2."""
+    uri = f"{path.absolute().as_uri()}?mode=ro&immutable=1"
+    with closing(sqlite3.connect(uri, uri=True)) as database:
+        database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST)
+        tables = "SELECT name FROM sqlite_master WHERE type = 'table'"  # a view may never end
+        if not {"topics", "messages"} <= {name for (name,) in database.execute(tables)}:
+            raise Refusal("expected tables topics and messages, as in a bag of ROS 2, got others")
+        found = database.execute("SELECT id, name, type, serialization_format FROM topics")
+        topics = {n: _Topic(*map(str, rest)) for n, *rest in found}
+        ((total,),) = database.execute("SELECT count(*) FROM messages")
+        found = database.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY id")
+        for n, (topic, time, data) in enumerate(found):
+            if topic in topics and isinstance(time, int) and isinstance(data, bytes):
+                yield _Message(topics[topic], time, data, n / total)
+
+
+def _message_rows(
+    file: Path, parts: Sequence[Path], description: Description, name: str
+) -> Iterator[Row]:
+    """The rows of one topic of a bag, whose files follow one another."""
+    make = _BAGS.get(parts[0].suffix, _mcap_messages)
+    found = list(dict.fromkeys((m.topic, m.fault) for m in chain.from_iterable(map(make, parts))))
+    topics = {topic for topic, fault in found if not fault}
+    if found and not topics:
+        raise Refusal(f"{file}: is {found[0][1]}")
+    topic = _chosen(file, topics, description, name)
+    read = _reader(topic, description)
+    for n, part in enumerate(parts):
+        for message in make(part):
+            share = (n + message.share) / len(parts)
+            if message.fault:
+                yield Row(message.fault, math.nan, share)
+            elif message.topic == topic:
+                yield read(message)._replace(share=share)
+
+
+def _chosen(file: Path, topics: set[_Topic], description: Description, name: str) -> _Topic:
+    """The topic called `name`, or the only one that fits."""
+    named = [topic for topic in sorted(topics) if name in ("", topic.name)]
+    arrays = [topic for topic in named if topic.encoding == "cdr" and topic.kind in _ARRAYS]
+    if description.kind == _JSON:
+        arrays += [topic for topic in named if topic.encoding == _JSON]
+    texts = [t for t in named if t.kind == STRING.name and description.kind != "binary"]
+    found = arrays or texts
+    if len(found) == 1:
+        return found[0]
+    there = ", ".join(f"{t.name} ({t.kind or t.encoding})" for t in (found or sorted(topics))[:20])
+    kinds = f"{', '.join(_ARRAYS)}, {STRING.name} or JSON"
+    if len(found) > 1:
+        raise Refusal(f"{file}: expected one topic, got {there}; choose by --topic NAME")
+    raise Refusal(
+        f"{file}: expected a topic {name + ' ' if name else ''}of {kinds} that fits the "
+        f"description, got {there or 'no topic'}"
+    )
+
+
+def _reader(topic: _Topic, description: Description) -> Callable[[_Message], Row]:
+    """What makes a row of each message of a topic."""
+    kind, numbers = _ARRAYS.get(topic.kind), count()
+
+    @cache
+    def placement(width: int) -> _Placement:
+        timed = width < len(description.columns) or description.columns.time < 0
+        return _Placement(description, [""] * width, timed)
+
+    def row(message: _Message) -> Row:
+        time = message.time * 1e-9
+        if topic.encoding == _JSON:
+            return Row(_one_line(message.data), time, 0.0)
+        try:
+            found = decode(kind or STRING, message.data)
+            if kind is None:
+                return Row(_one_line(found["data"].encode()), time, 0.0)
+            values = found["data"][found["layout.data_offset"] :]
+            return next(placement(len(values)).rows(values[None], np.array([time]), next(numbers)))
+        except Refusal as refusal:
+            return Row(f"no record: {refusal}", time, 0.0)
+
+    return row
+
+
+def _one_line(data: bytes) -> bytes:
+    return data.replace(b"\n", b" ") + b"\n"
+
+
+_ZIP, _SQLITE = b"PK\3\4", b"SQLite format 3\0"
+_KINDS = {_ZIP: ".npz", b"PAR1": ".parquet", MAGIC: ".mcap", _SQLITE: ".db3"}
+_BAGS = {".mcap": _mcap_messages, ".db3": _sqlite_messages}
