@@ -87,6 +87,13 @@ def _numbered(file: Path) -> None:
         writer.writerows([range(3 * P + 1), *np.column_stack([TIMES, K]).tolist()])
 
 
+def _indexed(file: Path) -> None:
+    """As pandas writes a table with an index of time."""
+    with file.open("w", newline="") as opened:
+        writer = csv.writer(opened)
+        writer.writerows([["time", *range(3 * P)], *np.column_stack([TIMES, K]).tolist()])
+
+
 def _npz(file: Path) -> None:
     np.savez_compressed(file, values=np.asfortranarray(K), time=TIMES)
 
@@ -157,6 +164,7 @@ def _folder_of_mcap(folder: Path) -> None:
 FILES: dict[str, tuple[str, str, Callable[[Path], None]]] = {
     "spreadsheet": ("a.csv", "text", _spreadsheet),
     "numbered columns": ("a.txt", "text", _numbered),
+    "numbered columns, index": ("a.csv", "text", _indexed),
     "arrays": ("a.npz", "text", _npz),
     "arrays, numbered records": ("a.npz", "milliseconds", _npz),
     "arrays without a column of time": ("a.npz", "untimed", _npz),
@@ -358,7 +366,7 @@ REFUSED: dict[str, tuple[str, Callable[[], bytes], str]] = {
     "cut.npz": (
         "text",
         lambda: _saved(values=K)[:3000],
-        "cannot be read .*; check that it is whole",
+        "cannot be read .*; check its name, and that it is whole",
     ),
     "pickled.npz": (
         "text",
