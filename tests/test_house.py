@@ -33,7 +33,7 @@ LIMITS = {
     # calibration; datagrams, standard input and files. What others measured, in the gallery.
     # Studies, plans and hard cases of any reading; its colours, ranges and residuals in the window.
     # Import of text, arrays, tables, bags of ROS 2 and MCAP files of others.
-    "statements": 41_011,
+    "statements": 41_012,
     # _files: one way to read and write files; _text: text from outside. For all rooms and the app.
     "loose modules of core": 10,
     "loose modules of the app": 8,

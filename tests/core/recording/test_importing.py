@@ -420,6 +420,15 @@ def test_a_damaged_parquet_is_refused(tmp_path: Path) -> None:
         _imported(tmp_path, file)
 
 
+def test_a_parquet_that_declares_far_more_than_it_holds_is_refused(tmp_path: Path) -> None:
+    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    zeros = arrow.array(np.zeros(2_000_000))
+    table = arrow.table({"time": zeros} | {f"c{n}": zeros for n in range(3 * P)})
+    parquet.write_table(table, tmp_path / "a.parquet")
+    with pytest.raises(Refusal, match="to take at most 256 MB"):
+        _imported(tmp_path, tmp_path / "a.parquet")
+
+
 def test_a_parquet_names_the_extra_that_reads_it(tmp_path: Path, monkeypatch) -> None:
     for name in ("pyarrow", "pyarrow.parquet"):
         monkeypatch.setitem(sys.modules, name, None)
