@@ -257,7 +257,8 @@ def test_bad_rows_are_counted_and_named_and_all_bytes_recorded(tmp_path: Path) -
 
 
 def test_time_that_goes_back_continues_and_duplicates_are_kept(tmp_path: Path) -> None:
-    rows = GOOD[:20] + GOOD[:20] + [GOOD[19]] * 3
+    same = [f"{TIMES[19]},{row.partition(',')[2]}" for row in GOOD[30:33]]
+    rows = GOOD[:20] + GOOD[:20] + same
     (tmp_path / "a.csv").write_bytes(_rows(rows))
 
     done = _imported(tmp_path, tmp_path / "a.csv")
