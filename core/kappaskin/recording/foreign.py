@@ -265,7 +265,9 @@ def _parquet_rows(file: Path, description: Description) -> Iterator[Row]:
         parquet: Any = importlib.import_module("pyarrow.parquet")
     except ImportError as error:
         raise lacking("parquet", f"{file}: a .parquet file", error) from error
-    with open_file(file) as opened, closing(parquet.ParquetFile(opened)) as table:
+    # Or all of the file would be in memory, not one group of rows.
+    streamed = {"pre_buffer": False, "buffer_size": 2**16}
+    with open_file(file) as opened, closing(parquet.ParquetFile(opened, **streamed)) as table:
         names: list[str] = table.schema_arrow.names
         total: int = table.metadata.num_rows
         if len(set(names)) < len(names):

@@ -39,7 +39,7 @@ _LONGEST = 1e9  # s of a recording
 _SHOWN = 60  # characters of a bad row
 _COMMA = re.compile(rb"\d,\d+\s*[;\t]")
 _SEPARATORS = (b";", b"\t", b",")
-_NUMBER = re.compile(rb"[\s\"]*[-+]?\.?\d")
+_NAME = re.compile(rb"(?i)(?!nan$|inf$|infinity$)[a-z_\x80-\xff]")
 _DAMAGES = (
     OSError,
     ValueError,
@@ -140,7 +140,8 @@ def import_steps(request: ImportRequest, scratch: Path) -> Generator[float | Imp
             after = f" after row {work.rows:,}" if work.rows else ""
             why = getattr(error, "strerror", None) or str(error)
             raise Refusal(
-                f"{request.file}: cannot be read{after} ({why:.100}); check that it is whole"
+                f"{request.file}: cannot be read{after} ({why:.100}); check its name, and that it "
+                "is whole"
             ) from error
         work.end()
     yield work.done()
@@ -192,7 +193,7 @@ class _Import:
         if not found and not (self._frames or self._heading):
             fields = [field.strip(b' "') for field in _fields(text)]
             counted = [b"%d" % n for n in range(len(fields))]
-            found = fields in (counted, [b"", *counted[:-1]]) or not any(map(_NUMBER.match, fields))
+            found = fields in (counted, [b"", *counted[:-1]]) or any(map(_NAME.match, fields))
             self._heading = text if found else b""
         self._headings += found
         return found

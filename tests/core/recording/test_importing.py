@@ -87,6 +87,13 @@ def _numbered(file: Path) -> None:
         writer.writerows([range(3 * P + 1), *np.column_stack([TIMES, K]).tolist()])
 
 
+def _indexed(file: Path) -> None:
+    """As pandas writes a table with an index of time."""
+    with file.open("w", newline="") as opened:
+        writer = csv.writer(opened)
+        writer.writerows([["time", *range(3 * P)], *np.column_stack([TIMES, K]).tolist()])
+
+
 def _npz(file: Path) -> None:
     np.savez_compressed(file, values=np.asfortranarray(K), time=TIMES)
 
@@ -157,6 +164,7 @@ def _folder_of_mcap(folder: Path) -> None:
 FILES: dict[str, tuple[str, str, Callable[[Path], None]]] = {
     "spreadsheet": ("a.csv", "text", _spreadsheet),
     "numbered columns": ("a.txt", "text", _numbered),
+    "numbered columns, index": ("a.csv", "text", _indexed),
     "arrays": ("a.npz", "text", _npz),
     "arrays, numbered records": ("a.npz", "milliseconds", _npz),
     "arrays without a column of time": ("a.npz", "untimed", _npz),
@@ -249,7 +257,8 @@ def test_bad_rows_are_counted_and_named_and_all_bytes_recorded(tmp_path: Path) -
 
 
 def test_time_that_goes_back_continues_and_duplicates_are_kept(tmp_path: Path) -> None:
-    rows = GOOD[:20] + GOOD[:20] + [GOOD[19]] * 3
+    same = [f"{TIMES[19]},{row.partition(',')[2]}" for row in GOOD[30:33]]
+    rows = GOOD[:20] + GOOD[:20] + same
     (tmp_path / "a.csv").write_bytes(_rows(rows))
 
     done = _imported(tmp_path, tmp_path / "a.csv")
@@ -358,7 +367,7 @@ REFUSED: dict[str, tuple[str, Callable[[], bytes], str]] = {
     "cut.npz": (
         "text",
         lambda: _saved(values=K)[:3000],
-        "cannot be read .*; check that it is whole",
+        "cannot be read .*; check its name, and that it is whole",
     ),
     "pickled.npz": (
         "text",
@@ -410,6 +419,15 @@ def test_a_damaged_parquet_is_refused(tmp_path: Path) -> None:
     file.write_bytes(file.read_bytes()[:-200])
     with pytest.raises(Refusal, match="cannot be read"):
         _imported(tmp_path, file)
+
+
+def test_a_parquet_that_declares_far_more_than_it_holds_is_refused(tmp_path: Path) -> None:
+    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    zeros = arrow.array(np.zeros(2_000_000))
+    table = arrow.table({"time": zeros} | {f"c{n}": zeros for n in range(3 * P)})
+    parquet.write_table(table, tmp_path / "a.parquet")
+    with pytest.raises(Refusal, match="to take at most 256 MB"):
+        _imported(tmp_path, tmp_path / "a.parquet")
 
 
 def test_a_parquet_names_the_extra_that_reads_it(tmp_path: Path, monkeypatch) -> None:
