@@ -162,7 +162,6 @@ def test_fields_have_the_shape_of_a_frame_and_pass_through_the_ring(kind):
 
 METHODS = ("as-printed", "direct", "fast", "tracking", "bayes", "finite-slope", "robust")
 REFUSED = {
-    **{(kind, "finite-slope"): "expected a curvature sensor for finite slopes" for kind in KINDS},
     ("rosettes", "fast"): "along x or y for the fast transforms, got curvature at 45 degrees",
     ("a mix", "fast"): "along x or y for the fast transforms, got slope at 30 degrees",
 }
