@@ -455,12 +455,6 @@ class SensorLayout:
         return [QUANTITIES[quantity] for quantity, _ in self.kinds]
 
     @property
-    def noise_unit(self) -> tuple[float, str]:
-        """How the noise of a reading is shown: by how many times a unit, and its name."""
-        units = set(self.kind_units)
-        return SHOWN_UNITS[units.pop()] if len(units) == 1 else (1.0, "times that stated")
-
-    @property
     def each_reads(self) -> list[str]:
         """The names of the k readings of every element, reading k P + p that of element p.
 
@@ -533,20 +527,26 @@ class SensorLayout:
         free = [k for k, (name, _) in enumerate(self.kinds) if name in self.reads.free]
         return np.equal.outer(self.kind, free).astype(float)
 
+    def stated(self, noise: Iterable[tuple[str, float]]) -> list[float]:
+        """That `noise` of each of `kinds`, by its name or that of its quantity; 0 without one."""
+        by = dict(noise)
+        return [by.get(name_of_reading(*kind), by.get(kind[0], 0.0)) for kind in self.kinds]
+
     def sigma(self, noise: Iterable[tuple[str, float]]) -> Array | None:
-        """Standard deviation of each reading (R,) by the `noise` of quantities that differ in unit.
+        """Standard deviation (R,) by the `noise` of readings that differ in it or unit.
 
         None where they do not. A `Refusal` where that of one is not stated.
         """
-        if len(set(self.kind_units)) == 1:
+        each = self.stated(noise)
+        if len(set(self.kind_units)) == len(set(each)) == 1:
             return None
-        stated = dict(noise)
-        if unknown := [name for name, _ in self.kinds if not stated.get(name)]:
+        if 0.0 in each:
+            unknown = self.kinds[each.index(0.0)][0]
             raise Refusal(
                 f"expected the noise of readings that differ in unit, {self.units}, got none of "
-                f"{unknown[0]}; give noise in [readings.{unknown[0]}]"
+                f"{unknown}; give noise in [readings.{unknown}]"
             )
-        return np.array([stated[name] for name, _ in self.kinds])[self.kind]
+        return np.array(each)[self.kind]
 
     def check_curvature_sensor(self, purpose: str) -> None:
         """Raise a `Refusal` where the elements do not read xx, yy and xy, as a `purpose` needs."""

@@ -5,6 +5,7 @@ import json
 import math
 import re
 import tomllib
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
@@ -26,6 +27,7 @@ from kappaskin.sensing import (
     Sensor,
     SensorLayout,
     kind_of_reading,
+    name_of_reading,
 )
 from kappaskin.sources.decoder import Decoder
 from kappaskin.sources.lines import (
@@ -152,7 +154,7 @@ READINGS = Part(
         "noise": Key(
             "Noise",
             "Standard deviation of a reading, in the same unit; estimated if omitted. Readings of "
-            "several units need it: it weighs them.",
+            "several units, or of one with different noise, are weighed by it and need it all.",
             kind=float,
             default=0.0,
             limits=Within(1e-12, 1e6, or_zero=True),
@@ -417,21 +419,26 @@ class _Conversion:
             raise table.refusal("expected a scale other than 0", key)
         return value
 
-    def noise(self, kinds: dict[str, str]) -> tuple[tuple[str, float], ...]:
-        """The given noise of each quantity that the columns read."""
-        given = {quantity: self.of(what, "noise") for what, quantity in kinds.items()}
+    def noise(self, each: Iterable[str]) -> tuple[tuple[str, float], ...]:
+        """The given noise of what the columns read: of each quantity, or of each that differs."""
+        given = {what: float(self.of(what, "noise")) for what in each}
         if not any(given.values()):
             return ()
-        for unit in set(QUANTITIES.values()):
-            found = {
-                what: self.of(what, "noise") for what in kinds if QUANTITIES[kinds[what]] == unit
-            }
-            if len(set(found.values())) > 1:
+        found, alike = dict[str, float](), dict[str, set[float]]()
+        for what, noise in given.items():
+            name = name_of_reading(*kind_of_reading(what))
+            if not noise or found.setdefault(name, noise) != noise:
                 raise self._table.refusal(
-                    f"expected one noise for all readings in {unit}, got "
-                    + ", ".join(f"{noise:g} of {what}" for what, noise in found.items())
+                    "expected one noise of all readings of a kind, where that of any is given, got "
+                    f"{', '.join(f'{noise:g} of {what}' for what, noise in given.items())}"
                 )
-        return tuple(given.items())
+            alike.setdefault(kind_of_reading(what)[0], set()).add(noise)
+        return tuple(
+            {
+                quantity if len(alike[quantity := name.partition("@")[0]]) == 1 else name: noise
+                for name, noise in found.items()
+            }.items()
+        )
 
     def done(self) -> None:
         """Refuse what is not asked for, and tables of what no column reads."""
@@ -454,7 +461,8 @@ def _reading(
             raise Refusal(f"expected one datum of all readings of {quantity}, got fixed and free")
     free = [quantity for quantity, datum in datums.items() if datum == "free"]
     components = {COMPONENTS[k] for k in np.flatnonzero(layout.live.any(axis=1))}
-    if not free and set(each) == components:
+    alike = len({readings.of(what, "noise") for what in each}) == 1
+    if alike and not free and set(each) == components:
         numbers = np.array([COMPONENTS.index(what) for what in each])
         channels = numbers * len(layout) + elements
         live = layout.live & np.isin(np.arange(layout.channels), channels).reshape(3, -1)
@@ -495,7 +503,7 @@ def _columns(
     units = set(layout.kind_units)
     digital = DigitalReadings(
         _STEPS[units.pop()] if len(units) == 1 else _STEP,
-        readings.noise({what: kind_of_reading(what)[0] for what in each}),
+        readings.noise(each),
     )
     columns = Columns(
         names,
