@@ -194,13 +194,16 @@ class Description:
     sync: bytes
     checksum: str
 
-    def decoder(self, whole: bool = False) -> LineDecoder:
+    def decoder(self, whole: bool = False, by_datagrams: bool = False) -> LineDecoder:
         """A decoder of its lines; `whole` where the bytes begin with the beginning of one."""
         if self.kind == "text":
-            return TextDecoder(self.columns, self.separator, whole)
-        if self.kind == "json":
-            return JsonDecoder(self.columns, self.paths, whole)
-        return BinaryDecoder(self.columns, self.struct, self.sync, self.checksum)
+            made = TextDecoder(self.columns, self.separator, whole)
+        elif self.kind == "json":
+            made = JsonDecoder(self.columns, self.paths, whole)
+        else:
+            made = BinaryDecoder(self.columns, self.struct, self.sync, self.checksum)
+        made.by_datagrams = by_datagrams
+        return made
 
 
 SCHEME = "sensor:"
@@ -523,22 +526,29 @@ def _columns(
 
 
 _TEXT = ("description", "name", "serial_number")
+_DATAGRAMS = "datagrams"  # is there, and true, where it sends them
 
 
-def described_text(sensor: Sensor) -> str:
+def described_text(sensor: Sensor, by_datagrams: bool = False) -> str:
     """The information text of a described `sensor`, as recordings have it."""
-    return json.dumps({key: getattr(sensor, key) for key in _TEXT}, separators=(",", ":"))
+    values = {key: getattr(sensor, key) for key in _TEXT}
+    values |= {_DATAGRAMS: True} if by_datagrams else {}
+    return json.dumps(values, separators=(",", ":"))
 
 
 def described_sensor(table: TomlTable) -> Sensor:
     """The sensor of an information text that `described_text` made."""
     text, name, serial_number = (table.get(key, str) for key in _TEXT)
+    if _DATAGRAMS in table:
+        table.get(_DATAGRAMS, bool)
     table.done()
     return description_of(text, name, serial_number).sensor
 
 
-def decoder_of(sensor: Sensor) -> Decoder | LineDecoder:
-    """The decoder of what a sensor sends."""
+def decoder_of(sensor: Sensor, text: str) -> Decoder | LineDecoder:
+    """The decoder of what a sensor with this information `text` sends."""
     if not sensor.description:
         return Decoder()
-    return description_of(sensor.description, sensor.name, sensor.serial_number).decoder()
+    found = description_of(sensor.description, sensor.name, sensor.serial_number)
+    by_datagrams = bool(json.loads(text).get(_DATAGRAMS))
+    return found.decoder(by_datagrams=by_datagrams)

@@ -33,13 +33,11 @@ class Input(ABC):
     """Where bytes come from, as from an open port; nothing can be sent there.
 
     A `patient` one waits until its bytes are taken, so that none are lost. `silence` says what to
-    check when nothing comes for seconds; nothing where that may be. Those of an input by `records`
-    come in whole ones.
+    check when nothing comes for seconds; nothing where that may be.
     """
 
     patient: ClassVar[bool] = True
     silence: ClassVar[str] = ""
-    by_records: ClassVar[bool] = False
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -61,7 +59,6 @@ class Datagrams(Input):
 
     patient = False
     silence = "check that it is sent to this address, and that no firewall keeps it away"
-    by_records = True
 
     def __init__(self, url: str, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__(clock)
