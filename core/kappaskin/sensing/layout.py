@@ -359,22 +359,28 @@ class SensorLayout:
         on = self.patch.contains(corners.reshape(-1, 2)).reshape(4, -1).all(axis=0)
         return on & (self.patch.depth(positions) * (1 + _ROUNDING) >= self.gage_length / 2)
 
+    def reading_at(self, positions: ArrayLike, which: Indices) -> "SensorLayout":
+        """Elements at other `positions` (C, 2) in m, each with the readings `which` (k,) of these.
+
+        Reading j C + c is which[j] of element c.
+        """
+        made = SensorLayout.scattered(self.patch, positions)
+        made = replace(made, gage_length=self.gage_length, cell=self.cell)
+        numbers: list[int] = self.kind[which].tolist()
+        kinds, C = [self.kinds[k] for k in numbers], len(made)
+        if not self.reads and kinds == self.kinds:
+            return made
+        quantity, direction = (np.repeat(of, C) for of in zip(*kinds, strict=True))
+        free = self.reads.free if self.reads else ()
+        return made.reading(np.tile(np.arange(C), len(which)), quantity, direction, free)
+
     def read_alike(self, positions: ArrayLike) -> "SensorLayout":
         """Elements at other `positions` (C, 2) in m, each with the k readings of every element.
 
         Reading k C + c is number k of element c. A `Refusal` where elements differ in what they
         read.
         """
-        k, made = len(self.each_reads), SensorLayout.scattered(self.patch, positions)
-        made = replace(made, gage_length=self.gage_length, cell=self.cell)
-        if not self.reads:
-            return made
-        P, C = len(self), len(made)
-        quantity, direction = self.reads.quantity[::P], self.reads.direction[::P]
-        element = np.tile(np.arange(C), k)
-        return made.reading(
-            element, np.repeat(quantity, C), np.repeat(direction, C), self.reads.free
-        )
+        return self.reading_at(positions, len(self) * np.arange(len(self.each_reads)))
 
     def in_unit(self, unit: str) -> "SensorLayout":
         """The same elements with their readings in this `unit` only."""
