@@ -104,6 +104,24 @@ class DeflectedSkin:
         twist = (second[2] - H / 2 * first[2]) / np.sqrt(first[0] * first[1])
         return np.stack([second[0] / first[0] - H, second[1] / first[1], twist])
 
+    def read(self, quantity, x, y, direction):
+        """A `quantity` at x, y (P,) along `direction` (P,) in rad from x, in SI units.
+
+        A height is the displacement; a slope how far the tangent has turned, p and q of the surface
+        in space; a curvature the normal curvature along c d + s r_y less that at rest.
+        """
+        c, s, H = np.cos(direction), np.sin(direction), 1 / self.radius
+        if quantity == "height":
+            return self.f(x, y)
+        if quantity == "twist":
+            return self.readings(x, y)[2]
+        if quantity == "slope":
+            v = self._moved(x, y, 0, 0)[1][:, 0]
+            return c * (self.f(x, y, 1, 0) + H * v) + s * self.f(x, y, 0, 1)
+        first, second = self._forms(x, y)
+        parts = np.stack([c * c, s * s, 2 * c * s])
+        return np.sum(parts * second, axis=0) / np.sum(parts * first, axis=0) - c * c * H
+
     def diagonal_difference(self, x, y):
         """Half of what the normal curvatures along the two diagonals differ by, (P,) in 1/m."""
         first, second = self._forms(x, y)

@@ -199,7 +199,7 @@ def scene_of_sensor(sensor: Sensor, noise: float) -> Scene:
     if isinstance(chain, DigitalReadings):
         stated = tuple((name, noise * each) for name, each in chain.noise) if several else ()
         digital = replace(chain, noise=stated)
-        chain = Transduction() if layout.senses_curvature_only else digital
+        chain = Transduction() if layout.senses_curvature_only and not several else digital
     return Scene(
         sensor.name,
         plate,

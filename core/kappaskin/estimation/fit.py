@@ -311,8 +311,7 @@ class Fit:
         the standard deviation of the displacement over the displacement, by RMS over the skin.
         Heights and slopes are what they are on any slope.
         """
-        names = {name for name, _ in self.estimator.layout.kinds}
-        if not self.estimator.linear or names <= {"height", "slope"}:
+        if not (self.estimator.linear and self.estimator.layout.senses_curvature):
             return 0.0
         c, axes = self.coefficients, (-2, -1)
         slope = np.array([self.estimator.slope(one) for one in c.reshape(-1, *c.shape[-2:])])

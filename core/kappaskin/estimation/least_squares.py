@@ -124,14 +124,18 @@ class LeastSquares(Estimator):
         return self._made(used, self._root, U_r, inverse)
 
     def _fit(self, flat: Array, used: Mask) -> Fit:
+        return self._solution(flat, used)[0]
+
+    def _solution(self, flat: Array, used: Mask) -> tuple[Fit, Array]:
+        """The fit, and its coefficients and offsets (..., N + d)."""
         solver = self._without(used)
-        c = flat if solver.count == flat.shape[-1] else flat[..., used]
+        c = found = flat if solver.count == flat.shape[-1] else flat[..., used]
         for factor in solver.factors:
-            c = np.dot(c, factor)
+            c = found = np.dot(found, factor)
         if solver.offsets is not None:
-            c, zero = np.split(c, [self.basis.size], axis=-1)
+            c, zero = np.split(found, [self.basis.size], axis=-1)
             flat = flat - np.dot(zero, solver.offsets.T)
-        return self._answer(flat, c, solver.spread, solver.spare)
+        return self._answer(flat, c, solver.spread, solver.spare), found
 
 
 class _PerFrame(Estimator):
@@ -215,7 +219,7 @@ _DAMPING = 0.1  # of the information on a flat skin, after the first step that e
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Trial:
-    """Coefficients (N,), their surface, and what it leaves (3, P) of the weighted readings."""
+    """Coefficients and offsets (N + d,), their surface, and what they leave of readings (R,)."""
 
     flat: Array
     surface: DeflectedSurface
@@ -230,17 +234,21 @@ class FiniteSlopeLeastSquares(LeastSquares):
     Marquardt's method, in at most six steps from the shape of `LeastSquares` on. The covariance is
     that of the problem linearised at the solution. Where six steps are not enough, as for slopes
     above one with much noise, the result is that of least squares and `Fit.converged` is false.
+    Heights and slopes are linear on any slope: of these alone it is least squares.
     """
 
     linear: ClassVar = False
 
     def _set_up(self) -> None:
         super()._set_up()
+        if not self.layout.senses_curvature:
+            return
         self._sensed = NormalCurvature(self.basis, self.layout, self.dtype)
-        # The unknowns z of c = root z, in which the problem of a flat skin is orthonormal.
-        self._to_c = self._root.astype(self.dtype)
-        in_z = np.matmul(self._sensed.maps, self._to_c)
-        self._maps = np.ascontiguousarray(in_z.swapaxes(0, 1))
+        # The unknowns z of (c, offsets) = root z, in which the problem of a flat skin is
+        # orthonormal.
+        self._to_c, N = self._root.astype(self.dtype), self.basis.size
+        self._maps = np.matmul(self._sensed.maps, self._to_c[:N])
+        self._zero = self._offsets.astype(self.dtype)
         self._solve = cast("Any", get_lapack_funcs("posv", dtype=self.dtype))
         self._rounding = _ROUNDINGS * float(np.finfo(self.dtype).eps)
 
@@ -248,25 +256,32 @@ class FiniteSlopeLeastSquares(LeastSquares):
     # number does not converge.
     @np.errstate(over="ignore", invalid="ignore")
     def predicted(self, coefficients: Array) -> Array:
-        """What the elements would read, (..., 3, P) in 1/m, of `coefficients` (..., Ni, Nj)."""
+        """What the elements would read, as the frame, of `coefficients` (..., Ni, Nj)."""
+        if not self.layout.senses_curvature:
+            return super().predicted(coefficients)
         return self._sensed(coefficients)
 
     @np.errstate(over="ignore", invalid="ignore")
     def _fit(self, flat: Array, used: Mask) -> Fit:
-        linear = super()._fit(flat, used)
-        weight = (self.weight * used).astype(self.dtype).reshape(3, -1)
-        K = np.where(used, flat, 0.0).reshape(*flat.shape[:-1], *weight.shape) * weight
+        linear, start = self._solution(flat, used)
+        if not self.layout.senses_curvature:
+            return linear
+        weight = (self.weight * used).astype(self.dtype)
+        K = np.where(used, flat, 0.0) * weight
         if flat.ndim == 1:
-            return self._refined(linear, K, weight)
-        frames = [self._refined(one, K[t], weight) for t, one in enumerate(linear.alone())]
+            return self._refined(linear, start, flat, K, weight)
+        frames = [
+            self._refined(one, start[t], flat[t], K[t], weight)
+            for t, one in enumerate(linear.alone())
+        ]
         return Fit.stacked(frames) if frames else linear
 
-    def _refined(self, linear: Fit, K: Array, weight: Array) -> Fit:
-        """The fit of one frame, from that of first order to the weighted readings K (3, P)."""
+    def _refined(self, linear: Fit, start: Array, flat: Array, K: Array, weight: Array) -> Fit:
+        """The fit of one frame `flat`, weighted K (R,), from the `linear` one, `start` (N + d,)."""
         size = last = float(np.linalg.norm(K))
         if not size:
             return linear
-        here, damping = self._trial(linear.coefficients.ravel(), K, weight), 0.0
+        here, damping = self._trial(start, K, weight), 0.0
         exact, no_more = max(_EXACT, self._rounding) * size, 1 + self._rounding
         unseen = _UNSEEN * float(np.sqrt(self.unknowns / np.maximum(linear.spare, 1)))
         for steps in range(1, _STEPS + 1):
@@ -279,33 +294,46 @@ class FiniteSlopeLeastSquares(LeastSquares):
             here, length = there, float(np.linalg.norm(step))
             last, left = length, length * min(length, last) / last if last else 0.0
             if not damping and left <= max(exact, unseen * math.sqrt(here.squares)):
-                return self._solved(linear, here, weight, steps)
+                return self._solved(linear, here, flat, weight, steps)
             damping = damping / 10 if damping > _DAMPING else 0.0
         return replace(linear, steps=_STEPS, converged=False)
 
+    def _split(self, flat: Array) -> tuple[Array, Array]:
+        """The coefficients (N,), and the readings (R,) of the offsets."""
+        N = self.basis.size
+        return flat[:N], self._zero @ flat[N:]
+
     def _trial(self, flat: Array, K: Array, weight: Array) -> _Trial:
-        surface = self._sensed.surface(flat)
-        left = K - weight * surface.readings
+        c, zero = self._split(flat)
+        surface = self._sensed.surface(c)
+        left = K - weight * (surface.readings + zero)
         return _Trial(flat, surface, left, float(np.vdot(left, left)))
 
     def _jacobian(self, surface: DeflectedSurface, weight: Array) -> Array:
-        """How the weighted readings, those of element after element, change with z, (3 P, F)."""
-        local = (surface.jacobian() * weight[:, None]).transpose(2, 0, 1)
-        return np.matmul(np.ascontiguousarray(local), self._maps).reshape(-1, self.unknowns)
+        """How the weighted readings change with z, (R, F)."""
+        of_shape = np.einsum("qr,qrf->rf", surface.jacobian() * weight, self._maps)
+        if not self._zero.size:
+            return of_shape
+        return of_shape + (weight[:, None] * self._zero) @ self._to_c[self.basis.size :]
 
     def _step(self, J: Array, left: Array, damping: float) -> Array:
         G = J.T @ J
         G.flat[:: len(G) + 1] += damping
-        _, step, failed = self._solve(G, J.T @ left.T.ravel())
+        _, step, failed = self._solve(G, J.T @ left)
         return np.full_like(step, np.nan) if failed else step
 
-    def _solved(self, linear: Fit, solution: _Trial, weight: Array, steps: int) -> Fit:
+    def _solved(self, linear: Fit, solution: _Trial, flat: Array, weight: Array, steps: int) -> Fit:
         def half() -> Array:
             J = self._jacobian(solution.surface, weight).astype(float)
             root = linalg.cholesky(J.T @ J, lower=True)
-            return linalg.solve_triangular(root, self._root.T, lower=True)
+            return linalg.solve_triangular(root, self._root[: self.basis.size].T, lower=True)
 
-        c = solution.flat.reshape(self.basis.shape)
+        c, zero = self._split(solution.flat)
         return replace(
-            linear, coefficients=c, uncertainty=RootUncertainty(half), steps=steps, converged=True
+            linear,
+            readings=(flat - zero).reshape(self.frame_shape),
+            coefficients=c.reshape(self.basis.shape),
+            uncertainty=RootUncertainty(half),
+            steps=steps,
+            converged=True,
         )

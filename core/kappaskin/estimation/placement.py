@@ -19,7 +19,7 @@ from scipy import linalg
 from kappaskin.bases import Basis
 from kappaskin.errors import Refusal
 from kappaskin.estimation.estimator import Estimator, column_lengths, combinations
-from kappaskin.frames import Array, Mask
+from kappaskin.frames import Array, Indices, Mask
 from kappaskin.sensing import SensorLayout
 
 
@@ -116,27 +116,26 @@ def place_elements(
 
     At least `spacing` in m from each other where the placement is optimal. Each reads what it did;
     `sigma` is the standard deviation of each reading, as an estimator takes it, and needed where
-    readings differ in unit. Raises a `Refusal` for elements that differ in what they read.
+    readings differ in unit. Raises a `Refusal` where there is no room.
     """
     return PLACEMENTS[by](layout, basis, spacing, sigma)
 
 
 def _sigma_of_each(layout: SensorLayout, sigma: ArrayLike | None) -> Array:
-    """The standard deviation (k,) of each reading of an element; 1 where all weigh the same."""
-    each, given = layout.each_reads, np.asarray(1.0 if sigma is None else sigma, float)
+    """The standard deviation (R,) of each reading; 1 where all weigh the same."""
+    given = np.asarray(1.0 if sigma is None else sigma, float)
     if sigma is None and " or " in layout.units:
         raise Refusal(
             f"expected the sigma of readings that differ in unit, {layout.units}, to place their "
             "elements, got none; give each its standard deviation"
         )
     fits = given.shape in ((), layout.frame_shape)
-    of_all = np.broadcast_to(given if fits else np.nan, layout.frame_shape).reshape(len(each), -1)
-    if not np.all((of_all == of_all[:, :1]) & (of_all > 0) & (of_all < math.inf)):
+    if not fits or not np.all((given > 0) & (given < math.inf)):
         raise Refusal(
-            f"expected a finite sigma above zero of {', '.join(each)}, one number or of shape "
-            f"{layout.frame_shape} and the same at every element, to place these; got {sigma!s:.80}"
+            f"expected a finite sigma above zero of {', '.join(layout.kind_names)}, one number or "
+            f"of shape {layout.frame_shape}, to place their elements; got {sigma!s:.80}"
         )
-    return of_all[:, 0]
+    return np.broadcast_to(given, layout.frame_shape).reshape(-1)
 
 
 def _candidates(layout: SensorLayout, spacing: float) -> Array:
@@ -164,33 +163,45 @@ def _exchanged(
     one element after the other, until none gains.
     """
     places = _candidates(layout, spacing)
-    rows, products = _scaled(layout, basis, places, sigma)
+    rows, which, products = _scaled(layout, basis, places, sigma)
     chosen = _nearest(layout.positions, places)
     free = np.ones(len(places), bool)
     free[chosen] = False
+    of_each = [layout.element == n for n in range(len(chosen))]
     for _ in range(_SWEEPS):
-        if not sum([_exchange(rows, products, chosen, free, n, det) for n in range(len(chosen))]):
+        moved = 0
+        for n, own in enumerate(of_each):
+            others = rows[chosen[layout.element[~own]], which[~own]]
+            moved += _exchange(rows[:, which[own]], others, products, chosen, free, n, det)
+        if not moved:
             break
-    return replace(layout, positions=places[np.sort(chosen)], shape=None)
+    alike = all(np.array_equal(which[own], which[of_each[0]]) for own in of_each)
+    return replace(layout, positions=places[np.sort(chosen) if alike else chosen], shape=None)
 
 
 def _scaled(
     layout: SensorLayout, basis: Basis, places: Array, sigma: ArrayLike | None
-) -> tuple[Array, Array]:
-    """Readings (C, k, F) over their `sigma` by elements at `places`, of F unknowns.
+) -> tuple[Array, Indices, Array]:
+    """Readings (C, k, F) over their `sigma` at `places`, of F unknowns; which of k each (R,) is.
 
     And the mean products (F, F) over the skin of what they are as shapes: functions, or nothing of
     an offset. Each unknown is scaled to unit size.
     """
-    there, C, each = layout.read_alike(places), len(places), _sigma_of_each(layout, sigma)
+    given, C = _sigma_of_each(layout, sigma), len(places)
+    kinds = np.column_stack([layout.kind, given])
+    _, first, which = np.unique(kinds, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)  # as the first element has them
+    which, first = np.argsort(order)[which.reshape(-1)], first[order]
+    there = layout.reading_at(places, first)
     some, _ = combinations(basis, layout)
     W = np.eye(basis.size) if some is None else some
-    M = np.hstack([there.operator(basis) @ W, there.offsets]) / np.repeat(each, C)[:, None]
+    M = np.hstack([there.operator(basis) @ W, there.offsets]) / np.repeat(given[first], C)[:, None]
     length = np.linalg.norm(M, axis=0) / math.sqrt(C)
     points, weights = basis.quadrature()
     shapes = basis.at(points) @ np.pad(W, [(0, 0), (0, M.shape[1] - W.shape[1])]) / length
     products = (weights[:, None] * shapes).T @ shapes / weights.sum()
-    return np.ascontiguousarray((M / length).reshape(len(each), C, -1).swapaxes(0, 1)), products
+    rows = (M / length).reshape(len(first), C, -1).swapaxes(0, 1)
+    return np.ascontiguousarray(rows), which, products
 
 
 def _nearest(positions: Array, places: Array) -> NDArray[np.intp]:
@@ -204,14 +215,20 @@ def _nearest(positions: Array, places: Array) -> NDArray[np.intp]:
 
 
 def _exchange(
-    rows: Array, products: Array, chosen: NDArray[np.intp], free: Mask, n: int, det: bool
+    rows: Array,
+    others: Array,
+    products: Array,
+    chosen: NDArray[np.intp],
+    free: Mask,
+    n: int,
+    det: bool,
 ) -> bool:
     """Move element `n` of those `chosen` to a better free place; whether there was one.
 
-    With M'M = A of the others and a place's rows r (k, F), det(A + r'r) = det(A) det(1 + r V r'),
-    V = A^-1, and trace((A + r'r)^-1 G) = trace(V G) - trace((1 + r V r')^-1 r V G V r').
+    With M'M = A of the readings of `others` (R, F) and a place's rows r (k, F),
+    det(A + r'r) = det(A) det(1 + r V r'), V = A^-1, and
+    trace((A + r'r)^-1 G) = trace(V G) - trace((1 + r V r')^-1 r V G V r').
     """
-    others = rows[np.delete(chosen, n)].reshape(-1, rows.shape[2])
     A = others.T @ others
     V = np.linalg.inv(A + _RIDGE * len(chosen) * np.eye(len(A)))
     here = np.append(np.flatnonzero(free), chosen[n])

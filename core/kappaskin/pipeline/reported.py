@@ -18,7 +18,7 @@ import numpy as np
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Fit
 from kappaskin.frames import COMPONENTS, Array, Estimate
-from kappaskin.sensing import SensorLayout
+from kappaskin.sensing import Sensor, SensorLayout
 
 if TYPE_CHECKING:
     from kappaskin.pipeline.quantities import Quantities
@@ -291,12 +291,13 @@ class ReportedQuantity:
         """Whether it is a number for each reading."""
         return self.parts == _OF_READINGS
 
-    def unit_of(self, layout: SensorLayout) -> str:
-        """Its unit: of what is in the unit of the readings, that of a `layout`.
+    def unit_of(self, sensor: Sensor) -> str:
+        """Its unit: of what is in the unit of the readings, that of a `sensor`.
 
         A number in units of their noise has none.
         """
-        if self.as_readings and len(set(layout.kind_units)) > 1:
+        layout = sensor.layout
+        if self.as_readings and sensor.sigma is not None:
             return ""
         return layout.units if self.unit and (self.of_readings or self.as_readings) else self.unit
 

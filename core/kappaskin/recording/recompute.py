@@ -85,7 +85,7 @@ class RecordedFrames:
         self._means.learn(text)
         after = self.sensor
         if after is not before and after and (after.description or (before and before.description)):
-            self._decoder = decoder_of(after)
+            self._decoder = decoder_of(after, text)
 
     def __call__(self, message: RecordedMessage) -> Iterator[Frame]:
         """The frames that came with one message, each of the `sensor` that there is then.

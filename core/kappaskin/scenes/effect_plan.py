@@ -4,6 +4,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from kappaskin.scenes.effects import (
     EFFECTS,
     NOTHING,
@@ -25,7 +27,7 @@ from kappaskin.scenes.effects import (
     Tension,
 )
 from kappaskin.scenes.scene import EffectSelection, Scene, survey
-from kappaskin.sensing import DigitalReadings, kind_of_reading
+from kappaskin.sensing import DigitalReadings
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ def effects_of(scene: Scene) -> dict[str, Effect]:
         there.append(GageLength(layout.gage_length))
     if dead := tuple(layout.dead):
         there.append(DeadElements(dead))
-    if not (layout.reads or plate.patch.base_curvature or scene.laid):
+    if layout.senses_curvature and not (plate.patch.base_curvature or scene.laid):
         there.append(FiniteSlopeEffect())
     electronics = scene.transduction
     if scene.moves and not isinstance(electronics, DigitalReadings):
@@ -93,8 +95,8 @@ def effects_of(scene: Scene) -> dict[str, Effect]:
         effect.on(layout) if isinstance(effect, Temperature) else effect for effect in scene.effects
     ]
     if electronics.noise:
-        stated = dict(electronics.noise)
-        noise = tuple(stated[kind_of_reading(name)[0]] for name in layout.each_reads)
+        stated = layout.stated(electronics.noise)
+        noise = tuple(np.array(stated)[layout.kind[:: len(layout)]].tolist())
         there.append(StatedNoise(max(noise), noise))
     if not isinstance(electronics, DigitalReadings):
         there.append(Saturation(electronics))

@@ -44,7 +44,7 @@ ValuesAt = Callable[[Array], Array]
 """From positions (P, 2) in m to a quantity (..., P, N) per m of each function there."""
 
 
-_X, _Y = np.eye(2)
+_X, _Y = _AXES = np.eye(2)
 
 
 def _along(basis: Basis, positions: Array, L: float, curvature: ValuesAt, t: Array) -> Array:
@@ -70,6 +70,12 @@ def _normal(K: Array, t: Array) -> Array:
     """The normal curvature (P, N) along t = (c, s) of K (3, P, N): c^2 xx + 2 c s xy + s^2 yy."""
     (xx, yy, xy), c, s = K, t[..., :1], t[..., 1:]
     return c * c * xx + s * s * yy + 2 * c * s * xy
+
+
+def _unit(direction: ArrayLike) -> Array:
+    """Unit vectors (..., 2) along `direction` (...) in rad from x; exact along x and y."""
+    t = np.stack([np.cos(direction), np.sin(direction)], axis=-1)
+    return np.where(np.abs(t) < np.finfo(float).eps, 0.0, t)
 
 
 def _slope(basis: Basis, places: Array, t: Array) -> Array:
@@ -108,6 +114,7 @@ QUANTITIES = {"height": "m", "slope": "m/m", "curvature": "1/m", "twist": "1/m"}
 SHOWN_UNITS = {"m": (1e6, "\N{MICRO SIGN}m"), "m/m": (1e3, "mrad"), "1/m": (1.0, "1/m")}
 """How readings are shown: by how many times a unit, and its name."""
 _ALONG = ("slope", "curvature")  # have a direction
+_CURVED = ("curvature", "twist")  # depend on the slope
 _ALIKE = 9  # decimals of a direction in rad: those equal so far are one
 _CURVATURES = (("curvature", 0.0), ("curvature", np.pi / 2), ("twist", 0.0))  # xx, yy and xy
 _DEGREES = 6  # decimals of a direction in degrees in a name
@@ -185,9 +192,7 @@ class Readings:
     @cached_property
     def along(self) -> Array:
         """Unit vectors (R, 2) along the directions; exact along x and y."""
-        t = np.column_stack([np.cos(self.direction), np.sin(self.direction)])
-        t[np.abs(t) < np.finfo(float).eps] = 0.0
-        return t
+        return _unit(self.direction)
 
     @cached_property
     def _kinds(self) -> tuple[list[tuple[str, float]], Indices]:
@@ -354,22 +359,28 @@ class SensorLayout:
         on = self.patch.contains(corners.reshape(-1, 2)).reshape(4, -1).all(axis=0)
         return on & (self.patch.depth(positions) * (1 + _ROUNDING) >= self.gage_length / 2)
 
+    def reading_at(self, positions: ArrayLike, which: Indices) -> "SensorLayout":
+        """Elements at other `positions` (C, 2) in m, each with the readings `which` (k,) of these.
+
+        Reading j C + c is which[j] of element c.
+        """
+        made = SensorLayout.scattered(self.patch, positions)
+        made = replace(made, gage_length=self.gage_length, cell=self.cell)
+        numbers: list[int] = self.kind[which].tolist()
+        kinds, C = [self.kinds[k] for k in numbers], len(made)
+        if not self.reads and kinds == self.kinds:
+            return made
+        quantity, direction = (np.repeat(of, C) for of in zip(*kinds, strict=True))
+        free = self.reads.free if self.reads else ()
+        return made.reading(np.tile(np.arange(C), len(which)), quantity, direction, free)
+
     def read_alike(self, positions: ArrayLike) -> "SensorLayout":
         """Elements at other `positions` (C, 2) in m, each with the k readings of every element.
 
         Reading k C + c is number k of element c. A `Refusal` where elements differ in what they
         read.
         """
-        k, made = len(self.each_reads), SensorLayout.scattered(self.patch, positions)
-        made = replace(made, gage_length=self.gage_length, cell=self.cell)
-        if not self.reads:
-            return made
-        P, C = len(self), len(made)
-        quantity, direction = self.reads.quantity[::P], self.reads.direction[::P]
-        element = np.tile(np.arange(C), k)
-        return made.reading(
-            element, np.repeat(quantity, C), np.repeat(direction, C), self.reads.free
-        )
+        return self.reading_at(positions, len(self) * np.arange(len(self.each_reads)))
 
     def in_unit(self, unit: str) -> "SensorLayout":
         """The same elements with their readings in this `unit` only."""
@@ -450,12 +461,6 @@ class SensorLayout:
         return [QUANTITIES[quantity] for quantity, _ in self.kinds]
 
     @property
-    def noise_unit(self) -> tuple[float, str]:
-        """How the noise of a reading is shown: by how many times a unit, and its name."""
-        units = set(self.kind_units)
-        return SHOWN_UNITS[units.pop()] if len(units) == 1 else (1.0, "times that stated")
-
-    @property
     def each_reads(self) -> list[str]:
         """The names of the k readings of every element, reading k P + p that of element p.
 
@@ -488,9 +493,14 @@ class SensorLayout:
         return found
 
     @property
+    def senses_curvature(self) -> bool:
+        """Whether a reading is of curvature, and depends on the slope too."""
+        return not {name for name, _ in self.kinds}.isdisjoint(_CURVED)
+
+    @property
     def senses_curvature_only(self) -> bool:
         """Whether a movement without curvature changes no reading."""
-        return {name for name, _ in self.kinds} <= {"curvature", "twist"}
+        return {name for name, _ in self.kinds}.issubset(_CURVED)
 
     @property
     def units(self) -> str:
@@ -523,20 +533,26 @@ class SensorLayout:
         free = [k for k, (name, _) in enumerate(self.kinds) if name in self.reads.free]
         return np.equal.outer(self.kind, free).astype(float)
 
+    def stated(self, noise: Iterable[tuple[str, float]]) -> list[float]:
+        """That `noise` of each of `kinds`, by its name or that of its quantity; 0 without one."""
+        by = dict(noise)
+        return [by.get(name_of_reading(*kind), by.get(kind[0], 0.0)) for kind in self.kinds]
+
     def sigma(self, noise: Iterable[tuple[str, float]]) -> Array | None:
-        """Standard deviation of each reading (R,) by the `noise` of quantities that differ in unit.
+        """Standard deviation (R,) by the `noise` of readings that differ in it or unit.
 
         None where they do not. A `Refusal` where that of one is not stated.
         """
-        if len(set(self.kind_units)) == 1:
+        each = self.stated(noise)
+        if len(set(self.kind_units)) == len(set(each)) == 1:
             return None
-        stated = dict(noise)
-        if unknown := [name for name, _ in self.kinds if not stated.get(name)]:
+        if 0.0 in each:
+            unknown = self.kinds[each.index(0.0)][0]
             raise Refusal(
                 f"expected the noise of readings that differ in unit, {self.units}, got none of "
-                f"{unknown[0]}; give noise in [readings.{unknown[0]}]"
+                f"{unknown}; give noise in [readings.{unknown}]"
             )
-        return np.array([stated[name] for name, _ in self.kinds])[self.kind]
+        return np.array(each)[self.kind]
 
     def check_curvature_sensor(self, purpose: str) -> None:
         """Raise a `Refusal` where the elements do not read xx, yy and xy, as a `purpose` needs."""
@@ -602,119 +618,104 @@ class SensorLayout:
 #     r_x = (1, 0, -p)     r_xx = (-H p, 0, -H - p_x)     r_xy = (0, 0, -p_y)
 #     r_y = (w, 1, -q)     r_yy = (w_y, 0, -q_y)          r_x x r_y = (p, q - p w, 1) = W n.
 # p_x, q_y and p_y are xx, yy and xy of first order. Gages along y have turned to r_y. So have gages
-# along x, as the skin is not sheared: they lie along d = r_x - w r_y. With the metric I, the scalar
-# products of d and r_y, and the second form II_ij = -n . r_ij of the same vectors the readings are
-#     xx: II_dd / I_dd - H      yy: II_yy / I_yy      xy: (II_dy - H I_dy / 2) / sqrt(I_dd I_yy).
+# along x, as the skin is not sheared: they lie along d = r_x - w r_y, and a gage along t = (c, s)
+# along c d + s r_y. With the metric I, the scalar products of d and r_y, and the second form
+# II_ij = -n . r_ij of the same vectors, with I_tt = c^2 I_dd + 2 c s I_dy + s^2 I_yy and II_tt
+# alike, the readings are
+#     along t: II_tt / I_tt - c^2 H         xy: (II_dy - H I_dy / 2) / sqrt(I_dd I_yy).
 # Of first order they are that one; that the arc is hardly stretched, v_x = H f, is taken for
 # granted. On a flat skin W^2 = 1 + p^2 + q^2, and they are
-#     f_xx / (W (1 + p^2))      f_yy / (W (1 + q^2))      f_xy / (W sqrt((1 + p^2) (1 + q^2))).
-_XX, _YY, _XY = range(3)
-_EACH = [_XX, _YY, _XY]
-_IN_X, _IN_Y = np.array([[[1.0], [0.0], [0.5]], [[0.0], [1.0], [0.5]]])
-"""Powers of 1/I_dd and of 1/I_yy in the readings, (3, 1)."""
+#     f_tt / (W (1 + f_t^2))      f_xy / (W sqrt((1 + p^2) (1 + q^2))).
+# Both are of two unit vectors u and v, which are t and t, or x and y: II_uv / sqrt(I_uu I_vv). What
+# shear takes off is (1 - u.v) H I_dy / 2. Heights and slopes are of first order by definition:
+# their u and v, p, q and w are zero.
 
 
 class DeflectedSurface:
-    """The deflected surface at P elements, from its `jet` (Q, ..., P).
+    """What R readings are on the deflected surface, from the `jet` (Q, ..., R) of each.
 
-    That is p_x, q_y, p_y, p and q as derived above; on a skin of `base_curvature` H in 1/m, also w
-    and w_y.
+    That is the reading of first order, p and q as derived above; on a skin of `base_curvature` H in
+    1/m, also w, w_y, q_y and p_y. `forms` (3, 3, R) are what of dd, dy and yy is in uu, vv and uv.
     """
 
-    def __init__(self, jet: Array, base_curvature: float) -> None:
-        self._jet, self._H = jet, base_curvature
-        first, p, q = jet[:3], jet[3], jet[4]
-        lengths = np.empty_like(first)  # I_dd, I_yy and the root of their product
-        lengths[_YY] = 1 + q * q
+    def __init__(self, jet: Array, forms: Array, base_curvature: float) -> None:
+        self._jet, self._forms, self._H = jet, forms, base_curvature
+        first, p, q = jet[:3]
+        dd, dy, yy, m = p * p, p * q, q * q, q
         if base_curvature:
-            w = jet[5]
-            lengths[_XX] = 1 + (p - w * q) ** 2 + w * w * (w * w - 1)
-            lengths[_YY] += w * w
-            self._area: Array = np.sqrt(1 + p * p + (q - p * w) ** 2)  # W
-        else:
-            lengths[_XX] = 1 + p * p
-            self._area = np.sqrt(lengths[_XX] + q * q)
-        np.sqrt(lengths[_XX] * lengths[_YY], out=lengths[_XY])
-        self._lengths, self._scale = lengths, 1 / (self._area * lengths)
-        self._second = self._scale * (self._second_form() if base_curvature else first)
+            w, wy, qy, py = jet[3:]
+            dd, dy = (p - w * q) ** 2 + w * w * (w * w - 1), dy - w * (w * w + yy)
+            yy, m, in_y = yy + w * w, q - p * w, qy - p * wy
+            in_d = base_curvature * (1 + p * p) - w * (2 * py - w * in_y)
+            first = first + self._mixed(2, in_d, -w * in_y, -p * wy)
+        self._first, self._area = first, 1 + p * p + m * m  # W II_uv and W^2
+        self._lengths = [1 + self._mixed(k, dd, dy, yy) for k in range(2)]  # I_uu and I_vv
+        self._length = np.sqrt(self._lengths[0]) * np.sqrt(self._lengths[1])
+        self._scale = 1 / (np.sqrt(self._area) * self._length)
+        self._second = self._ratio = self._scale * first
+        if base_curvature:
+            self._sheared = base_curvature / 2 * (1 - forms[2, 0] - forms[2, 2]) / self._length
+            self._ratio = self._second - self._sheared * dy
 
-    def _second_form(self) -> Array:
-        """W times II_dd, II_yy and II_dy, of a bent skin."""
-        px, qy, py, p, _, w, wy = self._jet
-        yy = qy - p * wy
-        return np.stack([self._H * (1 + p * p) + px - w * (2 * py - w * yy), yy, py - w * yy])
+    def _mixed(self, k: int, dd: Array, dy: Array, yy: Array) -> Array:
+        form = self._forms[k]
+        return form[0] * dd + form[1] * dy + form[2] * yy
 
     @property
     def readings(self) -> Array:
-        """What the gages read, (3, ..., P) in 1/m."""
-        if not self._H:
-            return self._second
-        readings = self._ratios()
-        readings[_XX] -= self._H
-        return readings
-
-    def _ratios(self) -> Array:
-        """The readings plus, along x of a bent skin, H."""
-        if not self._H:
-            return self._second
-        p, q, w = self._jet[3:6]
-        ratios = self._second.copy()
-        ratios[_XY] -= self._H / 2 * (p * q - w * (w * w + q * q)) / self._lengths[_XY]
-        return ratios
+        """What is read, (..., R)."""
+        return self._ratio - self._forms[2, 0] * self._H if self._H else self._ratio
 
     @property
     def slope(self) -> Array:
-        """The slope (..., P) along the steepest direction."""
-        return np.hypot(self._jet[3], self._jet[4])
+        """The slope (..., R) along the steepest direction; 0 of heights and slopes."""
+        return np.hypot(self._jet[1], self._jet[2])
 
     def jacobian(self) -> Array:
-        """How the readings of one frame change with its jet, (3, Q, P)."""
-        jet, second, ratios = self._jet, self._second, self._ratios()
-        in_x, in_y = ratios * (_IN_X / self._lengths[_XX]), ratios * (_IN_Y / self._lengths[_YY])
+        """How the readings of one frame change with their jet, (Q, R)."""
+        found, rates = np.zeros_like(self._jet), self._rates()
+        found[0] = self._scale
         if self._H:
-            found, rates = self._of_second_form() * self._scale[:, None], self._rates()
-            found[_XY, 3:6] -= self._of_shear()
-        else:
-            found, (p, q) = np.zeros((3, *jet.shape), jet.dtype), jet[3:]
-            found[_EACH, _EACH] = self._scale
-            rates = [(p, 2 * p, 0.0), (q, 0.0, 2 * q)]
-        second = second / self._area**2
-        for column, (area, along_x, along_y) in enumerate(rates, 3):
-            found[:, column] -= second * area + in_x * along_x + in_y * along_y
+            found[[1, 3, 4, 5, 6]] = self._scale * self._of_second_form()
+            found[1:4] -= self._sheared * rates[1]
+        of_u, of_v = (self._mixed(k, *rates[:3]) for k in range(2))
+        in_u, in_v = (self._ratio / (2 * length) for length in self._lengths)
+        change = self._second / self._area * rates[3] + in_u * of_u + in_v * of_v
+        found[1 : 1 + len(change)] -= change
         return found
 
-    def _rates(self) -> list[tuple[Array, Array, Array | float]]:
-        """How W^2 / 2, I_dd and I_yy change with p, with q and with w."""
-        p, q, w = self._jet[3:6]
+    def _rates(self) -> Array:
+        """How I_dd, I_dy, I_yy and W^2 / 2 change with p, with q and with w, (4, 2 or 3, R)."""
+        p, q = self._jet[1:3]
+        none = np.zeros_like(p)
+        if not self._H:
+            return np.array([[2 * p, none], [q, p], [none, 2 * q], [p, q]])
+        w = self._jet[3]
         m, e = q - p * w, p - w * q
-        return [
-            (p - w * m, 2 * e, 0.0),
-            (m, -2 * w * e, 2 * q),
-            (-p * m, 4 * w**3 - 2 * w - 2 * q * e, 2 * w),
-        ]
+        return np.array(
+            [
+                [2 * e, -2 * w * e, 4 * w**3 - 2 * w - 2 * q * e],
+                [q, p - 2 * w * q, -3 * w * w - q * q],
+                [none, 2 * q, 2 * w],
+                [p - w * m, m, -p * m],
+            ]
+        )
 
     def _of_second_form(self) -> Array:
-        """How W times II_dd, II_yy and II_dy change with the jet, (3, Q, P)."""
-        _, qy, py, p, _, w, wy = self._jet
-        yy, found = qy - p * wy, np.zeros((3, *self._jet.shape), self._jet.dtype)
-        found[_EACH, _EACH], found[_YY, 3], found[_YY, 6] = 1.0, -wy, -p
-        found[_XY, 1], found[_XY, 3], found[_XY, 5], found[_XY, 6] = -w, w * wy, -yy, w * p
-        found[_XX, 1], found[_XX, 2], found[_XX, 3] = w * w, -2 * w, 2 * self._H * p - w * w * wy
-        found[_XX, 5], found[_XX, 6] = 2 * (w * yy - py), -w * w * p
-        return found
-
-    def _of_shear(self) -> Array:
-        """How H I_dy / 2, over the lengths, changes with p, q and w, (3, P)."""
-        p, q, w = self._jet[3:6]
-        rates = np.stack([q, p - 2 * w * q, -3 * w * w - q * q])
-        return self._H / 2 * rates / self._lengths[_XY]
+        """How W II_uv changes with p, w, w_y, q_y and p_y, (5, R)."""
+        _, p, _, w, wy, qy, py = self._jet
+        in_y, none, square = qy - p * wy, np.zeros_like(p), w * w
+        in_dd = [2 * self._H * p - square * wy, 2 * (w * in_y - py), -square * p, square, -2 * w]
+        in_dy, in_yy = [w * wy, -in_y, w * p, -w, none], [-wy, none, -p, none, none]
+        return self._mixed(2, *np.array([in_dd, in_dy, in_yy]))
 
 
 class NormalCurvature:
-    """The map from coefficients to the true normal curvature of the surface along the gages.
+    """The map from coefficients to what the elements read of the deflected surface.
 
-    A gage of some length reads the mean of the curvature of first order along it, at the slope in
-    its middle. With a `plate` the shapes are those of its deflection under loads.
+    Gages sense its true normal curvature along them; heights and slopes are those of first order. A
+    gage of some length reads the mean of the curvature of first order along it, at the slope in its
+    middle. With a `plate` the shapes are those of its deflection under loads.
     """
 
     def __init__(
@@ -724,24 +725,43 @@ class NormalCurvature:
         dtype: DTypeLike = np.float64,
         plate: Plate | None = None,
     ) -> None:
-        layout.check_curvature_sensor("finite slopes")
         places, H = layout.positions, basis.patch.base_curvature
-        maps = [*layout.operator(basis, plate).reshape(3, len(layout), basis.size)]
-        maps += [basis.at(places, 1, 0), basis.at(places, 0, 1)]
+        at = [basis.at(places, 1, 0), basis.at(places, 0, 1)]
         if H:
             v, *turns = plate.hoop(basis, places) if plate else hoop_at(basis, places)
-            maps[3] = maps[3] + H * v
-            maps += turns
-        self.maps = np.stack(maps).astype(dtype)
-        """From coefficients to the jet of a `DeflectedSurface`, (Q, P, N)."""
-        self._columns, self._H = self.maps.reshape(-1, basis.size).T, H
+            curvature = plate.curvature(basis)(places) if plate else curvature_at(basis, places)
+            at = [at[0] + H * v, at[1], *turns, *curvature[1:]]
+        self._at = np.stack(at).astype(dtype)
+        self._first = layout.operator(basis, plate).astype(dtype)
+        along = [_AXES if name == "twist" else [_unit(t)] * 2 for name, t in layout.kinds]
+        (a, b), (c, d) = np.moveaxis(np.array(along), 0, -1)
+        forms = [
+            [a * a, 2 * a * b, b * b],
+            [c * c, 2 * c * d, d * d],
+            [a * c, a * d + b * c, b * d],
+        ]
+        curved = np.isin([name for name, _ in layout.kinds], _CURVED)
+        self._forms = (curved * np.array(forms))[..., layout.kind].astype(dtype)
+        self._element, self._curved = layout.element, curved[layout.kind]
+        self._all_curved = bool(self._curved.all())
+        self._columns = np.concatenate([self._first, *self._at]).T
+        self.frame_shape, self._H = layout.frame_shape, H
+
+    @property
+    def maps(self) -> Array:
+        """From coefficients to the jet of a `DeflectedSurface`, (Q, R, N)."""
+        return np.stack([self._first, *(self._at[:, self._element] * self._curved[:, None])])
 
     def surface(self, flat: Array) -> DeflectedSurface:
         """The surface at the elements, for flattened coefficients (..., N)."""
-        jet = np.dot(flat, self._columns).reshape(*flat.shape[:-1], *self.maps.shape[:2])
-        return DeflectedSurface(np.moveaxis(jet, -2, 0), self._H)
+        values, R = np.dot(flat, self._columns), len(self._first)
+        at = values[..., R:].reshape(*flat.shape[:-1], *self._at.shape[:2]).take(self._element, -1)
+        if not self._all_curved:
+            at *= self._curved
+        jet = np.moveaxis(np.concatenate([values[..., None, :R], at], axis=-2), -2, 0)
+        return DeflectedSurface(jet, self._forms, self._H)
 
     def __call__(self, coefficients: Array) -> Array:
-        """Curvature (..., 3, P) in 1/m for `coefficients` (..., Ni, Nj)."""
-        flat = coefficients.reshape(*coefficients.shape[:-2], self.maps.shape[2])
-        return np.moveaxis(self.surface(flat).readings, 0, -2)
+        """Readings (..., 3, P) in 1/m, or (..., R), for `coefficients` (..., Ni, Nj)."""
+        flat = coefficients.reshape(*coefficients.shape[:-2], self._columns.shape[0])
+        return self.surface(flat).readings.reshape(*flat.shape[:-1], *self.frame_shape)

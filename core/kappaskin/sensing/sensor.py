@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Frame, Mask
 from kappaskin.mechanics import Plate
-from kappaskin.sensing.layout import SensorLayout
+from kappaskin.sensing.layout import SHOWN_UNITS, SensorLayout
 from kappaskin.sensing.transduction import DigitalReadings, Transduction
 
 
@@ -124,17 +124,24 @@ class Sensor:
 
     @property
     def noise(self) -> float:
-        """Given standard deviation of readings that have one unit; NaN where none is given."""
+        """Given standard deviation of readings that are alike in it; NaN where none is given."""
         given = {noise for _, noise in self.transduction.noise}
         return given.pop() if len(given) == 1 and self.sigma is None and all(given) else math.nan
 
     @property
     def sigma(self) -> Array | None:
-        """Standard deviation of each reading, by the frame's shape, where they differ in unit.
+        """Standard deviation of each reading (R,), where they differ in unit or in noise.
 
         Else None, and the noise is estimated. A `Refusal` where the sensor does not state it.
         """
         return self.layout.sigma(self.transduction.noise)
+
+    @property
+    def noise_unit(self) -> tuple[float, str]:
+        """How the noise of a reading is shown: by how many times a unit, and its name."""
+        if self.sigma is None:
+            return SHOWN_UNITS[self.layout.kind_units[0]]
+        return 1.0, "times that stated"
 
     @cached_property
     def _dead(self) -> Mask | None:

@@ -323,7 +323,8 @@ class DigitalReadings:
     """Readings that a device sends as numbers, all at once: its electronics are not known.
 
     A frame holds them in counts of `resolution`, in the unit of each; the lowest one stands for no
-    reading. `noise` is the standard deviation of some quantities, by name, in their units.
+    reading. `noise` is the standard deviation of some quantities, or of a reading along one
+    direction, by name (`name_of_reading`), in their units.
     """
 
     resolution: float = 1e-7

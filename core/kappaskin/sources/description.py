@@ -5,6 +5,7 @@ import json
 import math
 import re
 import tomllib
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
@@ -26,6 +27,7 @@ from kappaskin.sensing import (
     Sensor,
     SensorLayout,
     kind_of_reading,
+    name_of_reading,
 )
 from kappaskin.sources.decoder import Decoder
 from kappaskin.sources.lines import (
@@ -152,7 +154,7 @@ READINGS = Part(
         "noise": Key(
             "Noise",
             "Standard deviation of a reading, in the same unit; estimated if omitted. Readings of "
-            "several units need it: it weighs them.",
+            "several units, or of one with different noise, are weighed by it and need it all.",
             kind=float,
             default=0.0,
             limits=Within(1e-12, 1e6, or_zero=True),
@@ -192,13 +194,16 @@ class Description:
     sync: bytes
     checksum: str
 
-    def decoder(self, whole: bool = False) -> LineDecoder:
+    def decoder(self, whole: bool = False, by_datagrams: bool = False) -> LineDecoder:
         """A decoder of its lines; `whole` where the bytes begin with the beginning of one."""
         if self.kind == "text":
-            return TextDecoder(self.columns, self.separator, whole)
-        if self.kind == "json":
-            return JsonDecoder(self.columns, self.paths, whole)
-        return BinaryDecoder(self.columns, self.struct, self.sync, self.checksum)
+            made = TextDecoder(self.columns, self.separator, whole)
+        elif self.kind == "json":
+            made = JsonDecoder(self.columns, self.paths, whole)
+        else:
+            made = BinaryDecoder(self.columns, self.struct, self.sync, self.checksum)
+        made.by_datagrams = by_datagrams
+        return made
 
 
 SCHEME = "sensor:"
@@ -445,21 +450,26 @@ class _Conversion:
             raise table.refusal("expected a scale other than 0", key)
         return value
 
-    def noise(self, kinds: dict[str, str]) -> tuple[tuple[str, float], ...]:
-        """The given noise of each quantity that the columns read."""
-        given = {quantity: self.of(what, "noise") for what, quantity in kinds.items()}
+    def noise(self, each: Iterable[str]) -> tuple[tuple[str, float], ...]:
+        """The given noise of what the columns read: of each quantity, or of each that differs."""
+        given = {what: float(self.of(what, "noise")) for what in each}
         if not any(given.values()):
             return ()
-        for unit in set(QUANTITIES.values()):
-            found = {
-                what: self.of(what, "noise") for what in kinds if QUANTITIES[kinds[what]] == unit
-            }
-            if len(set(found.values())) > 1:
+        found, alike = dict[str, float](), dict[str, set[float]]()
+        for what, noise in given.items():
+            name = name_of_reading(*kind_of_reading(what))
+            if not noise or found.setdefault(name, noise) != noise:
                 raise self._table.refusal(
-                    f"expected one noise for all readings in {unit}, got "
-                    + ", ".join(f"{noise:g} of {what}" for what, noise in found.items())
+                    "expected one noise of all readings of a kind, where that of any is given, got "
+                    f"{', '.join(f'{noise:g} of {what}' for what, noise in given.items())}"
                 )
-        return tuple(given.items())
+            alike.setdefault(kind_of_reading(what)[0], set()).add(noise)
+        return tuple(
+            {
+                quantity if len(alike[quantity := name.partition("@")[0]]) == 1 else name: noise
+                for name, noise in found.items()
+            }.items()
+        )
 
     def done(self) -> None:
         """Refuse what is not asked for, and tables of what no column reads."""
@@ -482,7 +492,8 @@ def _reading(
             raise Refusal(f"expected one datum of all readings of {quantity}, got fixed and free")
     free = [quantity for quantity, datum in datums.items() if datum == "free"]
     components = {COMPONENTS[k] for k in np.flatnonzero(layout.live.any(axis=1))}
-    if not free and set(each) == components:
+    alike = len({readings.of(what, "noise") for what in each}) == 1
+    if alike and not free and set(each) == components:
         numbers = np.array([COMPONENTS.index(what) for what in each])
         channels = numbers * len(layout) + elements
         live = layout.live & np.isin(np.arange(layout.channels), channels).reshape(3, -1)
@@ -523,7 +534,7 @@ def _columns(
     units = set(layout.kind_units)
     digital = DigitalReadings(
         _STEPS[units.pop()] if len(units) == 1 else _STEP,
-        readings.noise({what: kind_of_reading(what)[0] for what in each}),
+        readings.noise(each),
     )
     columns = Columns(
         names,
@@ -543,22 +554,29 @@ def _columns(
 
 
 _TEXT = ("description", "name", "serial_number")
+_DATAGRAMS = "datagrams"  # is there, and true, where it sends them
 
 
-def described_text(sensor: Sensor) -> str:
+def described_text(sensor: Sensor, by_datagrams: bool = False) -> str:
     """The information text of a described `sensor`, as recordings have it."""
-    return json.dumps({key: getattr(sensor, key) for key in _TEXT}, separators=(",", ":"))
+    values = {key: getattr(sensor, key) for key in _TEXT}
+    values |= {_DATAGRAMS: True} if by_datagrams else {}
+    return json.dumps(values, separators=(",", ":"))
 
 
 def described_sensor(table: TomlTable) -> Sensor:
     """The sensor of an information text that `described_text` made."""
     text, name, serial_number = (table.get(key, str) for key in _TEXT)
+    if _DATAGRAMS in table:
+        table.get(_DATAGRAMS, bool)
     table.done()
     return description_of(text, name, serial_number).sensor
 
 
-def decoder_of(sensor: Sensor) -> Decoder | LineDecoder:
-    """The decoder of what a sensor sends."""
+def decoder_of(sensor: Sensor, text: str) -> Decoder | LineDecoder:
+    """The decoder of what a sensor with this information `text` sends."""
     if not sensor.description:
         return Decoder()
-    return description_of(sensor.description, sensor.name, sensor.serial_number).decoder()
+    found = description_of(sensor.description, sensor.name, sensor.serial_number)
+    by_datagrams = bool(json.loads(text).get(_DATAGRAMS))
+    return found.decoder(by_datagrams=by_datagrams)

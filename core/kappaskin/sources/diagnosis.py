@@ -18,7 +18,7 @@ from kappaskin.sources.decoder import SEQUENCES, Accounting
 from kappaskin.sources.description import Description
 from kappaskin.sources.lines import LineDecoder
 from kappaskin.sources.ports import BaudRateSearch, Port
-from kappaskin.sources.serial_source import SerialSource, connected, taken
+from kappaskin.sources.serial_source import SerialSource, connected
 from kappaskin.sources.wire import VERSION, Command, FromDevice, Information, Reply, Samples
 
 _FEWEST_FRAMES = 3  # frames that tell no rate
@@ -154,7 +154,7 @@ class WireMonitor:
     def read(self, timeout: float) -> list[str]:
         """A line for each message and problem, after at most `timeout` s."""
         lost, lines = self._connection.lost, list[str]()
-        for now, data in taken(self._connection, self._decoder, timeout):
+        for now, data in self._connection.take(timeout):
             self._received_at = now
             for message in self._decoder.feed(data):
                 self._good_at = now

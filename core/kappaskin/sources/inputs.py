@@ -34,13 +34,12 @@ class Input(ABC):
 
     A `patient` one waits until its bytes are taken, so that none are lost. `silence` says what to
     check when nothing comes for seconds; nothing where that may be; `lost` why no more comes of one
-    that broke off. Those of an input by `records` come in whole ones.
+    that broke off.
     """
 
     patient: ClassVar[bool] = True
     silence: ClassVar[str] = ""
     lost: ClassVar[str] = "the device was unplugged or stopped; plug it in to continue"
-    by_records: ClassVar[bool] = False
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -62,7 +61,6 @@ class Datagrams(Input):
 
     patient = False
     silence = "check that it is sent to this address, and that no firewall keeps it away"
-    by_records = True
 
     def __init__(self, url: str, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__(clock)

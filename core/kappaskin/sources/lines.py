@@ -74,6 +74,8 @@ class LineDecoder(ABC):
     def __init__(self, columns: Columns) -> None:
         self.sequence = SequenceCounter()
         self.last = ""
+        self.by_datagrams = False
+        """Whether each `feed` is of a datagram, whose records do not go on in the next."""
         self._columns = columns
         self._bytes_in = self._bytes_good = self._number = 0
         self._sequences = SEQUENCES  # numbers after which the device's begin again
@@ -83,7 +85,7 @@ class LineDecoder(ABC):
     def feed(self, data: bytes) -> list[Samples]:
         """The new frames in order, duplicates left out."""
         self._bytes_in += len(data)
-        self._buffer += data
+        self._buffer += self._of_datagram(data) if self.by_datagrams else data
         return [samples for samples in self._records() if self._is_new(samples.sequence)]
 
     def _is_new(self, sequence: int) -> bool:
@@ -110,8 +112,8 @@ class LineDecoder(ABC):
         """The next bytes of a file, with one record at most; none at its end."""
 
     @abstractmethod
-    def whole(self, datagram: bytes) -> bytes:
-        """What to feed of a `datagram`, whose records do not go on in the next."""
+    def _of_datagram(self, datagram: bytes) -> bytes:
+        """The records of a `datagram`, the last of which ends with it."""
 
     @property
     def timed(self) -> bool:
@@ -201,8 +203,11 @@ class _Lines(LineDecoder):
     def next_of(self, file: BinaryIO) -> bytes:
         return file.readline(self._longest)
 
-    def whole(self, datagram: bytes) -> bytes:
-        return datagram if datagram.endswith(b"\n") else datagram + b"\n"
+    def _of_datagram(self, datagram: bytes) -> bytes:
+        if datagram.endswith(b"\n"):
+            return datagram
+        self._bytes_in += 1
+        return datagram + b"\n"
 
     @property
     def held(self) -> bytes:
@@ -410,10 +415,9 @@ class BinaryDecoder(LineDecoder):
     def next_of(self, file: BinaryIO) -> bytes:
         return file.read(self._size)
 
-    def whole(self, datagram: bytes) -> bytes:
+    def _of_datagram(self, datagram: bytes) -> bytes:
         if not len(datagram) % self._size:
             return datagram
-        self._bytes_in += len(datagram)
         self._discard("no whole number of records", datagram)
         return b""
 

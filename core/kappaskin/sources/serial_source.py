@@ -124,7 +124,8 @@ class SerialSource:
         self._interpreter.begin(clock_map)
         self._commands = DeviceCommands(self._send, clock_map)
         if self._description is not None:
-            self._identify(described_text(self._description.sensor))
+            by_datagrams = self.url.startswith(UDP)
+            self._identify(described_text(self._description.sensor, by_datagrams))
             return
         self._rates = BaudRateSearch(connection.baud_rate)
         self._commands.greet(now)
@@ -185,7 +186,7 @@ class SerialSource:
         lost = connection.lost
         # No more than can be used, or a flood would be kept in memory.
         wait = 0.0 if lost else timeout
-        arrived = [] if self._has_usable() else taken(connection, self._decoder, wait)
+        arrived = [] if self._has_usable() else connection.take(wait)
         if self._opening and not connection.opening:
             self._connect(connection)
         for now, data in arrived:
@@ -431,7 +432,8 @@ def connected(
         return SerialConnection(url, clock), Decoder()
     opened = opened or _input_of(url, description, clock)
     connection = SerialConnection(url, clock, description.baud_rate, opened)
-    return connection, description.decoder(whole=opened is not None)
+    by_datagrams = url.startswith(UDP)
+    return connection, description.decoder(whole=opened is not None, by_datagrams=by_datagrams)
 
 
 def _input_of(
@@ -448,16 +450,6 @@ def _input_of(
         records = description.decoder(whole=True)
         return partial(PlayedFile, Path(url), records, description.rate, clock)
     return None
-
-
-def taken(
-    connection: SerialConnection, decoder: Decoder | LineDecoder, timeout: float
-) -> list[tuple[float, bytes]]:
-    """What arrived and when, to feed to the `decoder`, after at most `timeout` s."""
-    arrived, by = connection.take(timeout), connection.input
-    if by is None or not by.by_records or not isinstance(decoder, LineDecoder):
-        return arrived
-    return [(now, whole) for now, data in arrived if (whole := decoder.whole(data))]
 
 
 class _EventQueue:

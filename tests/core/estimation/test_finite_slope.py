@@ -1,6 +1,7 @@
 """Gages on a slope: the true normal curvature, and the shape that explains it."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -385,6 +386,116 @@ def test_readings_of_no_surface_are_answered_as_by_least_squares_and_said_to_be(
     np.testing.assert_array_equal(answer.unit_sd, plain.unit_sd)
     assert (answer.noise > 0.5 * plain.noise).all()
     assert answer.warnings == ("no convergence in 5 of 5 frames; least squares shown",)
+
+
+# Other readings than xx, yy and xy of every element.
+
+ROSETTE = ["curvature@0", "curvature@60", "curvature@120"]
+OTHERS = {
+    "rosettes": lambda layout: layout.reading_each(ROSETTE),
+    "oblique gages and twist": lambda layout: layout.reading_each(["curvature@30", "twist"]),
+    "one gage": lambda layout: layout.reading_each(["curvature@20"]),
+    "a mix": lambda layout: layout.reading_each(["height", "slope@40", "curvature@-50", "twist"]),
+    "heights and slopes": lambda layout: layout.reading_each(["slope@0", "slope@90", "height"]),
+    "anything anywhere": lambda layout: layout.reading(
+        np.random.default_rng(8).integers(0, len(layout), 400),
+        np.random.default_rng(9).choice(["height", "slope", "curvature", "twist"], 400),
+        np.random.default_rng(10).uniform(-4, 9, 400),
+    ),
+}
+SD = {"height": 1e-5, "slope": 1e-3, "curvature": 0.2, "twist": 0.2}
+BENT = ["flat", "flat, clamped", "half round, clamped", "slightly bent"]
+every_other = pytest.mark.parametrize("kind", OTHERS)
+
+
+def other_skin(name, kind):
+    basis, layout = skin_of(name)
+    return basis, OTHERS[kind](layout)
+
+
+def read_of(basis, layout, c):
+    """The readings (R,) of the skin in space, and their standard deviations."""
+    skin, reads = in_space(basis, c), layout.reads
+    x, y = layout.positions[reads.element].T
+    each = {q: skin.read(q, x, y, reads.direction) for q in set(reads.quantity.tolist())}
+    return (
+        np.array([each[q][r] for r, q in enumerate(reads.quantity)]),
+        np.array([SD[q] for q in reads.quantity]),
+    )
+
+
+@every_other
+@pytest.mark.parametrize("name", BENT)
+def test_any_readings_are_predicted_as_the_surface_in_space_has_them(name, kind):
+    basis, layout = other_skin(name, kind)
+    c = smooth_shape(basis, 0.8)
+    expected, sigma = read_of(basis, layout, c)
+
+    predicted = FiniteSlopeLeastSquares(basis, layout, sigma).predicted(c)
+
+    np.testing.assert_allclose(predicted / sigma, expected / sigma, rtol=1e-9, atol=1e-7)
+
+
+@every_other
+@pytest.mark.parametrize("slope", [0.3, 1.0])
+@pytest.mark.parametrize("name", BENT)
+def test_steep_skins_come_back_from_any_readings(name, slope, kind):
+    basis, layout = other_skin(name, kind)
+    c = smooth_shape(basis, slope)
+    K, sigma = read_of(basis, layout, c)
+    K[[3, 77]] = np.nan
+
+    answer = FiniteSlopeLeastSquares(basis, layout, sigma)(K)
+
+    assert answer.converged
+    assert peak_error(basis, answer.coefficients, c) < 1e-5
+    assert np.array_equal(np.isnan(answer.residual), np.isnan(K))
+    plain = LeastSquares(basis, layout, sigma)(K)
+    wrong = peak_error(basis, plain.coefficients, c)
+    assert wrong < 1e-9 if kind == "heights and slopes" else wrong > 1e-3
+
+
+@every_other
+@pytest.mark.parametrize("name", ["flat", "half round, clamped"])
+def test_the_covariance_of_any_readings_is_that_of_the_linearised_problem(name, kind):
+    basis, layout = other_skin(name, kind)
+    W = np.eye(basis.size) if basis.free is None else basis.free
+    c, h = smooth_shape(basis, 0.8), 1e-8
+    K, sigma = read_of(basis, layout, c)
+
+    answer = FiniteSlopeLeastSquares(basis, layout, sigma)(K)
+
+    def weighted(g):
+        return read_of(basis, layout, answer.coefficients + (W @ g).reshape(basis.shape))[0] / sigma
+
+    J = np.stack([weighted(h * g) - weighted(-h * g) for g in np.eye(W.shape[1])], axis=1) / (2 * h)
+    expected = W @ np.linalg.inv(J.T @ J) @ W.T
+    scale = np.sqrt(np.outer(expected.diagonal(), expected.diagonal()))
+    np.testing.assert_allclose(answer.covariance / scale, expected / scale, rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["rosettes", "a mix", "anything anywhere"])
+@pytest.mark.parametrize("name", ["flat", "half round, clamped"])
+def test_error_bars_of_any_readings_hold_95_percent_and_so_with_a_free_datum(name, kind):
+    basis, layout = other_skin(name, kind)
+    c, rng = smooth_shape(basis, 1.0), np.random.default_rng(11)
+    K, sigma = read_of(basis, layout, c)
+    K = K + rng.normal(size=(150, K.size)) * sigma
+    quantity = "curvature" if kind == "rosettes" else "height"
+    layout = replace(layout, reads=replace(layout.reads, free=(quantity,)))
+    moved = K + 5 * sigma * (layout.reads.quantity == quantity)
+
+    answer, other = (FiniteSlopeLeastSquares(basis, layout, sigma)(each) for each in (K, moved))
+
+    off = (answer.coefficients - c)[:, *np.nonzero(np.abs(c))] / answer.sd[
+        :, *np.nonzero(np.abs(c))
+    ]
+    assert answer.converged.all()
+    assert 0.93 <= np.mean(np.abs(off) < 1.96) <= 0.97
+    scale = np.abs(c).max()
+    np.testing.assert_allclose(other.coefficients, answer.coefficients, rtol=0, atol=1e-3 * scale)
+    chi = np.sum((answer.residual / sigma) ** 2, axis=1) / answer.spare
+    assert np.mean(chi) == pytest.approx(1, abs=0.03)
 
 
 # What a method that neglects slopes says.

@@ -332,9 +332,6 @@ def test_fast_refuses_what_is_not_orthogonal():
 
 def test_what_takes_a_curvature_sensor_refuses_others_at_the_door():
     layout = LAYOUTS["height"]
-    for made in (
-        lambda: estimator_for("finite-slope", BASIS, layout),
-        lambda: ObjectFinder(Plate(SKIN), layout),
-    ):
+    for made in (lambda: ObjectFinder(Plate(SKIN), layout),):
         with pytest.raises(Refusal, match=r"expected a curvature sensor .* got readings of height"):
             made()

@@ -1,5 +1,6 @@
 """Scenes whose elements read heights, slopes, or curvature along any direction."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -142,6 +143,24 @@ def test_effects_of_strain_gages_are_refused_for_others(effect, why):
 def test_effects_that_do_not_occur_are_said_to_be_none(name):
     with pytest.raises(Refusal, match=f"effects that occur in this scene, got {name}"):
         scene_of("height", rest=f'[effects]\non = ["{name}"]')
+
+
+def test_gages_along_any_direction_read_less_on_a_slope_and_heights_do_not():
+    steep = '[effects]\non = ["finite-slope"]'
+    scene = scene_of("height", "curvature@30", rest=steep)
+    plain = scene_of("height", "curvature@30", rest='[effects]\noff = ["finite-slope"]')
+    (bent, read), (_, first) = (
+        Simulator(each).reading(each.sensor().scan(), 0.0) for each in (scene, plain)
+    )
+    c = bent.coefficients.ravel()
+    at = [scene.basis.at(scene.layout.positions, *order) @ c for order in [(1, 0), (0, 1)]]
+    along = math.cos(math.pi / 6) * at[0] + math.sin(math.pi / 6) * at[1]
+    less = np.sqrt(1 + at[0] ** 2 + at[1] ** 2) * (1 + along**2)
+
+    (height, curvature), (plain_height, plain_curvature) = read.reshape(2, -1), first.reshape(2, -1)
+    np.testing.assert_allclose(height, plain_height, rtol=1e-12)
+    np.testing.assert_allclose(curvature * less, plain_curvature, rtol=1e-9, atol=1e-9)
+    assert less.max() > 1.001
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ import pytest
 from kappaskin import Refusal
 from kappaskin.cli import of_sensor
 from kappaskin.errors import EndedSource, SourceError
-from kappaskin.recording import Verification
+from kappaskin.recording import Recorder, ReplayedSource, Verification
 from kappaskin.sources import WireMonitor, described_source, load_description, open_source
 from kappaskin.sources.inputs import StandardInput
 
@@ -192,6 +192,33 @@ def test_half_a_binary_datagram_is_not_joined_to_the_next(tmp_path, port, sender
     told = source.accounting()
     assert told.balanced
     assert dict(told.discarded) == {"no whole number of records": 20}
+
+
+@pytest.mark.parametrize("text", [BINARY, TEXT])
+def test_a_replay_of_datagrams_counts_what_was_counted(tmp_path, port, sender, text):
+    def whole(n):
+        return np.arange(n, n + 10, dtype="<i2").tobytes() if text == BINARY else line(n)
+
+    with source_of(tmp_path, f"udp://:{port}", text) as source:
+        recorder = Recorder(tmp_path / "out.mcap", time.monotonic())
+        source.record(recorder)
+        for sent in (whole(0)[:11], whole(1), whole(2)[:9], whole(3), whole(4) + b"12"):
+            sender.send(sent)
+        found = frames_of(source, 2) + frames_of(source, 2, seconds=0.3)
+        live = source.accounting()
+        source.record(None)
+        recorder.close()
+    with closing(ReplayedSource(tmp_path / "out.mcap")) as replayed:
+        again = frames_of(replayed, len(found), seconds=5) + frames_of(replayed, 1, seconds=0.3)
+        told = replayed.accounting()
+
+    assert live.balanced
+    assert told.balanced
+    assert len(again) == len(found)
+    assert dict(told.discarded) == dict(live.discarded) != {}
+    assert (told.good, told.lost) == (live.good, live.lost)
+    for one, other in zip(found, again, strict=True):
+        np.testing.assert_array_equal(one.counts, other.counts)
 
 
 def test_of_a_flood_every_byte_that_came_is_counted(tmp_path, port, sender):

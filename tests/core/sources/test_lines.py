@@ -85,6 +85,42 @@ def test_a_line_is_a_frame():
     assert np.isnan(curvature(samples)[6:12]).all()
 
 
+UNEVEN = """
+[readings]
+noise = 0.1
+[readings.xy]
+noise = 0.4
+[readings.yy]
+noise = 0.2
+"""
+
+
+def test_readings_of_one_unit_may_have_noises_of_their_own():
+    line = '[line]\nkind = "text"\ncolumns = ["xx:0..5", "xy:0..5", "yy:0..5"]\n'
+
+    sensor, even = (
+        described(line + UNEVEN).sensor,
+        described(line + "[readings]\nnoise = 0.1").sensor,
+    )
+
+    np.testing.assert_array_equal(sensor.sigma, np.repeat([0.1, 0.4, 0.2], 6))
+    assert sensor.layout.kind_names == ["curvature@0", "curvature@90", "twist"]
+    assert math.isnan(sensor.noise)
+    assert sensor.noise_unit == (1.0, "times that stated")
+    # Where they are alike it is a curvature sensor as before, whose readings are not weighed.
+    assert (even.sigma, even.noise, even.layout.frame_shape) == (None, 0.1, (3, 6))
+    assert even.noise_unit == (1.0, "1/m")
+
+
+def test_heights_beside_curvatures_of_different_noise_are_weighed_by_each():
+    line = '[line]\nkind = "text"\ncolumns = ["xx:0..5", "xy:0..5", "height:0..5"]\n'
+    uneven = UNEVEN.replace("yy", "height").replace("0.2", "2e-5")
+
+    sensor = described(line + uneven).sensor
+
+    np.testing.assert_array_equal(sensor.sigma, np.repeat([0.1, 0.4, 2e-5], 6))
+
+
 def test_channels_that_no_column_has_are_dead():
     line = TEXT.replace('"xy:2"', '"xy:2", "yy:0..5"')
     live = described(line).sensor.layout.live
@@ -344,7 +380,12 @@ def test_another_decoder_goes_on_from_the_bytes_held():
         ("scale = 0.5", "noise = -1.0", "expected"),
         ("scale = 0.5", 'datum = "loose"', "fixed, free"),
         ("scale = 0.5", "[readings.height]\nscale = 2.0", "a quantity that a column reads"),
-        ("scale = 0.5", "[readings.xx]\nnoise = 0.1", "one noise for all readings in 1/m"),
+        ("scale = 0.5", "[readings.xx]\nnoise = 0.1", r"got 0\.1 of xx, 0 of xy"),
+        (
+            'xy:2"]\n[readings]',
+            'xy:2", "twist:3"]\n[readings]\nnoise = 0.2\n[readings.xy]\nnoise = 0.1\n[readings.xx]',
+            r"got 0\.2 of xx, 0\.1 of xy, 0\.2 of twist",
+        ),
         ('"xx:0..5"', '"height:0..5"', "noise of readings that differ in unit"),
         ("grid = [3, 2]", 'grid = [3, 2]\nreads = ["height"]', "the columns tell what is read"),
         ('columns = ["time_ms", "", "xx:0..5", "xy:2"]', "", "columns"),

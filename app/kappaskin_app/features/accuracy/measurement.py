@@ -272,7 +272,7 @@ class CostMeasurement(QObject):
             self.scene, self.about = session.scene, ""
         elif np.isfinite(noise):
             self.scene = scene_of_sensor(status.sensor, noise)
-            times, unit = status.sensor.layout.noise_unit
+            times, unit = status.sensor.noise_unit
             text = f"{times * noise:.2g}\N{NO-BREAK SPACE}{unit}"
             self.about = f"With a point load in the middle and the present noise, {text}."
         if self.scene is not None:

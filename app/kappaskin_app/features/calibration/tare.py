@@ -251,11 +251,10 @@ def drift_text(status: Status) -> str:
         wait = "the skin is loaded" if drift.loaded else "wait two seconds"
         return f"Drift since the tare: unknown, {wait}"
     then = ", before the load" if drift.loaded else ""
-    layout = status.sensor.layout if status.sensor else None
-    by = f"{drift.curvature:.3f} 1/m"
-    if layout is not None and layout.reads:
-        one = len(set(layout.kind_units)) == 1
-        by = f"{drift.curvature:.2g} {layout.units if one else 'times the noise'}"
+    sensor, by = status.sensor, f"{drift.curvature:.3f} 1/m"
+    if sensor is not None and sensor.layout.reads:
+        unit = sensor.layout.units if sensor.sigma is None else "times the noise"
+        by = f"{drift.curvature:.2g} {unit}"
     return (
         f"Drift since the tare: {by} (RMS), equal to a displacement of "
         f"{1e3 * drift.displacement:.3f} mm{then}"

@@ -222,4 +222,4 @@ class DesignPanel(QWidget):
 
 
 def _micrometres(metres: float) -> str:
-    return f"{_MICRO * metres:.3g} \N{MICRO SIGN}m"
+    return f"{_MICRO * metres:.3g}\N{NO-BREAK SPACE}\N{MICRO SIGN}m"

@@ -15,6 +15,7 @@ from kappaskin_app.features.export.figures import TITLES, FigureWindow
 from kappaskin_app.features.export.scripting import script_of
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell import parts as menus
+from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.window import MainWindow
 
 _PYTHON = "Copy a Python script with the present source, scene and setup; it prints the contact"
@@ -48,6 +49,11 @@ class ExportFeature:
         }
         flat = shell.display.views | {"Picture of a &panel": docks}
         self.exports.register(shell.actions_by_name, solid, flat)
+        shell.settings_shown.connect(guarded(self._offer))
+
+    def _offer(self, _: Settings) -> None:
+        """Offer pictures of the views that the present sensor has."""
+        self.exports.offer(self._shell.actions_by_name, self._shell.display.views)
 
     def _save_picture(self) -> None:
         path = Path(time.strftime("kappaskin-%Y%m%d-%H%M%S.png")).resolve()

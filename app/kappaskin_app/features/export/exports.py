@@ -152,6 +152,7 @@ _MENU = "E&xport"
 _EXPORT = "Write readings, estimates or surfaces of a recording as files for other programs"
 _FILMING = "Start or stop a film of the skin, as MP4"
 _PICTURE = "Save a picture of {what} with time and settings; it must be visible"
+_OF = "picture-of-"  # begins the name of an action
 _FILM = "Film (*.mp4)"
 
 
@@ -183,12 +184,25 @@ class Exports(QObject):
         if self.filming is not None:
             words = "&Film of the skin, start or stop"
             actions.add("film", _MENU, words, self.film, "Ctrl+Shift+F", _FILMING)
-        menus = {_MENU: solid} | {f"{_MENU}{WITHIN}{title}": flat[title] for title in flat}
-        for menu, views in menus.items():
-            for name, view in views.items():
+        self._add_pictures(actions, _MENU, solid)
+        self.offer(actions, flat)
+
+    def offer(self, actions: Actions, flat: Mapping[str, Mapping[str, QWidget]]) -> None:
+        """Allow pictures of these flat views only, by the titles of their menus."""
+        for title, views in flat.items():
+            menu = f"{_MENU}{WITHIN}{title}"
+            self._add_pictures(actions, menu, views)
+            there = {f"{_OF}{name.lower()}" for name in views}
+            for name, entry in actions.entries.items():
+                if entry.menu == menu:
+                    actions.allow(name, "" if name in there else "this sensor does not read it")
+
+    def _add_pictures(self, actions: Actions, menu: str, views: Mapping[str, QWidget]) -> None:
+        for name, view in views.items():
+            if f"{_OF}{name.lower()}" not in actions.entries:
                 act = partial(self.picture, view, name, menu != _MENU)
                 words, tip = f"Picture of {name}{ELLIPSIS}", _PICTURE.format(what=name.lower())
-                actions.add(f"picture-of-{name.lower()}", menu, words, act, "", tip)
+                actions.add(f"{_OF}{name.lower()}", menu, words, act, "", tip)
 
     def ask(self) -> None:
         """Show the export dialog."""

@@ -81,7 +81,7 @@ def script_of(session: Session, settings: Settings, folder: Path) -> Script:
         made.append(f"SCENE = {_scene(session, settings)}")
         requests += ["engine.play(planned(SCENE))", "engine.seek(0.0)"]
     sensor = session.status.sensor
-    times, unit = sensor.layout.noise_unit if sensor else (1.0, "1/m")
+    times, unit = sensor.noise_unit if sensor else (1.0, "1/m")
     noise = "e.noise" if times == 1 else f"{times:g} * e.noise"
     return Script(_composed("\n".join(made), requests, noise, unit), files)
 

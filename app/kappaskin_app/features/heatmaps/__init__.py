@@ -1,5 +1,6 @@
 """Heatmaps: quantities of every element, one cell each, not interpolated."""
 
+from collections.abc import Iterable
 from functools import partial
 
 import numpy as np
@@ -10,7 +11,6 @@ from kappaskin_app.features.heatmaps.heatmap import Heatmap, HeatmapGrid
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.display import Display, Shown, of_row
 from kappaskin_app.shell.settings import Settings, locked_at
-from kappaskin_app.shell.settings.shown import COLOURS
 from kappaskin_app.shell.window import MainWindow
 
 _PERIOD = 0.06  # s between two drawings
@@ -28,10 +28,7 @@ class HeatmapsFeature:
         self.maps = HeatmapGrid()
         self.heatmaps = self.maps.heatmaps
         shell.docks.put_right("curvature", "By element", self.maps, _TIP, share=0.22)
-        words = {name: words[0].lower() + words[1:] for name, words in COLOURS}
-        shell.display.views["Picture of a &map"] = {
-            f"the map of {words[name]}": heatmap for name, heatmap in self.heatmaps.items()
-        }
+        self._list_maps(self.heatmaps)
         display, selection = shell.display, shell.selection
         display.limits.append(self._limits)
         display.restarted.connect(guarded(self._restart))
@@ -42,6 +39,14 @@ class HeatmapsFeature:
         self._selection, self._requests = selection, shell.requests
         for heatmap in self.heatmaps.values():
             self._connect(heatmap)
+
+    def _list_maps(self, names: Iterable[str]) -> None:
+        """Offer pictures of the maps of these names."""
+        shades = self._display.colouring.shades
+        self._display.views["Picture of a &map"] = {
+            f"the map of {label[0].lower()}{label[1:]}": self.heatmaps[name]
+            for name, label in ((name, shades[name].label) for name in names)
+        }
 
     def _connect(self, heatmap: Heatmap) -> None:
         selection, display = self._selection, self._display
@@ -68,6 +73,7 @@ class HeatmapsFeature:
             return
         for heatmap in self.maps.add(self._display.colouring.shades):
             self._connect(heatmap)
+        self._list_maps(self._display.colouring.maps)
         for heatmap in self.heatmaps.values():
             heatmap.show_layout(status.sensor.layout)
 

@@ -19,7 +19,7 @@ from kappaskin._text import json_cells
 from kappaskin.errors import lacking
 from kappaskin.pipeline import REPORTED, Axes, Getter, axes_of
 from kappaskin.recording.export.request import ExportedFrame, ExportRequest, RecordingInfo
-from kappaskin.sensing import SensorLayout
+from kappaskin.sensing import Sensor, SensorLayout
 
 
 class Column(NamedTuple):
@@ -65,7 +65,7 @@ def columns(info: RecordingInfo) -> tuple[Column, ...]:
 
     nominal = next(quantity for quantity in REPORTED if quantity.name == "nominal")
     groups = ("frame", "fit", "contact", "second")
-    made = {group: _columns(group, lengths, layout) for group in groups}
+    made = {group: _columns(group, lengths, info.sensor) for group in groups}
     return (
         Column(
             "time", "s", "<f8", (), (), "arrival time since the recording began", attrgetter("at")
@@ -86,18 +86,18 @@ def columns(info: RecordingInfo) -> tuple[Column, ...]:
     )
 
 
-def _columns(group: str, lengths: Axes, layout: SensorLayout) -> list[Column]:
+def _columns(group: str, lengths: Axes, sensor: Sensor) -> list[Column]:
     """The columns of the quantities of one group; `curvature` only where that is what is read."""
     return [
         Column(
-            f"{_name(quantity.name, layout)}{suffix}",
-            quantity.unit_of(layout),
+            f"{_name(quantity.name, sensor.layout)}{suffix}",
+            quantity.unit_of(sensor),
             quantity.kind,
             quantity.shape(lengths),
             quantity.labels(lengths) if quantity.parts else (),
             text,
             _value(getter),
-            quantity.units_of(layout),
+            quantity.units_of(sensor.layout),
         )
         for quantity in REPORTED
         for suffix, text, getter in quantity.forms

@@ -33,7 +33,7 @@ from kappaskin.sensing import (
 class FiniteSlopeEffect(Effect):
     """Gages read the true normal curvature, of which the second derivative is the first order.
 
-    It replaces the operator from coefficients to curvature.
+    It replaces the operator from coefficients to readings; heights and slopes stay as they are.
     """
 
     name: ClassVar = "finite-slope"
@@ -45,12 +45,13 @@ class FiniteSlopeEffect(Effect):
         sensed = NormalCurvature(survey.basis, layout, plate=survey.plate)
         surface = sensed.surface(survey.coefficients)
         number = float(surface.slope.max(initial=0.0)) ** 2
-        return Size(number, survey.share(survey.curvature - np.moveaxis(surface.readings, 0, -2)))
+        read = surface.readings.reshape(survey.curvature.shape)
+        return Size(number, survey.share(survey.curvature - read))
 
     def sensed(
         self, basis: Basis, layout: SensorLayout, plate: Plate | None = None
     ) -> Callable[[Array], Array]:
-        """Coefficients (Ni, Nj) in m to the curvature (3 P,) in 1/m that the elements read."""
+        """Coefficients (Ni, Nj) in m to the readings (R,) of the elements."""
         from kappaskin.scenes.effects.at_work.gages import finite_slope
 
         return finite_slope(basis, layout, plate)

@@ -9,6 +9,8 @@ import pytest
 from PySide6.QtCore import Qt
 
 from kappaskin import Patch, SensorLayout
+from kappaskin.scenes.effect_plan import kept_effects
+from kappaskin.scenes.effects import StatedNoise
 from kappaskin.sensing import DigitalReadings
 from kappaskin.studies import Setting
 from kappaskin_app.features.accuracy.measurement import setting_text
@@ -118,3 +120,21 @@ def test_a_sensor_of_several_units_is_reckoned_with_its_noise_over_that_stated()
     assert scene.layout.each_reads == ["height", "slope@30"]
     assert dict(scene.transduction.noise) == pytest.approx({"height": 1e-5, "slope": 1e-3})
     assert scene.effects == ()
+
+
+def test_a_sensor_whose_noises_differ_in_one_unit_is_reckoned_with_each() -> None:
+    noise = (("curvature@0", 0.1), ("curvature@90", 0.2), ("twist", 0.4))
+    sensor = replace(
+        scene_of(Settings()).sensor(),
+        layout=SensorLayout.regular(Patch(0.1, 0.1), 6, 6).reading(
+            np.tile(np.arange(36), 3),
+            np.repeat(["curvature", "curvature", "twist"], 36),
+            np.repeat([0.0, math.pi / 2, 0.0], 36),
+        ),
+        transduction=DigitalReadings(noise=noise),
+    )
+    scene = scene_of_sensor(sensor, 2.0)
+    (stated,) = (effect for effect in kept_effects(scene) if isinstance(effect, StatedNoise))
+    assert dict(zip(scene.layout.each_reads, stated.each, strict=True)) == pytest.approx(
+        {name: 2 * each for name, each in noise}
+    )

@@ -16,6 +16,10 @@ def test_each_quantity_and_direction_has_a_heatmap_in_its_unit(opened, until) ->
         "Heatmap of slope 0\N{DEGREE SIGN}",
         "Heatmap of slope 90\N{DEGREE SIGN}",
     ]
+    pictures = window.actions_by_name
+    until(lambda: "picture-of-the map of slope 90\N{DEGREE SIGN}" in pictures.entries)
+    assert not pictures.why_not("picture-of-the map of slope 0\N{DEGREE SIGN}")
+    assert "does not read" in pictures.why_not("picture-of-the map of curvature xx")
     plots = window.selected_element.traces.plots
     assert [plot.accessibleName() for plot in plots] == ["Reading slope@0", "Reading slope@90"]
     sensor = window.session.status.sensor
@@ -56,6 +60,9 @@ def test_ranges_and_colours_of_readings_are_kept_while_another_sensor_is_shown(
 
     window.session.request_source("sim:circle")
     until(lambda: window.heatmaps["xx"].isVisible() and not first.isVisible())
+    pictures = window.actions_by_name
+    assert not pictures.why_not("picture-of-the map of curvature xx")
+    assert "does not read" in pictures.why_not("picture-of-the map of slope 0\N{DEGREE SIGN}")
     assert (colour.currentText(), colour.findText("Slope 90\N{DEGREE SIGN}")) == (
         "Displacement",
         -1,
