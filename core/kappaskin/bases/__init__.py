@@ -26,6 +26,7 @@ _MAKERS: dict[type[Patch], dict[str, _Maker]] = {
         "sliding": partial(SineBasis, sliding=True),
         "clamped": ClampedBasis,
         "elastic": ElasticBasis,
+        "cantilever": partial(ClampedBasis, tip=True),
     },
     Disk: {"hinged": DiskBasis, "clamped": partial(DiskBasis, clamped=True)},
     Polygon: {"hinged": PolygonBasis, "clamped": partial(PolygonBasis, clamped=True)},
@@ -35,13 +36,16 @@ EDGES = tuple(_MAKERS[Patch])
 """Boundary conditions by name.
 
 `hinged`, with the ends of an arc pinned; `sliding`, with these free to slide; `clamped`, which
-fixes the slope too; `elastic`, a flat rectangle on an elastic rim.
+fixes the slope too; `elastic`, a flat rectangle on an elastic rim; `cantilever`, a flat strip
+clamped at x = 0 whose other end is free.
 """
 
 
 def edges_of(patch: Patch) -> tuple[str, ...]:
     """The boundary conditions that `patch` can have, the default first."""
-    return tuple(e for e in _MAKERS[type(patch)] if not (patch.base_curvature and e == "elastic"))
+    barred = {"elastic"} if patch.base_curvature else set[str]()
+    barred |= set() if patch.strip and not patch.base_curvature else {"cantilever"}
+    return tuple(edge for edge in _MAKERS[type(patch)] if edge not in barred)
 
 
 def check_edge(patch: Patch, edge: str) -> None:
