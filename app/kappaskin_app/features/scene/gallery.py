@@ -160,11 +160,13 @@ _FOLDER = Path(str(files("kappaskin_resources"))) / "measured"
 MEASURED = {
     "&Ball in a gel": _FOLDER / "ball" / "ball.mcap",
     "C&lamped plate": _FOLDER / "plate" / "slopes.mcap",
+    "&Fibre": _FOLDER / "fibre" / "fibre.mcap",
 }
 """Recordings of what others measured, by their titles."""
 _SOURCES = (
     "Replay the heights that a camera saw of a gel, pressed by a ball of 4.0 mm radius (9DTact).",
     "Replay the shape of a plate by its slopes, which a finite-element program computed (recolo).",
+    "Replay the shapes of a fibre held at one end, by the heights of 15 markers (motion capture).",
 )
 
 _RESIZE_DELAY = 200  # ms after the last change of size until pictures are painted
