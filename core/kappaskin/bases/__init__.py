@@ -54,6 +54,17 @@ def check_edge(patch: Patch, edge: str) -> None:
         raise Refusal(f"expected an edge of a {patch.name} among {', '.join(edges)}; got {edge!r}")
 
 
+def has_free_tip(basis: Basis) -> bool:
+    """Whether it is of a cantilever, which nothing holds at x = a."""
+    return isinstance(basis, ClampedBasis) and basis.tip
+
+
+def held_near(basis: Basis, x: float, y: float, within: float) -> list[tuple[float, float, float]]:
+    """`Patch.near_rim` without the free tip of a cantilever."""
+    places = basis.patch.near_rim(x, y, within)
+    return [at for at in places if not (has_free_tip(basis) and at[0] > basis.patch.a / 2)]
+
+
 def basis_for(patch: Patch, edge: str, Ni: int, Nj: int) -> Basis:
     """The basis of Ni x Nj functions for a patch with the boundary condition `edge`."""
     check_edge(patch, edge)

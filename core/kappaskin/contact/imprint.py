@@ -7,7 +7,7 @@ from typing import NamedTuple, cast
 import numpy as np
 import scipy
 
-from kappaskin.bases import Basis
+from kappaskin.bases import Basis, held_near
 from kappaskin.contact.drift import FittedDrift, level_and_slopes
 from kappaskin.contact.geometry import (
     CurvatureFormMap,
@@ -238,7 +238,7 @@ class Imprints:
             math.hypot(w_sd, fine_sd, math.hypot(*slopes) * math.sqrt(2) * place_sd),
             int(cast("float", fit.spare)),
             dent.single,
-            bool(patch.near_rim(x, y, _RIM)),
+            bool(held_near(self._basis, x, y, _RIM)),
             dent.size,
             math.hypot(
                 dent.resized if dent.turns else dent.size, math.sqrt(dent.size) * self._half_wave
