@@ -199,7 +199,7 @@ class Imprints:
         return mean, math.sqrt(float(squares.mean()))
 
     def _measured(self, dent: "_Dent", form: Array, fit: Fit) -> tuple[LocalGeometry, Contact]:
-        patch, strip = self._basis.patch, self._basis.patch.strip
+        strip = self._basis.patch.strip
         there = local_geometry(fit, dent.place)
         mean, scatter = self._form_over(form, dent.away)
         other, _ = self._form_over(form, 2 * dent.away)

@@ -530,7 +530,7 @@ def test_the_wave_numbers_of_a_cantilever_are_those_of_the_tables():
 
 def test_only_a_flat_strip_is_a_cantilever():
     for patch in (Patch(0.1, 0.1), Patch(0.04, 0.02, 0.0129, strip=True)):
-        with pytest.raises(Refusal, match="expected an edge of a .* among .*; got 'cantilever'"):
+        with pytest.raises(Refusal, match=r"expected an edge of a .* among .*; got 'cantilever'"):
             basis_for(patch, "cantilever", 4, 1)
         with pytest.raises(Refusal, match="expected a flat strip for a cantilever"):
             ClampedBasis(patch, 4, 1, tip=True)
