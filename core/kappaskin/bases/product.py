@@ -281,8 +281,8 @@ class ClampedBasis(JetProductBasis):
 def _beam(s: Array, count: int, tip: bool, *orders: int) -> Array:
     """The derivatives (O, S, N) of the first `count` modes of a beam of length 1.
 
-    `s` (S,) is from -1/2 to 1/2. Clamped at both ends, even ones are cos(k s)/cos(k/2) - cosh(k s)/cosh(k/2), odd ones the same
-    with sin and sinh, over sqrt(2). With a free `tip`, at x = s + 1/2, they are
+    With `s` (S,) from -1/2 to 1/2, even ones are cos(k s)/cos(k/2) - cosh(k s)/cosh(k/2), odd ones
+    the same with sin and sinh, over sqrt(2). With a free `tip`, at x = s + 1/2, they are
     cosh(k x) - cos(k x) - r (sinh(k x) - sin(k x)), r = (cosh k + cos k)/(sinh k + sin k), over
     sqrt(2). cosh and sinh are decaying exponentials from either end, so that nothing overflows or
     cancels.
