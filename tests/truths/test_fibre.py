@@ -39,7 +39,7 @@ def predicted(others, pooled=True):
     fits, rows = estimator_for("bayes", BASIS, layout)(HEIGHTS[:, read]), AT_ALL[list(others)]
     noise = fits.noise[:, None]
     if pooled:
-        noise = np.sqrt(fits.spare @ fits.noise**2 / fits.spare.sum())
+        noise = np.sqrt(np.average(fits.noise**2, weights=fits.spare))
         sigma = np.full(len(read), noise)
         fits = estimator_for("bayes", BASIS, layout, sigma)(HEIGHTS[:, read])
     error = fits.coefficients.reshape(100, -1) @ rows.T - HEIGHTS[:, others]
