@@ -1,7 +1,7 @@
 """A fibre held at one end, by the motion capture of others: 15 of its markers predict the others.
 
-Each marker stands off the fibre's axis by a vector of its own, up to 0.3 mm, which is most of the
-noise: how well the others are predicted depends on which they are.
+Markers seem to stand off the fibre's axis, each by a vector of its own, which is most of the noise:
+how well the others are predicted depends on which they are.
 """
 
 from functools import cache
