@@ -11,10 +11,10 @@ FOLDER = Path(str(files("kappaskin_resources"))) / "measured"
 
 
 def measured(name):
-    """The layout of a described sensor, and the readings (R,) in its one line."""
+    """The layout of a described sensor, and the readings (R,) in its line, (T, R) in T lines."""
     sensor = load_description(FOLDER / f"{name}.toml")
     columns, layout = sensor.columns, sensor.sensor.layout
     numbers = np.loadtxt(FOLDER / f"{name}.csv", delimiter=",")
-    readings = np.empty(layout.channels)
-    readings[columns.channels] = columns.scale * numbers[columns.places] + columns.offset
+    readings = np.empty((*numbers.shape[:-1], layout.channels))
+    readings[..., columns.channels] = columns.scale * numbers[..., columns.places] + columns.offset
     return layout, readings

@@ -75,7 +75,8 @@ class DrawnSkin:
     def deepest(self) -> float:
         """How far in mm the skin may be drawn from where it rests."""
         patch = self.patch
-        return MM * min(_DEEPEST * min(patch.a, patch.b), _NEAREST * patch.radius)
+        side = patch.a if patch.strip else min(patch.a, patch.b)
+        return MM * min(_DEEPEST * side, _NEAREST * patch.radius)
 
     @property
     def bounds(self) -> tuple[Array, Array]:

@@ -26,6 +26,7 @@ _MAKERS: dict[type[Patch], dict[str, _Maker]] = {
         "sliding": partial(SineBasis, sliding=True),
         "clamped": ClampedBasis,
         "elastic": ElasticBasis,
+        "cantilever": partial(ClampedBasis, tip=True),
     },
     Disk: {"hinged": DiskBasis, "clamped": partial(DiskBasis, clamped=True)},
     Polygon: {"hinged": PolygonBasis, "clamped": partial(PolygonBasis, clamped=True)},
@@ -35,19 +36,33 @@ EDGES = tuple(_MAKERS[Patch])
 """Boundary conditions by name.
 
 `hinged`, with the ends of an arc pinned; `sliding`, with these free to slide; `clamped`, which
-fixes the slope too; `elastic`, a flat rectangle on an elastic rim.
+fixes the slope too; `elastic`, a flat rectangle on an elastic rim; `cantilever`, a flat strip
+clamped at x = 0 whose other end is free.
 """
 
 
 def edges_of(patch: Patch) -> tuple[str, ...]:
     """The boundary conditions that `patch` can have, the default first."""
-    return tuple(e for e in _MAKERS[type(patch)] if not (patch.base_curvature and e == "elastic"))
+    barred = {"elastic"} if patch.base_curvature else set[str]()
+    barred |= set() if patch.strip and not patch.base_curvature else {"cantilever"}
+    return tuple(edge for edge in _MAKERS[type(patch)] if edge not in barred)
 
 
 def check_edge(patch: Patch, edge: str) -> None:
     """Raise a `Refusal` for a boundary condition that `patch` cannot have."""
     if edge not in (edges := edges_of(patch)):
         raise Refusal(f"expected an edge of a {patch.name} among {', '.join(edges)}; got {edge!r}")
+
+
+def has_free_tip(basis: Basis) -> bool:
+    """Whether it is of a cantilever, which nothing holds at x = a."""
+    return isinstance(basis, ClampedBasis) and basis.tip
+
+
+def held_near(basis: Basis, x: float, y: float, within: float) -> list[tuple[float, float, float]]:
+    """`Patch.near_rim` without the free tip of a cantilever."""
+    places = basis.patch.near_rim(x, y, within)
+    return [at for at in places if not (has_free_tip(basis) and at[0] > basis.patch.a / 2)]
 
 
 def basis_for(patch: Patch, edge: str, Ni: int, Nj: int) -> Basis:

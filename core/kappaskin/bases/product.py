@@ -236,11 +236,19 @@ class ClampedBasis(JetProductBasis):
     Between the edges they are nearly sines, so that elements at cell centres tell them apart as
     well; a smooth shape's coefficients fall as 1/k^5, its curvature converges as N^(-5/2). Their
     mean square is a sine's, 1/2 along each side. A bent skin is inextensible: f has no mean along
-    the arc.
+    the arc. With the `tip` free they are a cantilever's, of a flat strip: clamped at x = 0, without
+    moment and shear force at x = a.
     """
+
+    tip: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.tip and (not self.patch.strip or self.patch.base_curvature):
+            raise Refusal(
+                f"expected a flat strip for a cantilever, got a {self.patch.name} with a base "
+                f"curvature of {self.patch.base_curvature:g} 1/m; select another edge"
+            )
         if self.patch.base_curvature and self.Ni < 2:
             raise Refusal(
                 "a clamped inextensible arc cannot bend with one function only: expected at "
@@ -258,26 +266,28 @@ class ClampedBasis(JetProductBasis):
         return self._without_mean(ends[1] - ends[0])
 
     def _along(self, x: Array, length: float, count: int, derivative: int) -> Array:
-        values = _beam(x / length - 0.5, count, derivative)[0]
+        values = _beam(x / length - 0.5, count, self.tip, derivative)[0]
         if derivative < 0:
-            values -= _beam(np.array([-0.5, 0.5]), count, -1)[0].mean(axis=0)
+            values -= _beam(np.array([-0.5, 0.5]), count, self.tip, -1)[0].mean(axis=0)
         return values * length**-derivative
 
     def _jet(self, x: float, length: float, count: int) -> Array:
-        jet = _beam(np.array([x / length - 0.5]), count, 0, 1, 2)[:, 0]
+        jet = _beam(np.array([x / length - 0.5]), count, self.tip, 0, 1, 2)[:, 0]
         jet[1] /= length
         jet[2] /= length**2
         return jet
 
 
-def _beam(s: Array, count: int, *orders: int) -> Array:
-    """The derivatives (O, S, N) of the first `count` modes of a clamped beam of length 1.
+def _beam(s: Array, count: int, tip: bool, *orders: int) -> Array:
+    """The derivatives (O, S, N) of the first `count` modes of a beam of length 1.
 
     With `s` (S,) from -1/2 to 1/2, even ones are cos(k s)/cos(k/2) - cosh(k s)/cosh(k/2), odd ones
-    the same with sin and sinh, over sqrt(2); cosh and sinh as decaying exponentials from either
-    end, so that nothing overflows or cancels.
+    the same with sin and sinh, over sqrt(2). With a free `tip`, at x = s + 1/2, they are
+    cosh(k x) - cos(k x) - r (sinh(k x) - sin(k x)), r = (cosh k + cos k)/(sinh k + sin k), over
+    sqrt(2). cosh and sinh are decaying exponentials from either end, so that nothing overflows or
+    cancels.
     """
-    modes = _beam_modes(count, orders)
+    modes = _beam_modes(count, tip, orders)
     ks, half = np.multiply.outer(s, modes.k), modes.k / 2
     wave = modes.waves * np.sin(ks + modes.phases)
     return wave - modes.decays * (np.exp(ks - half) + modes.far * np.exp(-ks - half))
@@ -295,22 +305,32 @@ class _BeamModes:
 
 
 @lru_cache(64)
-def _beam_modes(count: int, orders: tuple[int, ...]) -> _BeamModes:
-    """What the derivatives of `orders` share; k are the roots of cos k cosh k = 1 above zero."""
-    k = (np.arange(1.0, count + 1) + 0.5) * np.pi  # nearly: Newton's method does the rest
-    for _ in range(4):
+def _beam_modes(count: int, tip: bool, orders: tuple[int, ...]) -> _BeamModes:
+    """What the derivatives of `orders` share; k are the roots of cos k cosh k = 1 above zero.
+
+    With a free `tip`, of cos k cosh k = -1.
+    """
+    right = -1.0 if tip else 1.0
+    k = (np.arange(1.0, count + 1) + right / 2) * np.pi
+    for _ in range(6):  # nearly: Newton's method does the rest
         sech = 2 * np.exp(-k) / (1 + np.exp(-2 * k))
-        k -= (np.cos(k) - sech) / (sech * np.tanh(k) - np.sin(k))
+        k -= (np.cos(k) - right * sech) / (right * sech * np.tanh(k) - np.sin(k))
     d = np.array(orders, float)[:, None, None]
     sign = np.where(np.arange(count) % 2, -1.0, 1.0)
-    phase, scale = (1 + sign) * np.pi / 4, k**d / np.sqrt(2)
-    return _BeamModes(
-        k,
-        phase + d * np.pi / 2,
-        scale / np.sin(k / 2 + phase),
-        scale / (1 + sign * np.exp(-k)),
-        sign * (-1.0) ** d,
-    )
+    scale = k**d / np.sqrt(2)
+    if tip:
+        # The factor of exp(k x), (1 - r)/2, as that of exp(k (x - 1)); the other is (1 + r)/2.
+        rising = (np.sin(k) - np.cos(k) - np.exp(-k)) / (
+            1 - np.exp(-2 * k) + 2 * np.exp(-k) * np.sin(k)
+        )
+        r = 1 - 2 * rising * np.exp(-k)
+        phase, waves = k / 2 - np.arctan2(1, r), np.hypot(1, r)
+        decays, far = -rising, (1 + r) / 2 / rising
+    else:
+        phase = (1 + sign) * np.pi / 4
+        waves, decays, far = 1 / np.sin(k / 2 + phase), 1 / (1 + sign * np.exp(-k)), sign
+    phases = phase + d * np.pi / 2
+    return _BeamModes(k, phases, scale * waves, scale * decays, far * (-1.0) ** d)
 
 
 @dataclass(frozen=True)

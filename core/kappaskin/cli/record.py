@@ -430,7 +430,7 @@ def reconstruct(
     grid
         Number of points of the surface along x and y; none when left out.
     edge
-        The boundary condition: hinged, sliding, clamped or elastic.
+        The boundary condition: hinged, sliding, clamped, elastic or cantilever (a flat strip).
     method
         The estimator: least-squares, as-printed, direct, fast, bayes, finite-slope, tracking or
         robust.

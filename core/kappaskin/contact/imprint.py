@@ -7,7 +7,7 @@ from typing import NamedTuple, cast
 import numpy as np
 import scipy
 
-from kappaskin.bases import Basis
+from kappaskin.bases import Basis, held_near
 from kappaskin.contact.drift import FittedDrift, level_and_slopes
 from kappaskin.contact.geometry import (
     CurvatureFormMap,
@@ -199,7 +199,7 @@ class Imprints:
         return mean, math.sqrt(float(squares.mean()))
 
     def _measured(self, dent: "_Dent", form: Array, fit: Fit) -> tuple[LocalGeometry, Contact]:
-        patch, strip = self._basis.patch, self._basis.patch.strip
+        strip = self._basis.patch.strip
         there = local_geometry(fit, dent.place)
         mean, scatter = self._form_over(form, dent.away)
         other, _ = self._form_over(form, 2 * dent.away)
@@ -238,7 +238,7 @@ class Imprints:
             math.hypot(w_sd, fine_sd, math.hypot(*slopes) * math.sqrt(2) * place_sd),
             int(cast("float", fit.spare)),
             dent.single,
-            bool(patch.near_rim(x, y, _RIM)),
+            bool(held_near(self._basis, x, y, _RIM)),
             dent.size,
             math.hypot(
                 dent.resized if dent.turns else dent.size, math.sqrt(dent.size) * self._half_wave

@@ -11,7 +11,7 @@ import scipy
 from numpy.typing import ArrayLike
 from scipy.linalg import lapack
 
-from kappaskin.bases import Basis, SineBasis, basis_for
+from kappaskin.bases import Basis, SineBasis, basis_for, held_near
 from kappaskin.contact.influence import influence_of
 from kappaskin.contact.stretched import StretchedSkin
 from kappaskin.estimation import Fit, PatternCache
@@ -397,7 +397,7 @@ class PointContact:
         if self.basis.unobservable is not None:
             return False
         least = here.power - here.left * (1 + _REGION / tables.spare)
-        for x_rim, y_rim, share in self.patch.near_rim(x, y, _DOUBTFUL):
+        for x_rim, y_rim, share in held_near(self.basis, x, y, _DOUBTFUL):
             if share < _RIM:
                 return True
             K = self._rows[4]

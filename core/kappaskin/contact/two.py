@@ -7,7 +7,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from kappaskin.bases import basis_for
+from kappaskin.bases import basis_for, held_near
 from kappaskin.contact.drift import FittedDrift, SmoothDrift
 from kappaskin.contact.geometry import contact_geometry
 from kappaskin.contact.influence import influence_of
@@ -309,8 +309,8 @@ class _Pairs:
         return (
             force * other > 0
             and math.hypot(X - x, Y - y) > wide
-            and not self.patch.near_rim(x, y, _RIM)
-            and not self.patch.near_rim(X, Y, _RIM)
+            and not held_near(self._basis, x, y, _RIM)
+            and not held_near(self._basis, X, Y, _RIM)
             and two.left <= spare * left_by_chance(_LEFT, spare, fit.spare)
         )
 

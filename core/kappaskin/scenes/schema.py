@@ -104,7 +104,7 @@ SKIN = Part(
     {
         "shape": Key(
             "Shape",
-            "The outline. A strip is held at its two ends along x; its shape is constant along y.",
+            "The outline. A strip is held at its ends along x; its shape is constant along y.",
             kind=str,
             default="rectangle",
         ),
@@ -124,7 +124,8 @@ SKIN = Part(
         "edge": Key(
             "Edge",
             "Boundary condition along the rim. Hinged: the skin rotates freely; sliding: the ends "
-            "of a bent skin slide; clamped: no rotation; elastic: the rim rests on springs.",
+            "of a bent skin slide; clamped: no rotation; elastic: the rim rests on springs; "
+            "cantilever: a flat strip, clamped at x = 0 and free at its other end.",
             choices=tuple((edge, edge.capitalize()) for edge in EDGES),
         ),
         "rigidity": Key(

@@ -17,13 +17,14 @@ from kappaskin import (
     Simulator,
     load_scene,
 )
-from kappaskin.bases import EDGES
+from kappaskin.bases import edges_of
 from kappaskin.scenes import scene_file
 from kappaskin_app.shell.loads import dragged
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.scene import LOAD_CASES, SHAPES, SPREAD_CASES
 from kappaskin_app.shell.simulation import (
     is_table_1,
+    patch_of,
     plate_of,
     scene_of,
     with_consequences,
@@ -315,7 +316,7 @@ def test_a_small_spread_load_presses_as_a_point_does() -> None:
 
 
 def test_every_edge_can_be_simulated_on_the_first_skin() -> None:
-    for edge in EDGES:
+    for edge in edges_of(patch_of(Settings())):
         assert scene_of(Settings(edge=edge)).edge == edge
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
-from kappaskin import Disk
-from kappaskin.bases import EDGES
+from kappaskin import Disk, Patch
+from kappaskin.bases import edges_of
 from kappaskin_app.shell.window import MainWindow
 
 
@@ -102,7 +102,7 @@ def test_only_edges_that_the_skin_can_have_are_offered(window: MainWindow, until
         return [box.itemData(i) for i in range(box.count()) if box.model().item(i).isEnabled()]
 
     shape, basis = window.shape, window.basis
-    assert offered(shape, "edge") == list(EDGES)
+    assert offered(shape, "edge") == list(edges_of(Patch(0.1, 0.1)))
     window.history.change("Edges", -1, edge="elastic", fit_edge="elastic")
     window.requests.set("shape", "cylinder")
     assert (window.history.settings.edge, window.history.settings.fit_edge) == ("hinged", "")

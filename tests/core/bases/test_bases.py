@@ -224,21 +224,42 @@ def test_off_a_disk_or_a_polygon_there_is_nothing(held_skin):
 # Edges
 
 
+def held_rim(held_skin):
+    """Of a cantilever the clamped end."""
+    points, inward, lengths = rim(held_skin.patch)
+    there = points[:, 0] == 0 if held_skin.edge == "cantilever" else np.full(len(points), True)
+    return points[there], inward[there], lengths[there]
+
+
 @pytest.mark.where(which=lambda held_skin: held_skin.edge != "elastic")
 def test_what_is_held_does_not_move(held_skin):
-    values = held_skin.basis().at(rim(held_skin.patch)[0])
+    values = held_skin.basis().at(held_rim(held_skin)[0])
 
     np.testing.assert_allclose(values, 0, atol=2e-13)
 
 
-@pytest.mark.where(which=lambda held_skin: held_skin.edge == "clamped")
+@pytest.mark.where(which=lambda held_skin: held_skin.edge in ("clamped", "cantilever"))
 def test_a_clamped_edge_holds_the_slope(held_skin):
-    basis, (points, inward, _) = held_skin.basis(), rim(held_skin.patch)
+    basis, (points, inward, _) = held_skin.basis(), held_rim(held_skin)
 
     slopes = slope_across(basis, points, inward)
 
     largest = np.abs(basis.at(inside(held_skin.patch), 1, 0)).max()
     np.testing.assert_allclose(slopes, 0, atol=1e-12 * largest)
+
+
+@pytest.mark.where(which=lambda held_skin: held_skin.edge == "cantilever")
+def test_at_a_free_tip_there_is_neither_moment_nor_shear_force(held_skin):
+    basis, (a, y) = held_skin.basis(), (held_skin.patch.a, held_skin.patch.b / 2)
+    step = 1e-4 * a
+
+    bent = basis.at(np.array([[a, y], [a - step, y], [a - 2 * step, y]]), 2, 0)
+
+    largest = np.abs(basis.at(inside(held_skin.patch), 2, 0)).max(axis=0)
+    np.testing.assert_allclose(bent[0] / largest, 0, atol=1e-12)
+    # w_xx = e^2 w_xxxx / 2 at e from the tip: its slope would show at once.
+    np.testing.assert_allclose((bent[2] - 4 * bent[1]) / largest, 0, atol=1e-6)
+    assert np.abs(bent[1] / largest).min() > 1e-9
 
 
 def has_no_moment(held_skin):
@@ -368,18 +389,19 @@ def test_on_a_skin_twice_as_large_the_same_functions_bend_less(held_skin):
 # Completeness
 #
 # The best a basis can do for a smooth f follows from which conditions at its edges f breaks. Say
-# the first broken one has order r: 0 for the value, 1 for the slope across, 2 for the moment, 4
-# where f meets them all and only the load that would make it, of four more derivatives, ends at
-# the rim. Then f is r + 1/2 times differentiable in the scale of spaces that the plate's operator
-# makes, and the error in the mean square falls as k^-(r + 1/2), k the wave number of the last
-# function. With d the product of the distances to the edges, d^p breaks the condition of order p,
-# or, meeting all there are, r = 4.
+# the first broken one has order r: 0 for the value, 1 for the slope across, 2 for the moment, 3
+# for the shear force, 4 where f meets them all and only the load that would make it, of four more
+# derivatives, ends at the rim. Then f is r + 1/2 times differentiable in the scale of spaces that
+# the plate's operator makes, and the error in the mean square falls as k^-(r + 1/2), k the wave
+# number of the last function. With d the product of the distances to the edges, d^p breaks the
+# condition of order p, or, meeting all there are, r = 4.
 
 BROKEN = {
     "hinged": {0: 0, 1: 2, 3: 4},
     "sliding": {0: 0, 1: 2, 3: 4},
     "clamped": {0: 0, 1: 1, 3: 4},
     "elastic": {0: 2, 1: 2, 3: 4},  # its functions have no second derivative across the rim
+    "cantilever": {0: 0, 1: 1, 3: 3},  # of x: the shear force at the tip is the next
 }
 
 
@@ -481,15 +503,37 @@ def test_every_sine_product_is_an_eigenfunction_of_the_laplacian():
     np.testing.assert_allclose(laplacian, expected, rtol=1e-12, atol=1e-9)
 
 
-def test_many_clamped_functions_neither_overflow_nor_cancel():
-    basis = ClampedBasis(Patch(0.1, 0.02, strip=True), 1000, 1)
+@pytest.mark.parametrize("tip", [False, True])
+def test_many_clamped_functions_neither_overflow_nor_cancel(tip):
+    basis = ClampedBasis(Patch(0.1, 0.02, strip=True), 1000, 1, tip)
     points = np.array([[0.0, 0.01], [0.1, 0.01], [0.0123, 0.01]])
 
-    values, slopes = basis.at(points), basis.at(points, 1, 0)
+    values, slopes, bent = (basis.at(points, order) for order in range(3))
 
-    np.testing.assert_allclose(values[:2], 0, atol=1e-11)
-    np.testing.assert_allclose(slopes[:2] / (1000 * np.pi / 0.1), 0, atol=1e-11)
+    k = 1000 * np.pi / 0.1
+    held = [0] if tip else [0, 1]
+    np.testing.assert_allclose(values[held], 0, atol=1e-11)
+    np.testing.assert_allclose(slopes[held] / k, 0, atol=1e-11)
+    np.testing.assert_allclose(bent[1] / k**2 if tip else 0, 0, atol=1e-11)
     assert np.abs(values[2]).max() < 1.1
+
+
+def test_the_wave_numbers_of_a_cantilever_are_those_of_the_tables():
+    """W. Young, Roark's formulas for stress and strain: 3.52, 22.0, 61.7, 121, 200."""
+    basis = ClampedBasis(Patch(1.0, 1.0, strip=True), 5, 1, tip=True)
+    bending, mass = (overlaps(basis)(order, order) for order in ((2, 0), (0, 0)))
+
+    frequencies = np.sqrt(np.diag(bending) / np.diag(mass))
+
+    np.testing.assert_allclose(frequencies, [3.516, 22.03, 61.70, 120.9, 199.9], rtol=5e-4)
+
+
+def test_only_a_flat_strip_is_a_cantilever():
+    for patch in (Patch(0.1, 0.1), Patch(0.04, 0.02, 0.0129, strip=True)):
+        with pytest.raises(Refusal, match=r"expected an edge of a .* among .*; got 'cantilever'"):
+            basis_for(patch, "cantilever", 4, 1)
+        with pytest.raises(Refusal, match="expected a flat strip for a cantilever"):
+            ClampedBasis(patch, 4, 1, tip=True)
 
 
 # What is refused
@@ -498,7 +542,11 @@ def test_many_clamped_functions_neither_overflow_nor_cancel():
 def test_each_skin_names_its_edges_and_refuses_others():
     flat, bent, disk = Patch(0.1, 0.1), Patch(0.04, 0.03, 0.0129), Disk(0.05)
 
-    assert edges_of(flat) == EDGES == ("hinged", "sliding", "clamped", "elastic")
+    strip, arc = Patch(0.1, 0.02, strip=True), Patch(0.1, 0.02, 0.05, strip=True)
+
+    assert edges_of(flat) == ("hinged", "sliding", "clamped", "elastic")
+    assert edges_of(strip) == EDGES == (*edges_of(flat), "cantilever")
+    assert "cantilever" not in edges_of(arc)
     assert edges_of(bent) == ("hinged", "sliding", "clamped")
     assert edges_of(disk) == ("hinged", "clamped")
     with pytest.raises(Refusal, match=r"of a disk of radius 0\.05 m among hinged, clamped; got 'e"):

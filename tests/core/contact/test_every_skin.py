@@ -11,6 +11,7 @@ from argyris import ArgyrisPlate
 from kappaskin import (
     DiscLoad,
     LeastSquares,
+    Patch,
     Plate,
     PointContact,
     PointLoad,
@@ -169,3 +170,26 @@ def test_on_a_clamped_plate_heights_from_any_zero_give_the_force(held_skin):
             off[-1].append((touch.force - 0.2) / touch.force_sd)
         assert (np.abs(off) < 1.96).mean() > 0.85
         assert np.square(off).mean() < 1.6
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.95, 0.985])
+def test_a_load_on_a_cantilever_is_found_up_to_its_tip(share):
+    """By the bending moment F (s - x) of a beam with a free end."""
+    patch = Patch(0.1, 0.02, strip=True)
+    plate, elements = Plate(patch), SensorLayout.regular(patch, 20, 1)
+    rng, s, F = np.random.default_rng(0), share * patch.a, 0.02
+    fit = LeastSquares(basis_for(patch, "cantilever", 12, 1), elements)
+    of_load = F * np.maximum(s - elements.positions[:, 0], 0) / (plate.rigidity * patch.b)
+    found = Contacts(plate, elements, "cantilever")
+    off = []
+    for _ in range(20):
+        K = rng.normal(0, 0.3, (3, 20))
+        K[0] += of_load
+
+        contact, _ = found(K, fit(K))
+
+        assert contact.single
+        assert not contact.near_rim
+        off.append((contact.position[0] - s) / contact.position_sd[0])
+        off.append((contact.force - F) / contact.force_sd)
+    assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.35)

@@ -230,6 +230,47 @@ def test_a_round_plate_agrees_with_its_closed_form_under_a_disc_that_covers_it(e
     assert w == pytest.approx(factor * 3.0 * 0.05**4 / (64 * 2.0), rel=1e-3)
 
 
+# A cantilever: Euler's and Bernoulli's beam, clamped at x = 0
+
+STRIP = Patch(0.3, 0.02, strip=True)
+EI = 2.0 * STRIP.b
+ALONG = np.linspace(0.05, 1.0, 20) * STRIP.a
+
+
+def cantilever(load, modes=30):
+    """Deflection, slope and curvature (3, 20) along the strip."""
+    basis = basis_for(STRIP, "cantilever", modes, 1)
+    c = Plate(STRIP, 2.0).deflection([load], basis).ravel()
+    points = np.column_stack([ALONG, np.full(20, 0.01)])
+    return np.stack([basis.at(points, order) @ c for order in range(3)])
+
+
+@pytest.mark.parametrize("at", [0.3, 0.5, 1.0])
+def test_a_cantilever_agrees_with_the_beam_under_a_point_load(at):
+    s, x = at * STRIP.a, ALONG
+
+    found = cantilever(PointLoad(s, 0.01, 3.0))
+
+    near, far = np.minimum(x, s), np.maximum(x, s)
+    exact = [near**2 * (3 * far - near) / 6, near * (2 * s - near) / 2, s - near]
+    for order, (one, true) in enumerate(zip(found, exact, strict=True)):
+        # The functions beyond k = 30 add less than the sum of 4 (k pi)^(order - 4).
+        left = 4 / (3 - order) / math.pi ** (4 - order) / 30 ** (3 - order)
+        unit = 3.0 * STRIP.a ** (3 - order) / EI
+        np.testing.assert_allclose(one / unit, 3.0 * true / EI / unit, rtol=0, atol=left)
+
+
+def test_a_cantilever_agrees_with_the_beam_under_a_uniform_load():
+    x, a, q = ALONG, STRIP.a, 3.0 * STRIP.b
+
+    w, slope, curvature = cantilever(uniform(STRIP, 3.0))
+
+    np.testing.assert_allclose(w, q * x**2 * (x**2 - 4 * a * x + 6 * a**2) / (24 * EI), rtol=5e-6)
+    np.testing.assert_allclose(slope, q * x * (x**2 - 3 * a * x + 3 * a**2) / (6 * EI), rtol=1e-4)
+    exact = q * (a - x) ** 2 / (2 * EI)
+    np.testing.assert_allclose(curvature, exact, rtol=0, atol=2e-3 * exact.max())
+
+
 # What else holds it: tension, foam, a fluid
 
 

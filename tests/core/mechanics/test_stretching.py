@@ -195,3 +195,14 @@ def test_only_flat_rectangles_of_known_thickness_stretch(plate, edge):
 def test_a_plate_of_another_patch_is_refused():
     with pytest.raises(Refusal, match="use one"):
         Stretching(sheet(), SineBasis(Patch(0.1, 0.08), 4, 4))
+
+
+def test_a_cantilever_is_not_stretched_as_it_bends():
+    strip = Plate(Patch(0.1, 0.02, strip=True), thickness=0.25e-3)
+    for edge, stretched in (("cantilever", False), ("clamped", True)):
+        basis = basis_for(strip.patch, edge, 6, 1)
+
+        force = Stretching(strip, basis).force(np.full((6, 1), 1e-3))
+
+        assert bool(np.abs(force).max() > 1.0) == stretched
+        assert stretched or not force.any()

@@ -583,6 +583,28 @@ def test_a_disk_and_a_polygon_are_read_by_their_outline(saved) -> None:
         reconstruct(saved(outline=[[0, 0], [0.1, 0.1], [0.1, 0], [0, 0.1]]), (4, 4))
 
 
+def test_heights_of_a_cantilever_are_read_as_a_beams_under_a_load_at_its_tip(saved) -> None:
+    a, F_over_EI = 0.3, 0.5
+    x = (np.arange(12) + 0.5) * a / 12
+    path = saved(
+        size=[a],
+        positions=x[:, None],
+        curvature=None,
+        values=(F_over_EI * x**2 * (3 * a - x) / 6)[None],
+        element=np.arange(12),
+        quantity=np.full(12, "height"),
+        direction=np.zeros(12),
+    )
+
+    found = reconstruct(path, (10, 1), (7, 2), edge="cantilever")
+
+    at = found["grid_x"]
+    beam = F_over_EI * at**2 * (3 * a - at) / 6
+    np.testing.assert_allclose(found["w"][0, 0], beam, rtol=0, atol=1e-3 * beam[-1])
+    with pytest.raises(Refusal, match="among hinged, sliding, clamped, elastic; got 'cantilever'"):
+        reconstruct(saved(), (4, 4), edge="cantilever")
+
+
 def test_a_large_grid_is_read_by_fast_transforms_though_no_matrix_would_fit(tmp_path) -> None:
     patch = Patch(0.1, 0.1)
     layout, basis = SensorLayout.regular(patch, 128, 128), SineBasis(patch, 120, 120)

@@ -101,7 +101,32 @@ def test_files_that_a_scene_names_lie_beside_it(tmp_path):
     assert scene.duration == 2.0
 
 
+CANTILEVER = (
+    'format = 1\n[skin]\nshape = "strip"\nsize = [0.3, 0.02]\nedge = "cantilever"\n'
+    'rigidity = 2.0\n[elements]\ngrid = [6, 1]\nreads = ["height"]\n'
+    '[[touch]]\nwhat = "point"\nx = 0.3\ny = 0.01\nforce = 0.1\n'
+)
+
+
+def test_a_cantilever_moves_as_a_beam_under_a_load_at_its_tip():
+    scene = read(CANTILEVER)
+    x, a = scene.layout.positions[:, 0], 0.3
+
+    c = scene.plate.deflection(scene.loads, scene.basis).ravel()
+
+    beam = 0.1 * x**2 * (3 * a - x) / (6 * 2.0 * 0.02)
+    assert scene.layout.operator(scene.basis) @ c == pytest.approx(beam, rel=1e-3)
+
+
 WRONG = {
+    "a cantilever with two sides": (
+        CANTILEVER.replace('shape = "strip"', ""),
+        "among hinged, .*, elastic; got 'cantilever'",
+    ),
+    "a bent cantilever": (
+        CANTILEVER.replace("rigidity", "radius = 0.2\nrigidity"),
+        "among hinged, sliding, clamped; got 'cantilever'",
+    ),
     "an unknown key": (HEAD + "edeg = 'hinged'\n", "line 5: skin.edeg: .* did you mean edge?"),
     "an unknown table": (HEAD + "[elemnts]\ngrid = [4, 4]\n", "line 5: elemnts: .*mean elements?"),
     "an unknown effect": (HEAD + "[effects.creeep]\nshare = 0.1\n", "line 5: .*mean creep?"),

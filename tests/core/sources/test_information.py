@@ -280,6 +280,10 @@ BAD = {
         said(outline="disk", size=[0.1, 0.1], edge="elastic", grid=[3, 3]),
         "among hinged, clamped; got 'elastic'",
     ),
+    "cantilever with two sides": (
+        said(edge="cantilever"),
+        r"an edge of a patch of 0\.1 x 0\.08 m among hinged, .*, elastic; got 'cantilever'",
+    ),
     "edge unknown": (
         said(edge="glued"),
         "edge: expected one of hinged, .*, got 'glued'",

@@ -44,7 +44,7 @@ from kappaskin_app.features.scene.thumbnails import Thumbnails, ThumbnailStyle
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import Tasks
 from kappaskin_app.theme import FAINT, current, follow_look, grown
-from kappaskin_app.widgets.layout import scrolled
+from kappaskin_app.widgets.layout import Flow, scrolled
 from kappaskin_app.widgets.lettering import RIGHT
 from kappaskin_app.widgets.parts import ELLIPSIS, Label, button, in_a_row, text_label
 
@@ -160,11 +160,13 @@ _FOLDER = Path(str(files("kappaskin_resources"))) / "measured"
 MEASURED = {
     "&Ball in a gel": _FOLDER / "ball" / "ball.mcap",
     "C&lamped plate": _FOLDER / "plate" / "slopes.mcap",
+    "Fibre": _FOLDER / "fibre" / "fibre.mcap",
 }
 """Recordings of what others measured, by their titles."""
 _SOURCES = (
     "Replay the heights that a camera saw of a gel, pressed by a ball of 4.0 mm radius (9DTact).",
     "Replay the shape of a plate by its slopes, which a finite-element program computed (recolo).",
+    "Replay the shapes of a fibre held at one end, by the heights of 15 markers (motion capture).",
 )
 
 _RESIZE_DELAY = 200  # ms after the last change of size until pictures are painted
@@ -291,8 +293,9 @@ class GalleryPanel(QWidget):
         row.setContentsMargins(4, 2, 8, 4)
         scenes = QVBoxLayout()
         scenes.addWidget(self.cards, 1)
-        measured = in_a_row(heading, *self.measured)
-        measured.addStretch(1)
+        measured = Flow()
+        for widget in (heading, *self.measured):
+            measured.addWidget(widget)
         scenes.addLayout(measured)
         row.addLayout(scenes, 7)
         row.addWidget(details, 3)

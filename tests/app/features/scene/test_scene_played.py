@@ -154,13 +154,13 @@ def test_connecting_again_goes_on_with_the_scene_that_was_played(window, panel, 
 
 
 @pytest.mark.cases("0")
-@pytest.mark.parametrize("number", [0, 1])
+@pytest.mark.parametrize("number", [0, 1, 2])
 def test_what_others_measured_is_replayed(window, panel, until, number) -> None:
     file = list(MEASURED.values())[number]
     panel.gallery.measured[number].click()
     until(lambda: window.playback.summary is not None)
     assert window.playback.summary.path == file
-    sensor = "measured-ball", "measured-plate-slopes"
+    sensor = "measured-ball", "measured-plate-slopes", "measured-fibre"
     until(lambda: window.session.status.sensor.serial_number == sensor[number])
     until(lambda: np.isnan(window.session.estimate.contact.force))
     until(lambda: window.session.estimate.contact.present)
