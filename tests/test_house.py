@@ -34,8 +34,8 @@ LIMITS = {
     # calibration; datagrams, standard input and files. What others measured, in the gallery.
     # Studies, plans and hard cases of any reading; its colours, ranges and residuals in the window.
     # From Python: readings that a program pushes, estimates in its loop; plug-ins. Import of text,
-    # arrays, tables, bags of ROS 2 and MCAP files of others. Finite slopes in any readings; noises of
-    # their own; datagrams in recordings; pictures of maps. Cantilevers, and a fibre in the gallery.
+    # arrays, tables, bags of ROS 2 and MCAP files of others. Finite slopes in any readings; noises
+    # of their own; datagrams in recordings; pictures of maps. Cantilevers; a fibre in the gallery.
     "statements": 41_480,
     # _files: one way to read and write files; _text: text from outside; _plugins: what other
     # packages add. For all rooms and the app.

@@ -10,6 +10,7 @@ from kappaskin.frames import Estimate, Frame
 from kappaskin.health import HealthMonitor
 from kappaskin.live.pipelines import built
 from kappaskin.pipeline import Pipeline, Setup, usual_setup
+from kappaskin.recording import ReplayedSource
 from kappaskin.sensing import Sensor
 from kappaskin.sources import described_source, open_source
 
@@ -23,7 +24,7 @@ class Stream:
     Of the frames that the loop has not taken, the newest 64 wait; `dropped` counts the others. A
     source that waits itself, such as a file, drops none. `sensor` is the one connected, None until
     it is known. The loop ends with its source; it raises a `SourceError` where the connection is
-    lost, or nothing usable has come for three seconds.
+    lost, or nothing usable has come for three seconds. Estimates of a recording are computed anew.
     """
 
     def __init__(self, source: str, setup: Setup | None, trust: bool) -> None:
@@ -63,6 +64,8 @@ class Stream:
             self._waiting += frames
             if trouble := self._source.trouble:
                 raise SourceError(trouble)
+            if isinstance(self._source, ReplayedSource) and self._source.ended:
+                self.close()
         except Refusal as reason:
             self._failure = None if isinstance(reason, EndedSource) else reason
             self.close()

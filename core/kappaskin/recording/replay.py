@@ -239,6 +239,11 @@ class ReplayedSource:
         self._steps, self._moves = 1 if self._back else forward + max(frames, 1), True
 
     @property
+    def ended(self) -> bool:
+        """Whether there are no more frames."""
+        return self._next is None and not self._ready
+
+    @property
     def stands(self) -> bool:
         """Whether it is paused or at its end."""
         return not self._speed or self._next is None
@@ -316,8 +321,7 @@ class ReplayedSource:
                 break
             frames.append(self._give(self._ready.popleft()))
         if self._steps and self._last is not None:
-            over = self._next is None and not self._ready
-            self._steps = 0 if over else self._steps - len(frames)
+            self._steps = 0 if self.ended else self._steps - len(frames)
             if self._moves:
                 self._from, self._since = self._recording.seconds(self._last.mark[0]), self._clock()
         return frames
