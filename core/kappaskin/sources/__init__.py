@@ -27,6 +27,12 @@ from kappaskin.sources.pseudo_device import PseudoDevice as PseudoDevice
 from kappaskin.sources.pushed import FEED as FEED
 from kappaskin.sources.pushed import Feed as Feed
 from kappaskin.sources.pushed import feed as feed
+from kappaskin.sources.recognition import READS as READS
+from kappaskin.sources.recognition import NewSensor as NewSensor
+from kappaskin.sources.recognition import Recognised as Recognised
+from kappaskin.sources.recognition import Recogniser as Recogniser
+from kappaskin.sources.recognition import columns_of as columns_of
+from kappaskin.sources.recognition import description_text as description_text
 from kappaskin.sources.serial_source import SerialSource as SerialSource
 from kappaskin.sources.simulated import SimulatedSource as SimulatedSource
 from kappaskin.sources.simulated import VirtualClock as VirtualClock

@@ -1,0 +1,344 @@
+"""Recognition: what the lines of an unknown board are, and the description that follows."""
+
+import json
+import math
+from collections import Counter, deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import groupby
+from typing import Any, cast
+
+import numpy as np
+
+from kappaskin._toml import table
+from kappaskin.errors import Refusal
+from kappaskin.frames import Array
+from kappaskin.sources.description import Description, description_of
+from kappaskin.sources.lines import SEPARATORS, TIMES
+
+_KEPT, _JUDGED = 300, 40  # lines whose numbers are held, and by which their form is judged
+_LONGEST = 2**16  # bytes of a line
+_ALIKE, _TEXT = 0.8, 0.9  # share of lines of one form, and of bytes that are text
+_SPAN = 0.5  # s that times are compared with those of arrival
+_OFF = 0.1  # share by which the rate of a clock may differ
+_SPOKEN = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces"}
+_UNITS = {"time": "s", "time_ms": "ms", "time_us": "\N{MICRO SIGN}s"}
+_PRINTED = frozenset(range(32, 127)) | frozenset(b"\t\r\n")
+
+_BINARY = (
+    "The bytes are no text: another baud rate, or binary records, which a file describes (guide: "
+    "Your own sensor)."
+)
+_COMMA = "The numbers have a decimal comma; let the board print a point."
+_WORDS = "The lines are no numbers; let the board print numbers alone, the same count in each line."
+
+
+@dataclass(frozen=True, eq=False)
+class Recognised:
+    """What is recognised of lines: their `kind`, text or json, empty until there are enough.
+
+    Each has a number for each of `labels`, as `numbers` (n, columns) of the newest lines; of JSON
+    `paths` has the key of each value and how many numbers it has. `rate` in 1/s is that of lines.
+    `roles` are what columns are found to be: a time, `sequence`, empty for a constant; None for
+    others. `trouble` says what it is instead, and what to do.
+    """
+
+    kind: str = ""
+    separator: str = ""
+    labels: tuple[str, ...] = ()
+    paths: tuple[tuple[str, int], ...] = ()
+    rate: float = math.nan
+    numbers: Array = field(default_factory=lambda: np.empty((0, 0)))
+    roles: tuple[str | None, ...] = ()
+    trouble: str = ""
+
+    @property
+    def text(self) -> str:
+        """What is recognised, in a sentence."""
+        if not self.kind:
+            return self.trouble or "Waiting for lines."
+        how = f"separated by {_SPOKEN[self.separator]}" if self.separator else "in each line"
+        what = "Numbers" if self.kind == "text" else "A JSON object"
+        parts = [f"{what} {how}", f"{len(self.labels)} columns", f"{self.rate:.0f} lines/s"]
+        for place, role in enumerate(self.roles):
+            if role in TIMES:
+                parts.append(f"column {place} is the time in {_UNITS[role]}")
+            elif role == "sequence":
+                parts.append(f"column {place} counts the lines")
+        return "; ".join(parts) + "."
+
+
+class Recogniser:
+    """Finds out from bytes as they arrive what the lines of a board are; never raises."""
+
+    def __init__(self) -> None:
+        self.lines = deque[tuple[float, str]](maxlen=_KEPT)
+        """The newest lines, with the time of their arrival in s."""
+        self._buffer, self._first = b"", True
+        self._bytes = Counter[bool]()  # whether they are text
+
+    def feed(self, now: float, data: bytes) -> None:
+        """Take bytes that arrived at the time `now` in s."""
+        self._bytes.update(byte in _PRINTED for byte in data[:_LONGEST])
+        *lines, self._buffer = (self._buffer + data).split(b"\n")
+        self._buffer = self._buffer[-_LONGEST:]
+        for line in lines:
+            if not self._first and line.strip():
+                self.lines.append((now, line[:_LONGEST].decode(errors="replace").strip()))
+            self._first = False  # of which the beginning may be missing
+
+    def forget(self) -> None:
+        """Begin anew, as after another baud rate."""
+        self.__init__()
+
+    @property
+    def garbled(self) -> bool:
+        """Whether much of what came is no text."""
+        return self._bytes[True] < _TEXT * self._bytes.total()
+
+    def found(self) -> Recognised:
+        """What is recognised up to now."""
+        if self.garbled:
+            return Recognised(trouble=_BINARY)
+        lines = [line for _, line in self.lines]
+        if len(lines) < 3:
+            return Recognised()
+        for find in (_json, _text):
+            if (found := find(lines)) is not None:
+                return self._measured(*found)
+        judged = lines[-_JUDGED:]
+        comma = sum(any(c in line for c in ";\t ") and "," in line for line in judged)
+        return Recognised(trouble=_COMMA if comma > len(judged) / 2 and _commas(judged) else _WORDS)
+
+    def _measured(
+        self,
+        kind: str,
+        separator: str,
+        labels: tuple[str, ...],
+        paths: tuple[tuple[str, int], ...],
+        rows: list[list[float] | None],
+    ) -> Recognised:
+        """With the rate, and what the columns are by their course."""
+        times = np.array([now for now, _ in self.lines])
+        there = [place for place, row in enumerate(rows) if row is not None]
+        numbers = np.array([rows[place] for place in there], float).reshape(len(there), -1)
+        times, span = times[there], float(times[there[-1]] - times[there[0]])
+        rate = (len(there) - 1) / span if span > 0 else math.nan
+        roles = _roles(numbers, times) if span > _SPAN else (None,) * len(labels)
+        return Recognised(kind, separator, labels, paths, rate, numbers, roles)
+
+
+_Form = tuple[str, str, tuple[str, ...], tuple[tuple[str, int], ...], list[list[float] | None]]
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text) if "_" not in text else None
+    except ValueError:
+        return None if text else math.nan
+
+
+def _text(lines: list[str]) -> _Form | None:
+    """Lines of numbers by the separator that gives most of them."""
+    best: tuple[int, str] | None = None
+    for separator in SEPARATORS:
+        counts = Counter(
+            len(row) for line in lines[-_JUDGED:] if (row := _row(line, separator)) is not None
+        )
+        if not counts:
+            continue
+        count, often = counts.most_common(1)[0]
+        if often >= _ALIKE * len(lines[-_JUDGED:]) and (best is None or count > best[0]):
+            best = count, separator
+    if best is None:
+        return None
+    count, separator = best
+    rows = [
+        row if row and len(row) == count else None for row in (_row(x, separator) for x in lines)
+    ]
+    return "text", separator, _headed(lines, separator, count), (), rows
+
+
+def _row(line: str, separator: str) -> list[float] | None:
+    """The numbers of a line; None where it has anything else."""
+    parts = line.split() if separator == " " else line.split(separator)
+    numbers = [_number(part.strip()) for part in parts]
+    return None if None in numbers else cast("list[float]", numbers)
+
+
+def _headed(lines: list[str], separator: str, count: int) -> tuple[str, ...]:
+    """The names of columns in a heading, if there was one, else their numbers."""
+    for line in lines:
+        parts = [part.strip(' "') for part in line.split(separator if separator != " " else None)]
+        if len(parts) == count and all(part and _number(part) is None for part in parts):
+            return tuple(parts)
+    return tuple(str(place) for place in range(count))
+
+
+def _json(lines: list[str]) -> _Form | None:
+    """Lines with a JSON object, by the keys of its numbers and lists of them."""
+    found = [_leaves(line) for line in lines]
+    forms = Counter(tuple((p, len(v)) for p, v in leaves) for leaves in found[-_JUDGED:] if leaves)
+    if not forms:
+        return None
+    paths, often = forms.most_common(1)[0]
+    if often < _ALIKE * len(found[-_JUDGED:]):
+        return None
+    labels = [path if count == 1 else f"{path}[{k}]" for path, count in paths for k in range(count)]
+    rows = [
+        [number for _, values in leaves for number in values]
+        if leaves and tuple((p, len(v)) for p, v in leaves) == paths
+        else None
+        for leaves in found
+    ]
+    return "json", "", tuple(labels), paths, rows
+
+
+def _leaves(line: str) -> list[tuple[str, list[float]]] | None:
+    """Every number, or list of numbers, of an object with the path of its keys."""
+    try:
+        value = json.loads(line)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(value, dict):
+        return None
+    found: list[tuple[str, list[float]]] = []
+    waiting: list[tuple[str, Any]] = [("", value)]
+    while waiting:
+        path, value = waiting.pop(0)
+        values = cast("list[Any]", value if isinstance(value, list) else [value])
+        if isinstance(value, dict):
+            inside = cast("dict[str, Any]", value)
+            waiting += [(f"{path}.{key}" if path else key, inside[key]) for key in inside]
+        elif values and all(type(each) in (int, float) or each is None for each in values):
+            found.append((path, [math.nan if v is None else float(v) for v in values]))
+    return found or None
+
+
+def _commas(lines: list[str]) -> bool:
+    """Whether lines are numbers but for a comma in place of the point."""
+    return any(
+        all(_row(line.replace(",", "."), separator) for line in lines)
+        for separator in (";", "\t", " ")
+    )
+
+
+def _roles(numbers: Array, times: Array) -> tuple[str | None, ...]:
+    """What each column of `numbers` (n, columns) is by its course over `times` (n,) in s."""
+    passed = float(times[-1] - times[0])
+    roles: list[str | None] = []
+    for column in numbers.T:
+        steps, role = np.diff(column), None
+        if not np.isfinite(column).any() or np.nanmin(column) == np.nanmax(column):
+            role = ""
+        elif np.all(steps >= 0) and np.isfinite(column).all() and steps.any():
+            units = {name: passed / unit for name, unit in TIMES.items()}
+            near = {n: abs((column[-1] - column[0]) / each - 1) for n, each in units.items()}
+            name = min(near, key=near.__getitem__)
+            role = name if near[name] < _OFF else "sequence" if np.all(steps == 1) else None
+        roles.append(role)
+    for single in (TIMES, ("sequence",)):
+        there = [place for place, role in enumerate(roles) if role in single]
+        for place in there[1:]:
+            roles[place] = ""
+    return tuple(roles)
+
+
+READS: Mapping[str, tuple[str, ...]] = {
+    "Heights": ("height",),
+    "Slopes along x": ("slope@0",),
+    "Slopes along x and y": ("slope@0", "slope@90"),
+    "Curvatures along x": ("xx",),
+    "Curvatures xx and yy": ("xx", "yy"),
+    "Curvatures xx, yy and xy": ("xx", "yy", "xy"),
+}
+"""What the elements of a sensor usually read, by its name on the screen."""
+
+
+def columns_of(found: Recognised, reads: tuple[str, ...], interleaved: bool) -> tuple[str, ...]:
+    """The meaning of each column where its elements read `reads`, and times are as recognised.
+
+    All readings of one kind stand together, or all of one element where they are `interleaved`.
+    Columns beyond a whole number of elements are ignored.
+    """
+    roles = found.roles or (None,) * len(found.labels)
+    places = [place for place, role in enumerate(roles) if role is None]
+    count, columns = len(places) // len(reads), [role or "" for role in roles]
+    for n, place in enumerate(places[: count * len(reads)]):
+        kind, element = (n % len(reads), n // len(reads)) if interleaved else divmod(n, count)
+        columns[place] = f"{reads[kind]}:{element}"
+    return tuple(columns)
+
+
+@dataclass(frozen=True)
+class NewSensor:
+    """What a person says of a sensor: its `title`, `size` (2,) in m, `grid`, `columns`.
+
+    A reading is `scale` times the number, in SI. Without a `rigidity` in N m its material is
+    unknown; with a `free` zero each frame has an unknown offset.
+    """
+
+    title: str
+    size: tuple[float, float]
+    grid: tuple[int, int]
+    columns: tuple[str, ...]
+    scale: float = 1.0
+    rigidity: float | None = None
+    free: bool = False
+    baud: int = 115_200
+
+
+def description_text(found: Recognised, sensor: NewSensor) -> str:
+    """The text of the description of a `sensor` whose lines are as `found`, checked.
+
+    A `Refusal` names what is wrong with it.
+    """
+    line: dict[str, Any] = {"kind": found.kind}
+    if found.kind == "json":
+        at, fields = 0, dict[str, str]()
+        for path, count in found.paths:
+            joined = _joined(sensor.columns[at : at + count])
+            if len(joined) > 1:
+                raise Refusal(f"expected readings of one kind in {path}, got {', '.join(joined)}")
+            if joined[0] or count > 1:
+                fields[path] = joined[0]
+            at += count
+        line["fields"] = {key: text for key, text in fields.items() if text}
+    else:
+        line |= {"separator": found.separator, "columns": _joined(sensor.columns)}
+    skin = {"size": list(sensor.size)} | (
+        {} if sensor.rigidity is None else {"rigidity": sensor.rigidity}
+    )
+    readings: dict[str, Any] = {"scale": sensor.scale}
+    if sensor.free:
+        readings["datum"] = "free"
+    parts = (
+        table("", {"format": 1, "title": sensor.title}),
+        table("[skin]", skin, {"size": "m", "rigidity": "N m"}),
+        table("[elements]", {"grid": list(sensor.grid)}),
+        table("[line]", line | {"baud": sensor.baud}),
+        table("[readings]", readings),
+    )
+    text = "\n".join(parts)
+    described(text)
+    return text
+
+
+def described(text: str) -> Description:
+    """The description with this text, of no file yet; a `Refusal` where it is none."""
+    return description_of(text, "new sensor")
+
+
+def _joined(columns: tuple[str, ...]) -> list[str]:
+    """The columns with ranges of elements, as a description has them."""
+    joined: list[str] = []
+
+    def run(each: tuple[int, str]) -> tuple[str, int]:
+        what, found, element = each[1].partition(":")
+        return what, each[0] - int(element) if found else -1 - each[0]
+
+    for (what, _), group in groupby(enumerate(columns), run):
+        names = [name for _, name in group]
+        first, last = (name.partition(":")[2] for name in (names[0], names[-1]))
+        joined.append(f"{what}:{first}..{last}" if len(names) > 1 else names[0])
+    return joined
