@@ -22,8 +22,8 @@ LIMITS = {
     # mechanics: shell and stretching; contact: influence, stretched, lower_bound, imprint;
     # studies: summed; sources: interpreter, lines of other formats, a sensor's description, inputs,
     # readings that a program pushes; live: the loop of a program; recording: foreign and importing,
-    # files of other programs; _plugins.
-    "modules": 345,
+    # files of other programs; _plugins. Recognition of a board's lines, and the dialog of it.
+    "modules": 347,
     # Shells and plates that stretch, a load's size, slopes on shells, revisions of estimates;
     # ovals beside objects, and whether an object fits; errors told beforehand, of calibrations on
     # other paths, and of effects that act on one another.
@@ -36,7 +36,8 @@ LIMITS = {
     # From Python: readings that a program pushes, estimates in its loop; plug-ins. Import of text,
     # arrays, tables, bags of ROS 2 and MCAP files of others. Finite slopes in any readings; noises
     # of their own; datagrams in recordings; pictures of maps. Cantilevers; a fibre in the gallery.
-    "statements": 41_480,
+    # The connection wizard: what a board's lines are, from the port to the live skin.
+    "statements": 42_110,
     # _files: one way to read and write files; _text: text from outside; _plugins: what other
     # packages add. For all rooms and the app.
     "loose modules of core": 11,

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Collection
 from dataclasses import fields, replace
+from difflib import get_close_matches
 from functools import partial
 from importlib.resources import files
 from os.path import isfile
@@ -349,7 +350,7 @@ def _effects(
     with table.blamed("choose"):
         choice = _choice(table, accuracy)
     for name in table:
-        if name not in EFFECTS and table.is_table(name):
+        if table.is_table(name) and not get_close_matches(name, EFFECTS):
             why = _plugins.left_out(_plugins.EFFECTS, name)
             raise table.refusal(f"expected effects among {', '.join(EFFECTS)}{why}", name)
     table.done(*EFFECTS)

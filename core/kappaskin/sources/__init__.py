@@ -29,6 +29,7 @@ from kappaskin.sources.pushed import Feed as Feed
 from kappaskin.sources.pushed import feed as feed
 from kappaskin.sources.recognition import READS as READS
 from kappaskin.sources.recognition import NewSensor as NewSensor
+from kappaskin.sources.recognition import RawLines as RawLines
 from kappaskin.sources.recognition import Recognised as Recognised
 from kappaskin.sources.recognition import Recogniser as Recogniser
 from kappaskin.sources.recognition import columns_of as columns_of

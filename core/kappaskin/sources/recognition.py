@@ -2,19 +2,23 @@
 
 import json
 import math
+import time
 from collections import Counter, deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from itertools import groupby
+from functools import partial
+from itertools import cycle, groupby
 from typing import Any, cast
 
 import numpy as np
 
 from kappaskin._toml import table
-from kappaskin.errors import Refusal
+from kappaskin.errors import Refusal, SourceError
 from kappaskin.frames import Array
 from kappaskin.sources.description import Description, description_of
+from kappaskin.sources.inputs import UDP, Datagrams
 from kappaskin.sources.lines import SEPARATORS, TIMES
+from kappaskin.sources.ports import BAUD_RATES, SerialConnection
 
 _KEPT, _JUDGED = 300, 40  # lines whose numbers are held, and by which their form is judged
 _LONGEST = 2**16  # bytes of a line
@@ -24,6 +28,10 @@ _OFF = 0.1  # share by which the rate of a clock may differ
 _SPOKEN = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces"}
 _UNITS = {"time": "s", "time_ms": "ms", "time_us": "\N{MICRO SIGN}s"}
 _PRINTED = frozenset(range(32, 127)) | frozenset(b"\t\r\n")
+
+_RATES = (115_200, 9600, 57_600, 38_400, 19_200, *BAUD_RATES)
+_DWELL, _RETRY = 0.8, 1.0  # s of garbled bytes before another rate; s between two tries to open
+_ENOUGH = 64  # bytes by which they are judged
 
 _BINARY = (
     "The bytes are no text: another baud rate, or binary records, which a file describes (guide: "
@@ -94,7 +102,7 @@ class Recogniser:
     @property
     def garbled(self) -> bool:
         """Whether much of what came is no text."""
-        return self._bytes[True] < _TEXT * self._bytes.total()
+        return self._bytes.total() >= _ENOUGH and self._bytes[True] < _TEXT * self._bytes.total()
 
     def found(self) -> Recognised:
         """What is recognised up to now."""
@@ -342,3 +350,54 @@ def _joined(columns: tuple[str, ...]) -> list[str]:
         first, last = (name.partition(":")[2] for name in (names[0], names[-1]))
         joined.append(f"{what}:{first}..{last}" if len(names) > 1 else names[0])
     return joined
+
+
+class RawLines:
+    """Lines of an unknown board on a port, or at a URL; opened again whenever it is gone.
+
+    `recogniser` has what came since it was there, at the `baud` rate that gave text. `poll` is to
+    be called a few times a second; `trouble` says why nothing comes.
+    """
+
+    def __init__(self, url: str, clock: Callable[[], float] = time.monotonic) -> None:
+        self.url, self._clock = url, clock
+        self.recogniser, self.trouble = Recogniser(), ""
+        self._rates = cycle(_RATES)
+        self.baud = next(self._rates)
+        self._connection: SerialConnection | None = None
+        self._next_try = self._since = -math.inf
+
+    def poll(self) -> None:
+        """Take what arrived."""
+        now = self._clock()
+        if self._connection is None:
+            if now >= self._next_try:
+                self._open(now)
+            return
+        lost = self._connection.lost
+        for arrived, data in self._connection.take(0.0):
+            self.recogniser.feed(arrived, data)
+        if lost and self._connection.empty:
+            self.trouble = f"{self.url}: connection lost; plug the board in again."
+            self.close()
+        elif self.recogniser.garbled and now - self._since > _DWELL:
+            self.baud, self._since = next(self._rates), now
+            self._connection.set_baud_rate(self.baud)
+            self.recogniser.forget()
+
+    def _open(self, now: float) -> None:
+        self._next_try, self._since = now + _RETRY, now
+        opened = partial(Datagrams, self.url, self._clock) if self.url.startswith(UDP) else None
+        try:
+            self._connection = SerialConnection(self.url, self._clock, self.baud, opened)
+        except SourceError as error:
+            self.trouble = f"{error}; retrying."
+            return
+        self.trouble = ""
+        self.recogniser.forget()
+
+    def close(self) -> None:
+        """Let go of the port."""
+        if self._connection is not None:
+            self._connection.close()
+            self._connection = None

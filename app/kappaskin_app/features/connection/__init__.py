@@ -5,8 +5,9 @@ from pathlib import Path
 from PySide6.QtWidgets import QFileDialog
 
 from kappaskin.live import ResumeInfo
-from kappaskin.sources import described_source, is_description, load_description
+from kappaskin.sources import described_source, is_description, load_description, parts_of
 from kappaskin_app.features.connection.panel import ConnectionPanel, PortSearch
+from kappaskin_app.features.connection.wizard import NewSensorDialog
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.opening import Kind
 from kappaskin_app.shell.pages import LIVE
@@ -18,6 +19,7 @@ _SIMULATE = "Connect the simulated skin that the panels define"
 _CONNECT = "Connect the source selected under Connection"
 _DISCONNECT = "Close the source; the last readings stay visible, marked as lost"
 _OPEN = "Connect a sensor with a line format of its own, described in a file (.toml)"
+_NEW = "Describe a board that prints numbers, from the lines that it sends"
 _FILES = "Sensor description (*.toml)"
 _PORTS = "Search for serial ports; the list is also updated every second"
 
@@ -40,6 +42,12 @@ class ConnectionFeature:
         add("connect", SOURCE, "&Connect", self._connect, "Ctrl+Return", _CONNECT)
         add("disconnect", SOURCE, "&Disconnect", session.disconnect_from, "Ctrl+D", _DISCONNECT)
         add("ports", SOURCE, "Re&fresh ports", self.port_search.refresh, "F5", _PORTS)
+        self.new_sensor = NewSensorDialog(shell.tasks, shell)
+        self.new_sensor.opening.connect(guarded(self._free))
+        self.new_sensor.made.connect(guarded(self._connect_new))
+        self.connection.new_requested.connect(guarded(self.new_sensor.begin))
+        shell.closing.connect(guarded(self.new_sensor.reject))
+        add("new-sensor", SOURCE, f"&New sensor{ELLIPSIS}", self.new_sensor.begin, "", _NEW)
         add("open-sensor", FILE, f"Open &sensor{ELLIPSIS}", self._open, "", _OPEN)
         shell.opening.add(
             Kind("sensor description", (".toml",), self._connect_described, is_description)
@@ -76,6 +84,17 @@ class ConnectionFeature:
         else:
             self._show()
             self._shell.notify("Type the port of this sensor behind its description, then connect")
+
+    def _free(self, port: str) -> None:
+        """Let go of a port that the dialog is to read."""
+        source = self._session.engine.source or ""
+        if port in (source, parts_of(source)[1]):
+            self._session.disconnect_from()
+
+    def _connect_new(self, file: Path, port: str) -> None:
+        """Connect the sensor at a port that a new file describes."""
+        self._shell.opening.note(file)
+        self._session.request_source(described_source(file.absolute(), port))
 
     def _show(self) -> None:
         """Show the panel with the focus on the list of sources."""

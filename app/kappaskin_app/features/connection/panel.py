@@ -23,7 +23,7 @@ from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.form import pass_window_keys
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.settings import calibration_text
-from kappaskin_app.widgets.parts import Label, plain_tip
+from kappaskin_app.widgets.parts import ELLIPSIS, Label, plain_tip
 from kappaskin_app.widgets.text import COMMAND, day
 
 _PERIOD = 1000  # ms between two searches
@@ -76,6 +76,7 @@ class ConnectionPanel(Panel):
     connect_requested = Signal(str)
     disconnect_requested = Signal()
     refresh_requested = Signal()
+    new_requested = Signal()
 
     def __init__(self) -> None:
         super().__init__("Connection")
@@ -110,11 +111,16 @@ class ConnectionPanel(Panel):
         self.sources.setCompleter(None)  # pyright: ignore[reportArgumentType]
         self.disconnect_button.clicked.connect(self.disconnect_requested)
         self.refresh_button.clicked.connect(self.refresh_requested)
+        self.new_button = QPushButton(f"New sensor{ELLIPSIS}")
+        self.new_button.setObjectName("new_sensor_button")
+        self.new_button.setToolTip("Describe a board that prints numbers, from its lines.")
+        self.new_button.clicked.connect(lambda *_: self.new_requested.emit())
         buttons = QHBoxLayout()
         for button in (self.connect_button, self.disconnect_button, self.refresh_button):
             buttons.addWidget(button)
         self.body.addWidget(self.sources)
         self.body.addLayout(buttons)
+        self.body.addWidget(self.new_button)
         self.body.addWidget(self.device)
         self.body.addWidget(self.losses)
         self._around.addWidget(self.copy_button, alignment=Qt.AlignmentFlag.AlignRight)

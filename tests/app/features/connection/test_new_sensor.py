@@ -1,0 +1,182 @@
+"""A board that nobody described, from its lines to a live skin, by mouse and keys."""
+
+import os
+import threading
+import time
+import tomllib
+from contextlib import suppress
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QFileDialog
+
+from kappaskin.sources import load_description
+
+tty = pytest.importorskip("tty", reason="no pseudo-terminals on this system")
+pytestmark = pytest.mark.slow
+M, N, RATE = 4, 3, 100.0
+
+
+class Board:
+    """Prints milliseconds and the heights of 4 x 3 elements in um; `pressed` is one of them."""
+
+    def __init__(self) -> None:
+        self.pressed: int | None = None
+        self.over = threading.Event()
+        self._begun = time.monotonic()
+        self.plug()
+
+    def plug(self) -> None:
+        self._ours, theirs = os.openpty()
+        tty.setraw(theirs)
+        os.set_blocking(self._ours, False)
+        self.port = os.ttyname(theirs)
+        self._theirs = theirs
+        self.over.clear()
+        self._thread = threading.Thread(target=self._print)
+        self._thread.start()
+
+    def _print(self) -> None:
+        rng = np.random.default_rng(0)
+        while not self.over.wait(1 / RATE):
+            heights = rng.normal(0, 1.0, M * N)
+            if self.pressed is not None:
+                heights[self.pressed] += 200.0
+            numbers = [1e3 * (time.monotonic() - self._begun), *heights]
+            line = ",".join(f"{number:.2f}" for number in numbers) + "\n"
+            with suppress(BlockingIOError):  # nobody reads
+                os.write(self._ours, line.encode())
+
+    def unplug(self) -> None:
+        self.over.set()
+        self._thread.join()
+        os.close(self._ours)
+        os.close(self._theirs)
+
+
+@pytest.fixture
+def board():
+    made = Board()
+    yield made
+    if not made.over.is_set():
+        made.unplug()
+
+
+def click(widget) -> None:
+    QTest.mouseClick(widget, Qt.MouseButton.LeftButton)
+
+
+def typed(widget, text: str) -> None:
+    widget.setFocus()
+    QTest.keyClick(widget, Qt.Key.Key_A, Qt.KeyboardModifier.ControlModifier)
+    QTest.keyClicks(widget, text)
+
+
+def test_a_board_becomes_a_live_skin(window, until, board, tmp_path, monkeypatch) -> None:
+    file = tmp_path / "glove.toml"
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(file), ""))
+    click(window.connection.new_button)
+    dialog = window.new_sensor
+    until(dialog.isVisible)
+    typed(dialog.ports.lineEdit(), board.port)
+    QTest.keyClick(dialog.ports.lineEdit(), Qt.Key.Key_Return)
+    until(lambda: "13 columns" in dialog.fact.text() and "time in ms" in dialog.fact.text())
+    assert "separated by commas" in dialog.fact.text()
+    assert "," in dialog.raw.toPlainText()
+
+    click(dialog.next)
+    until(lambda: dialog.table.rowCount() == 13 and len(dialog.found.numbers) > 100)
+    assert dialog.table.item(0, 4).text() == "time_ms"
+    assert dialog.table.item(1, 4).text() == "height:0"
+    assert dialog.answering() == []
+    board.pressed = 7
+    until(lambda: dialog.answering() == [8])
+    board.pressed = None
+
+    click(dialog.next)
+    typed(dialog.name, "Glove")
+    typed(dialog.sides[0].lineEdit(), "20")
+    typed(dialog.sides[1].lineEdit(), "15")
+    assert [box.value() for box in dialog.grid] == [M, N]
+    until(dialog.next.isEnabled)
+    click(dialog.next)
+
+    until(lambda: window.session.status.sensor.name == "Glove")
+    described = tomllib.loads(file.read_text())
+    assert described["skin"]["size"] == [0.02, 0.015]
+    assert described["line"]["columns"] == ["time_ms", "height:0..11"]
+    assert described["readings"]["scale"] == 1e-6
+    assert load_description(file).sensor.name == "Glove"
+    until(lambda: window.display.badge.state == "LIVE")
+    assert not dialog.isVisible()
+
+
+def test_columns_are_set_by_selection_and_what_cannot_be_is_said(window, until, board) -> None:
+    window.actions_by_name["new-sensor"].trigger()
+    dialog = window.new_sensor
+    typed(dialog.ports.lineEdit(), board.port)
+    click(dialog.read)
+    until(lambda: dialog.next.isEnabled() and dialog.found.roles[:1] == ("time_ms",))
+    click(dialog.next)
+    dialog.table.selectRow(1)
+    dialog.meaning.setCurrentText("Ignored")
+    click(dialog.assign)
+    assert dialog.table.item(1, 4).text() == "ignored"
+    dialog.table.selectRow(2)
+    QTest.keyClick(dialog.table, Qt.Key.Key_Down, Qt.KeyboardModifier.ShiftModifier)
+    dialog.meaning.setCurrentText("Slope along y")
+    dialog.element.setValue(5)
+    click(dialog.assign)
+    assert dialog.columns[2:5] == ("slope@90:5", "slope@90:6", "height:3")
+    click(dialog.next)
+    until(lambda: "noise" in dialog.fact.text() or "unit" in dialog.fact.text())
+    assert not dialog.next.isEnabled()
+    click(dialog.back)
+    dialog.reads.setCurrentText("Slopes along x")
+    dialog.reads.activated.emit(0)
+    click(dialog.next)
+    dialog.grid[0].setValue(1)
+    until(lambda: "Expected elements from 0 to" in dialog.fact.text())
+    QTest.keyClick(dialog, Qt.Key.Key_Escape)
+    assert not dialog.isVisible()
+
+
+def test_unplugged_in_the_middle_it_says_so_and_goes_on(window, until, tmp_path) -> None:
+    board = Board()
+    link = tmp_path / "ttyBoard"
+    link.symlink_to(board.port)
+    dialog = window.new_sensor
+    dialog.begin()
+    typed(dialog.ports.lineEdit(), str(link))
+    click(dialog.read)
+    until(lambda: "time in ms" in dialog.fact.text())
+    click(dialog.next)
+    dialog.table.selectRow(1)
+    dialog.meaning.setCurrentText("Ignored")
+    click(dialog.assign)
+    board.unplug()
+    until(lambda: "plug the board in again" in dialog.fact.text())
+    link.unlink()
+    until(lambda: "retrying" in dialog.fact.text())
+    board.plug()
+    link.symlink_to(board.port)
+    until(lambda: "13 columns" in dialog.fact.text() and dialog.lines.trouble == "")
+    assert dialog.columns[:3] == ("time_ms", "", "height:1")
+    board.unplug()
+    dialog.reject()
+
+
+def test_a_port_that_is_plugged_in_is_read_by_itself(window, until, board) -> None:
+    from kappaskin.sources import Port
+
+    dialog = window.new_sensor
+    dialog.begin()
+    dialog.show_ports([Port("/dev/ttyS0")])
+    assert dialog.lines is None
+    dialog.show_ports([Port("/dev/ttyS0"), Port(board.port)])
+    until(lambda: "13 columns" in dialog.fact.text())
+    assert dialog.ports.currentText() == board.port
+    dialog.close()
+    assert dialog.lines is None
