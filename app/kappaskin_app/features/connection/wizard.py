@@ -267,7 +267,7 @@ class NewSensorDialog(QDialog):
             (self.reads, "What each element reads; the columns are guessed by it."),
             (self.order, "How the readings of several kinds follow each other in a line."),
             (self.table, "A row for each column. Select rows to change what they are."),
-            (self.meaning, "What the selected columns are."),
+            (self.meaning, "What they are, once Set is pressed."),
             (self.element, "Element of the first selected column; the next ones follow."),
             (self.name, "Name of the sensor, shown wherever it is connected."),
             (self.sides[0], "Length of the skin in x."),
