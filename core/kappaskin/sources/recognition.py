@@ -8,10 +8,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import cycle, groupby
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
+from kappaskin._files import open_file
 from kappaskin._toml import table
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.frames import Array
@@ -32,6 +34,8 @@ _PRINTED = frozenset(range(32, 127)) | frozenset(b"\t\r\n")
 _RATES = (115_200, 9600, 57_600, 38_400, 19_200, *BAUD_RATES)
 _DWELL, _RETRY = 0.8, 1.0  # s of garbled bytes before another rate; s between two tries to open
 _ENOUGH = 64  # bytes by which they are judged
+_HEADING = 8  # first lines among which a heading may be
+_HEAD = 2**19  # bytes of a file that are looked at
 
 _BINARY = (
     "The bytes are no text: another baud rate, or binary records, which a file describes (guide: "
@@ -67,7 +71,8 @@ class Recognised:
             return self.trouble or "Waiting for lines."
         how = f"separated by {_SPOKEN[self.separator]}" if self.separator else "in each line"
         what = "Numbers" if self.kind == "text" else "A JSON object"
-        parts = [f"{what} {how}", f"{len(self.labels)} columns", f"{self.rate:.0f} lines/s"]
+        parts = [f"{what} {how}", f"{len(self.labels)} columns"]
+        parts += [f"{self.rate:.0f} lines/s"] if math.isfinite(self.rate) else []
         for place, role in enumerate(self.roles):
             if role in TIMES:
                 parts.append(f"column {place} is the time in {_UNITS[role]}")
@@ -77,12 +82,16 @@ class Recognised:
 
 
 class Recogniser:
-    """Finds out from bytes as they arrive what the lines of a board are; never raises."""
+    """Finds out from bytes as they arrive what the lines of a board are; never raises.
 
-    def __init__(self) -> None:
+    Those of a file have not `arrived`: their times cannot be compared with a clock.
+    """
+
+    def __init__(self, arrived: bool = True) -> None:
+        self._arrived = arrived
         self.lines = deque[tuple[float, str]](maxlen=_KEPT)
         """The newest lines, with the time of their arrival in s."""
-        self._buffer, self._first = b"", True
+        self._buffer, self._first, self._head = b"", True, list[str]()
         self._bytes = Counter[bool]()  # whether they are text
 
     def feed(self, now: float, data: bytes) -> None:
@@ -91,13 +100,15 @@ class Recogniser:
         *lines, self._buffer = (self._buffer + data).split(b"\n")
         self._buffer = self._buffer[-_LONGEST:]
         for line in lines:
-            if not self._first and line.strip():
-                self.lines.append((now, line[:_LONGEST].decode(errors="replace").strip()))
+            if not (self._first and self._arrived) and line.strip():
+                text = line[:_LONGEST].decode(errors="replace").strip()
+                self.lines.append((now, text))
+                self._head += [text] * (len(self._head) < _HEADING)
             self._first = False  # of which the beginning may be missing
 
     def forget(self) -> None:
         """Begin anew, as after another baud rate."""
-        self.__init__()
+        self.__init__(self._arrived)
 
     @property
     def garbled(self) -> bool:
@@ -111,9 +122,8 @@ class Recogniser:
         lines = [line for _, line in self.lines]
         if len(lines) < 3:
             return Recognised()
-        for find in (_json, _text):
-            if (found := find(lines)) is not None:
-                return self._measured(*found)
+        if (found := _json(lines) or _text(lines, self._head)) is not None:
+            return self._measured(*found)
         judged = lines[-_JUDGED:]
         comma = sum(any(c in line for c in ";\t ") and "," in line for line in judged)
         return Recognised(trouble=_COMMA if comma > len(judged) / 2 and _commas(judged) else _WORDS)
@@ -132,7 +142,9 @@ class Recogniser:
         numbers = np.array([rows[place] for place in there], float).reshape(len(there), -1)
         times, span = times[there], float(times[there[-1]] - times[there[0]])
         rate = (len(there) - 1) / span if span > 0 else math.nan
-        roles = _roles(numbers, times) if span > _SPAN else (None,) * len(labels)
+        roles: tuple[str | None, ...] = (None,) * len(labels)
+        if span > _SPAN or not self._arrived:
+            roles = _roles(numbers, span if self._arrived else math.nan)
         return Recognised(kind, separator, labels, paths, rate, numbers, roles)
 
 
@@ -146,8 +158,8 @@ def _number(text: str) -> float | None:
         return None if text else math.nan
 
 
-def _text(lines: list[str]) -> _Form | None:
-    """Lines of numbers by the separator that gives most of them."""
+def _text(lines: list[str], head: list[str]) -> _Form | None:
+    """Lines of numbers by the separator that gives most of them; a heading may be in the `head`."""
     best: tuple[int, str] | None = None
     for separator in SEPARATORS:
         counts = Counter(
@@ -164,7 +176,7 @@ def _text(lines: list[str]) -> _Form | None:
     rows = [
         row if row and len(row) == count else None for row in (_row(x, separator) for x in lines)
     ]
-    return "text", separator, _headed(lines, separator, count), (), rows
+    return "text", separator, _headed(head, separator, count), (), rows
 
 
 def _row(line: str, separator: str) -> list[float] | None:
@@ -231,14 +243,21 @@ def _commas(lines: list[str]) -> bool:
     )
 
 
-def _roles(numbers: Array, times: Array) -> tuple[str | None, ...]:
-    """What each column of `numbers` (n, columns) is by its course over `times` (n,) in s."""
-    passed = float(times[-1] - times[0])
+def _roles(numbers: Array, passed: float) -> tuple[str | None, ...]:
+    """What each column of `numbers` (n, columns) is by its course while so many s `passed`.
+
+    Where that is not known, NaN, steps of 1 count, smaller ones are s and larger ones ms or us.
+    """
     roles: list[str | None] = []
     for column in numbers.T:
         steps, role = np.diff(column), None
         if not np.isfinite(column).any() or np.nanmin(column) == np.nanmax(column):
             role = ""
+        elif np.all(steps > 0) and np.isfinite(column).all() and math.isnan(passed):
+            step = float(np.median(steps))
+            units = {"time": 0.5, "time_ms": 400.0, "time_us": math.inf}
+            name = next(name for name, most in units.items() if step < most)
+            role = "sequence" if np.all(steps == 1) else name
         elif np.all(steps >= 0) and np.isfinite(column).all() and steps.any():
             units = {name: passed / unit for name, unit in TIMES.items()}
             near = {n: abs((column[-1] - column[0]) / each - 1) for n, each in units.items()}
@@ -350,6 +369,29 @@ def _joined(columns: tuple[str, ...]) -> list[str]:
         first, last = (name.partition(":")[2] for name in (names[0], names[-1]))
         joined.append(f"{what}:{first}..{last}" if len(names) > 1 else names[0])
     return joined
+
+
+class FileLines:
+    """The first lines of a file, as `RawLines` has those of a board."""
+
+    baud = 115_200
+
+    def __init__(self, file: Path) -> None:
+        self.url, self.trouble = str(file), ""
+        self.recogniser = Recogniser(arrived=False)
+        try:
+            with open_file(file) as opened:
+                head = opened.read(_HEAD)
+        except OSError as error:
+            self.trouble = f"{file}: cannot be read ({error.strerror or error})."
+            return
+        self.recogniser.feed(0.0, head if len(head) == _HEAD else head + b"\n")
+
+    def poll(self) -> None:
+        """Nothing: all has arrived."""
+
+    def close(self) -> None:
+        """Nothing is held open."""
 
 
 class RawLines:

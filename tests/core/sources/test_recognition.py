@@ -8,7 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kappaskin import Refusal
-from kappaskin.sources import READS, NewSensor, Recogniser, columns_of, description_text
+from kappaskin.sources import (
+    READS,
+    FileLines,
+    NewSensor,
+    Recogniser,
+    columns_of,
+    description_text,
+)
 from kappaskin.sources.description import description_of
 
 RATE = 100.0
@@ -166,3 +173,20 @@ def test_what_cannot_be_is_refused_by_name(change, why) -> None:
     }
     with pytest.raises(Refusal, match=why):
         description_text(found, NewSensor(**given_ | change))
+
+
+@pytest.mark.parametrize(
+    ("step", "role"), [(0.01, "time"), (10, "time_ms"), (10_000, "time_us"), (1, "sequence")]
+)
+def test_the_times_of_a_file_are_guessed_by_their_steps(tmp_path, step, role) -> None:
+    file = tmp_path / "a.csv"
+    file.write_text("t,a,b\n" + "".join(f"{n * step},{n % 3},{n % 5}\n" for n in range(50)))
+    found = FileLines(file).recogniser.found()
+
+    assert (found.labels, found.roles) == (("t", "a", "b"), (role, None, None))
+    assert len(found.numbers) == 50
+    assert "lines/s" not in found.text
+
+
+def test_a_file_that_cannot_be_read_says_so(tmp_path) -> None:
+    assert "cannot be read" in FileLines(tmp_path / "none.csv").trouble

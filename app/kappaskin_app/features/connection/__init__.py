@@ -5,10 +5,13 @@ from pathlib import Path
 from PySide6.QtWidgets import QFileDialog
 
 from kappaskin.live import ResumeInfo
+from kappaskin.recording import Imported, ImportRequest, ImportTask, unused
 from kappaskin.sources import described_source, is_description, load_description, parts_of
 from kappaskin_app.features.connection.panel import ConnectionPanel, PortSearch
 from kappaskin_app.features.connection.wizard import NewSensorDialog
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.background import BackgroundTask
+from kappaskin_app.shell.folders import recordings_folder
 from kappaskin_app.shell.opening import Kind
 from kappaskin_app.shell.pages import LIVE
 from kappaskin_app.shell.parts import FILE, SOURCE
@@ -49,6 +52,15 @@ class ConnectionFeature:
         shell.closing.connect(guarded(self.new_sensor.reject))
         add("new-sensor", SOURCE, f"&New sensor{ELLIPSIS}", self.new_sensor.begin, "", _NEW)
         add("open-sensor", FILE, f"Open &sensor{ELLIPSIS}", self._open, "", _OPEN)
+        self._imported = Path()
+        self._importing = BackgroundTask[float | Imported](
+            shell.tasks,
+            "Importing",
+            self._take_import,
+            cancelled="Cancelled; nothing was imported.",
+        )
+        shell.closing.connect(guarded(self._importing.stop))
+        shell.opening.add(Kind("readings", (".csv",), self.new_sensor.begin))
         shell.opening.add(
             Kind("sensor description", (".toml",), self._connect_described, is_description)
         )
@@ -92,9 +104,21 @@ class ConnectionFeature:
             self._session.disconnect_from()
 
     def _connect_new(self, file: Path, port: str) -> None:
-        """Connect the sensor at a port that a new file describes."""
+        """Connect the sensor that a new file describes at a port, or import its lines."""
         self._shell.opening.note(file)
+        if (lines := Path(port)).is_file():
+            self._imported = unused(recordings_folder() / f"{lines.stem}.mcap")
+            request = ImportRequest(lines, self._imported, file)
+            self._importing.begin(lambda: ImportTask(request))
+            return
         self._session.request_source(described_source(file.absolute(), port))
+
+    def _take_import(self, came: float | Imported) -> None:
+        """Play what was imported."""
+        if isinstance(came, Imported):
+            self._shell.opening.open(self._imported)
+            bad = "; ".join(each.words for each in came.bad)
+            self._shell.notify(f"Imported {came.words}{bad and f'; left out {bad}'}")
 
     def _show(self) -> None:
         """Show the panel with the focus on the list of sources."""

@@ -32,6 +32,7 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.sources import (
     READS,
+    FileLines,
     NewSensor,
     Port,
     RawLines,
@@ -117,7 +118,8 @@ class _Trace(QStyledItemDelegate):
 class NewSensorDialog(QDialog):
     """Three steps: the port with its raw lines, what the columns are, the skin.
 
-    `opening` brings the port before it is opened; `made` the file of a description and its port.
+    `opening` brings the port before it is opened; `made` the file of a description and its port. A
+    file of lines may take the place of the port.
     """
 
     opening = Signal(str)
@@ -128,7 +130,7 @@ class NewSensorDialog(QDialog):
         self.setObjectName("new_sensor")
         self.setWindowTitle("New sensor")
         self.resize(860, 620)
-        self.lines: RawLines | None = None
+        self.lines: RawLines | FileLines | None = None
         self.found = Recognised()
         self.columns: tuple[str, ...] = ()
         self._known: set[str] | None = None
@@ -301,8 +303,11 @@ class NewSensorDialog(QDialog):
         if not url or (self.lines is not None and self.lines.url == url):
             return
         self._let_go()
-        self.opening.emit(url)
-        self.lines = RawLines(url)
+        if (file := Path(url)).is_file():
+            self.lines = FileLines(file)
+        else:
+            self.opening.emit(url)
+            self.lines = RawLines(url)
         self.found, self.columns = Recognised(), ()
         self.raw.clear()
 
@@ -468,7 +473,8 @@ class NewSensorDialog(QDialog):
         self.step.setText("&nbsp; › &nbsp;".join(each))
         self.hint.setText(_HINTS[at])
         self.back.setEnabled(at > 0)
-        self.next.setText(f"&Save and connect{ELLIPSIS}" if at == len(_STEPS) - 1 else "&Next")
+        what = "import" if isinstance(self.lines, FileLines) else "connect"
+        self.next.setText(f"&Save and {what}{ELLIPSIS}" if at == len(_STEPS) - 1 else "&Next")
         first: Sequence[QWidget] = (self.ports, self.table, self.name)
         first[at].setFocus()
         self._show_fact()
@@ -494,13 +500,16 @@ class NewSensorDialog(QDialog):
         self.accept()
         self.made.emit(file, url)
 
-    def begin(self) -> None:
-        """Show the dialog, as it was left."""
+    def begin(self, file: Path | None = None) -> None:
+        """Show the dialog as it was left, or with the lines of a `file`."""
         self.show()
         self.raise_()
         self.ports.setFocus()
         self._timer.start()
         self.search.refresh()
+        if file is not None:
+            self.ports.setCurrentText(str(file))
+            self._read_port()
 
     def done(self, result: int) -> None:
         self._timer.stop()

@@ -180,3 +180,30 @@ def test_a_port_that_is_plugged_in_is_read_by_itself(window, until, board) -> No
     assert dialog.ports.currentText() == board.port
     dialog.close()
     assert dialog.lines is None
+
+
+def test_a_table_that_is_dropped_is_described_and_imported(
+    window, until, tmp_path, monkeypatch
+) -> None:
+    table, file = tmp_path / "week.csv", tmp_path / "week.toml"
+    rows = (f"{n / 100},{','.join(f'{n * k % 7}' for k in range(1, 13))}" for n in range(300))
+    table.write_text("time," + ",".join(f"h{k}" for k in range(12)) + "\n" + "\n".join(rows) + "\n")
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(file), ""))
+    monkeypatch.setattr(
+        "kappaskin_app.features.connection.recordings_folder", lambda: tmp_path / "made"
+    )
+    (tmp_path / "made").mkdir()
+    window.opening.open(table)
+    dialog = window.new_sensor
+    until(lambda: "13 columns" in dialog.fact.text())
+    assert dialog.columns[:2] == ("time", "height:0")
+    click(dialog.next)
+    assert dialog.table.item(1, 1).text() == "h0"
+    click(dialog.next)
+    until(dialog.next.isEnabled)
+    assert "import" in dialog.next.text()
+    click(dialog.next)
+
+    until(lambda: window.display.badge.state == "REPLAY")
+    until(lambda: window.session.status.replay.length == pytest.approx(2.99))
+    assert (tmp_path / "made" / "week.mcap").exists()
