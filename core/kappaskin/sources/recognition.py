@@ -6,7 +6,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import lru_cache, partial
 from itertools import cycle, groupby
 from pathlib import Path
 from typing import Any, cast
@@ -179,6 +179,7 @@ def _text(lines: list[str], head: list[str]) -> _Form | None:
     return "text", separator, _headed(head, separator, count), (), rows
 
 
+@lru_cache(len(SEPARATORS) * _KEPT)  # lines are looked at again with each new one
 def _row(line: str, separator: str) -> list[float] | None:
     """The numbers of a line; None where it has anything else."""
     parts = line.split() if separator == " " else line.split(separator)
@@ -214,6 +215,7 @@ def _json(lines: list[str]) -> _Form | None:
     return "json", "", tuple(labels), paths, rows
 
 
+@lru_cache(_KEPT)
 def _leaves(line: str) -> list[tuple[str, list[float]]] | None:
     """Every number, or list of numbers, of an object with the path of its keys."""
     try:
