@@ -3,10 +3,12 @@
 import json
 import math
 import time
+import zipfile
 from collections import Counter, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
+from importlib import import_module
 from itertools import cycle, groupby
 from pathlib import Path
 from typing import Any, cast
@@ -15,7 +17,7 @@ import numpy as np
 
 from kappaskin._files import open_file
 from kappaskin._toml import table
-from kappaskin.errors import Refusal, SourceError
+from kappaskin.errors import Refusal, SourceError, lacking
 from kappaskin.frames import Array
 from kappaskin.sources.description import Description, description_of
 from kappaskin.sources.inputs import UDP, Datagrams
@@ -373,8 +375,56 @@ def _joined(columns: tuple[str, ...]) -> list[str]:
     return joined
 
 
+def _first_rows(file: Path) -> bytes:
+    """The first bytes of a text; of arrays or a table the first rows, as text below their names."""
+    if file.suffix == ".npz":
+        with open_file(file) as opened, zipfile.ZipFile(opened) as archive:
+            names = [name for name in ("time", "values") if f"{name}.npy" in archive.NameToInfo]
+            parts = [_first_of(archive, name) for name in names]
+        heads = [name for name, part in zip(names, parts, strict=True) if part.shape[1] == 1]
+        heads += [f"values[{n}]" for n in range(parts[-1].shape[1])] * (parts[-1].shape[1] > 1)
+        return _lines_of(heads, np.hstack(parts))
+    if file.suffix == ".parquet":
+        try:
+            parquet: Any = import_module("pyarrow.parquet")
+        except ImportError as error:
+            raise lacking("parquet", "reading Parquet", error) from error
+        with open_file(file) as opened, parquet.ParquetFile(opened) as table:
+            rows: Any = next(table.iter_batches(_KEPT))
+            columns = [np.array(column.to_pylist(), float) for column in rows.columns]
+            return _lines_of(rows.schema.names, np.column_stack(columns))
+    with open_file(file) as opened:
+        head = opened.read(_HEAD)
+    return head if len(head) == _HEAD else head + b"\n"
+
+
+def _first_of(archive: zipfile.ZipFile, name: str) -> Array:
+    """The first rows (n, K) of an array of numbers in an NPZ file, whatever its size."""
+    form = np.lib.format
+    with archive.open(f"{name}.npy") as opened:
+        old = form.read_magic(opened) == (1, 0)
+        read = form.read_array_header_1_0 if old else form.read_array_header_2_0
+        shape, by_columns, kind = read(opened)
+        if kind.kind not in "fiu" or by_columns or not 1 <= len(shape) <= 2:
+            raise ValueError(f"expected numbers in rows in {name}, got {kind} of shape {shape}")
+        columns = int(np.prod(shape[1:]))
+        data = opened.read(min(_KEPT, shape[0]) * columns * kind.itemsize)
+    return np.frombuffer(data, kind).reshape(-1, columns).astype(float)
+
+
+def _lines_of(names: Sequence[str], rows: Array) -> bytes:
+    lines = [",".join(names), *(",".join(map(repr, row)) for row in rows.tolist())]
+    return "".join(f"{line}\n" for line in lines).encode()
+
+
+_DAMAGE = (OSError, ValueError, LookupError, StopIteration, TypeError, EOFError, MemoryError)
+
+
 class FileLines:
-    """The first lines of a file, as `RawLines` has those of a board."""
+    """The first lines of a file, as `RawLines` has those of a board.
+
+    Of arrays in an NPZ file and of a Parquet table they are the first rows.
+    """
 
     baud = 115_200
 
@@ -382,12 +432,11 @@ class FileLines:
         self.url, self.trouble = str(file), ""
         self.recogniser = Recogniser(arrived=False)
         try:
-            with open_file(file) as opened:
-                head = opened.read(_HEAD)
-        except OSError as error:
-            self.trouble = f"{file}: cannot be read ({error.strerror or error})."
-            return
-        self.recogniser.feed(0.0, head if len(head) == _HEAD else head + b"\n")
+            self.recogniser.feed(0.0, _first_rows(file))
+        except Refusal as refusal:
+            self.trouble = f"{refusal}."
+        except (*_DAMAGE, zipfile.BadZipFile) as error:
+            self.trouble = f"{file}: cannot be read ({getattr(error, 'strerror', None) or error})."
 
     def poll(self) -> None:
         """Nothing: all has arrived."""

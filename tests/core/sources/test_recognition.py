@@ -190,3 +190,34 @@ def test_the_times_of_a_file_are_guessed_by_their_steps(tmp_path, step, role) ->
 
 def test_a_file_that_cannot_be_read_says_so(tmp_path) -> None:
     assert "cannot be read" in FileLines(tmp_path / "none.csv").trouble
+
+
+def test_arrays_and_tables_are_lines_of_their_first_rows(tmp_path) -> None:
+    values, time = rows(500, 4), np.arange(500) / 100
+    np.savez(tmp_path / "a.npz", values=values, time=time)
+    found = FileLines(tmp_path / "a.npz").recogniser.found()
+    assert found.labels == ("time", *(f"values[{n}]" for n in range(4)))
+    assert found.roles == ("time", None, None, None, None)
+    np.testing.assert_array_equal(found.numbers, np.column_stack([time, values])[:300])
+
+    parquet = pytest.importorskip("pyarrow.parquet")
+    import pyarrow
+
+    parquet.write_table(pyarrow.table({"t": time, "h0": values[:, 0]}), tmp_path / "a.parquet")
+    found = FileLines(tmp_path / "a.parquet").recogniser.found()
+    assert (found.labels, found.roles) == (("t", "h0"), ("time", None))
+    np.testing.assert_array_equal(found.numbers[:, 1], values[:300, 0])
+
+
+@pytest.mark.parametrize("name", ["a.npz", "a.parquet"])
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04", b"PAR1" + bytes(40), b"1,2,3\n" * 9])
+def test_damaged_arrays_and_tables_say_so(tmp_path, name, content) -> None:
+    (tmp_path / name).write_bytes(content)
+    assert "cannot be read" in FileLines(tmp_path / name).trouble
+
+
+def test_arrays_of_objects_and_without_values_are_refused(tmp_path) -> None:
+    np.savez(tmp_path / "a.npz", values=np.array([{}, 1], object))
+    assert "cannot be read" in FileLines(tmp_path / "a.npz").trouble
+    np.savez(tmp_path / "b.npz", other=np.ones((3, 2)))
+    assert "cannot be read" in FileLines(tmp_path / "b.npz").trouble

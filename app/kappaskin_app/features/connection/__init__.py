@@ -60,7 +60,7 @@ class ConnectionFeature:
             cancelled="Cancelled; nothing was imported.",
         )
         shell.closing.connect(guarded(self._importing.stop))
-        shell.opening.add(Kind("readings", (".csv",), self.new_sensor.begin))
+        shell.opening.add(Kind("readings", (".csv", ".npz", ".parquet"), self.new_sensor.begin))
         shell.opening.add(
             Kind("sensor description", (".toml",), self._connect_described, is_description)
         )
