@@ -239,6 +239,7 @@ class NewSensorDialog(QDialog):
         self.known.setToolTip("Where it is known, forces are estimated too.")
         self.rigidity = QDoubleSpinBox(decimals=6, minimum=1e-6, maximum=1e6, value=3.7e-3)  # pyright: ignore[reportCallIssue]
         self.rigidity.setSuffix(" N m")
+        self.rigidity.setAccessibleName("Rigidity of the skin")
         self.rigidity.setEnabled(False)
         self.known.toggled.connect(self.rigidity.setEnabled)
         names = ("Size in x", "Size in y", "Elements in x", "Elements in y", "Scale", "Unit")
