@@ -35,8 +35,15 @@ def with_error(value: float, sd: float, digits: int, unit: str = "", sign: str =
     return f"{text}{bar} {unit}".rstrip()
 
 
+def capital(text: str) -> str:
+    """The text with a capital, unless it begins with a name such as that of a file."""
+    word = text.partition(" ")[0].rstrip(",;:")
+    return text[:1].upper() + text[1:] if word.isalpha() else text
+
+
 def sentence(text: str) -> str:
-    text = text[:1].upper() + text[1:]
+    """The text with a capital, as `capital` sets it, and a stop."""
+    text = capital(text)
     return text if not text or text.endswith((".", "?", "!")) else f"{text}."
 
 

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 from kappaskin._text import printable
 from kappaskin.frames import Event
 from kappaskin.live import Status
+from kappaskin_app.widgets.parts import capital
 
 _KEPT = 64
 _NOTHING = "No events. Connections, lost messages and restarts are listed here."
@@ -61,7 +62,7 @@ class EventLog(QDialog):
             return
         self._seen = status.event_count
         self._add(new)
-        self.notified.emit("; ".join(dict.fromkeys(_sentence(event.text) for event in new[-2:])))
+        self.notified.emit("; ".join(dict.fromkeys(capital(event.text) for event in new[-2:])))
 
     def note(self, kind: str, text: str) -> None:
         """Add an event of the app itself."""
@@ -85,7 +86,3 @@ def _lines(events: Sequence[Event]) -> list[str]:
         f"{printable(event.text)}"
         for event in events
     ]
-
-
-def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:]

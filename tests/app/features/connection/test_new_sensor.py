@@ -1,10 +1,12 @@
 """A board that nobody described, from its lines to a live skin, by mouse and keys."""
 
+import json
 import os
 import threading
 import time
 import tomllib
 from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -207,3 +209,25 @@ def test_a_table_that_is_dropped_is_described_and_imported(
     until(lambda: window.display.badge.state == "REPLAY")
     until(lambda: window.session.status.replay.length == pytest.approx(2.99))
     assert (tmp_path / "made" / "week.mcap").exists()
+
+
+def test_json_in_lines_is_described_by_its_keys(window, until, tmp_path, monkeypatch) -> None:
+    lines, file = tmp_path / "glove.jsonl", tmp_path / "glove.toml"
+    rows = ({"n": n, "skin": {"h": [n * k % 7 for k in range(1, 7)]}} for n in range(200))
+    lines.write_text("".join(json.dumps(row) + "\n" for row in rows))
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(file), ""))
+    dialog = window.new_sensor
+    made = list[tuple[Path, str]]()
+    dialog.made.disconnect()
+    dialog.made.connect(lambda *what: made.append(what))
+    dialog.begin(lines)
+    until(lambda: "A JSON object in each line; 7 columns" in dialog.fact.text())
+    click(dialog.next)
+    assert dialog.table.item(1, 1).text() == "skin.h[0]"
+    click(dialog.next)
+    until(dialog.next.isEnabled)
+    click(dialog.next)
+
+    assert made == [(file, str(lines))]
+    fields = tomllib.loads(file.read_text())["line"]["fields"]
+    assert fields == {"n": "sequence", "skin.h": "height:0..5"}
