@@ -335,7 +335,8 @@ def _value(value: Any) -> str:
         case str():
             return _text(value)
         case dict():
-            each = (f"{key} = {_value(one)}" for key, one in cast("dict[str, Any]", value).items())
+            inside = cast("dict[str, Any]", value)
+            each = (f"{_key(key)} = {_value(one)}" for key, one in inside.items())
             return f"{{ {', '.join(each)} }}"
         case datetime():
             return value.isoformat()
@@ -343,6 +344,10 @@ def _value(value: Any) -> str:
             return _list([_value(each) for each in cast("list[Any]", value)])
         case _:
             return repr(value).replace("e-0", "e-")
+
+
+def _key(key: str) -> str:
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _text(key)
 
 
 def _list(each: list[str]) -> str:

@@ -141,8 +141,9 @@ def test_what_is_described_reads_what_was_sent(name, interleaved) -> None:
     assert description.sensor.plate.unknown_material
 
 
-def test_json_is_described_by_fields_and_a_mix_in_one_field_is_refused() -> None:
-    lines = [json.dumps({"n": n, "h": row[:4]}) for n, row in enumerate(rows().tolist())]
+@pytest.mark.parametrize("key", ["h", "a key of 3 words", "\N{GREEK SMALL LETTER KAPPA}"])
+def test_json_is_described_by_fields_and_a_mix_in_one_field_is_refused(key) -> None:
+    lines = [json.dumps({"n": n, "skin": {key: row[:4]}}) for n, row in enumerate(rows().tolist())]
     found = recognised(lines)
     columns = columns_of(found, ("height",), False)
     text = description_text(found, NewSensor("Board", (0.02, 0.02), (2, 2), columns, 1e-3, 0.01))
@@ -150,7 +151,7 @@ def test_json_is_described_by_fields_and_a_mix_in_one_field_is_refused() -> None
     assert '"n" = "sequence"' in text or 'n = "sequence"' in text
     assert len(description_of(text, "b").decoder(whole=True).feed(f"{lines[5]}\n".encode())) == 1
     mixed = (*columns[:4], "slope@0:3")
-    with pytest.raises(Refusal, match="one kind in h"):
+    with pytest.raises(Refusal, match="one kind in skin"):
         description_text(found, NewSensor("Board", (0.02, 0.02), (2, 2), mixed))
 
 
