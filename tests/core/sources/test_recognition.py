@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kappaskin import Refusal
+from kappaskin import Refusal, SourceError
 from kappaskin.sources import (
     READS,
     FileLines,
     NewSensor,
+    RawLines,
     Recogniser,
     columns_of,
     description_text,
@@ -222,3 +223,56 @@ def test_arrays_of_objects_and_without_values_are_refused(tmp_path) -> None:
     assert "cannot be read" in FileLines(tmp_path / "a.npz").trouble
     np.savez(tmp_path / "b.npz", other=np.ones((3, 2)))
     assert "cannot be read" in FileLines(tmp_path / "b.npz").trouble
+
+
+class Wire:
+    """A port whose board prints at 9600 baud; at another rate its bytes are garbled."""
+
+    lost, empty = False, True
+
+    def __init__(self, url, clock, baud, opened) -> None:
+        self.baud, self._clock, self._n = baud, clock, 0
+
+    def take(self, timeout):
+        self._n += 1
+        text = f"{self._n},{self._n % 7},{self._n % 5}\n".encode()
+        data = text if self.baud == 9600 else bytes(255 - byte for byte in text)
+        return [(self._clock(), data)]
+
+    def set_baud_rate(self, baud) -> None:
+        self.baud = baud
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+
+def test_the_baud_rate_is_found_by_trying(monkeypatch) -> None:
+    monkeypatch.setattr("kappaskin.sources.recognition.SerialConnection", Wire)
+    now = 0.0
+    lines = RawLines("/dev/ttyX", lambda: now)
+    rates = []
+    for _ in range(200):
+        lines.poll()
+        rates.append(lines.baud)
+        now += 0.05
+
+    assert list(dict.fromkeys(rates)) == [115_200, 9600]
+    assert len(lines.recogniser.found().labels) == 3
+    lines.close()
+
+
+def test_a_port_that_is_absent_is_tried_again(monkeypatch) -> None:
+    def absent(*_):
+        raise SourceError("/dev/ttyX: there is no such port")
+
+    now = 0.0
+    monkeypatch.setattr("kappaskin.sources.recognition.SerialConnection", absent)
+    lines = RawLines("/dev/ttyX", lambda: now)
+    lines.poll()
+    assert lines.trouble == "/dev/ttyX: there is no such port; retrying."
+    monkeypatch.setattr("kappaskin.sources.recognition.SerialConnection", Wire)
+    lines.poll()
+    assert lines.trouble
+    now = 1.1
+    lines.poll()
+    assert lines.trouble == ""
