@@ -2,10 +2,11 @@
 
 import json
 import math
+import re
 import time
 import zipfile
 from collections import Counter, deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from importlib import import_module
@@ -22,12 +23,14 @@ from kappaskin.frames import Array
 from kappaskin.sources.description import Description, description_of
 from kappaskin.sources.inputs import UDP, Datagrams
 from kappaskin.sources.lines import SEPARATORS, TIMES
-from kappaskin.sources.ports import BAUD_RATES, SerialConnection
+from kappaskin.sources.ports import BAUD_RATES, Port, SerialConnection
 
 _KEPT, _JUDGED = 300, 40  # lines whose numbers are held, and by which their form is judged
 _LONGEST = 2**16  # bytes of a line
 _ALIKE, _TEXT = 0.8, 0.9  # share of lines of one form, and of bytes that are text
+_GAP = 0.01  # s at least between two lines of a course
 _SPAN = 0.5  # s that times are compared with those of arrival
+_SECONDS, _MILLISECONDS = 0.5, 400.0  # steps of a file's times below which they are in these
 _OFF = 0.1  # share by which the rate of a clock may differ
 _SPOKEN = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces"}
 _UNITS = {"time": "s", "time_ms": "ms", "time_us": "\N{MICRO SIGN}s"}
@@ -53,8 +56,9 @@ class Recognised:
 
     Each has a number for each of `labels`, as `numbers` (n, columns) of the newest lines; of JSON
     `paths` has the key of each value and how many numbers it has. `rate` in 1/s is that of lines.
-    `roles` are what columns are found to be: a time, `sequence`, empty for a constant; None for
-    others. `trouble` says what it is instead, and what to do.
+    `roles` are what columns are found to be: a time, `sequence`, empty for a constant beside the
+    readings, None for a reading; none at all until there is time enough. `trouble` says what it is
+    instead, and what to do.
     """
 
     kind: str = ""
@@ -93,6 +97,7 @@ class Recogniser:
         self._arrived = arrived
         self.lines = deque[tuple[float, str]](maxlen=_KEPT)
         """The newest lines, with the time of their arrival in s."""
+        self._course = deque[tuple[float, str]](maxlen=_KEPT)  # with gaps, for seconds
         self._buffer, self._first, self._head = b"", True, list[str]()
         self._bytes = Counter[bool]()  # whether they are text
 
@@ -105,6 +110,8 @@ class Recogniser:
             if not (self._first and self._arrived) and line.strip():
                 text = line[:_LONGEST].decode(errors="replace").strip()
                 self.lines.append((now, text))
+                if not self._course or now - self._course[-1][0] >= _GAP:
+                    self._course.append((now, text))
                 self._head += [text] * (len(self._head) < _HEADING)
             self._first = False  # of which the beginning may be missing
 
@@ -121,14 +128,14 @@ class Recogniser:
         """What is recognised up to now."""
         if self.garbled:
             return Recognised(trouble=_BINARY)
-        lines = [line for _, line in self.lines]
-        if len(lines) < 3:
+        lines = [line for _, line in (*self._course, *self.lines)]
+        if len(self.lines) < 3:
             return Recognised()
+        if _decimal_commas(lines[-_JUDGED:]):
+            return Recognised(trouble=_COMMA)
         if (found := _json(lines) or _text(lines, self._head)) is not None:
             return self._measured(*found)
-        judged = lines[-_JUDGED:]
-        comma = sum(any(c in line for c in ";\t ") and "," in line for line in judged)
-        return Recognised(trouble=_COMMA if comma > len(judged) / 2 and _commas(judged) else _WORDS)
+        return Recognised(trouble=_WORDS)
 
     def _measured(
         self,
@@ -139,15 +146,27 @@ class Recogniser:
         rows: list[list[float] | None],
     ) -> Recognised:
         """With the rate, and what the columns are by their course."""
-        times = np.array([now for now, _ in self.lines])
-        there = [place for place, row in enumerate(rows) if row is not None]
-        numbers = np.array([rows[place] for place in there], float).reshape(len(there), -1)
-        times, span = times[there], float(times[there[-1]] - times[there[0]])
-        rate = (len(there) - 1) / span if span > 0 else math.nan
-        roles: tuple[str | None, ...] = (None,) * len(labels)
-        if span > _SPAN or not self._arrived:
-            roles = _roles(numbers, span if self._arrived else math.nan)
+        split, columns = len(self._course), len(labels)
+        course, since = _numbers(rows[:split], self._course, columns)
+        numbers, times = _numbers(rows[split:], self.lines, columns)
+        span = float(times[-1] - times[0]) if len(times) else 0.0
+        rate = (len(times) - 1) / span if span > 0 else math.nan
+        passed = float(since[-1] - since[0]) if len(since) else 0.0
+        roles: tuple[str | None, ...] = ()
+        if not self._arrived:
+            roles = _roles(numbers, numbers, math.nan)
+        elif passed > _SPAN:
+            roles = _roles(numbers, course, passed)
         return Recognised(kind, separator, labels, paths, rate, numbers, roles)
+
+
+def _numbers(
+    rows: list[list[float] | None], lines: Iterable[tuple[float, str]], columns: int
+) -> tuple[Array, Array]:
+    """The numbers (n, columns) of the lines that have them, and the times (n,) of these."""
+    there = [(now, row) for row, (now, _) in zip(rows, lines, strict=True) if row is not None]
+    numbers = np.array([row for _, row in there], float).reshape(len(there), columns)
+    return numbers, np.array([now for now, _ in there])
 
 
 _Form = tuple[str, str, tuple[str, ...], tuple[tuple[str, int], ...], list[list[float] | None]]
@@ -181,7 +200,7 @@ def _text(lines: list[str], head: list[str]) -> _Form | None:
     return "text", separator, _headed(head, separator, count), (), rows
 
 
-@lru_cache(len(SEPARATORS) * _KEPT)  # lines are looked at again with each new one
+@lru_cache(2 * len(SEPARATORS) * _KEPT)  # lines are looked at again with each new one
 def _row(line: str, separator: str) -> list[float] | None:
     """The numbers of a line; None where it has anything else."""
     parts = line.split() if separator == " " else line.split(separator)
@@ -217,7 +236,7 @@ def _json(lines: list[str]) -> _Form | None:
     return "json", "", tuple(labels), paths, rows
 
 
-@lru_cache(_KEPT)
+@lru_cache(2 * _KEPT)
 def _leaves(line: str) -> list[tuple[str, list[float]]] | None:
     """Every number, or list of numbers, of an object with the path of its keys."""
     try:
@@ -239,40 +258,71 @@ def _leaves(line: str) -> list[tuple[str, list[float]]] | None:
     return found or None
 
 
-def _commas(lines: list[str]) -> bool:
-    """Whether lines are numbers but for a comma in place of the point."""
-    return any(
-        all(_row(line.replace(",", "."), separator) for line in lines)
-        for separator in (";", "\t", " ")
+_DECIMAL = re.compile(r"[-+]?\d+(?:,\d+)?")
+
+
+def _decimal_commas(lines: list[str]) -> bool:
+    """Whether the lines are numbers with a comma in place of the point.
+
+    Either another separator, such as a comma with a space, shows which commas these are; or every
+    second number is as the digits behind a comma: always as many, and some begin with 0.
+    """
+    for separator in (";", "\t", ", ", " "):
+        parts = [[part.strip() for part in line.split(separator)] for line in lines]
+        each = [part for line in parts for part in line if part]
+        several = all(len(line) > 1 for line in parts)
+        if several and any("," in p for p in each) and all(map(_DECIMAL.fullmatch, each)):
+            return True
+    fields = [line.split(",") for line in lines]
+    behind = [part.strip() for line in fields for part in line[1::2]]
+    digits = {len(part) for part in behind}
+    return (
+        all(len(line) % 2 == 0 for line in fields)
+        and len(digits) == 1
+        and digits.pop() > 1
+        and all(map(str.isdigit, behind))
+        and any(part.startswith("0") for part in behind)
     )
 
 
-def _roles(numbers: Array, passed: float) -> tuple[str | None, ...]:
-    """What each column of `numbers` (n, columns) is by its course while so many s `passed`.
+def _roles(numbers: Array, course: Array, passed: float) -> tuple[str | None, ...]:
+    """What each column is by the newest `numbers` (n, columns) and its `course` (m, columns).
 
-    Where that is not known, NaN, steps of 1 count, smaller ones are s and larger ones ms or us.
+    `passed` are the s of the course. Where that is not known, NaN, steps of 1 count, smaller ones
+    are s and larger ones ms or us. Readings may rest: constants are ignored only before and behind
+    those that vary, and where these are more.
     """
-    roles: list[str | None] = []
-    for column in numbers.T:
-        steps, role = np.diff(column), None
-        if not np.isfinite(column).any() or np.nanmin(column) == np.nanmax(column):
-            role = ""
-        elif np.all(steps > 0) and np.isfinite(column).all() and math.isnan(passed):
-            step = float(np.median(steps))
-            units = {"time": 0.5, "time_ms": 400.0, "time_us": math.inf}
-            name = next(name for name, most in units.items() if step < most)
-            role = "sequence" if np.all(steps == 1) else name
-        elif np.all(steps >= 0) and np.isfinite(column).all() and steps.any():
-            units = {name: passed / unit for name, unit in TIMES.items()}
-            near = {n: abs((column[-1] - column[0]) / each - 1) for n, each in units.items()}
-            name = min(near, key=near.__getitem__)
-            role = name if near[name] < _OFF else "sequence" if np.all(steps == 1) else None
-        roles.append(role)
+    roles = [
+        _clock(recent, whole, passed) for recent, whole in zip(numbers.T, course.T, strict=True)
+    ]
     for single in (TIMES, ("sequence",)):
-        there = [place for place, role in enumerate(roles) if role in single]
-        for place in there[1:]:
+        for place in [place for place, role in enumerate(roles) if role in single][1:]:
             roles[place] = ""
+    lows, highs = (function(course, axis=0) for function in (np.fmin.reduce, np.fmax.reduce))
+    left = [place for place, role in enumerate(roles) if role is None]
+    varying = [place for place in left if lows[place] < highs[place]]
+    if 2 * len(varying) > len(left):
+        for place in left:
+            if not varying[0] <= place <= varying[-1]:
+                roles[place] = ""
     return tuple(roles)
+
+
+def _clock(recent: Array, course: Array, passed: float) -> str | None:
+    """The unit of time that a column goes by, or `sequence`; None for others."""
+    steps = np.diff(course)
+    if not (len(steps) and np.isfinite(course).all() and np.all(steps >= 0) and steps.any()):
+        return None
+    counts = len(recent) > 1 and bool(np.all(np.diff(recent) == 1))
+    if math.isnan(passed):
+        if counts or np.any(steps == 0):
+            return "sequence" if counts else None
+        step = float(np.median(steps))
+        return "time" if step < _SECONDS else "time_ms" if step < _MILLISECONDS else "time_us"
+    gone = float(course[-1] - course[0])
+    near = {name: abs(gone * unit / passed - 1) for name, unit in TIMES.items()}
+    name = min(near, key=near.__getitem__)
+    return name if near[name] < _OFF else "sequence" if counts else None
 
 
 READS: Mapping[str, tuple[str, ...]] = {
@@ -453,7 +503,7 @@ class RawLines:
     """
 
     def __init__(self, url: str, clock: Callable[[], float] = time.monotonic) -> None:
-        self.url, self._clock = url, clock
+        self.url, self._clock, self._plug = url, clock, Port.named(url)
         self.recogniser, self.trouble = Recogniser(), ""
         self._rates = cycle(_RATES)
         self.baud = next(self._rates)
@@ -480,6 +530,9 @@ class RawLines:
 
     def _open(self, now: float) -> None:
         self._next_try, self._since = now + _RETRY, now
+        if self.trouble and self._plug.serial_number:  # perhaps under another name
+            same = (port.port for port in Port.found() if port.same_plug(self._plug))
+            self.url = next(same, self.url)
         opened = partial(Datagrams, self.url, self._clock) if self.url.startswith(UDP) else None
         try:
             self._connection = SerialConnection(self.url, self._clock, self.baud, opened)

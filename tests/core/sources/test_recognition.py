@@ -276,3 +276,32 @@ def test_a_port_that_is_absent_is_tried_again(monkeypatch) -> None:
     now = 1.1
     lines.poll()
     assert lines.trouble == ""
+
+
+@pytest.mark.parametrize("rate", [20.0, 700.0, 2000.0])
+def test_times_are_found_at_any_rate(rate) -> None:
+    lines = [f"{n * 1e3 / rate:.1f},{n},{n % 7}" for n in range(round(2 * rate))]
+
+    assert recognised(lines, rate=rate).roles == ("time_ms", "sequence", None)
+
+
+def test_elements_at_rest_are_readings() -> None:
+    lines = [f"{n * 10}," + ",".join(["0"] * 12) for n in range(100)]
+    assert recognised(lines).roles == ("time_ms", *[None] * 12)
+    pressed = [f"{n * 10}," + ",".join(["0"] * 5 + [str(n % 9)] + ["0"] * 6) for n in range(100)]
+    assert recognised(pressed).roles == ("time_ms", *[None] * 12)
+
+
+@pytest.mark.parametrize("separator", [", ", ",", ";", "\t"])
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_no_decimal_comma_is_taken_for_a_separator(separator, count) -> None:
+    lines = [separator.join(f"{v:.2f}".replace(".", ",") for v in row) for row in rows(99, count)]
+
+    assert "decimal comma" in recognised(lines).trouble
+
+
+@pytest.mark.parametrize("separator", [",", ", "])
+def test_whole_numbers_are_no_decimal_commas(separator) -> None:
+    whole = np.random.default_rng(2).integers(10, 1024, (99, 4))
+
+    assert len(recognised([separator.join(map(str, row)) for row in whole]).labels) == 4

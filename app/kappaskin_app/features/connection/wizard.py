@@ -55,7 +55,8 @@ _SHOWN = 14  # raw lines
 _COURSE = 100  # newest numbers of a column that are drawn
 _CELL = 24  # px of the map's picture along a side of an element, so that it has edges
 _NOW = 5  # numbers that are now
-_SURE, _SHARE = 6.0, 0.3  # times the noise, and share of the most, of a column that answers
+_SURE, _SHARE = 4.0, 0.3  # times the noise, and share of the most, of a column that answers
+_HELD = 300  # looks for which a column may answer before that is its rest
 _STEPS = ("1 Port", "2 Columns", "3 Skin")
 _NUMBER, _NAME, _VALUE, _TRACE, _ROLE = range(5)
 _IGNORED, _COUNTED = "Ignored", "Line count"
@@ -134,7 +135,8 @@ class NewSensorDialog(QDialog):
         self.found = Recognised()
         self.columns: tuple[str, ...] = ()
         self._known: set[str] | None = None
-        self._edited = False  # whether columns were set by hand
+        self._rest: Array | None = None  # what the columns are while nothing answers
+        self._held = 0  # looks since something answers
         self.step, self.hint, self.fact = Label(), Label(wordWrap=True), Label(wordWrap=True)  # pyright: ignore[reportCallIssue]
         self.step.setTextFormat(Qt.TextFormat.RichText)
         self.pages = QStackedWidget()
@@ -327,9 +329,11 @@ class NewSensorDialog(QDialog):
         found = self.lines.recogniser.found()
         if found.kind:
             was, self.found = self.found, found
-            new = found.labels != was.labels
-            if new or (found.roles != was.roles and not self._edited):
+            # What a person has seen is no more guessed anew, as after a board was plugged in again.
+            first = self.pages.currentIndex() == 0 and found.roles not in ((), was.roles)
+            if found.labels != was.labels or first:
                 self._guess()
+            self._follow_rest()
         if self.pages.currentIndex() == 0:
             newest = [line for _, line in list(self.lines.recogniser.lines)[-_SHOWN:]]
             self.raw.setPlainText("\n".join(printable(line) for line in newest))
@@ -346,7 +350,7 @@ class NewSensorDialog(QDialog):
             text = self.lines.trouble
         elif self.lines is not None and not self.found.kind:
             text = self.lines.recogniser.found().text
-        ready = bool(self.found.kind)
+        ready = bool(self.found.roles)
         if self.pages.currentIndex() == 2 and ready:
             try:
                 self._text()
@@ -360,7 +364,7 @@ class NewSensorDialog(QDialog):
     def _guess(self) -> None:
         """What the columns are, from what the elements read."""
         reads = READS[self.reads.currentText()]
-        self._edited = False
+        self._rest = None
         self.columns = columns_of(self.found, reads, bool(self.order.currentIndex()))
         count = sum(":" in column for column in self.columns) // len(reads)
         first = next((m for m in range(round(count**0.5), 0, -1) if count % m == 0), 1)
@@ -385,7 +389,7 @@ class NewSensorDialog(QDialog):
         for n, row in enumerate(rows[:1] if single else rows):
             reading = meaning and not single
             columns[row] = f"{meaning}:{self.element.value() + n}" if reading else meaning
-        self.columns, self._edited = tuple(columns), True
+        self.columns = tuple(columns)
         self._offer_units()
         self._show_columns()
 
@@ -410,16 +414,24 @@ class NewSensorDialog(QDialog):
                     item.setForeground(ink)
         self.table.viewport().update()
 
+    def _follow_rest(self) -> None:
+        """Follow what the columns are at rest, while none answers or one does for very long."""
+        numbers = np.nan_to_num(self.found.numbers)  # a missing one is no answer
+        if len(numbers) < 4 * _NOW:
+            return
+        self._held = self._held + 1 if self.answering() else 0
+        if self._rest is None or not self._held or self._held > _HELD:
+            self._rest, self._held = np.median(numbers[-_COURSE:], axis=0), 0
+
     def answering(self) -> list[int]:
         """The columns that differ now by far more than they scatter; none of times and counts."""
-        numbers = self.found.numbers
-        if len(numbers) < 4 * _NOW:
+        numbers = np.nan_to_num(self.found.numbers)  # a missing one is no answer
+        if self._rest is None or len(self._rest) != len(self.columns) or len(numbers) < 4 * _NOW:
             return []
-        with np.errstate(invalid="ignore"):
-            noise = np.nanmedian(np.abs(np.diff(numbers, axis=0)), axis=0)
-            moved = np.abs(np.nanmean(numbers[-_NOW:], axis=0) - np.nanmedian(numbers, axis=0))
+        noise = np.percentile(np.abs(np.diff(numbers, axis=0)), 90, axis=0)
+        moved = np.abs(np.mean(numbers[-_NOW:], axis=0) - self._rest)
         moved[[":" not in column for column in self.columns]] = 0.0
-        most = np.nanmax(moved, initial=0.0)
+        most = moved.max(initial=0.0)
         return np.flatnonzero((moved > _SURE * noise) & (moved > _SHARE * most)).tolist()
 
     # The skin.
@@ -445,8 +457,8 @@ class NewSensorDialog(QDialog):
         m, n = (box.value() for box in self.grid)
         numbers, values = self.found.numbers, np.full(m * n, np.nan)
         first = next((c.partition(":")[0] for c in self.columns if ":" in c), "")
-        if len(numbers):
-            change = np.nanmean(numbers[-3:], axis=0) - np.nanmedian(numbers, axis=0)
+        if len(numbers) and self._rest is not None:
+            change = np.mean(np.nan_to_num(numbers[-3:]), axis=0) - self._rest
             for place, column in enumerate(self.columns):
                 what, found, element = column.partition(":")
                 if found and what == first and int(element) < m * n:

@@ -95,7 +95,11 @@ def test_a_board_becomes_a_live_skin(window, until, board, tmp_path, monkeypatch
     assert dialog.answering() == []
     board.pressed = 7
     until(lambda: dialog.answering() == [8])
+    begun = time.monotonic()
+    until(lambda: time.monotonic() - begun > 4.0)  # more than all the lines that are kept
+    assert dialog.answering() == [8]
     board.pressed = None
+    until(lambda: dialog.answering() == [])
 
     click(dialog.next)
     typed(dialog.name, "Glove")
@@ -165,6 +169,18 @@ def test_unplugged_in_the_middle_it_says_so_and_goes_on(window, until, tmp_path)
     board.plug()
     link.symlink_to(board.port)
     until(lambda: "13 columns" in dialog.fact.text() and dialog.lines.trouble == "")
+    assert dialog.columns[:3] == ("time_ms", "", "height:1")
+    click(dialog.next)
+    for box, value in zip(dialog.grid, (2, 6), strict=True):
+        box.setValue(value)
+    board.unplug()
+    link.unlink()
+    until(lambda: "retrying" in dialog.fact.text())
+    board.plug()
+    link.symlink_to(board.port)
+    begun = time.monotonic()
+    until(lambda: dialog.lines.trouble == "" and time.monotonic() - begun > 3.0)
+    assert [box.value() for box in dialog.grid] == [2, 6]
     assert dialog.columns[:3] == ("time_ms", "", "height:1")
     board.unplug()
     dialog.reject()
