@@ -463,7 +463,7 @@ class NewSensorDialog(QDialog):
                 what, found, element = column.partition(":")
                 if found and what == first and int(element) < m * n:
                     values[int(element)] = change[place] * self.scale.value()
-        most = float(np.nanmax(np.abs(values), initial=0.0)) or 1.0
+        most = float(np.nan_to_num(np.abs(values)).max(initial=0.0)) or 1.0
         sides = (self.sides[0].value(), self.sides[1].value())
         nowhere = np.full(2, np.nan)
         self.map.title.setText(f"Change of {first} now, in {self.unit.currentText()}")
