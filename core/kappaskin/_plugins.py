@@ -56,7 +56,7 @@ def plug_ins(
                 raise ValueError("the name is taken")
             check(point.name, made := point.load())
             loaded[point.name] = made
-        except Exception as error:  # a plug-in may raise anything
+        except (Exception, SystemExit) as error:  # a plug-in may raise anything
             trouble = f"{type(error).__name__}: {error}"
         module = sys.modules.get(getattr(made, "__module__", point.module))
         package = point.dist.name if point.dist else "an unknown package"

@@ -65,6 +65,7 @@ def test_what_is_installed_is_loaded_with_its_package_version_and_file(installed
     ("code", "point", "why"),
     [
         ("raise RuntimeError('no licence')", "x=broken_one:made", "RuntimeError: no licence"),
+        ("raise SystemExit(3)", "x=broken_one:made", "SystemExit: 3"),
         ("import no_such_module", "x=broken_one:made", "ModuleNotFoundError"),
         ("made = 1", "x=broken_one:other", "AttributeError"),
         ("def (", "x=broken_one:made", "SyntaxError"),
