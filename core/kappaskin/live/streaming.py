@@ -1,6 +1,7 @@
 """Stream: the estimates of a source, in a loop of a program."""
 
 import os
+import time
 import weakref
 from collections import deque
 from pathlib import Path
@@ -55,23 +56,31 @@ class Stream:
         raise failure or StopIteration
 
     def _receive(self) -> None:
-        """Read what has arrived; wait for it where nothing else waits."""
+        """Read what has arrived up to now; wait for it where nothing else waits."""
         if not self._finish.alive or (self._waiting and self._source.patient):
             return
+        began = time.monotonic()
         try:
-            frames = self._source.read(0.0 if self._waiting else _READ)
-            self._follow()
-            self._waiting += frames
-            if trouble := self._source.trouble:
-                raise SourceError(trouble)
+            frames = self._take(0.0 if self._waiting else _READ)
+            while frames and frames[-1].host_time < began and not self._source.patient:
+                frames = self._take(0.0)
             if isinstance(self._source, ReplayedSource) and self._source.ended:
                 self.close()
         except Refusal as reason:
             self._failure = None if isinstance(reason, EndedSource) else reason
             self.close()
+
+    def _take(self, timeout: float) -> list[Frame]:
+        """Read frames after at most `timeout` s, and let the newest wait."""
+        frames = self._source.read(timeout)
+        self._follow()
+        self._waiting += frames
         while self._pipeline and len(self._waiting) > _WAITING and not self._source.patient:
             self._pipeline.pass_over(self._waiting.popleft())
             self.dropped += 1
+        if trouble := self._source.trouble:
+            raise SourceError(trouble)
+        return frames
 
     def _follow(self) -> None:
         """Set up for the sensor that is connected now."""

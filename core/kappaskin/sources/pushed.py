@@ -3,7 +3,6 @@
 The socket sends the information text of the sensor once, then binary records of values.
 """
 
-import math
 import os
 import re
 import select
@@ -45,6 +44,7 @@ _WAITING = 64  # records that wait for a receiver at most, beside what the syste
 _HELD = 2**14  # bytes that the system is to hold
 _ANSWER, _LAST, _WAIT = 2.0, 1.0, 0.1  # s for the text, for what waits at the end, for a read
 _BLOCK = 2**16
+_LATEST = 1e11  # s since 1970: some three thousand years
 
 
 class Feed:
@@ -88,7 +88,7 @@ class Feed:
         if time is not None and self._timed:
             raise Refusal("expected no time: a column of the description has it; leave it out")
         stamp = clock.time() if time is None else float(time)
-        if not 0 <= stamp < math.inf:
+        if not 0 <= stamp < _LATEST:
             raise Refusal(f"expected a time in s since 1970, as of time.time(), got {time}")
         with self._lock:
             record = self._record([self._pushed % SEQUENCES, stamp, *numbers.tolist()])

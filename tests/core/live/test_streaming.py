@@ -86,6 +86,19 @@ def test_of_frames_that_wait_the_newest_are_given_and_the_others_counted(board) 
     assert found.dropped == 136
 
 
+def test_after_a_pause_the_newest_frames_are_given(board) -> None:
+    with feed("glove", board) as glove, stream("feed:glove") as found:
+        for n in range(3000):  # more than one read brings
+            glove.push([n, n / 1000, *[1e-4] * 16])
+            if not n % 20:
+                time.sleep(1e-3)
+        time.sleep(0.3)
+        first = next(found).sequence
+
+    assert first == 3000 - 64
+    assert found.dropped + glove.dropped == 3000 - 64
+
+
 def test_a_lost_connection_is_raised_and_what_came_before_is_given(board) -> None:
     glove, found = feed("glove", board), stream("feed:glove")
     for n in range(5):

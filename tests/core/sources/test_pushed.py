@@ -96,6 +96,7 @@ def test_a_column_of_the_time_and_of_the_sequence_are_used(board) -> None:
         (VALUES, -1.0, "expected a time"),
         (VALUES, float("nan"), "expected a time"),
         (VALUES, float("inf"), "expected a time"),
+        (VALUES, 1e300, "expected a time"),
     ],
 )
 def test_what_is_no_record_is_refused_and_the_feed_goes_on(board, values, when, reason) -> None:
