@@ -277,7 +277,8 @@ class Recording:
         if not self._topics:
             raise Refusal(
                 f"{self.path}: expected a recording of this program, got an MCAP file of "
-                f"{self.library or 'another'!r:.60}"
+                f"{self.library or 'another'!r:.60}; `kappaskin import` makes one of it, with the "
+                "description of its sensor"
             )
 
     # The summary at the end of a file.

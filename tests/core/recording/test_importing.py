@@ -492,3 +492,10 @@ def test_ctrl_c_stops_the_command_and_leaves_nothing(run, tmp_path: Path, monkey
     assert code == 2
     assert "nothing was written" in told
     assert {file.name for file in tmp_path.iterdir()} == {"a.csv", "board.toml"}
+
+
+def test_a_bag_that_is_opened_as_a_recording_names_the_command(tmp_path: Path) -> None:
+    _ros(tmp_path / "a.mcap")
+
+    with pytest.raises(Refusal, match="`kappaskin import` makes one of it"):
+        Recording(tmp_path / "a.mcap")
