@@ -12,7 +12,7 @@ from kappaskin.estimation import Fit, sigma_warning
 from kappaskin.frames import Array, Frame
 from kappaskin.health import FaultCodes, Health, HealthMonitor
 from kappaskin.live.ring import Ring, slot_type
-from kappaskin.pipeline import Pipeline, Setup
+from kappaskin.pipeline import Pipeline, Setup, pipeline_for
 from kappaskin.scenes import Scene
 from kappaskin.sensing import Sensor
 
@@ -69,7 +69,7 @@ class PipelineHost:
         if self._sensor is None:
             self.status = replace(self.status, setup=self._requested, refusal="")
         elif self._building is None:
-            job = (built, self._sensor, self._requested, self.status.generation + 1, smaller)
+            job = (_built, self._sensor, self._requested, self.status.generation + 1, smaller)
             self._building = self._builder.submit(*job)
             self.status = replace(self.status, computing=True)
 
@@ -149,22 +149,12 @@ class _Built:
     refusal: str = ""
 
 
-def built(sensor: Sensor, requested: Setup, generation: int, smaller: bool) -> _Built:
+def _built(sensor: Sensor, requested: Setup, generation: int, smaller: bool) -> _Built:
     """A pipeline as requested, or if it may be `smaller` with as many functions as possible."""
-    refusal = ""
-    most = max(requested.Ni, requested.Nj)
-    for limit in range(most, 0 if smaller else most - 1, -1):
-        setup = replace(requested, Ni=min(requested.Ni, limit), Nj=min(requested.Nj, limit))
-        try:
-            return _Built(sensor, requested, Pipeline(sensor, setup, generation), refusal)
-        except Refusal as reason:
-            refusal = refusal or str(reason)
-        except MemoryError:
-            refusal = refusal or (
-                f"{requested.Ni} x {requested.Nj} functions for {sensor.layout} do not fit in "
-                "memory; use fewer"
-            )
-    return _Built(sensor, requested, None, refusal)
+    try:
+        return _Built(sensor, requested, *pipeline_for(sensor, requested, generation, smaller))
+    except Refusal as reason:
+        return _Built(sensor, requested, None, str(reason))
 
 
 _SHOWN_EVERY = 1 / 60  # s between two frames that are computed

@@ -9,8 +9,7 @@ from pathlib import Path
 from kappaskin.errors import EndedSource, Refusal, SourceError
 from kappaskin.frames import Estimate, Frame
 from kappaskin.health import HealthMonitor
-from kappaskin.live.pipelines import built
-from kappaskin.pipeline import Pipeline, Setup, usual_setup
+from kappaskin.pipeline import Pipeline, Setup, pipeline_for, usual_setup
 from kappaskin.recording import ReplayedSource
 from kappaskin.sensing import Sensor
 from kappaskin.sources import described_source, open_source
@@ -88,11 +87,9 @@ class Stream:
             return
         self.dropped += len(self._waiting)
         self._waiting.clear()
-        usual = self._setup is None
-        made = built(sensor, self._setup or usual_setup(sensor), 1, smaller=usual)
-        if made.pipeline is None:
-            raise Refusal(made.refusal)
-        self.sensor, self._pipeline, self._health = sensor, made.pipeline, HealthMonitor(sensor)
+        setup, usual = self._setup or usual_setup(sensor), self._setup is None
+        self._pipeline, _ = pipeline_for(sensor, setup, smaller=usual)
+        self.sensor, self._health = sensor, HealthMonitor(sensor)
 
     def close(self) -> None:
         """Close the source; the frames that wait can still be taken."""

@@ -2,6 +2,7 @@
 
 from kappaskin.pipeline.pipeline import REVISION as REVISION
 from kappaskin.pipeline.pipeline import Pipeline as Pipeline
+from kappaskin.pipeline.pipeline import pipeline_for as pipeline_for
 from kappaskin.pipeline.quantities import ErrorBars as ErrorBars
 from kappaskin.pipeline.quantities import Quantities as Quantities
 from kappaskin.pipeline.reconstruction import reconstruct as reconstruct

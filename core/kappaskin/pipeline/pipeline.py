@@ -383,6 +383,28 @@ def _estimator_settings(pipeline: Pipeline) -> tuple[object, ...]:
     return setup.method, pipeline.basis.shape, setup.edge or pipeline.sensor.edge, setup.rim_sd
 
 
+def pipeline_for(
+    sensor: Sensor, setup: Setup, generation: int = 0, smaller: bool = False
+) -> tuple[Pipeline, str]:
+    """The pipeline of a `setup`; with `smaller`, of as many of its functions as the sensor allows.
+
+    And why it has fewer, empty where it has all. Raises a `Refusal` where there is none.
+    """
+    refusal, most = "", max(setup.Ni, setup.Nj)
+    for limit in range(most, 0 if smaller else most - 1, -1):
+        limited = replace(setup, Ni=min(setup.Ni, limit), Nj=min(setup.Nj, limit))
+        try:
+            return Pipeline(sensor, limited, generation), refusal
+        except Refusal as reason:
+            refusal = refusal or str(reason)
+        except MemoryError:
+            refusal = refusal or (
+                f"{setup.Ni} x {setup.Nj} functions for {sensor.layout} do not fit in memory; use "
+                "fewer"
+            )
+    raise Refusal(refusal)
+
+
 def _check_size(sensor: Sensor, setup: Setup, budget: Budget | None) -> None:
     check_method(setup.method)
     method, numbers = METHODS[setup.method], _PER_POINT * setup.nx * setup.ny
