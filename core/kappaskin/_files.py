@@ -7,6 +7,8 @@ import secrets
 import shutil
 import stat
 import tempfile
+import zipfile
+import zlib
 from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -20,6 +22,14 @@ _NO_HOME = Path(os.devnull, "no-home-directory")  # in which nothing can be writ
 
 LIMIT = "KAPPASKIN_LIMIT"
 """Environment variable: bytes that reading a file may take, instead of the usual limits."""
+
+# RuntimeError where it seems encrypted or packed by a method there is not, MemoryError where it
+# claims to be huge.
+ARCHIVE_DAMAGES = (
+    *(OSError, ValueError, EOFError, RuntimeError, MemoryError, OverflowError),
+    *(zipfile.BadZipFile, zlib.error),
+)
+"""What a damaged archive makes zipfile and NumPy raise."""
 
 _TIMES = 200  # its size, that a file may declare
 _ALWAYS = 256_000_000  # bytes that any file may declare

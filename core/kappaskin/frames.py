@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int32]
-Indices = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 

@@ -4,7 +4,6 @@ import io
 import math
 import os
 import zipfile
-import zlib
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
@@ -13,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin._files import Budget, check_memory, open_file
+from kappaskin._files import ARCHIVE_DAMAGES, Budget, check_memory, open_file
 from kappaskin.bases import Basis, basis_for
 from kappaskin.contact import (
     KINDS,
@@ -65,19 +64,6 @@ _READ_AS = 8  # bytes of each number in memory
 _MOST = 2**27  # numbers in one array: 1 GiB
 _NAMED = 2**18  # readings times functions: of more, none that is not determined is named
 
-# What a damaged archive makes zipfile and NumPy raise: RuntimeError when it seems encrypted or
-# packed by a method there is not, MemoryError when it claims to be huge.
-_DAMAGES = (
-    OSError,
-    ValueError,
-    EOFError,
-    RuntimeError,
-    MemoryError,
-    OverflowError,
-    zipfile.BadZipFile,
-    zlib.error,
-)
-
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
     # Opened here: np.load leaves a file that it opened itself open when the archive is damaged.
@@ -123,7 +109,7 @@ def _read(path: Path) -> tuple[dict[str, Array], dict[str, NDArray[np.str_]]]:
         raise Refusal(f"{path}: there is no such file; expected an NPZ with {_NEEDED}") from error
     except Refusal:
         raise
-    except _DAMAGES as error:
+    except ARCHIVE_DAMAGES as error:
         raise Refusal(f"{path}: cannot be read as NPZ ({error}); expected {_NEEDED}") from error
     needed = ("values", "element", "quantity") if "values" in found else ("curvature",)
     for name in ("size", "positions", *needed):

@@ -60,7 +60,7 @@ _STEP = 1000  # rows of a table that are read at once
 _QUOTED = re.compile(rb'"([^",;\t]*)"')
 
 
-class Row(NamedTuple):
+class FileRow(NamedTuple):
     """A row: its record as text or bytes, the numbers of one, or why it is none.
 
     It is of the `time` in s, NaN where none comes with it; up to it a `share` of the file is read.
@@ -71,12 +71,11 @@ class Row(NamedTuple):
     share: float
 
 
-def rows_of(file: Path, description: Description, topic: str, scratch: Path) -> Iterator[Row]:
+def rows_of(file: Path, description: Description, topic: str, scratch: Path) -> Iterator[FileRow]:
     """The rows of a `file`, or of a folder with a bag of ROS 2; of messages those of a `topic`.
 
     Arrays are unpacked in the folder `scratch`. A `Refusal` where it is no file of that kind, or
-    does not fit; other errors as the libraries
-    that read it raise them.
+    does not fit; other errors as the libraries that read it raise them.
     """
     if file.is_dir():
         parts = [part for part in file.iterdir() if part.suffix in _BAGS]
@@ -118,7 +117,7 @@ def rows_of(file: Path, description: Description, topic: str, scratch: Path) -> 
 # Lines, or binary records
 
 
-def _line_rows(file: Path, description: Description) -> Iterator[Row]:
+def _line_rows(file: Path, description: Description) -> Iterator[FileRow]:
     decoder, text = description.decoder(whole=True), description.kind != "binary"
     with open_file(file) as opened:
         size = max(opened.seek(0, 2), 1)
@@ -138,7 +137,7 @@ def _line_rows(file: Path, description: Description) -> Iterator[Row]:
                     more = decoder.next_of(opened)
             if description.kind == "text" and isinstance(data, bytes) and b'"' in data:
                 data = _QUOTED.sub(rb"\1", data)
-            yield Row(data, math.nan, opened.tell() / size)
+            yield FileRow(data, math.nan, opened.tell() / size)
 
 
 # Tables
@@ -169,7 +168,7 @@ class _Placement:
         if self._needs_time and not (timed or self._rate):
             raise Refusal(f"expected times in s in {_TIME!r}, got none; {NO_TIME}")
 
-    def rows(self, values: NDArray[Any], times: Array | None, first: int) -> Iterator[Row]:
+    def rows(self, values: NDArray[Any], times: Array | None, first: int) -> Iterator[FileRow]:
         """Those of `values` (n, K) at `times` (n,) in s, of which the first has a number."""
         columns, count = self._columns, len(values)
         numbers = np.zeros((count, len(columns)))
@@ -182,7 +181,7 @@ class _Placement:
             numbers[:, columns.sequence] = np.arange(first, first + count)
         for row, time in zip(numbers.tolist(), times.tolist(), strict=True):
             usable = math.isfinite(time) or not self._needs_time
-            yield Row(row if usable else "time or sequence: no time", time, 0.0)
+            yield FileRow(row if usable else "time or sequence: no time", time, 0.0)
 
 
 NO_TIME = "give a column of time, or rate = 100, in records per second, in [line]"
@@ -195,7 +194,7 @@ def _table_rows(
     names: Sequence[str],
     total: int,
     blocks: Iterable[Mapping[str, NDArray[Any]]],
-) -> Iterator[Row]:
+) -> Iterator[FileRow]:
     """The rows of a table of `total` rows with columns of these names, some at a time."""
     timed = _TIME in names
     rest = [name for name in names if name != _TIME]
@@ -222,7 +221,7 @@ def _seconds(times: NDArray[Any]) -> Array:
 _VALUES = "values"
 
 
-def _npz_rows(file: Path, description: Description, scratch: Path) -> Iterator[Row]:
+def _npz_rows(file: Path, description: Description, scratch: Path) -> Iterator[FileRow]:
     own = description.columns
     with open_file(file) as opened, zipfile.ZipFile(opened) as archive:
         there = [name.removesuffix(".npy") for name in archive.namelist()]
@@ -260,7 +259,7 @@ def _npz_rows(file: Path, description: Description, scratch: Path) -> Iterator[R
     yield from _table_rows(file, description, [*arrays], total, blocks)
 
 
-def _parquet_rows(file: Path, description: Description) -> Iterator[Row]:
+def _parquet_rows(file: Path, description: Description) -> Iterator[FileRow]:
     try:
         parquet: Any = importlib.import_module("pyarrow.parquet")
     except ImportError as error:
@@ -357,7 +356,7 @@ def _sqlite_messages(path: Path) -> Iterator[_Message]:
 
 def _message_rows(
     file: Path, parts: Sequence[Path], description: Description, name: str
-) -> Iterator[Row]:
+) -> Iterator[FileRow]:
     """The rows of one topic of a bag, whose files follow one another."""
     make = _BAGS.get(parts[0].suffix, _mcap_messages)
     found = list(dict.fromkeys((m.topic, m.fault) for m in chain.from_iterable(map(make, parts))))
@@ -370,7 +369,7 @@ def _message_rows(
         for message in make(part):
             share = (n + message.share) / len(parts)
             if message.fault:
-                yield Row(message.fault, math.nan, share)
+                yield FileRow(message.fault, math.nan, share)
             elif message.topic == topic:
                 yield read(message)._replace(share=share)
 
@@ -395,7 +394,7 @@ def _chosen(file: Path, topics: set[_Topic], description: Description, name: str
     )
 
 
-def _reader(topic: _Topic, description: Description) -> Callable[[_Message], Row]:
+def _reader(topic: _Topic, description: Description) -> Callable[[_Message], FileRow]:
     """What makes a row of each message of a topic."""
     kind, numbers = _ARRAYS.get(topic.kind), count()
 
@@ -404,18 +403,18 @@ def _reader(topic: _Topic, description: Description) -> Callable[[_Message], Row
         timed = width < len(description.columns) or description.columns.time < 0
         return _Placement(description, [""] * width, timed)
 
-    def row(message: _Message) -> Row:
+    def row(message: _Message) -> FileRow:
         time = message.time * 1e-9
         if topic.encoding == _JSON:
-            return Row(_one_line(message.data), time, 0.0)
+            return FileRow(_one_line(message.data), time, 0.0)
         try:
             found = decode(kind or STRING, message.data)
             if kind is None:
-                return Row(_one_line(found["data"].encode()), time, 0.0)
+                return FileRow(_one_line(found["data"].encode()), time, 0.0)
             values = found["data"][found["layout.data_offset"] :]
             return next(placement(len(values)).rows(values[None], np.array([time]), next(numbers)))
         except Refusal as refusal:
-            return Row(f"no record: {refusal}", time, 0.0)
+            return FileRow(f"no record: {refusal}", time, 0.0)
 
     return row
 

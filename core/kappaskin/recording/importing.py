@@ -5,8 +5,6 @@ import re
 import sqlite3
 import struct
 import time
-import zipfile
-import zlib
 from collections import Counter
 from collections.abc import Generator
 from contextlib import closing
@@ -14,13 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from kappaskin._files import ARCHIVE_DAMAGES
 from kappaskin.errors import Refusal
 from kappaskin.frames import Frame
-from kappaskin.pipeline import Pipeline, Setup
+from kappaskin.pipeline import Pipeline, Setup, pipeline_for
 from kappaskin.recording.disk import ScratchTask, is_there
-from kappaskin.recording.foreign import NO_TIME, Row, rows_of
+from kappaskin.recording.foreign import NO_TIME, FileRow, rows_of
 from kappaskin.recording.recorder import Recorder
-from kappaskin.sensing import Sensor
 from kappaskin.sources import (
     ClockState,
     Interpreter,
@@ -40,21 +38,7 @@ _SHOWN = 60  # characters of a bad row
 _COMMA = re.compile(rb"\d,\d+\s*[;\t]")
 _SEPARATORS = (b";", b"\t", b",")
 _NAME = re.compile(rb"(?i)(?!nan$|inf$|infinity$)[a-z_\x80-\xff]")
-_DAMAGES = (
-    OSError,
-    ValueError,
-    EOFError,
-    RuntimeError,
-    MemoryError,
-    OverflowError,
-    LookupError,
-    TypeError,
-    SyntaxError,
-    struct.error,
-    zipfile.BadZipFile,
-    zlib.error,
-    sqlite3.Error,
-)
+_DAMAGES = (*ARCHIVE_DAMAGES, LookupError, TypeError, SyntaxError, struct.error, sqlite3.Error)
 
 
 @dataclass(frozen=True)
@@ -167,7 +151,7 @@ class _Import:
         self._since = set[int]()  # sequence numbers since the last estimate
         self._bad, self._first = Counter[str](), dict[str, tuple[int, str]]()
 
-    def take(self, row: Row) -> None:
+    def take(self, row: FileRow) -> None:
         """Take one row."""
         self.rows += 1
         data = row.data
@@ -260,7 +244,7 @@ class _Import:
         recorder.connected(text)
         self._map(recorder, at)
         if self._interpreter.sensor is not None:
-            self._pipeline = _usual_pipeline(self._interpreter.sensor)
+            self._pipeline, _ = pipeline_for(self._interpreter.sensor, Setup(), smaller=True)
             recorder.set_up(self._pipeline)
         return recorder
 
@@ -337,17 +321,6 @@ class _Import:
 def _fields(line: bytes) -> list[bytes]:
     """The fields of a line, whichever separator it has."""
     return line.split(next((separator for separator in _SEPARATORS if separator in line), None))
-
-
-def _usual_pipeline(sensor: Sensor) -> Pipeline:
-    """The default one, with as many functions as the elements determine."""
-    usual = Setup()
-    for most in range(max(usual.Ni, usual.Nj), 1, -1):
-        try:
-            return Pipeline(sensor, Setup(Ni=min(usual.Ni, most), Nj=min(usual.Nj, most)))
-        except Refusal:
-            continue
-    return Pipeline(sensor, Setup(Ni=1, Nj=1))
 
 
 class ImportTask(ScratchTask[Imported]):

@@ -31,7 +31,7 @@ from kappaskin.sources.recognition import READS as READS
 from kappaskin.sources.recognition import FileLines as FileLines
 from kappaskin.sources.recognition import NewSensor as NewSensor
 from kappaskin.sources.recognition import RawLines as RawLines
-from kappaskin.sources.recognition import Recognised as Recognised
+from kappaskin.sources.recognition import RecognisedLines as RecognisedLines
 from kappaskin.sources.recognition import Recogniser as Recogniser
 from kappaskin.sources.recognition import columns_of as columns_of
 from kappaskin.sources.recognition import description_text as description_text

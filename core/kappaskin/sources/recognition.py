@@ -16,7 +16,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from kappaskin._files import open_file
+from kappaskin._files import ARCHIVE_DAMAGES, open_file
 from kappaskin._toml import table
 from kappaskin.errors import Refusal, SourceError, lacking
 from kappaskin.frames import Array
@@ -51,7 +51,7 @@ _WORDS = "The lines are no numbers; let the board print numbers alone, the same 
 
 
 @dataclass(frozen=True, eq=False)
-class Recognised:
+class RecognisedLines:
     """What is recognised of lines: their `kind`, text or json, empty until there are enough.
 
     Each has a number for each of `labels`, as `numbers` (n, columns) of the newest lines; of JSON
@@ -115,27 +115,23 @@ class Recogniser:
                 self._head += [text] * (len(self._head) < _HEADING)
             self._first = False  # of which the beginning may be missing
 
-    def forget(self) -> None:
-        """Begin anew, as after another baud rate."""
-        self.__init__(self._arrived)
-
     @property
     def garbled(self) -> bool:
         """Whether much of what came is no text."""
         return self._bytes.total() >= _ENOUGH and self._bytes[True] < _TEXT * self._bytes.total()
 
-    def found(self) -> Recognised:
+    def found(self) -> RecognisedLines:
         """What is recognised up to now."""
         if self.garbled:
-            return Recognised(trouble=_BINARY)
+            return RecognisedLines(trouble=_BINARY)
         lines = [line for _, line in (*self._course, *self.lines)]
         if len(self.lines) < 3:
-            return Recognised()
+            return RecognisedLines()
         if _decimal_commas(lines[-_JUDGED:]):
-            return Recognised(trouble=_COMMA)
+            return RecognisedLines(trouble=_COMMA)
         if (found := _json(lines) or _text(lines, self._head)) is not None:
             return self._measured(*found)
-        return Recognised(trouble=_WORDS)
+        return RecognisedLines(trouble=_WORDS)
 
     def _measured(
         self,
@@ -144,7 +140,7 @@ class Recogniser:
         labels: tuple[str, ...],
         paths: tuple[tuple[str, int], ...],
         rows: list[list[float] | None],
-    ) -> Recognised:
+    ) -> RecognisedLines:
         """With the rate, and what the columns are by their course."""
         split, columns = len(self._course), len(labels)
         course, since = _numbers(rows[:split], self._course, columns)
@@ -157,7 +153,7 @@ class Recogniser:
             roles = _roles(numbers, numbers, math.nan)
         elif passed > _SPAN:
             roles = _roles(numbers, course, passed)
-        return Recognised(kind, separator, labels, paths, rate, numbers, roles)
+        return RecognisedLines(kind, separator, labels, paths, rate, numbers, roles)
 
 
 def _numbers(
@@ -336,7 +332,9 @@ READS: Mapping[str, tuple[str, ...]] = {
 """What the elements of a sensor usually read, by its name on the screen."""
 
 
-def columns_of(found: Recognised, reads: tuple[str, ...], interleaved: bool) -> tuple[str, ...]:
+def columns_of(
+    found: RecognisedLines, reads: tuple[str, ...], interleaved: bool
+) -> tuple[str, ...]:
     """The meaning of each column where its elements read `reads`, and times are as recognised.
 
     All readings of one kind stand together, or all of one element where they are `interleaved`.
@@ -369,7 +367,7 @@ class NewSensor:
     baud: int = 115_200
 
 
-def description_text(found: Recognised, sensor: NewSensor) -> str:
+def description_text(found: RecognisedLines, sensor: NewSensor) -> str:
     """The text of the description of a `sensor` whose lines are as `found`, checked.
 
     A `Refusal` names what is wrong with it.
@@ -467,9 +465,6 @@ def _lines_of(names: Sequence[str], rows: Array) -> bytes:
     return "".join(f"{line}\n" for line in lines).encode()
 
 
-_DAMAGE = (OSError, ValueError, LookupError, StopIteration, TypeError, EOFError, MemoryError)
-
-
 class FileLines:
     """The first lines of a file, as `RawLines` has those of a board.
 
@@ -485,7 +480,7 @@ class FileLines:
             self.recogniser.feed(0.0, _first_rows(file))
         except Refusal as refusal:
             self.trouble = f"{refusal}."
-        except (*_DAMAGE, zipfile.BadZipFile) as error:
+        except (*ARCHIVE_DAMAGES, LookupError, StopIteration, TypeError) as error:
             self.trouble = f"{file}: cannot be read ({getattr(error, 'strerror', None) or error})."
 
     def poll(self) -> None:
@@ -526,7 +521,7 @@ class RawLines:
         elif self.recogniser.garbled and now - self._since > _DWELL:
             self.baud, self._since = next(self._rates), now
             self._connection.set_baud_rate(self.baud)
-            self.recogniser.forget()
+            self.recogniser = Recogniser()
 
     def _open(self, now: float) -> None:
         self._next_try, self._since = now + _RETRY, now
@@ -540,7 +535,7 @@ class RawLines:
             self.trouble = f"{error}; retrying."
             return
         self.trouble = ""
-        self.recogniser.forget()
+        self.recogniser = Recogniser()
 
     def close(self) -> None:
         """Let go of the port."""

@@ -305,3 +305,13 @@ def test_whole_numbers_are_no_decimal_commas(separator) -> None:
     whole = np.random.default_rng(2).integers(10, 1024, (99, 4))
 
     assert len(recognised([separator.join(map(str, row)) for row in whole]).labels) == 4
+
+
+def test_arrays_whose_bytes_are_damaged_say_so(tmp_path) -> None:
+    file = tmp_path / "a.npz"
+    np.savez_compressed(file, values=rows(500, 4))
+    content = bytearray(file.read_bytes())
+    content[200:260] = bytes(60)
+    file.write_bytes(content)
+
+    assert "cannot be read" in FileLines(file).trouble

@@ -36,7 +36,7 @@ from kappaskin.sources import (
     NewSensor,
     Port,
     RawLines,
-    Recognised,
+    RecognisedLines,
     columns_of,
     description_text,
 )
@@ -132,7 +132,7 @@ class NewSensorDialog(QDialog):
         self.setWindowTitle("New sensor")
         self.resize(860, 620)
         self.lines: RawLines | FileLines | None = None
-        self.found = Recognised()
+        self.found = RecognisedLines()
         self.columns: tuple[str, ...] = ()
         self._known: set[str] | None = None
         self._rest: Array | None = None  # what the columns are while nothing answers
@@ -311,7 +311,7 @@ class NewSensorDialog(QDialog):
         else:
             self.opening.emit(url)
             self.lines = RawLines(url)
-        self.found, self.columns = Recognised(), ()
+        self.found, self.columns = RecognisedLines(), ()
         self.raw.clear()
 
     def _let_go(self) -> None:
