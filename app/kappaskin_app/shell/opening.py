@@ -25,8 +25,8 @@ SCENES = "Scene (*.toml)"
 class Kind:
     """A kind of file: its name, its `suffixes`, and the function that opens one.
 
-    Of several kinds with one suffix, `is_one` selects; the one without it takes the rest. One
-    that `needs_sensor` is opened once a sensor is known.
+    A folder has the suffix "". Of several kinds with one suffix, `is_one` selects; the one without
+    it takes the rest. One that `needs_sensor` is opened once a sensor is known.
     """
 
     words: str
@@ -90,7 +90,7 @@ class Opening(QObject):
 
     def opens(self, file: Path) -> bool:
         """Whether files of this suffix can be opened."""
-        return any(file.suffix.lower() in kind.suffixes for kind in self._kinds)
+        return any(_suffix(file) in kind.suffixes for kind in self._kinds)
 
     def open(self, file: Path) -> None:
         """Open a file by its kind, or report why it cannot be opened."""
@@ -135,11 +135,13 @@ class Opening(QObject):
 
     def _kind(self, file: Path) -> Kind:
         """The kind of a file; refused where there is none, or it cannot be read."""
-        alike = [kind for kind in self._kinds if file.suffix.lower() in kind.suffixes]
+        alike = [kind for kind in self._kinds if _suffix(file) in kind.suffixes]
         for kind in sorted(alike, key=lambda kind: kind.is_one is None):
             if kind.is_one is None or kind.is_one(file):
                 return kind
-        kinds = ", ".join(f"a {kind.words} ({' '.join(kind.suffixes)})" for kind in self._kinds)
+        kinds = ", ".join(
+            f"a {kind.words} ({' '.join(kind.suffixes).strip()})" for kind in self._kinds
+        )
         raise Refusal(f"{file}: expected {kinds}; choose such a file")
 
     # Recent files.
@@ -180,6 +182,10 @@ class Opening(QObject):
         action.setEnabled(there)
         action.setToolTip(plain_tip(str(file) if there else f"{file} was moved or deleted"))
         action.triggered.connect(guarded(lambda *_: self.open(file)))
+
+
+def _suffix(file: Path) -> str:
+    return "" if file.is_dir() else file.suffix.lower() or "."
 
 
 def _shown(file: Path) -> str:

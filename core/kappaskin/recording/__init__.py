@@ -5,6 +5,8 @@ from kappaskin.recording.disk import is_written as is_written
 from kappaskin.recording.export.request import ExportRequest as ExportRequest
 from kappaskin.recording.export.writing import Exported as Exported
 from kappaskin.recording.export.writing import ExportTask as ExportTask
+from kappaskin.recording.foreign import FileLines as FileLines
+from kappaskin.recording.foreign import is_foreign as is_foreign
 from kappaskin.recording.importing import Imported as Imported
 from kappaskin.recording.importing import ImportRequest as ImportRequest
 from kappaskin.recording.importing import ImportTask as ImportTask

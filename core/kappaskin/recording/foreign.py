@@ -4,11 +4,12 @@ import importlib
 import math
 import re
 import sqlite3
+import struct
 import zipfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from functools import cache
-from itertools import chain, count
+from itertools import count, islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,8 +18,8 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 from numpy.typing import NDArray
 
-from kappaskin._files import Budget, open_file
-from kappaskin.errors import Refusal, lacking
+from kappaskin._files import ARCHIVE_DAMAGES, Budget, open_file
+from kappaskin.errors import Damaged, Refusal, lacking
 from kappaskin.frames import Array
 from kappaskin.recording.cdr import MessageType, decode
 from kappaskin.recording.messages import STRING
@@ -27,13 +28,14 @@ from kappaskin.recording.reading import (
     MAGIC,
     MESSAGE_HEADER,
     CorruptRecord,
+    Recording,
     cost,
     parsed,
     record_at,
     records_in,
     unpacked,
 )
-from kappaskin.sources import Description
+from kappaskin.sources import Description, Recogniser
 
 _DIMENSION = MessageType(
     "std_msgs/msg/MultiArrayDimension", "string label\nuint32 size\nuint32 stride"
@@ -57,6 +59,8 @@ _ARRAYS = {
 _JSON = "json"
 _TIME = "time"
 _STEP = 1000  # rows of a table that are read at once
+_FIRST, _LOOKED = 300, 20_000  # rows, and messages, by which an unknown file is known
+_HEAD, _MOST = 2**19, 2**26  # bytes of them, of lines and of messages
 _QUOTED = re.compile(rb'"([^",;\t]*)"')
 
 
@@ -78,16 +82,23 @@ def rows_of(file: Path, description: Description, topic: str, scratch: Path) -> 
     does not fit; other errors as the libraries that read it raise them.
     """
     if file.is_dir():
-        parts = [part for part in file.iterdir() if part.suffix in _BAGS]
-        parts.sort(key=lambda part: (part.suffix, len(part.name), part.name))
-        if not parts or len({part.suffix for part in parts}) > 1:
-            raise Refusal(
-                f"{file}: expected a bag of ROS 2, with .mcap or .db3 files, got "
-                f"{', '.join(sorted(part.name for part in file.iterdir())[:5]) or 'nothing'}; "
-                "`ros2 bag convert` makes one of others"
-            )
-        yield from _message_rows(file, parts, description, topic)
+        yield from _message_rows(file, description, topic)
         return
+    kind = _kind_of(file)
+    if topic and kind not in (MAGIC, _SQLITE):
+        raise Refusal(f"{file}: expected no --topic, as it has no messages")
+    if kind in (MAGIC, _SQLITE):
+        yield from _message_rows(file, description, topic)
+    elif kind:
+        blocks = _npz_blocks(file, description, scratch)
+        made = blocks if kind == _ZIP else _parquet_blocks(file, _STEP)
+        yield from _table_rows(file, description, made)
+    else:
+        yield from _line_rows(file, description)
+
+
+def _kind_of(file: Path) -> bytes:
+    """The first bytes that show what a file is, b"" of lines; a `Refusal` if its name differs."""
     with open_file(file) as opened:
         head = opened.read(len(_SQLITE))
     if head.startswith(b"#ROSBAG"):
@@ -103,15 +114,7 @@ def rows_of(file: Path, description: Description, topic: str, scratch: Path) -> 
             f"{file}: expected {_KINDS[expected]} contents, got "
             f"{_KINDS.get(kind) or f'others, which begin with {head[:8]!r}'}; check the name"
         )
-    if topic and kind not in (MAGIC, _SQLITE):
-        raise Refusal(f"{file}: expected no --topic, as it has no messages")
-    if kind in (MAGIC, _SQLITE):
-        yield from _message_rows(file, [file], description, topic)
-    elif kind:
-        made = _parquet_rows(file, description)
-        yield from _npz_rows(file, description, scratch) if kind == _ZIP else made
-    else:
-        yield from _line_rows(file, description)
+    return kind
 
 
 # Lines, or binary records
@@ -184,29 +187,36 @@ class _Placement:
             yield FileRow(row if usable else "time or sequence: no time", time, 0.0)
 
 
+DAMAGES = (*ARCHIVE_DAMAGES, LookupError, TypeError, SyntaxError, struct.error, sqlite3.Error)
+"""What libraries raise of files that are damaged."""
+
 NO_TIME = "give a column of time, or rate = 100, in records per second, in [line]"
 """What to do where a file has no times."""
 
 
+class _Block(NamedTuple):
+    """Some rows of a table of `total` rows, by the names of its columns."""
+
+    total: int
+    columns: Mapping[str, NDArray[Any]]
+
+
 def _table_rows(
-    file: Path,
-    description: Description,
-    names: Sequence[str],
-    total: int,
-    blocks: Iterable[Mapping[str, NDArray[Any]]],
+    file: Path, description: Description, blocks: Iterable[_Block]
 ) -> Iterator[FileRow]:
-    """The rows of a table of `total` rows with columns of these names, some at a time."""
-    timed = _TIME in names
-    rest = [name for name in names if name != _TIME]
-    placement, first = _Placement(description, rest, timed), 0
-    for block in blocks:
-        for name, values in block.items():
+    """The rows of a table, some at a time."""
+    placement, first = None, 0
+    for total, columns in blocks:
+        timed = _TIME in columns
+        rest = [name for name in columns if name != _TIME]
+        placement = placement or _Placement(description, rest, timed)
+        for name, values in columns.items():
             if values.dtype.kind not in ("fiuM" if name == _TIME else "fiu"):
                 raise Refusal(f"{file}: expected numbers in {name!r:.60}, got {values.dtype}")
-        times = _seconds(block[_TIME]) if timed else None
-        values = np.column_stack([block[name].astype(float) for name in rest])
+        times = _seconds(columns[_TIME]) if timed else None
+        values = np.column_stack([columns[name].astype(float) for name in rest])
         for row in placement.rows(values, times, first):
-            yield row._replace(share=first / max(total, 1))
+            yield row._replace(share=first / total)
         first += len(values)
 
 
@@ -221,7 +231,7 @@ def _seconds(times: NDArray[Any]) -> Array:
 _VALUES = "values"
 
 
-def _npz_rows(file: Path, description: Description, scratch: Path) -> Iterator[FileRow]:
+def _npz_blocks(file: Path, description: Description, scratch: Path) -> Iterator[_Block]:
     own = description.columns
     with open_file(file) as opened, zipfile.ZipFile(opened) as archive:
         there = [name.removesuffix(".npy") for name in archive.namelist()]
@@ -252,14 +262,12 @@ def _npz_rows(file: Path, description: Description, scratch: Path) -> Iterator[F
             arrays.clear()  # the time is among the values
         arrays = {f"column {n}": column for n, column in enumerate(values.T)} | arrays
     total = len(next(iter(arrays.values()), ()))
-    blocks = (
-        {name: array[first : first + _STEP] for name, array in arrays.items()}
-        for first in range(0, total, _STEP)
-    )
-    yield from _table_rows(file, description, [*arrays], total, blocks)
+    for first in range(0, total, _STEP):
+        yield _Block(total, {name: array[first : first + _STEP] for name, array in arrays.items()})
 
 
-def _parquet_rows(file: Path, description: Description) -> Iterator[FileRow]:
+def _parquet_blocks(file: Path, step: int) -> Generator[_Block]:
+    """The columns of a Parquet table, `step` rows at a time."""
     try:
         parquet: Any = importlib.import_module("pyarrow.parquet")
     except ImportError as error:
@@ -273,14 +281,9 @@ def _parquet_rows(file: Path, description: Description) -> Iterator[FileRow]:
             raise Refusal(f"{file}: expected columns of different names, got one twice")
         Budget(file, opened.seek(0, 2)).take(8 * total * len(names), f"{total} rows")
         own = [name for name in names if not name.startswith("__index_level_")]  # those of pandas
-        blocks = (
-            {
-                name: column.to_numpy(zero_copy_only=False)
-                for name, column in zip(own, batch.columns, strict=True)
-            }
-            for batch in table.iter_batches(_STEP, columns=own)
-        )
-        yield from _table_rows(file, description, own, total, blocks)
+        for batch in table.iter_batches(step, columns=own):
+            arrays = (column.to_numpy(zero_copy_only=False) for column in batch.columns)
+            yield _Block(total, dict(zip(own, arrays, strict=True)))
 
 
 # Messages
@@ -354,49 +357,75 @@ def _sqlite_messages(path: Path) -> Iterator[_Message]:
                 yield _Message(topics[topic], time, data, n / total)
 
 
-def _message_rows(
-    file: Path, parts: Sequence[Path], description: Description, name: str
-) -> Iterator[FileRow]:
-    """The rows of one topic of a bag, whose files follow one another."""
-    make = _BAGS.get(parts[0].suffix, _mcap_messages)
-    found = list(dict.fromkeys((m.topic, m.fault) for m in chain.from_iterable(map(make, parts))))
+def _messages(file: Path) -> Iterator[_Message]:
+    """All of a file, or of a folder whose files follow one another."""
+    parts = _parts_of(file) if file.is_dir() else [file]
+    if not parts or len({part.suffix for part in parts}) > 1:
+        raise Refusal(
+            f"{file}: expected a bag of ROS 2, with .mcap or .db3 files, got "
+            f"{', '.join(sorted(part.name for part in file.iterdir())[:5]) or 'nothing'}; "
+            "`ros2 bag convert` makes one of others"
+        )
+    for n, part in enumerate(parts):
+        for message in _BAGS[_kind_of(part)](part):
+            yield message._replace(share=(n + message.share) / len(parts))
+
+
+def _parts_of(folder: Path) -> list[Path]:
+    """The files of a bag in a folder, in their order."""
+    parts = [part for part in folder.iterdir() if part.suffix in map(_KINDS.get, _BAGS)]
+    return sorted(parts, key=lambda part: (part.suffix, len(part.name), part.name))
+
+
+def _message_rows(file: Path, description: Description, name: str) -> Iterator[FileRow]:
+    """The rows of one topic of a bag."""
+    found = list(dict.fromkeys((m.topic, m.fault) for m in _messages(file)))
     topics = {topic for topic, fault in found if not fault}
     if found and not topics:
         raise Refusal(f"{file}: is {found[0][1]}")
     topic = _chosen(file, topics, description, name)
     read = _reader(topic, description)
-    for n, part in enumerate(parts):
-        for message in make(part):
-            share = (n + message.share) / len(parts)
-            if message.fault:
-                yield FileRow(message.fault, math.nan, share)
-            elif message.topic == topic:
-                yield read(message)._replace(share=share)
+    for message in _messages(file):
+        if message.fault:
+            yield FileRow(message.fault, math.nan, message.share)
+        elif message.topic == topic:
+            yield read(message)._replace(share=message.share)
+
+
+def _fitting(topics: Iterable[_Topic], kind: str = "") -> list[_Topic]:
+    """Those whose messages may be records of this kind, or of any; texts if there are no others."""
+    topics = sorted(topics)
+    arrays = [topic for topic in topics if topic.encoding == "cdr" and topic.kind in _ARRAYS]
+    if kind in ("", _JSON):
+        arrays += [topic for topic in topics if topic.encoding == _JSON]
+    return arrays or [t for t in topics if t.kind == STRING.name and kind != "binary"]
 
 
 def _chosen(file: Path, topics: set[_Topic], description: Description, name: str) -> _Topic:
     """The topic called `name`, or the only one that fits."""
-    named = [topic for topic in sorted(topics) if name in ("", topic.name)]
-    arrays = [topic for topic in named if topic.encoding == "cdr" and topic.kind in _ARRAYS]
-    if description.kind == _JSON:
-        arrays += [topic for topic in named if topic.encoding == _JSON]
-    texts = [t for t in named if t.kind == STRING.name and description.kind != "binary"]
-    found = arrays or texts
+    found = _fitting((topic for topic in topics if name in ("", topic.name)), description.kind)
     if len(found) == 1:
         return found[0]
-    there = ", ".join(f"{t.name} ({t.kind or t.encoding})" for t in (found or sorted(topics))[:20])
-    kinds = f"{', '.join(_ARRAYS)}, {STRING.name} or JSON"
-    if len(found) > 1:
-        raise Refusal(f"{file}: expected one topic, got {there}; choose by --topic NAME")
-    raise Refusal(
-        f"{file}: expected a topic {name + ' ' if name else ''}of {kinds} that fits the "
-        f"description, got {there or 'no topic'}"
+    if found:
+        raise Refusal(f"{file}: expected one topic, got {_named(found)}; choose by --topic NAME")
+    raise _no_topic(file, topics, name)
+
+
+def _no_topic(file: Path, topics: Iterable[_Topic], name: str = "") -> Refusal:
+    return Refusal(
+        f"{file}: expected a topic {name + ' ' if name else ''}of {', '.join(_ARRAYS)}, "
+        f"{STRING.name} or JSON that fits the description, got "
+        f"{_named(sorted(topics)) or 'no topic'}"
     )
+
+
+def _named(topics: Sequence[_Topic]) -> str:
+    return ", ".join(f"{topic.name} ({topic.kind or topic.encoding})" for topic in topics[:20])
 
 
 def _reader(topic: _Topic, description: Description) -> Callable[[_Message], FileRow]:
     """What makes a row of each message of a topic."""
-    kind, numbers = _ARRAYS.get(topic.kind), count()
+    numbers = count()
 
     @cache
     def placement(width: int) -> _Placement:
@@ -405,18 +434,25 @@ def _reader(topic: _Topic, description: Description) -> Callable[[_Message], Fil
 
     def row(message: _Message) -> FileRow:
         time = message.time * 1e-9
-        if topic.encoding == _JSON:
-            return FileRow(_one_line(message.data), time, 0.0)
         try:
-            found = decode(kind or STRING, message.data)
-            if kind is None:
-                return FileRow(_one_line(found["data"].encode()), time, 0.0)
-            values = found["data"][found["layout.data_offset"] :]
+            values = _contents(topic, message.data)
+            if isinstance(values, bytes):
+                return FileRow(values, time, 0.0)
             return next(placement(len(values)).rows(values[None], np.array([time]), next(numbers)))
         except Refusal as refusal:
             return FileRow(f"no record: {refusal}", time, 0.0)
 
     return row
+
+
+def _contents(topic: _Topic, data: bytes) -> bytes | NDArray[Any]:
+    """The numbers (K,) of a message, or its text as a line; a `Refusal` where it is none."""
+    if topic.encoding == _JSON:
+        return _one_line(data)
+    found = decode(_ARRAYS.get(topic.kind, STRING), data)
+    if topic.kind in _ARRAYS:
+        return found["data"][found["layout.data_offset"] :]
+    return _one_line(found["data"].encode())
 
 
 def _one_line(data: bytes) -> bytes:
@@ -425,4 +461,128 @@ def _one_line(data: bytes) -> bytes:
 
 _ZIP, _SQLITE = b"PK\3\4", b"SQLite format 3\0"
 _KINDS = {_ZIP: ".npz", b"PAR1": ".parquet", MAGIC: ".mcap", _SQLITE: ".db3"}
-_BAGS = {".mcap": _mcap_messages, ".db3": _sqlite_messages}
+_BAGS = {MAGIC: _mcap_messages, _SQLITE: _sqlite_messages}
+
+
+# What an unknown file is
+
+
+def is_foreign(file: Path) -> bool:
+    """Whether this is a bag of ROS 2, its folder, or an MCAP file of another program."""
+    try:
+        if file.is_dir():
+            return bool(_parts_of(file))
+        if (kind := _kind_of(file)) == MAGIC:
+            with Recording(file):
+                return False
+        return kind == _SQLITE
+    except Refusal as refusal:
+        return not isinstance(refusal, Damaged)
+    except OSError:
+        return False
+
+
+class FileLines:
+    """The first lines of a file, as `RawLines` has those of a board.
+
+    Of arrays in an NPZ file and of a Parquet table they are the first rows; of a bag the messages
+    of a `topic`, the first of its `topics` that have numbers if left out. It is `timed` where each
+    row has a time beside it.
+    """
+
+    baud = 115_200
+
+    def __init__(self, file: Path, topic: str = "") -> None:
+        self.url, self.topic, self.trouble = str(file), topic, ""
+        self.topics: list[str] = []
+        self.timed = False
+        self.recogniser = Recogniser(arrived=False)
+        try:
+            for time, line in self._lines(file):
+                self.recogniser.feed(time, line)
+        except Refusal as refusal:
+            self.trouble = f"{refusal}."
+        except DAMAGES as error:
+            self.trouble = f"{file}: cannot be read ({getattr(error, 'strerror', None) or error})."
+
+    def poll(self) -> None:
+        """Nothing: all has arrived."""
+
+    def close(self) -> None:
+        """Nothing is held open."""
+
+    def _lines(self, file: Path) -> Iterator[tuple[float, bytes]]:
+        """Lines, each with the time of its message in s."""
+        if file.is_dir() or (kind := _kind_of(file)) in _BAGS:
+            self.timed = True
+            yield from self._message_lines(file)
+        elif kind == _ZIP:
+            yield 0.0, _npz_head(file)
+        elif kind:
+            with closing(_parquet_blocks(file, _FIRST)) as blocks:
+                for _, columns in islice(blocks, 1):
+                    rows = [
+                        _seconds(values) if name == _TIME else values.astype(float)
+                        for name, values in columns.items()
+                    ]
+                    yield 0.0, _text_of([*columns], np.column_stack(rows))
+        else:
+            with open_file(file) as opened:
+                head = opened.read(_HEAD)
+            yield 0.0, head if len(head) == _HEAD else head + b"\n"
+
+    def _message_lines(self, file: Path) -> Iterator[tuple[float, bytes]]:
+        found, size = dict[_Topic, list[_Message]](), 0
+        for message in islice(_messages(file), _LOOKED):
+            if message.fault and not found:
+                raise Refusal(f"{file}: is {message.fault}")
+            found.setdefault(message.topic, [])
+            if _fitting([message.topic]):
+                found[message.topic].append(message)
+            if (size := size + len(message.data)) > _MOST:
+                break
+        fitting = _fitting(found)
+        self.topics = [topic.name for topic in fitting]
+        chosen = next((topic for topic in fitting if self.topic in ("", topic.name)), None)
+        if chosen is None:
+            raise _no_topic(file, found, self.topic)
+        self.topic = chosen.name
+        for message in found[chosen]:
+            try:
+                values = _contents(chosen, message.data)
+            except Refusal:
+                continue  # counted when it is imported
+            line = values if isinstance(values, bytes) else _text_of([], values[None])
+            yield message.time * 1e-9, line
+
+
+def _npz_head(file: Path) -> bytes:
+    """The first rows of arrays, as text below their names."""
+    with open_file(file) as opened, zipfile.ZipFile(opened) as archive:
+        names = [name for name in (_TIME, _VALUES) if f"{name}.npy" in archive.NameToInfo]
+        parts = [_first_of(archive, name) for name in names]
+    if not parts:
+        raise Refusal(f"{file}: expected arrays values (T, columns) and time (T,), got others")
+    heads = [name for name, part in zip(names, parts, strict=True) if part.shape[1] == 1]
+    heads += [f"values[{n}]" for n in range(parts[-1].shape[1])] * (parts[-1].shape[1] > 1)
+    return _text_of(heads, np.hstack(parts))
+
+
+def _first_of(archive: zipfile.ZipFile, name: str) -> Array:
+    """The first rows (n, K) of an array of numbers in an NPZ file, whatever its size."""
+    form = np.lib.format
+    with archive.open(f"{name}.npy") as opened:
+        old = form.read_magic(opened) == (1, 0)
+        read = form.read_array_header_1_0 if old else form.read_array_header_2_0
+        shape, by_columns, kind = read(opened)
+        if kind.kind not in "fiu" or by_columns or not 1 <= len(shape) <= 2:
+            raise ValueError(f"expected numbers in rows in {name}, got {kind} of shape {shape}")
+        columns = int(np.prod(shape[1:]))
+        data = opened.read(min(_FIRST, shape[0]) * columns * kind.itemsize)
+    return np.frombuffer(data, kind).reshape(-1, columns).astype(float)
+
+
+def _text_of(names: Sequence[str], rows: Array) -> bytes:
+    """Rows (n, K) as lines of text, below the names of their columns."""
+    lines = [",".join(names)] * bool(names) + [",".join(map(repr, r)) for r in rows.tolist()]
+    return "".join(f"{line}\n" for line in lines).encode()

@@ -2,8 +2,6 @@
 
 import math
 import re
-import sqlite3
-import struct
 import time
 from collections import Counter
 from collections.abc import Generator
@@ -12,12 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from kappaskin._files import ARCHIVE_DAMAGES
 from kappaskin.errors import Refusal
 from kappaskin.frames import Frame
 from kappaskin.pipeline import Pipeline, Setup, pipeline_for
 from kappaskin.recording.disk import ScratchTask, is_there
-from kappaskin.recording.foreign import NO_TIME, FileRow, rows_of
+from kappaskin.recording.foreign import DAMAGES, NO_TIME, FileRow, rows_of
 from kappaskin.recording.recorder import Recorder
 from kappaskin.sources import (
     ClockState,
@@ -38,7 +35,6 @@ _SHOWN = 60  # characters of a bad row
 _COMMA = re.compile(rb"\d,\d+\s*[;\t]")
 _SEPARATORS = (b";", b"\t", b",")
 _NAME = re.compile(rb"(?i)(?!nan$|inf$|infinity$)[a-z_\x80-\xff]")
-_DAMAGES = (*ARCHIVE_DAMAGES, LookupError, TypeError, SyntaxError, struct.error, sqlite3.Error)
 
 
 @dataclass(frozen=True)
@@ -120,7 +116,7 @@ def import_steps(request: ImportRequest, scratch: Path) -> Generator[float | Imp
         except Refusal as refusal:
             named = str(refusal).startswith(str(request.file))
             raise Refusal(f"{'' if named else f'{request.file}: '}{refusal}") from refusal
-        except _DAMAGES as error:
+        except DAMAGES as error:
             after = f" after row {work.rows:,}" if work.rows else ""
             why = getattr(error, "strerror", None) or str(error)
             raise Refusal(

@@ -28,7 +28,6 @@ from kappaskin.sources.pushed import FEED as FEED
 from kappaskin.sources.pushed import Feed as Feed
 from kappaskin.sources.pushed import feed as feed
 from kappaskin.sources.recognition import READS as READS
-from kappaskin.sources.recognition import FileLines as FileLines
 from kappaskin.sources.recognition import NewSensor as NewSensor
 from kappaskin.sources.recognition import RawLines as RawLines
 from kappaskin.sources.recognition import RecognisedLines as RecognisedLines

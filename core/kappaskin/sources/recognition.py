@@ -4,21 +4,17 @@ import json
 import math
 import re
 import time
-import zipfile
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
-from importlib import import_module
 from itertools import cycle, groupby
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
-from kappaskin._files import ARCHIVE_DAMAGES, open_file
 from kappaskin._toml import table
-from kappaskin.errors import Refusal, SourceError, lacking
+from kappaskin.errors import Refusal, SourceError
 from kappaskin.frames import Array
 from kappaskin.sources.description import Description, description_of
 from kappaskin.sources.inputs import UDP, Datagrams
@@ -40,7 +36,6 @@ _RATES = (115_200, 9600, 57_600, 38_400, 19_200, *BAUD_RATES)
 _DWELL, _RETRY = 0.8, 1.0  # s of garbled bytes before another rate; s between two tries to open
 _ENOUGH = 64  # bytes by which they are judged
 _HEADING = 8  # first lines among which a heading may be
-_HEAD = 2**19  # bytes of a file that are looked at
 
 _BINARY = (
     "The bytes are no text: another baud rate, or binary records, which a file describes (guide: "
@@ -354,7 +349,8 @@ class NewSensor:
     """What a person says of a sensor: its `title`, `size` (2,) in m, `grid`, `columns`.
 
     A reading is `scale` times the number, in SI. Without a `rigidity` in N m its material is
-    unknown; with a `free` zero each frame has an unknown offset.
+    unknown; with a `free` zero each frame has an unknown offset. `rate` in 1/s is that of a file
+    without times.
     """
 
     title: str
@@ -365,6 +361,7 @@ class NewSensor:
     rigidity: float | None = None
     free: bool = False
     baud: int = 115_200
+    rate: float | None = None
 
 
 def description_text(found: RecognisedLines, sensor: NewSensor) -> str:
@@ -395,7 +392,7 @@ def description_text(found: RecognisedLines, sensor: NewSensor) -> str:
         table("", {"format": 1, "title": sensor.title}),
         table("[skin]", skin, {"size": "m", "rigidity": "N m"}),
         table("[elements]", {"grid": list(sensor.grid)}),
-        table("[line]", line | {"baud": sensor.baud}),
+        table("[line]", line | ({"rate": sensor.rate} if sensor.rate else {"baud": sensor.baud})),
         table("[readings]", readings),
     )
     text = "\n".join(parts)
@@ -421,73 +418,6 @@ def _joined(columns: tuple[str, ...]) -> list[str]:
         first, last = (name.partition(":")[2] for name in (names[0], names[-1]))
         joined.append(f"{what}:{first}..{last}" if len(names) > 1 else names[0])
     return joined
-
-
-def _first_rows(file: Path) -> bytes:
-    """The first bytes of a text; of arrays or a table the first rows, as text below their names."""
-    if file.suffix == ".npz":
-        with open_file(file) as opened, zipfile.ZipFile(opened) as archive:
-            names = [name for name in ("time", "values") if f"{name}.npy" in archive.NameToInfo]
-            parts = [_first_of(archive, name) for name in names]
-        heads = [name for name, part in zip(names, parts, strict=True) if part.shape[1] == 1]
-        heads += [f"values[{n}]" for n in range(parts[-1].shape[1])] * (parts[-1].shape[1] > 1)
-        return _lines_of(heads, np.hstack(parts))
-    if file.suffix == ".parquet":
-        try:
-            parquet: Any = import_module("pyarrow.parquet")
-        except ImportError as error:
-            raise lacking("parquet", "reading Parquet", error) from error
-        with open_file(file) as opened, parquet.ParquetFile(opened) as table:
-            rows: Any = next(table.iter_batches(_KEPT))
-            columns = [np.array(column.to_pylist(), float) for column in rows.columns]
-            return _lines_of(rows.schema.names, np.column_stack(columns))
-    with open_file(file) as opened:
-        head = opened.read(_HEAD)
-    return head if len(head) == _HEAD else head + b"\n"
-
-
-def _first_of(archive: zipfile.ZipFile, name: str) -> Array:
-    """The first rows (n, K) of an array of numbers in an NPZ file, whatever its size."""
-    form = np.lib.format
-    with archive.open(f"{name}.npy") as opened:
-        old = form.read_magic(opened) == (1, 0)
-        read = form.read_array_header_1_0 if old else form.read_array_header_2_0
-        shape, by_columns, kind = read(opened)
-        if kind.kind not in "fiu" or by_columns or not 1 <= len(shape) <= 2:
-            raise ValueError(f"expected numbers in rows in {name}, got {kind} of shape {shape}")
-        columns = int(np.prod(shape[1:]))
-        data = opened.read(min(_KEPT, shape[0]) * columns * kind.itemsize)
-    return np.frombuffer(data, kind).reshape(-1, columns).astype(float)
-
-
-def _lines_of(names: Sequence[str], rows: Array) -> bytes:
-    lines = [",".join(names), *(",".join(map(repr, row)) for row in rows.tolist())]
-    return "".join(f"{line}\n" for line in lines).encode()
-
-
-class FileLines:
-    """The first lines of a file, as `RawLines` has those of a board.
-
-    Of arrays in an NPZ file and of a Parquet table they are the first rows.
-    """
-
-    baud = 115_200
-
-    def __init__(self, file: Path) -> None:
-        self.url, self.trouble = str(file), ""
-        self.recogniser = Recogniser(arrived=False)
-        try:
-            self.recogniser.feed(0.0, _first_rows(file))
-        except Refusal as refusal:
-            self.trouble = f"{refusal}."
-        except (*ARCHIVE_DAMAGES, LookupError, StopIteration, TypeError) as error:
-            self.trouble = f"{file}: cannot be read ({getattr(error, 'strerror', None) or error})."
-
-    def poll(self) -> None:
-        """Nothing: all has arrived."""
-
-    def close(self) -> None:
-        """Nothing is held open."""
 
 
 class RawLines:

@@ -87,7 +87,7 @@ def test_what_cannot_be_opened_says_why_and_is_not_listed(
         (calibration, "skin.toml"),
         (
             tmp_path / "notes.txt",
-            "expected a sensor description (.toml), a recording (.mcap .part), a calibration",
+            "expected a sensor description (.toml), a table of readings (.csv .npz .parquet), a",
         ),
     ):
         window.opening.open(file)

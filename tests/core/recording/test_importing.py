@@ -20,11 +20,13 @@ from mcap_ros2.writer import Writer as RosWriter
 from kappaskin import Recording, Refusal
 from kappaskin.recording import (
     ExportRequest,
+    FileLines,
     Imported,
     ImportRequest,
     ImportTask,
     ReplayedSource,
     Verification,
+    is_foreign,
 )
 from kappaskin.recording.export.writing import export_steps
 from kappaskin.recording.importing import import_steps
@@ -180,6 +182,46 @@ FILES: dict[str, tuple[str, str, Callable[[Path], None]]] = {
     "rosbags, sqlite": ("bag", "untimed", lambda file: _bag(file, "SQLITE3")),
     "json": ("a.mcap", "json", _json),
 }
+
+
+MESSAGES = ("mcap", "folder", "rosbags, mcap", "rosbags, sqlite", "json")
+
+
+@pytest.mark.parametrize("name", MESSAGES)
+def test_the_first_messages_of_a_bag_are_lines_with_its_numbers(tmp_path, name) -> None:
+    file, _, make = FILES[name]
+    make(tmp_path / file)
+    lines = FileLines(tmp_path / file)
+    found = lines.recogniser.found()
+
+    assert is_foreign(tmp_path / file)
+    assert (lines.trouble, lines.topics, lines.timed) == ("", [lines.topic], True)
+    assert found.rate == pytest.approx(100.0, rel=1e-6)
+    readings = [n for n, label in enumerate(found.labels) if label != "skin.t"]
+    count = min(len(K), len(found.numbers))
+    np.testing.assert_allclose(found.numbers[-count:, readings], K[-count:], rtol=1e-12)
+
+
+def test_the_topic_of_a_bag_is_chosen(tmp_path) -> None:
+    _ros(tmp_path / "a.mcap", others=True)
+
+    assert FileLines(tmp_path / "a.mcap").topics == ["/other", "/skin"]
+    assert FileLines(tmp_path / "a.mcap", "/skin").topic == "/skin"
+    assert "/skin (std_msgs/msg/Float64" in FileLines(tmp_path / "a.mcap", "/none").trouble
+
+
+def test_what_is_no_bag_of_another_program(tmp_path) -> None:
+    (tmp_path / "empty").mkdir()
+    _npz(tmp_path / "a.npz")
+    _imported(tmp_path, tmp_path / "a.npz")
+    own = (tmp_path / "out.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(own[: len(own) // 2])
+    (tmp_path / "text.mcap").write_bytes(b"1,2,3")
+
+    for name in ("empty", "a.npz", "out.mcap", "cut.mcap", "none.db3"):
+        assert not is_foreign(tmp_path / name), name
+    assert "expected a bag of ROS 2" in FileLines(tmp_path / "empty").trouble
+    assert "expected .mcap contents" in FileLines(tmp_path / "text.mcap").trouble
 
 
 def _sensor(folder: Path, kind: str) -> Path:

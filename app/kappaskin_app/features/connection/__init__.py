@@ -5,7 +5,7 @@ from pathlib import Path
 from PySide6.QtWidgets import QFileDialog
 
 from kappaskin.live import ResumeInfo
-from kappaskin.recording import Imported, ImportRequest, ImportTask, unused
+from kappaskin.recording import Imported, ImportRequest, ImportTask, is_foreign, unused
 from kappaskin.sources import described_source, is_description, load_description, parts_of
 from kappaskin_app.features.connection.panel import ConnectionPanel, PortSearch
 from kappaskin_app.features.connection.wizard import NewSensorDialog
@@ -60,10 +60,13 @@ class ConnectionFeature:
             cancelled="Cancelled; nothing was imported.",
         )
         shell.closing.connect(guarded(self._importing.stop))
-        shell.opening.add(Kind("readings", (".csv", ".npz", ".parquet"), self.new_sensor.begin))
-        shell.opening.add(
-            Kind("sensor description", (".toml",), self._connect_described, is_description)
-        )
+        begin, folder = self.new_sensor.begin, ""
+        for kind in (
+            Kind("sensor description", (".toml",), self._connect_described, is_description),
+            Kind("table of readings", (".csv", ".npz", ".parquet"), begin),
+            Kind("bag of ROS 2", (".db3", ".mcap", folder), begin, is_foreign),
+        ):
+            shell.opening.add(kind)
         shell.menus.welcome.add(
             2,
             "Connec&t a sensor",
@@ -103,12 +106,12 @@ class ConnectionFeature:
         if port in (source, parts_of(source)[1]):
             self._session.disconnect_from()
 
-    def _connect_new(self, file: Path, port: str) -> None:
+    def _connect_new(self, file: Path, port: str, topic: str) -> None:
         """Connect the sensor that a new file describes at a port, or import its lines."""
         self._shell.opening.note(file)
-        if (lines := Path(port)).is_file():
+        if (lines := Path(port)).is_file() or is_foreign(lines):
             self._imported = unused(recordings_folder() / f"{lines.stem}.mcap")
-            request = ImportRequest(lines, self._imported, file)
+            request = ImportRequest(lines, self._imported, file, topic)
             self._importing.begin(lambda: ImportTask(request))
             return
         self._session.request_source(described_source(file.absolute(), port))

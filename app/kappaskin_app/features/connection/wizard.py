@@ -30,9 +30,9 @@ from kappaskin._files import write_whole
 from kappaskin._text import printable
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
+from kappaskin.recording import FileLines, is_foreign
 from kappaskin.sources import (
     READS,
-    FileLines,
     NewSensor,
     Port,
     RawLines,
@@ -119,12 +119,12 @@ class _Trace(QStyledItemDelegate):
 class NewSensorDialog(QDialog):
     """Three steps: the port with its raw lines, what the columns are, the skin.
 
-    `opening` brings the port before it is opened; `made` the file of a description and its port. A
-    file of lines may take the place of the port.
+    `opening` brings the port before it is opened; `made` the file of a description, its port, and
+    the topic of a bag. A file of lines or messages may take the place of the port.
     """
 
     opening = Signal(str)
-    made = Signal(Path, str)
+    made = Signal(Path, str, str)
 
     def __init__(self, tasks: Tasks, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -179,6 +179,10 @@ class NewSensorDialog(QDialog):
         self.read = button("&Read", "read_port", "Show what this port or URL sends (Enter).")
         self.read.clicked.connect(guarded(lambda *_: self._read_port()))
         self.ports.lineEdit().returnPressed.connect(guarded(self._read_port))  # pyright: ignore
+        self.topics = QComboBox(sizeAdjustPolicy=QComboBox.SizeAdjustPolicy.AdjustToContents)  # pyright: ignore[reportCallIssue]
+        self.topics.setAccessibleName("Topic of the messages")
+        self.topics.setVisible(False)
+        self.topics.activated.connect(guarded(lambda *_: self._read_topic()))
         self.raw = QPlainTextEdit(readOnly=True)  # pyright: ignore[reportCallIssue]
         self.raw.setAccessibleName("Lines as they arrive")
         self.raw.setPlaceholderText("The lines of the board are shown here as they arrive.")
@@ -188,6 +192,7 @@ class NewSensorDialog(QDialog):
         layout.setContentsMargins(0, 0, 0, 0)
         above = QHBoxLayout()
         above.addWidget(self.ports, 1)
+        above.addWidget(self.topics)
         above.addWidget(self.read)
         layout.addLayout(above)
         layout.addWidget(self.raw, 1)
@@ -227,12 +232,15 @@ class NewSensorDialog(QDialog):
 
     def _skin_page(self) -> QWidget:
         page, form = QWidget(), QFormLayout()
+        self.form = form
         self.name = QLineEdit("My sensor")
         self.sides = [_length(40.0), _length(40.0)]
         self.grid = [QSpinBox(minimum=1, maximum=4096) for _ in range(2)]  # pyright: ignore[reportCallIssue]
         self.scale = _Factor(decimals=9, minimum=-1e9, maximum=1e9, value=1.0)  # pyright: ignore[reportCallIssue]
         self.scale.setStepType(QDoubleSpinBox.StepType.AdaptiveDecimalStepType)
         self.unit = QComboBox()
+        self.rate = QDoubleSpinBox(decimals=3, minimum=1e-3, maximum=1e5, value=100.0)  # pyright: ignore[reportCallIssue]
+        self.rate.setSuffix(" rows/s")
         self.free = QCheckBox("The zero is unknown in each frame")
         self.free.setToolTip(
             "Each frame has an unknown offset, as where the distance of a camera is not known."
@@ -244,8 +252,16 @@ class NewSensorDialog(QDialog):
         self.rigidity.setAccessibleName("Rigidity of the skin")
         self.rigidity.setEnabled(False)
         self.known.toggled.connect(self.rigidity.setEnabled)
-        names = ("Size in x", "Size in y", "Elements in x", "Elements in y", "Scale", "Unit")
-        boxes = (*self.sides, *self.grid, self.scale, self.unit)
+        names = (
+            "Size in x",
+            "Size in y",
+            "Elements in x",
+            "Elements in y",
+            "Scale",
+            "Unit",
+            "Rate",
+        )
+        boxes = (*self.sides, *self.grid, self.scale, self.unit, self.rate)
         for words, box in zip(names, boxes, strict=True):
             box.setAccessibleName(words)
         times = "\N{MULTIPLICATION SIGN}"
@@ -256,6 +272,7 @@ class NewSensorDialog(QDialog):
                 pair.setStretch(place, 1)
             form.addRow(words, pair)
         form.addRow("A number of 1 is", in_a_row(self.scale, self.unit))
+        form.addRow("Rate", self.rate)
         form.addRow("", self.free)
         form.addRow("Skin", in_a_row(self.known, self.rigidity))
         self.map = SurfaceMap("Readings now", "", "Change of the readings since the beginning.")
@@ -268,6 +285,7 @@ class NewSensorDialog(QDialog):
     def _tips(self) -> list[tuple[QWidget, str]]:
         return [
             (self.ports, "A port found on this machine, or a port or URL typed here."),
+            (self.topics, "The messages of this bag that have the readings."),
             (self.raw, "The newest lines, as they arrive."),
             (self.reads, "What each element reads; the columns are guessed by it."),
             (self.order, "How the readings of several kinds follow each other in a line."),
@@ -281,6 +299,7 @@ class NewSensorDialog(QDialog):
             (self.grid[1], "Number of elements in y; element numbers run along y first."),
             (self.scale, "A reading for each unit of the board's numbers."),
             (self.unit, "Unit of a reading."),
+            (self.rate, "Rows of the file in a second, as it has no times."),
             (self.rigidity, "Bending rigidity D = E h\u00b3 / (12 (1 \u2212 \u03bd\u00b2))."),
         ]
 
@@ -306,11 +325,25 @@ class NewSensorDialog(QDialog):
         if not url or (self.lines is not None and self.lines.url == url):
             return
         self._let_go()
-        if (file := Path(url)).is_file():
-            self.lines = FileLines(file)
+        if (file := Path(url)).is_file() or is_foreign(file):
+            self._begin(FileLines(file))
         else:
             self.opening.emit(url)
-            self.lines = RawLines(url)
+            self._begin(RawLines(url))
+
+    def _read_topic(self) -> None:
+        if self.lines is not None:
+            self._begin(FileLines(Path(self.lines.url), self.topics.currentText()))
+
+    def _begin(self, lines: RawLines | FileLines) -> None:
+        """Look at these lines from now on."""
+        self.lines = lines
+        topics = lines.topics if isinstance(lines, FileLines) else []
+        self.topics.clear()
+        self.topics.addItems(topics)
+        self.topics.setVisible(len(topics) > 1)
+        if isinstance(lines, FileLines):
+            self.topics.setCurrentText(lines.topic)
         self.found, self.columns = RecognisedLines(), ()
         self.raw.clear()
 
@@ -447,7 +480,14 @@ class NewSensorDialog(QDialog):
             self.rigidity.value() if self.known.isChecked() else None,
             self.free.isChecked(),
             self.lines.baud if self.lines is not None else 115_200,
+            self.rate.value() if self._untimed else None,
         )
+
+    @property
+    def _untimed(self) -> bool:
+        """Whether the rows of a file have no times."""
+        of_file = isinstance(self.lines, FileLines) and not self.lines.timed
+        return of_file and not set(self.columns) & set(_times())
 
     def _text(self) -> str:
         return description_text(self.found, self._sensor())
@@ -485,6 +525,7 @@ class NewSensorDialog(QDialog):
         each = (f"<b>{words}</b>" if n == at else words for n, words in enumerate(_STEPS))
         self.step.setText("&nbsp; › &nbsp;".join(each))
         self.hint.setText(_HINTS[at])
+        self.form.setRowVisible(self.rate, self._untimed)
         self.back.setEnabled(at > 0)
         what = "import" if isinstance(self.lines, FileLines) else "connect"
         self.next.setText(f"&Save and {what}{ELLIPSIS}" if at == len(_STEPS) - 1 else "&Next")
@@ -509,9 +550,9 @@ class NewSensorDialog(QDialog):
         except Refusal as refusal:
             self.fact.setText(printable(str(refusal)))
             return
-        url = self.lines.url
+        url, topic = self.lines.url, getattr(self.lines, "topic", "")
         self.accept()
-        self.made.emit(file, url)
+        self.made.emit(file, url, topic)
 
     def begin(self, file: Path | None = None) -> None:
         """Show the dialog as it was left, or with the lines of a `file`."""

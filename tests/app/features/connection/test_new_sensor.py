@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.writer import Writer
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog
@@ -227,13 +228,67 @@ def test_a_table_that_is_dropped_is_described_and_imported(
     assert (tmp_path / "made" / "week.mcap").exists()
 
 
+def test_a_bag_that_is_dropped_is_described_and_its_topic_imported(
+    window, until, tmp_path, monkeypatch
+) -> None:
+    bag, file = tmp_path / "bag", tmp_path / "glove.toml"
+    bag.mkdir()
+    with (bag / "bag_0.mcap").open("wb") as opened:
+        writer = Writer(opened)
+        writer.start()
+        schema = writer.register_schema("k", "", b"")
+        for name, count in (("/all", 3), ("/skin", 6)):
+            channel = writer.register_channel(name, "json", schema)
+            for n in range(200):
+                data = json.dumps({"h": [n * k % 7 for k in range(1, count + 1)]}).encode()
+                writer.add_message(channel, n * 10**7, data, n * 10**7)
+        writer.finish()
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(file), ""))
+    monkeypatch.setattr("kappaskin_app.features.connection.recordings_folder", lambda: tmp_path)
+    assert window.opening.opens(bag)
+    window.opening.open(bag)
+    dialog = window.new_sensor
+    until(lambda: "3 columns; 100 lines/s" in dialog.fact.text())
+    assert dialog.topics.isVisible()
+    QTest.keyClick(dialog.topics, Qt.Key.Key_Down)
+    until(lambda: "6 columns" in dialog.fact.text())
+    click(dialog.next)
+    click(dialog.next)
+    assert not dialog.form.isRowVisible(dialog.rate)
+    until(dialog.next.isEnabled)
+    click(dialog.next)
+
+    until(lambda: window.display.badge.state == "REPLAY")
+    until(lambda: window.session.status.replay.length == pytest.approx(1.99))
+    assert len(window.session.status.sensor.layout.positions) == 6
+
+
+def test_a_table_without_times_has_a_rate(window, until, tmp_path, monkeypatch) -> None:
+    table, file = tmp_path / "a.csv", tmp_path / "a.toml"
+    table.write_text("".join(f"{n * 3 % 7},{n * 5 % 7}\n" for n in range(100)))
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(file), ""))
+    monkeypatch.setattr("kappaskin_app.features.connection.recordings_folder", lambda: tmp_path)
+    dialog = window.new_sensor
+    dialog.begin(table)
+    until(lambda: "2 columns" in dialog.fact.text())
+    click(dialog.next)
+    click(dialog.next)
+    assert dialog.form.isRowVisible(dialog.rate)
+    dialog.rate.setValue(50.0)
+    until(dialog.next.isEnabled)
+    click(dialog.next)
+
+    until(lambda: window.display.badge.state == "REPLAY")
+    until(lambda: window.session.status.replay.length == pytest.approx(99 / 50))
+
+
 def test_json_in_lines_is_described_by_its_keys(window, until, tmp_path, monkeypatch) -> None:
     lines, file = tmp_path / "glove.jsonl", tmp_path / "glove.toml"
     rows = ({"n": n, "skin": {"h": [n * k % 7 for k in range(1, 7)]}} for n in range(200))
     lines.write_text("".join(json.dumps(row) + "\n" for row in rows))
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(file), ""))
     dialog = window.new_sensor
-    made = list[tuple[Path, str]]()
+    made = list[tuple[Path, str, str]]()
     dialog.made.disconnect()
     dialog.made.connect(lambda *what: made.append(what))
     dialog.begin(lines)
@@ -244,6 +299,6 @@ def test_json_in_lines_is_described_by_its_keys(window, until, tmp_path, monkeyp
     until(dialog.next.isEnabled)
     click(dialog.next)
 
-    assert made == [(file, str(lines))]
+    assert made == [(file, str(lines), "")]
     fields = tomllib.loads(file.read_text())["line"]["fields"]
     assert fields == {"n": "sequence", "skin.h": "height:0..5"}
