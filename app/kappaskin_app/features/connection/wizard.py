@@ -83,6 +83,11 @@ _HINTS = (
     "Press the skin: the columns that answer light up. Select rows to change what they are.",
     "Press the skin: the map shows where. Element 0 is at low x and low y, the next one above it.",
 )
+_FILE_HINTS = (
+    "The first rows of the file. For a board, plug it in, or type its port or URL.",
+    "Select rows to change what they are.",
+    "Element 0 is at low x and low y, the next one above it.",
+)
 
 
 class _Trace(QStyledItemDelegate):
@@ -346,6 +351,8 @@ class NewSensorDialog(QDialog):
             self.topics.setCurrentText(lines.topic)
         self.found, self.columns = RecognisedLines(), ()
         self.raw.clear()
+        self._look()
+        self._show_step()
 
     def _let_go(self) -> None:
         if self.lines is not None:
@@ -521,13 +528,13 @@ class NewSensorDialog(QDialog):
         self._look()
 
     def _show_step(self) -> None:
-        at = self.pages.currentIndex()
+        at, of_file = self.pages.currentIndex(), isinstance(self.lines, FileLines)
         each = (f"<b>{words}</b>" if n == at else words for n, words in enumerate(_STEPS))
         self.step.setText("&nbsp; › &nbsp;".join(each))
-        self.hint.setText(_HINTS[at])
+        self.hint.setText((_FILE_HINTS if of_file else _HINTS)[at])
         self.form.setRowVisible(self.rate, self._untimed)
         self.back.setEnabled(at > 0)
-        what = "import" if isinstance(self.lines, FileLines) else "connect"
+        what = "import" if of_file else "connect"
         self.next.setText(f"&Save and {what}{ELLIPSIS}" if at == len(_STEPS) - 1 else "&Next")
         first: Sequence[QWidget] = (self.ports, self.table, self.name)
         first[at].setFocus()
