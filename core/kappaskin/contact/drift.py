@@ -96,7 +96,8 @@ class SmoothDrift:
             return None
         noise, of_noise = told
         judged = {"known_noise": np.array(noise), "spare": of_noise}
-        found = self._beside(curvature, replace(fit, **judged))
+        most = spare * left_by_chance(_LEFT, spare, of_noise) * noise**2
+        found = self._beside(curvature, replace(fit, **judged), most)
         after = self._beside.rest
         squares = float(after.dot(after)) / noise**2
         better = left / noise**2 - squares

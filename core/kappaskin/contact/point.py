@@ -117,6 +117,7 @@ _STEPS = 20  # of Gauss-Newton at most; 1 or 2 do but for the last millimetres a
 _WORTH = 2.0  # variances of the noise: after a step that gains less, another one is not worth it
 _CAREFUL = 0.1  # of a side: within it a strong load may be taken for a weak one further in,
 _WORTH_AT_RIM = 0.1  # and small steps in this many variances lead to it
+_HOPE = 10.0  # times what a step gains: more is not to be gained by all that follow
 _NO_GAIN = 1e-13  # of the readings' squares
 _FURTHEST = 0.05  # of a side, in one step
 _RIDGE = 1e-12  # keeps a load on the rim, which moves nothing, solvable
@@ -240,8 +241,11 @@ class PointContact:
         weights = None if used.all() else used.astype(float)
         return _Tables(norm, weights, max(len(M) - len(free) - self._unknowns, 1), free)
 
-    def __call__(self, curvature: Array, fit: Fit) -> Contact:
-        """The contact for the readings of a frame, NaN where missing, and the `fit` to them."""
+    def __call__(self, curvature: Array, fit: Fit, most: float = math.inf) -> Contact:
+        """The contact for the readings of a frame, NaN where missing, and the `fit` to them.
+
+        `NO_CONTACT` too where no load comes near leaving at `most` that sum of squares.
+        """
         read = curvature.ravel()
         K, tables = self._used(read if self._scale is None else read * self._scale)
         explained = self._map(self._modal(K).reshape(self.basis.shape))
@@ -262,7 +266,7 @@ class PointContact:
             if self._stretched is not None:
                 self._stretched.begin(x, y, float(fit.jet(x, y)[0][0]))
             here = self._linearised(x, y, self._start, 0.0, tables, variance)
-        return self._refined(x, y, here, tables, variance, fit)
+        return self._refined(x, y, here, tables, variance, fit, most)
 
     def _used(self, K: Array) -> tuple[Array, _Tables]:
         """The readings, 0 where missing, less their part along `free`, and the tables."""
@@ -290,10 +294,20 @@ class PointContact:
         return rows, H.item(0, 0), _inverse(H)
 
     def _refined(
-        self, x: float, y: float, here: _Linearised, tables: _Tables, variance: float, fit: Fit
+        self,
+        x: float,
+        y: float,
+        here: _Linearised,
+        tables: _Tables,
+        variance: float,
+        fit: Fit,
+        most: float,
     ) -> Contact:
         a, b, s, force = _FURTHEST * self.patch.a, _FURTHEST * self.patch.b, self._start, 0.0
+        hopeless = False
         for _ in range(_STEPS):
+            if hopeless := here.left - _HOPE * here.gain > most:
+                break
             before, (force, dx, dy, ds) = force, here.steps
             x, y = self.patch.inward(
                 x + _clamped(-a, dx / force, a), y + _clamped(-b, dy / force, b)
@@ -312,7 +326,7 @@ class PointContact:
         if len(tables.free):
             self.along = (tables.free @ self.rest) @ tables.free
             self.rest -= self.along
-        return self._contact(x, y, s, here, tables, fit)
+        return NO_CONTACT if hopeless else self._contact(x, y, s, here, tables, fit)
 
     def _worth(self, x: float, y: float) -> float:
         """Variances of the noise that a step must gain to be worth another one."""
