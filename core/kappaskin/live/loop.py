@@ -43,7 +43,6 @@ from kappaskin.sources import SimulatedSource, Source, open_source
 _READ = 0.02  # s a read may wait, and so a command
 _REPORT = 0.1  # s between two statuses
 _AGAIN = 0.5  # s between two tries to open a port
-_FRESH = 1.5e-3  # s of computing between two reads where receivers wait for the newest
 
 
 class EngineLoop:
@@ -263,11 +262,11 @@ class EngineLoop:
 
     def _compute(self, frames: list[Frame], pipeline: Pipeline) -> None:
         """Compute the newest frames, as many as there is time for."""
-        within = (_FRESH,) if self._publishing.active else ()
         source = self._source
         paused = isinstance(source, ReplayedSource) and source.stands
         least = min(len(frames), int(paused))  # or a requested frame would not be shown
-        late = len(frames) - max(self._rate_limit.affordable(len(frames), *within), least)
+        affordable = self._rate_limit.affordable(len(frames), self._publishing.active)
+        late = len(frames) - max(affordable, least)
         if late:
             self._status = replace(self._status, skipped=self._status.skipped + late)
         for frame in frames[:late]:

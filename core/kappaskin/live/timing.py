@@ -11,8 +11,10 @@ from kappaskin.frames import Frame
 
 _ALL = 0.8  # of the time: where estimates of all frames take less, every one is computed
 _SHARE = 0.4  # of it, for estimates where they take more: reading and drawing must not wait
+_WANTED = 0.75  # of it, where receivers wait for each
 _SAVED = 0.05  # s of computing that may be saved up for a burst, or be owed
 _AT_ONCE = 0.02  # s of computing between two reads at most
+_FRESH = 1.5e-3  # s of it where receivers wait for the newest
 _SHOWN = 1 / 30  # s after which one is computed in any case: the screen shows it
 _LATEST = 0.1  # weight of the last costs in what one is taken to cost
 _WHILE = 0.5  # s over which it is judged how many come
@@ -29,17 +31,18 @@ class RateLimit:
         self._credit, self._cost, self._rate = _SAVED, 0.0, 0.0
         self._then, self._seen = clock(), -math.inf
 
-    def affordable(self, waiting: int, within: float = _AT_ONCE) -> int:
-        """How many of so many frames are to be computed now; more than one only `within` so many s.
+    def affordable(self, waiting: int, wanted: bool = False) -> int:
+        """How many of so many frames are to be computed now; `wanted` where receivers wait for it.
 
-        The last of those that arrived together is as late as all of them take.
+        The last of those that arrived together is as late as all of them take: then few together.
         """
+        share, within = (_WANTED, _FRESH) if wanted else (_SHARE, _AT_ONCE)
         now = self._clock()
         passed, self._then = now - self._then, now
         if passed:
             latest = min(1.0, passed / _WHILE)
             self._rate += latest * (waiting / passed - self._rate)
-        self._credit = min(_SAVED, self._credit + _SHARE * passed)
+        self._credit = min(_SAVED, self._credit + share * passed)
         least = int(now - self._seen >= _SHOWN)
         if not self._cost:
             return min(waiting, least)

@@ -8,7 +8,8 @@ from kappaskin.live.timing import RateLimit
 class Played:
     """A loop that is given frames at a `rate` in frames/s, each estimate taking `cost` s."""
 
-    def __init__(self, rate: float, cost: float, reads: float = 1e-3) -> None:
+    def __init__(self, rate: float, cost: float, reads: float = 1e-3, wanted: bool = False) -> None:
+        self.wanted = wanted
         self.now, self.rate, self.cost, self.reads = 0.0, rate, cost, reads
         self.pace = RateLimit(lambda: self.now)
         self.came = self.computed = 0
@@ -19,7 +20,7 @@ class Played:
         while self.now < end:
             self.now += self.reads
             waiting = int(self.now * self.rate) - self.came
-            count = self.pace.affordable(waiting)
+            count = self.pace.affordable(waiting, self.wanted)
             assert 0 <= count <= waiting
             if count:
                 self.longest, self._last = max(self.longest, self.now - self._last), self.now
@@ -38,13 +39,14 @@ def test_every_frame_is_computed_where_there_is_time(rate, cost) -> None:
     assert played.came - played.computed <= 10  # until it is known what one costs
 
 
+@pytest.mark.parametrize(("wanted", "share"), [(False, 0.4), (True, 0.75)])
 @pytest.mark.parametrize(("rate", "cost"), [(2000, 0.5e-3), (2000, 2e-3), (20_000, 0.3e-3)])
-def test_where_there_is_not_a_share_of_the_time_is_spent(rate, cost) -> None:
-    played = Played(rate, cost).go(2.0)  # until it is known how many come and what one costs
+def test_where_there_is_not_a_share_of_the_time_is_spent(rate, cost, wanted, share) -> None:
+    played = Played(rate, cost, 1e-4, wanted).go(2.0)  # until it knows rate and cost
     begun, busy = played.now, played.busy
     played.go(10.0)
     assert played.computed < played.came
-    assert (played.busy - busy) / (played.now - begun) == pytest.approx(0.4, abs=0.03)
+    assert (played.busy - busy) / (played.now - begun) == pytest.approx(share, abs=0.03)
 
 
 def test_someone_who_looks_on_is_always_shown_something() -> None:
@@ -82,6 +84,7 @@ def test_nothing_waiting_costs_nothing() -> None:
 def test_of_frames_that_came_together_only_so_many_are_computed_as_are_not_late() -> None:
     pace = Played(500, 0.5e-3).go(2.0).pace
     assert pace.affordable(20) > 3
-    assert pace.affordable(20, 1.6e-3) == 3
-    assert pace.affordable(20, 1e-4) == 1  # the newest, however long it takes
-    assert pace.affordable(0, 1e-4) == 0
+    assert pace.affordable(20, wanted=True) == 3
+    slow = Played(100, 3e-3).go(2.0).pace
+    assert slow.affordable(20, wanted=True) == 1  # the newest, however long it takes
+    assert pace.affordable(0, wanted=True) == 0
