@@ -19,7 +19,7 @@ from kappaskin.errors import Refusal
 if TYPE_CHECKING:
     from multiprocessing.context import ForkServerContext, SpawnContext
 
-_RAISED = 10  # of 40 steps of priority
+_RAISED = _LOWERED = 10  # of 40 steps of priority
 
 Context: TypeAlias = "ForkServerContext | SpawnContext"
 
@@ -157,6 +157,8 @@ def _send_items(
     """Send each item in a tuple, or a refusal, and None at the end; runs in the child process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is the parent's; it closes the pipe
     end_with_parent()
+    if hasattr(os, "nice"):
+        os.nice(_LOWERED)  # whoever reads and draws comes first
     with suppress(OSError):  # the parent has ended
         try:
             for item in make(*about):
@@ -169,8 +171,8 @@ def _send_items(
 class BackgroundProcess(Generic[_Item]):
     """Computes the items of `make(*about)` in a process, called `name`, of one thread.
 
-    No call here but `wait` waits. The process ends when it is done, when `close` is called, or
-    when the process that started it has ended.
+    Its priority is low. No call here but `wait` waits. The process ends when it is done, when
+    `close` is called, or when the process that started it has ended.
     """
 
     def __init__(self, name: str, make: Callable[..., Iterable[_Item]], *about: object) -> None:

@@ -1,15 +1,16 @@
 """Draws for some seconds and prints what it managed as JSON.
 
-`python drawing.py WHAT SECONDS SOURCE`: a `bare` QtInteractor, the `app` as it opens, or with
-`everything` shown that it can show at once. Each shares the two cores with an engine that reads
-SOURCE: `sim:FILE`, or the port of a `device` of its own at 500 frames/s.
+`python drawing.py WHAT SECONDS SOURCE`: a `bare` QtInteractor, the `app` as it opens, with
+`everything` shown that it can show at once, or while it is `measuring` the cost of accuracy. Each
+shares the two cores with an engine that reads SOURCE: `sim:FILE`, or the port of a `device` of its
+own at 500 frames/s.
 """
 
 import json
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 
@@ -62,21 +63,26 @@ def bare(application: QApplication, source: str, seconds: float) -> dict[str, fl
 
 
 def app(
-    application: QApplication, source: str, seconds: float, everything: bool = False
+    application: QApplication,
+    source: str,
+    seconds: float,
+    begin: Callable[[MainWindow], None] | None = None,
 ) -> dict[str, float]:
     """The whole window at 1280 x 800."""
     window = MainWindow([made() for made in FEATURES], source)
     window.show()
-    if everything:
-        # Once it has met the skin, of which it then tells an element.
-        QTimer.singleShot(round(SETTLE / 2 * 1e3), lambda: _show_everything(window))
+    if begin is not None:  # once it has met the skin
+        QTimer.singleShot(round(SETTLE / 2 * 1e3), lambda: begin(window))
     QTimer.singleShot(round((SETTLE + seconds) * 1e3), application.quit)
     application.exec()
     now = time.monotonic()
     ages = [age for when, age in window.features["membrane"].membrane.ages if when > now - seconds]
-    status = window.session.status
+    status, measured = window.session.status, window.features["accuracy"].measurement
+    tried, running = measured.progress[0], measured.running
     window.close()
     return {
+        "tried": tried,
+        "measuring": running,
         "drawn": len(ages) / seconds,
         "age_p99_ms": float(np.percentile(ages, 99)) * 1e3,
         "reader_gap_p99_ms": status.reader_gap * 1e3,
@@ -91,6 +97,10 @@ def _show_everything(window: MainWindow) -> None:
     window.history.change("Everything", -1, maps=maps, traced=(33, 44, 55), **shown)
     window.features["traces"].selected_element.select(44)
     window.layouts.apply(_SHOWN)
+
+
+def _measure(window: MainWindow) -> None:
+    window.docks["cost"].show()
 
 
 @contextmanager
@@ -108,7 +118,12 @@ def read_from(source: str) -> Iterator[str]:
 
 if __name__ == "__main__":
     what, seconds = sys.argv[1], float(sys.argv[2])
-    run = {"bare": bare, "app": app, "everything": partial(app, everything=True)}[what]
+    run = {
+        "bare": bare,
+        "app": app,
+        "everything": partial(app, begin=_show_everything),
+        "measuring": partial(app, begin=_measure),
+    }[what]
     with read_from(sys.argv[3]) as source:
         application = QApplication([])
         application.setStyle("Fusion")

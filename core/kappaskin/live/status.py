@@ -80,6 +80,8 @@ class Status:
 
     def after(self, events: Sequence[Event]) -> "Status":
         """The same status with `events` appended."""
+        if not events:  # mostly, and a copy is not free
+            return self
         last = (*self.events, *events)[-_EVENTS:]
         return replace(self, events=last, event_count=self.event_count + len(events))
 

@@ -94,6 +94,7 @@ class CostMeasurement(QObject):
             cancelled="Cancelled; Measure starts again.",
         )
         self._active = False
+        self._began = 0.0, 0  # when the task did, and how many were measured before
         self._next = 0.0
         self._recent: deque[tuple[float, float, float]] = deque()
         self._generation = -1
@@ -164,6 +165,15 @@ class CostMeasurement(QObject):
         """The number of measured settings, and of all."""
         requested = self._requested()
         return sum(setting in self.costs for setting in requested), len(requested)
+
+    @property
+    def left(self) -> float:
+        """How many s the rest of the settings take, by those measured since the task began."""
+        since, before = self._began
+        done, requested = self.progress
+        if not self.running or done <= before:
+            return float("nan")
+        return (time.monotonic() - since) * (requested - done) / (done - before)
 
     @property
     def present(self) -> Setting | None:
@@ -250,6 +260,7 @@ class CostMeasurement(QObject):
             if effects_with in self.effects or self.difference():
                 effects_with = None
             if self.scene is not None and (missing or effects_with):
+                self._began = time.monotonic(), self.progress[0]
                 self.task.compute(cost_steps, self.scene, missing, effects_with)
         except Refusal as refusal:
             self.refusal = str(refusal)

@@ -204,7 +204,8 @@ class CostPanel(QWidget):
         self.bar.setMaximum(max(requested, 1))
         self.bar.setValue(done)
         self.bar.setVisible(now.running)
-        self.count.setText(f"{done} of {requested}" if requested else "")
+        left = f", {duration(now.left)} left" if math.isfinite(now.left) else ""
+        self.count.setText(f"{done} of {requested}{left}" if requested else "")
         self._show_message(now, self._why(now))
         self._show_effects(now)
 

@@ -40,6 +40,8 @@ def test_the_panel_is_hidden_until_f9_and_then_measures_by_itself(
     until(lambda: _processes() == ["kappaskin-cost_steps"])
     until(lambda: window.cost.bar.isVisible())
     until(lambda: window.measurement.progress[0] > 0, 60.0)
+    assert window.measurement.left > 0
+    until(lambda: " left" in window.cost.count.text())
     drawn = len(window.membrane.ages)
     until(lambda: len(window.membrane.ages) > drawn + 2)
 
