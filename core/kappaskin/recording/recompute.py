@@ -111,6 +111,8 @@ class RecordedFrames:
         self._pending.clear()
         self._times, self._truth = RecordedClock(), None
         self._means.begin(self._times)
+        if self.sensor and self.sensor.description:  # it never sends its information
+            self._learn(self._means.text)
 
     def _map(self, fields: dict[str, Any]) -> None:
         numbers = (fields[name] for name in ("at", "offset", "half", "drift", "spread"))

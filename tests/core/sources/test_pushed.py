@@ -1,5 +1,6 @@
 """Readings that a program pushes, on a socket of this user, to frames; every record counted."""
 
+import math
 import os
 import socket
 import stat
@@ -93,6 +94,11 @@ def test_a_column_of_the_time_and_of_the_sequence_are_used(board) -> None:
         (VALUES[1:], None, "expected 10 values"),
         ([VALUES], None, "expected 10 values"),
         (1.0, None, "expected 10 values"),
+        (VALUES * 1j, None, "expected real numbers"),
+        ([*VALUES[1:], "a"], None, "expected real numbers"),
+        ([*VALUES[1:], 10**400], None, "expected real numbers"),
+        ([[1.0], *VALUES[1:]], None, "expected real numbers"),
+        (VALUES, "now", "expected real numbers"),
         (VALUES, -1.0, "expected a time"),
         (VALUES, float("nan"), "expected a time"),
         (VALUES, float("inf"), "expected a time"),
@@ -109,12 +115,32 @@ def test_what_is_no_record_is_refused_and_the_feed_goes_on(board, values, when, 
     assert frame.sequence == 0
 
 
-@pytest.mark.parametrize("name", ["", "a b", "../glove", "x" * 25, "gl\0ve"])
+def test_what_is_masked_is_missing(board) -> None:
+    with feed("glove", board) as glove, closing(open_source("feed:glove")) as source:
+        glove.push(np.ma.masked_less(VALUES, 5.5))
+        (frame,) = taken(source, 1)
+        assert np.isnan(source.sensor.nominal(frame)).sum() == 5
+
+
+@pytest.mark.parametrize(("place", "value"), [(0, -1.0), (0, np.nan), (1, -5.0), (1, np.inf)])
+def test_a_time_or_sequence_number_that_cannot_be_is_refused(board, place, value) -> None:
+    board.write_text(JSON)
+    values = np.arange(11.0)
+    values[place] = value
+    with (
+        feed("glove", board) as glove,
+        pytest.raises(Refusal, match="times and sequence numbers of 0 or more"),
+    ):
+        glove.push(values)
+
+
+@pytest.mark.parametrize("name", ["", "a b", "../glove", "x" * 25, "gl\0ve", None])
 def test_a_name_that_cannot_be_is_refused(board, name) -> None:
     with pytest.raises(Refusal, match="expected a name of a feed"):
         feed(name, board)
-    with pytest.raises(SourceError, match="expected a name of a feed"):
-        open_source(f"feed:{name}")
+    if name is not None:
+        with pytest.raises(SourceError, match="expected a name of a feed"):
+            open_source(f"feed:{name}")
 
 
 def test_a_sensor_of_our_own_format_is_refused(board) -> None:
@@ -129,7 +155,7 @@ def test_two_feeds_of_one_name_are_refused_and_one_left_behind_is_replaced(board
     script += "print(1, flush=True); time.sleep(60)"
     with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE) as other:
         other.stdout.readline()
-        with pytest.raises(Refusal, match="another program has a feed 'glove'"):
+        with pytest.raises(Refusal, match="there is a feed 'glove' already"):
             feed("glove", board)
         other.kill()
     with feed("glove", board) as glove, closing(open_source("feed:glove")) as source:
@@ -217,6 +243,106 @@ def test_a_closed_feed_takes_no_more(board) -> None:
             glove.push(VALUES)
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
+def test_a_process_that_is_forked_leaves_the_feed_alone(board) -> None:
+    with feed("glove", board) as glove, closing(open_source("feed:glove")) as source:
+        if not (child := os.fork()):
+            try:
+                glove.push(VALUES)
+            except Refusal:
+                glove.close()
+                os._exit(0)
+            os._exit(1)
+        assert os.waitpid(child, 0)[1] == 0
+        glove.push(VALUES)
+        assert len(taken(source, 1)) == 1
+        with closing(open_source("feed:glove")):
+            pass
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
+def test_a_feed_that_is_ended_by_force_is_lost_at_once_though_a_worker_of_it_lives(board) -> None:
+    script = f"""
+import kappaskin, os, time
+f = kappaskin.feed('glove', {str(board)!r})
+time.sleep(1.0)
+child = os.fork()
+if child:
+    print(child, flush=True)
+    f.push(range(10))
+time.sleep(60)
+"""
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE) as other:
+        end = time.monotonic() + 20
+        while time.monotonic() < end:
+            try:
+                source = open_source("feed:glove")
+                break
+            except SourceError:
+                time.sleep(0.05)
+        with closing(source):
+            worker = int(other.stdout.readline())
+            taken(source, 1)
+            other.kill()
+            begun = time.monotonic()
+            while not source.trouble and time.monotonic() < begun + 10:
+                source.read(0.05)
+            assert "start it again" in source.trouble
+            assert time.monotonic() - begun < 5
+            feed("glove", board).close()
+        os.kill(worker, 9)
+
+
+def test_who_joins_a_feed_of_many_elements_need_not_wait_for_a_push(board) -> None:
+    rng = np.random.default_rng(0)
+    places = np.round(rng.uniform(0.001, 0.059, (3000, 2)), 9).tolist()
+    board.write_text(
+        BOARD.replace("grid = [3, 3]", f"positions = {places}").replace("0..8", "0..2999")
+    )
+    with feed("many", board) as many, closing(open_source("feed:many")) as source:
+        many.push(np.zeros(3001))  # 24 kB, more than the system holds
+        assert len(taken(source, 1, 10.0)) == 1
+
+
+def test_receivers_that_came_and_went_leave_nothing_though_nothing_is_pushed(board) -> None:
+    with feed("glove", board):
+        before = len(os.listdir("/dev/fd"))
+        for _ in range(20):
+            open_source("feed:glove").close()
+        end = time.monotonic() + 10
+        while len(os.listdir("/dev/fd")) > before + 2 and time.monotonic() < end:
+            time.sleep(0.05)
+        assert len(os.listdir("/dev/fd")) <= before + 2
+
+
+def test_a_feed_that_pushes_nothing_is_said(board) -> None:
+    with feed("glove", board), closing(open_source("feed:glove")) as source:
+        end = time.monotonic() + 10
+        while not source.trouble and time.monotonic() < end:
+            source.read(0.05)
+        assert "pushes nothing" in source.trouble
+
+
+def test_a_feed_that_is_forgotten_ends(board) -> None:
+    glove = feed("glove", board)
+    del glove
+    feed("glove", board).close()
+
+
+def test_what_waits_when_a_receiver_goes_is_counted(board) -> None:
+    with feed("glove", board) as glove:
+        with socket.socket(socket.AF_UNIX) as deaf:
+            deaf.connect(str(machine_folder("feeds") / "glove.sock"))
+            deaf.recv(1)
+            for _ in range(2000):
+                glove.push(VALUES)
+            dropped = glove.dropped
+        end = time.monotonic() + 10
+        while glove.dropped == dropped and time.monotonic() < end:
+            time.sleep(0.02)
+        assert dropped + 64 <= glove.dropped <= dropped + 65
+
+
 def test_what_sends_something_else_is_refused(board) -> None:
     folder = machine_folder("feeds")
     folder.mkdir(0o700, parents=True, exist_ok=True)
@@ -248,3 +374,25 @@ def test_it_is_recorded_and_verified(board, tmp_path) -> None:
     *_, verdict = Verification.steps(path)
     assert verdict.same
     assert verdict.frames > 50
+
+
+def test_a_recording_over_a_break_is_verified_to_its_end(board, tmp_path) -> None:
+    path = tmp_path / "glove.mcap"
+    command = [sys.executable, "-m", "kappaskin", "record", "feed:glove", str(path)]
+    first, again = feed("glove", board), None
+    with subprocess.Popen([*command, "--seconds", "4"]) as recording:
+        begun, pushed = math.inf, 0
+        while recording.poll() is None:
+            if first.dropped < pushed and begun == math.inf:
+                begun = time.monotonic()
+            if again is None and time.monotonic() > begun + 1.5:
+                first.close()
+                again = feed("glove", board)
+            (again or first).push(VALUES)
+            pushed += again is None
+            time.sleep(0.01)
+    again.close()
+
+    *_, verdict = Verification.steps(path)
+    assert verdict.same
+    assert verdict.frames > 200
