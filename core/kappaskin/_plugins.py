@@ -34,10 +34,22 @@ class PlugIn:
         """What it is and where from, with its trouble."""
         kind = self.group.rpartition(".")[2].removesuffix("s")
         trouble = f", left out: {self.trouble}" if self.trouble else ""
-        return f"{kind} {self.name} of {self.package} {self.version}{trouble}"
+        return (
+            f"{kind} {self.name} of {self.package} {self.version or '(unknown version)'}{trouble}"
+        )
 
 
 _found: dict[tuple[str, str, str], PlugIn] = {}
+
+
+def told(error: BaseException) -> str:
+    """What a plug-in raised, in words; a `KeyboardInterrupt` is raised again, as a person's."""
+    if isinstance(error, KeyboardInterrupt):
+        raise error
+    try:
+        return f"{type(error).__name__}: {error}"
+    except Exception:  # its text is the plug-in's, too
+        return type(error).__name__
 
 
 def plug_ins(
@@ -50,17 +62,19 @@ def plug_ins(
     """
     loaded: dict[str, Any] = {}
     for point in metadata.entry_points(group=group):
-        made, trouble = None, ""
+        package, version, trouble = "an unknown package", "", ""
         try:
+            said: dict[str, Any] = point.dist.metadata.json if point.dist else {}
+            package, version = said.get("name") or package, said.get("version") or ""
             if point.name in ours or point.name in loaded:
                 raise ValueError("the name is taken")
+            if not point.pattern.match(point.value):
+                raise ValueError(f"expected MODULE:OBJECT, got {point.value!r:.60}")
             check(point.name, made := point.load())
             loaded[point.name] = made
-        except (Exception, SystemExit) as error:  # a plug-in may raise anything
-            trouble = f"{type(error).__name__}: {error}"
-        module = sys.modules.get(getattr(made, "__module__", point.module))
-        package = point.dist.name if point.dist else "an unknown package"
-        version = point.dist.version if point.dist else ""
+        except BaseException as error:  # a plug-in may raise anything
+            trouble = told(error)
+        module = sys.modules.get(point.value.partition(":")[0].strip())
         file = getattr(module, "__file__", None) or ""
         _found[group, point.name, package] = PlugIn(
             group, point.name, package, version, file, trouble

@@ -17,6 +17,14 @@ class Own(LeastSquares):
     pass
 """
 
+ODD_TEXT = """
+class Odd(Exception):
+    def __str__(self):
+        raise RuntimeError
+
+raise Odd
+"""
+
 
 @pytest.fixture
 def installed(tmp_path, monkeypatch):
@@ -72,6 +80,10 @@ def test_what_is_installed_is_loaded_with_its_package_version_and_file(installed
         ("made = 1", "x=broken_two:made", "ModuleNotFoundError"),
         ("made = 1", "taken=broken_one:made", "ValueError: the name is taken"),
         ("made = 1", "odd=broken_one:made", "TypeError: odd"),
+        ("", "x=not a valid:::thing", "ValueError: expected MODULE:OBJECT, got 'not a valid:::"),
+        ("", "x=", "ValueError: expected MODULE:OBJECT, got ''"),
+        ("class Halt(BaseException): ...\nraise Halt('no key')", "x=broken_one", "Halt: no key"),
+        (ODD_TEXT, "x=broken_one:made", "Odd"),
     ],
 )
 def test_a_broken_one_is_left_out_and_named(installed, code, point, why) -> None:
@@ -87,6 +99,36 @@ def test_a_broken_one_is_left_out_and_named(installed, code, point, why) -> None
     assert f"of broken_one 1.5, left out: {why}" in found.text
     assert why in left_out(EFFECTS, found.name)
     assert left_out(ESTIMATORS, found.name) == "; a plug-in may be missing"
+
+
+def test_an_odd_name_of_its_module_is_no_trouble(installed, tmp_path) -> None:
+    installed("odd_one", "def made(): ...\nmade.__module__ = []", effects=["x=odd_one:made"])
+
+    assert plug_ins(EFFECTS, accept).keys() == {"x"}
+    (found,) = found_plug_ins()
+    assert (found.file, found.trouble) == (str(tmp_path / "odd_one.py"), "")
+
+
+def test_ctrl_c_is_never_left_out(installed) -> None:
+    installed("slow_one", "raise KeyboardInterrupt", effects=["x=slow_one:made"])
+    with pytest.raises(KeyboardInterrupt):
+        plug_ins(EFFECTS, accept)
+
+
+@pytest.mark.parametrize(
+    ("said", "text"),
+    [
+        (None, "source x of an unknown package (unknown version)"),
+        ("Metadata-Version: 2.1\nName: bare_one\n", "source x of bare_one (unknown version)"),
+    ],
+)
+def test_what_is_not_said_of_a_package_is_unknown(installed, tmp_path, said, text) -> None:
+    installed("bare_one", "made = 7", sources=["x=bare_one:made"])
+    metadata = tmp_path / "bare_one-1.5.dist-info" / "METADATA"
+    metadata.unlink() if said is None else metadata.write_text(said)
+
+    assert plug_ins(SOURCES, accept) == {"x": 7}
+    assert [one.text for one in found_plug_ins()] == [text]
 
 
 @pytest.mark.slow
