@@ -88,7 +88,7 @@ def found_plug_ins() -> list[PlugIn]:
 
 
 def left_out(group: str, name: str) -> str:
-    """Why a plug-in `name` is not there, for the end of a refusal."""
+    """Which plug-in `name` fails, or why it is not there, for the end of a refusal."""
     here = (one for one in _found.values() if (one.group, one.name) == (group, name))
     found = next(here, None)
     return f"; plug-in {found.text}" if found else "; a plug-in may be missing"

@@ -9,6 +9,8 @@ import pytest
 
 from kappaskin import _plugins
 from kappaskin._plugins import EFFECTS, ESTIMATORS, SOURCES, found_plug_ins, left_out, plug_ins
+from kappaskin.errors import Refusal, SourceError
+from kappaskin.sources import described_source, open_source
 
 ESTIMATOR = """
 from kappaskin.estimation import LeastSquares
@@ -23,6 +25,36 @@ class Odd(Exception):
         raise RuntimeError
 
 raise Odd
+"""
+
+SOURCE = """
+from kappaskin.errors import EndedSource
+
+class Halted(BaseException):
+    pass
+
+class Odd(Exception):
+    def __str__(self):
+        raise RuntimeError
+
+class Short:
+    sensor, patient, trouble, temperature = None, False, "", 20.0
+    read = record = close = lambda *_: []
+
+def opened(url, sensor):
+    match url.partition(":")[2]:
+        case "none":
+            return None
+        case "seven":
+            return 7
+        case "short":
+            return Short()
+        case "refused":
+            raise EndedSource("the tape is over")
+        case "Ctrl+C":
+            raise KeyboardInterrupt
+        case what:
+            raise {"exit": SystemExit, "halt": Halted, "odd": Odd}.get(what, RuntimeError)("no key")
 """
 
 
@@ -129,6 +161,56 @@ def test_what_is_not_said_of_a_package_is_unknown(installed, tmp_path, said, tex
 
     assert plug_ins(SOURCES, accept) == {"x": 7}
     assert [one.text for one in found_plug_ins()] == [text]
+
+
+@pytest.mark.parametrize(
+    ("what", "came"),
+    [
+        ("licence", "RuntimeError: no key"),
+        ("exit", "SystemExit: no key"),
+        ("halt", "Halted: no key"),
+        ("odd", "Odd"),
+        ("none", "TypeError: None has no sensor, read, patient, "),
+        ("seven", "TypeError: 7 has no sensor, read, patient, "),
+        ("short", " has no events, accounting"),
+    ],
+)
+def test_a_source_that_fails_is_refused_with_the_name_of_its_plug_in(
+    installed, tmp_path, monkeypatch, what, came
+) -> None:
+    installed("bad_one", SOURCE, sources=["bad=bad_one:opened"])
+    monkeypatch.setattr("kappaskin.sources.source._plugged", lambda: plug_ins(SOURCES, accept))
+
+    for name in (f"bad:{what}", described_source(tmp_path / "board.toml", f"bad:{what}")):
+        with pytest.raises(SourceError) as refused:
+            open_source(name)
+        assert str(refused.value).startswith(f"expected a source for bad:{what}, got ")
+        assert came in str(refused.value)
+        assert str(refused.value).endswith("; plug-in source bad of bad_one 1.5")
+
+
+def test_its_own_refusal_and_ctrl_c_pass(installed, monkeypatch) -> None:
+    installed("bad_one", SOURCE, sources=["bad=bad_one:opened"])
+    monkeypatch.setattr("kappaskin.sources.source._plugged", lambda: plug_ins(SOURCES, accept))
+
+    with pytest.raises(Refusal, match=r"^the tape is over$"):
+        open_source("bad:refused")
+    with pytest.raises(KeyboardInterrupt):
+        open_source("bad:Ctrl+C")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("what", ["licence", "none"])
+def test_a_recording_of_a_source_that_fails_is_refused(installed, tmp_path, what) -> None:
+    installed("bad_one", SOURCE, sources=["bad=bad_one:opened"])
+
+    code, _, complaint = command("record", f"bad:{what}", str(tmp_path / "bad.mcap"))
+
+    assert code == 2
+    (line,) = complaint.splitlines()
+    assert line.startswith(f"kappaskin: expected a source for bad:{what}, got ")
+    assert line.endswith("; plug-in source bad of bad_one 1.5")
+    assert list(tmp_path.glob("bad.mcap*")) == []
 
 
 @pytest.mark.slow

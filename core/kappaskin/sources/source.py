@@ -5,8 +5,8 @@ from functools import cache
 from pathlib import Path
 from typing import Protocol
 
-from kappaskin._plugins import SOURCES, plug_ins
-from kappaskin.errors import SourceError
+from kappaskin._plugins import SOURCES, left_out, plug_ins, told
+from kappaskin.errors import Refusal, SourceError
 from kappaskin.frames import Event, Frame
 from kappaskin.sensing import Sensor
 from kappaskin.sources.clock import ClockState
@@ -110,9 +110,25 @@ def _check(name: str, made: object) -> None:
 
 
 def plugged_source(url: str, sensor: Path | None) -> Source | None:
-    """The source that a plug-in opens of a `url` and a `sensor`'s description, if one does."""
+    """The source that a plug-in opens of a `url` and a `sensor`'s description, if one does.
+
+    Raises a `SourceError` that names a plug-in which raises anything but a `Refusal`, or which
+    opens something else than a source.
+    """
     scheme, found, _ = url.partition(":")
-    return _plugged()[scheme](url, sensor) if found and scheme in _plugged() else None
+    if not found or scheme not in _plugged():
+        return None
+    try:
+        made = _plugged()[scheme](url, sensor)
+        if lacks := [part for part in vars(Source) if part[0] != "_" and not hasattr(made, part)]:
+            raise TypeError(f"{made!r:.60} has no {', '.join(lacks)}")
+        return made
+    except Refusal:
+        raise
+    except BaseException as error:  # a plug-in may raise anything
+        raise SourceError(
+            f"expected a source for {url}, got {told(error)}{left_out(SOURCES, scheme)}"
+        ) from error
 
 
 def open_source(name: str, trust: bool = False) -> Source:
