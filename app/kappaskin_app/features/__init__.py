@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from kappaskin._plugins import FEATURES as GROUP
-from kappaskin._plugins import plug_ins
+from kappaskin._plugins import plug_ins, told
 from kappaskin_app.features.accuracy import AccuracyFeature
 from kappaskin_app.features.calibration import CalibrationFeature
 from kappaskin_app.features.compare import CompareFeature
@@ -71,8 +71,8 @@ class PluggedFeature:
         try:
             self.feature = self._made()  # kept: Qt holds none of the slots of a Python object
             self.feature.install(shell)
-        except Exception as error:  # a plug-in may raise anything
-            text = f"Plug-in feature {self.name} left out: {type(error).__name__}: {error}."
+        except BaseException as error:  # a plug-in may raise anything
+            text = f"Plug-in feature {self.name} left out: {told(error)}."
             log.warning(text, exc_info=error)
             shell.notify(text)
 

@@ -27,10 +27,21 @@ class Odd:
     def install(self, shell):
         raise RuntimeError("no licence")
 
+class Ended:
+    name = "ended"
+
+    def install(self, shell):
+        raise SystemExit(1)
+
 class Other:
     name = "other"
 """
-POINTS = "[kappaskin.features]\npeak=peak_plug:Peak\nodd=peak_plug:Odd\nother=peak_plug:Other\n"
+POINTS = """[kappaskin.features]
+peak = peak_plug:Peak
+ended = peak_plug:Ended
+odd = peak_plug:Odd
+other = peak_plug:Other
+"""
 
 
 @pytest.fixture
@@ -49,7 +60,7 @@ def plugged(tmp_path, monkeypatch):
 def test_it_is_installed_and_a_broken_one_is_named(
     plugged, qapp, window_class, until, caplog
 ) -> None:
-    assert [feature.name for feature in plugged] == ["peak", "odd"]
+    assert [feature.name for feature in plugged] == ["peak", "ended", "odd"]
     (left_out,) = [one for one in _plugins.found_plug_ins() if one.trouble]
     assert left_out.name == "other"
 
@@ -64,3 +75,4 @@ def test_it_is_installed_and_a_broken_one_is_named(
 
     assert notified == "Plug-in feature odd left out: RuntimeError: no licence."
     assert "no licence" in caplog.text
+    assert "Plug-in feature ended left out: SystemExit: 1." in caplog.text
