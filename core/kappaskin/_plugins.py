@@ -82,6 +82,12 @@ def plug_ins(
     return loaded
 
 
+def check_feature(name: str, made: Any) -> None:
+    """Raise a `TypeError` for what is no feature of the app of this `name`."""
+    if not callable(getattr(made, "install", None)) or getattr(made, "name", "") != name:
+        raise TypeError(f"expected a class with the name {name!r} and install, got {made!r:.60}")
+
+
 def found_plug_ins() -> list[PlugIn]:
     """Every plug-in that was looked for so far in this process."""
     return list(_found.values())

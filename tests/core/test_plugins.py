@@ -57,6 +57,16 @@ def opened(url, sensor):
             raise {"exit": SystemExit, "halt": Halted, "odd": Odd}.get(what, RuntimeError)("no key")
 """
 
+FEATURES = """
+class Good:
+    name = "good"
+
+    def install(self, shell):
+        pass
+
+seven = 7
+"""
+
 
 @pytest.fixture
 def installed(tmp_path, monkeypatch):
@@ -253,6 +263,19 @@ def test_the_doctor_lists_them(installed, tmp_path) -> None:
         lines[0] == f"plug-in             estimator own of good_one 1.5  {tmp_path / 'good_one.py'}"
     )
     assert "source y of good_one 1.5, left out: AttributeError" in lines[1]
+
+
+@pytest.mark.slow
+def test_the_doctor_lists_what_is_no_feature_as_left_out(installed) -> None:
+    points = ["good=pane:Good", "better=pane:Good", "seven=pane:seven"]
+    installed("pane", FEATURES, features=points)
+
+    code, printed, _ = command("doctor", "--json")
+    found = {one["name"]: one["trouble"] for one in json.loads(printed)["plug_ins"]}
+    assert code == 0
+    assert found["good"] == ""
+    assert found["better"].startswith("TypeError: expected a class with the name 'better' and ")
+    assert found["seven"] == "TypeError: expected a class with the name 'seven' and install, got 7"
 
 
 @pytest.mark.slow

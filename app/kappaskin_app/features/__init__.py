@@ -7,10 +7,9 @@ order in which their panels, docks and actions do.
 
 import logging
 from collections.abc import Callable
-from typing import Any
 
 from kappaskin._plugins import FEATURES as GROUP
-from kappaskin._plugins import plug_ins, told
+from kappaskin._plugins import check_feature, plug_ins, told
 from kappaskin_app.features.accuracy import AccuracyFeature
 from kappaskin_app.features.calibration import CalibrationFeature
 from kappaskin_app.features.compare import CompareFeature
@@ -77,14 +76,8 @@ class PluggedFeature:
             shell.notify(text)
 
 
-def _check(name: str, made: Any) -> None:
-    """Raise a `TypeError` for what is no feature of this `name`."""
-    if not callable(getattr(made, "install", None)) or getattr(made, "name", "") != name:
-        raise TypeError(f"expected a class with the name {name!r} and install, got {made!r:.60}")
-
-
 def all_features() -> list[Feature]:
     """Every feature, those of plug-ins last."""
     ours = [made() for made in FEATURES]
-    plugged = plug_ins(GROUP, _check, {feature.name for feature in ours})
+    plugged = plug_ins(GROUP, check_feature, {feature.name for feature in ours})
     return [*ours, *(PluggedFeature(name, made) for name, made in plugged.items())]

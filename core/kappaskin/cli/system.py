@@ -83,14 +83,14 @@ def _display() -> str:
 
 def _plug_ins() -> "list[PlugIn]":
     """Every plug-in of every group, loaded."""
-    # Those of the app are found in its process: here they need not be whole.
+    # The app alone knows the names of its own features: here none is taken.
     from kappaskin import _plugins
     from kappaskin import estimation as estimation
     from kappaskin import scenes as scenes
     from kappaskin.sources import plugged_source
 
     plugged_source(":", None)
-    _plugins.plug_ins(_plugins.FEATURES, lambda name, made: None)
+    _plugins.plug_ins(_plugins.FEATURES, _plugins.check_feature)
     return _plugins.found_plug_ins()
 
 
