@@ -42,7 +42,7 @@ class PlugIn:
 _found: dict[tuple[str, str, str], PlugIn] = {}
 
 
-def told(error: BaseException) -> str:
+def error_text(error: BaseException) -> str:
     """What a plug-in raised, in words; a `KeyboardInterrupt` is raised again, as a person's."""
     if isinstance(error, KeyboardInterrupt):
         raise error
@@ -64,8 +64,8 @@ def plug_ins(
     for point in metadata.entry_points(group=group):
         package, version, trouble = "an unknown package", "", ""
         try:
-            said: dict[str, Any] = point.dist.metadata.json if point.dist else {}
-            package, version = said.get("name") or package, said.get("version") or ""
+            known: dict[str, Any] = point.dist.metadata.json if point.dist else {}
+            package, version = known.get("name") or package, known.get("version") or ""
             if point.name in ours or point.name in loaded:
                 raise ValueError("the name is taken")
             if not point.pattern.match(point.value):
@@ -73,7 +73,7 @@ def plug_ins(
             check(point.name, made := point.load())
             loaded[point.name] = made
         except BaseException as error:  # a plug-in may raise anything
-            trouble = told(error)
+            trouble = error_text(error)
         module = sys.modules.get(point.value.partition(":")[0].strip())
         file = getattr(module, "__file__", None) or ""
         _found[group, point.name, package] = PlugIn(

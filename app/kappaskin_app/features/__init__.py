@@ -9,7 +9,7 @@ import logging
 from collections.abc import Callable
 
 from kappaskin._plugins import FEATURES as GROUP
-from kappaskin._plugins import check_feature, plug_ins, told
+from kappaskin._plugins import check_feature, error_text, plug_ins
 from kappaskin_app.features.accuracy import AccuracyFeature
 from kappaskin_app.features.calibration import CalibrationFeature
 from kappaskin_app.features.compare import CompareFeature
@@ -71,7 +71,7 @@ class PluggedFeature:
             self.feature = self._made()  # kept: Qt holds none of the slots of a Python object
             self.feature.install(shell)
         except BaseException as error:  # a plug-in may raise anything
-            text = f"Plug-in feature {self.name} left out: {told(error)}."
+            text = f"Plug-in feature {self.name} left out: {error_text(error)}."
             log.warning(text, exc_info=error)
             shell.notify(text)
 

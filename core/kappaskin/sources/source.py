@@ -5,7 +5,7 @@ from functools import cache
 from pathlib import Path
 from typing import Protocol
 
-from kappaskin._plugins import SOURCES, left_out, plug_ins, told
+from kappaskin._plugins import SOURCES, error_text, left_out, plug_ins
 from kappaskin.errors import Refusal, SourceError
 from kappaskin.frames import Event, Frame
 from kappaskin.sensing import Sensor
@@ -127,7 +127,7 @@ def plugged_source(url: str, sensor: Path | None) -> Source | None:
         raise
     except BaseException as error:  # a plug-in may raise anything
         raise SourceError(
-            f"expected a source for {url}, got {told(error)}{left_out(SOURCES, scheme)}"
+            f"expected a source for {url}, got {error_text(error)}{left_out(SOURCES, scheme)}"
         ) from error
 
 
