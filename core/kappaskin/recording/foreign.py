@@ -5,6 +5,7 @@ import math
 import re
 import sqlite3
 import struct
+import sys
 import zipfile
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
@@ -341,10 +342,16 @@ def _mcap_messages(path: Path) -> Iterator[_Message]:
 
 
 def _sqlite_messages(path: Path) -> Iterator[_Message]:
-    """All of a .db3 file of ROS 2."""
-    uri = f"{path.absolute().as_uri()}?mode=ro&immutable=1"
+    """All of a .db3 file of ROS 2, and of its write-ahead log; nothing is written beside them."""
+    log, index = (Path(f"{path.resolve()}{end}") for end in ("-wal", "-shm"))
+    logged, used = log.exists() and log.stat().st_size > 0, index.exists()
+    # A program that still writes has an index of the log, with its locks. Where there is none, only
+    # a reader that has the file to itself makes none.
+    how = "cache=private" if used else f"vfs={'win32' if sys.platform == 'win32' else 'unix'}-none"
+    uri = f"{path.absolute().as_uri()}?mode=ro&{how if logged else 'immutable=1'}"
     with closing(sqlite3.connect(uri, uri=True)) as database:
         database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST)
+        database.execute(f"PRAGMA locking_mode = {'NORMAL' if used else 'EXCLUSIVE'}")
         tables = "SELECT name FROM sqlite_master WHERE type = 'table'"  # a view may never end
         if not {"topics", "messages"} <= {name for (name,) in database.execute(tables)}:
             raise Refusal("expected tables topics and messages, as in a bag of ROS 2, got others")
@@ -354,7 +361,7 @@ def _sqlite_messages(path: Path) -> Iterator[_Message]:
         found = database.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY id")
         for n, (topic, time, data) in enumerate(found):
             if topic in topics and isinstance(time, int) and isinstance(data, bytes):
-                yield _Message(topics[topic], time, data, n / total)
+                yield _Message(topics[topic], time, data, n / max(total, 1))
 
 
 def _messages(file: Path) -> Iterator[_Message]:

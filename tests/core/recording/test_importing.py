@@ -4,11 +4,13 @@ import csv
 import io
 import json
 import runpy
+import shutil
 import sqlite3
 import sys
 import tempfile
 import zipfile
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -28,8 +30,10 @@ from kappaskin.recording import (
     Verification,
     is_foreign,
 )
+from kappaskin.recording.cdr import encode
 from kappaskin.recording.export.writing import export_steps
 from kappaskin.recording.importing import import_steps
+from kappaskin.recording.messages import STRING
 
 HOSTILE = runpy.run_path(str(Path(__file__).parents[2] / "hostile_files.py"))
 T, P, STEP = 60, 9, 1e-6  # rows, elements, and the step of counts of curvatures in 1/m
@@ -353,6 +357,52 @@ def test_it_replays_as_a_recording_of_ours(tmp_path: Path) -> None:
     assert [frame.device_time for frame in frames] == TIMES.tolist()
     assert np.all(np.isfinite([frame.taken for frame in frames]))
     replayed.close()
+
+
+def _logged_bag(folder: Path) -> sqlite3.Connection:
+    """A bag that is being written: 20 rows in `w.db3`, and 40 in its write-ahead log."""
+    database = sqlite3.connect(folder / "w.db3", isolation_level=None)
+    database.execute("PRAGMA journal_mode = WAL")
+    database.execute(
+        "CREATE TABLE topics (id INTEGER PRIMARY KEY, name, type, serialization_format)"
+    )
+    database.execute("CREATE TABLE messages (id INTEGER PRIMARY KEY, topic_id, timestamp, data)")
+    database.execute("INSERT INTO topics VALUES (1, '/skin', ?, 'cdr')", [STRING.name])
+    rows = [(1, BEGAN + n * 10**7, encode(STRING, {"data": row})) for n, row in enumerate(GOOD)]
+    insert = "INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)"
+    database.executemany(insert, rows[:20])
+    database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    database.execute("PRAGMA wal_autocheckpoint = 0")
+    database.executemany(insert, rows[20:])
+    return database
+
+
+@pytest.mark.parametrize("left", [("db3", "db3-wal"), ("db3", "db3-wal", "db3-shm")])
+def test_a_bag_is_imported_with_its_write_ahead_log(left: tuple[str, ...], tmp_path: Path) -> None:
+    (tmp_path / "bag").mkdir()
+    (tmp_path / "out").mkdir()
+    with closing(_logged_bag(tmp_path)):
+        for end in left:  # as when the program was ended by force
+            shutil.copy(tmp_path / f"w.{end}", tmp_path / "bag")
+        kept = [file for file in (tmp_path / "bag").iterdir() if not file.name.endswith("-shm")]
+        before = [file.read_bytes() for file in kept]
+        (tmp_path / "bag").chmod(0o555)
+
+        assert _imported(tmp_path / "out", tmp_path / "bag" / "w.db3").frames == T
+
+        assert {file.name for file in (tmp_path / "bag").iterdir()} == {f"w.{end}" for end in left}
+        assert [file.read_bytes() for file in kept] == before
+    assert is_foreign(tmp_path / "bag")
+    (tmp_path / "bag").chmod(0o755)
+
+
+def test_a_bag_that_is_being_written_is_imported_up_to_now(tmp_path: Path) -> None:
+    with closing(_logged_bag(tmp_path)) as database:
+        assert _imported(tmp_path, tmp_path / "w.db3").frames == T
+        database.execute("DELETE FROM messages")  # nobody else holds it
+    (tmp_path / "out.mcap").unlink()
+    with pytest.raises(Refusal, match="got no topic"):
+        _imported(tmp_path, tmp_path / "w.db3")
 
 
 def _saved(**arrays: Any) -> bytes:
