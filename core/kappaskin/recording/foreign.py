@@ -124,7 +124,7 @@ def _kind_of(file: Path) -> bytes:
 def _line_rows(file: Path, description: Description) -> Iterator[FileRow]:
     decoder, text = description.decoder(whole=True), description.kind != "binary"
     with open_file(file) as opened:
-        size = max(opened.seek(0, 2), 1)
+        size = opened.seek(0, 2)
         opened.seek(0)
         if opened.read(2) in (b"\xff\xfe", b"\xfe\xff"):
             raise Refusal(f"{file}: expected text in UTF-8, got UTF-16; save it as UTF-8")
@@ -141,7 +141,12 @@ def _line_rows(file: Path, description: Description) -> Iterator[FileRow]:
                     more = decoder.next_of(opened)
             if description.kind == "text" and isinstance(data, bytes) and b'"' in data:
                 data = _QUOTED.sub(rb"\1", data)
-            yield FileRow(data, math.nan, opened.tell() / size)
+            yield FileRow(data, math.nan, opened.tell() / max(size, 1))
+        if (read := opened.tell()) < size:
+            raise Refusal(
+                f"{file}: expected {size:,} bytes, as at the beginning, got {read:,}, as another "
+                "program made it shorter; import it once none writes to it"
+            )
 
 
 # Tables

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import os
 import runpy
 import shutil
 import sqlite3
@@ -403,6 +404,19 @@ def test_a_bag_that_is_being_written_is_imported_up_to_now(tmp_path: Path) -> No
     (tmp_path / "out.mcap").unlink()
     with pytest.raises(Refusal, match="got no topic"):
         _imported(tmp_path, tmp_path / "w.db3")
+
+
+@pytest.mark.parametrize("kind", ["text", "binary"])
+def test_a_file_that_shrinks_meanwhile_is_refused(kind: str, tmp_path: Path) -> None:
+    row = (b"\xaa\x55" + bytes(228)) if kind == "binary" else f"{GOOD[0]}\n".encode()
+    (tmp_path / "a.csv").write_bytes(row * 1000)
+    request = ImportRequest(tmp_path / "a.csv", tmp_path / "r.mcap", _sensor(tmp_path, kind))
+    (tmp_path / "scratch").mkdir()
+    steps = import_steps(request, tmp_path / "scratch")
+    next(steps)
+    os.truncate(tmp_path / "a.csv", len(row) * 300 + 100)
+    with pytest.raises(Refusal, match=rf"a.csv: expected {len(row) * 1000:,} bytes.*shorter"):
+        list(steps)
 
 
 def _saved(**arrays: Any) -> bytes:
