@@ -1,5 +1,6 @@
 """Import: files of other programs to recordings of a described sensor."""
 
+import errno
 import math
 import re
 import time
@@ -32,6 +33,7 @@ _REPORT = 0.05  # s between two reports
 _DATES = 1e9, 4e9  # s: times from 2001 to 2096 are since 1970, others since any beginning
 _LONGEST = 1e9  # s of a recording
 _SHOWN = 60  # characters of a bad row
+_ELSEWHERE = "free space, or choose another folder"
 _COMMA = re.compile(rb"\d,\d+\s*[;\t]")
 _SEPARATORS = (b";", b"\t", b",")
 _NAME = re.compile(rb"(?i)(?!nan$|inf$|infinity$)[a-z_\x80-\xff]")
@@ -113,17 +115,23 @@ def import_steps(request: ImportRequest, scratch: Path) -> Generator[float | Imp
                 if time.monotonic() >= next_report:
                     next_report = time.monotonic() + _REPORT
                     yield min(row.share, 1.0)
+            work.end()
         except Refusal as refusal:
-            named = str(refusal).startswith(str(request.file))
-            raise Refusal(f"{'' if named else f'{request.file}: '}{refusal}") from refusal
+            words, made = str(refusal), str(work.to)
+            if words.startswith(made):  # which nobody knows, and is removed
+                why = words.removeprefix(made).removeprefix(".part: ").removeprefix(": ")
+                raise Refusal(f"{request.to}: {why.partition(';')[0]}; {_ELSEWHERE}") from refusal
+            named = words.startswith(str(request.file))
+            raise Refusal(f"{'' if named else f'{request.file}: '}{words}") from refusal
         except DAMAGES as error:
             after = f" after row {work.rows:,}" if work.rows else ""
             why = getattr(error, "strerror", None) or str(error)
+            if getattr(error, "errno", None) in (errno.ENOSPC, errno.EDQUOT):
+                raise Refusal(f"{request.to}: {why}; {_ELSEWHERE}") from error
             raise Refusal(
                 f"{request.file}: cannot be read{after} ({why:.100}); check its name, and that it "
                 "is whole"
             ) from error
-        work.end()
     yield work.done()
 
 
@@ -131,7 +139,7 @@ class _Import:
     """Takes rows in order, as a source takes the records of a device, at their own times."""
 
     def __init__(self, request: ImportRequest, to: Path) -> None:
-        self._request, self._to = request, to
+        self._request, self.to = request, to
         self.description = load_description(request.sensor)
         self._decoder = self.description.decoder(whole=True)
         self._timed = self._decoder.timed
@@ -199,7 +207,7 @@ class _Import:
         self._pending = b""
         recorder.wait()
         if not recorder.written.active:
-            raise Refusal(f"{self._request.to}: {recorder.written.trouble}")
+            raise Refusal(recorder.written.trouble)
 
     def _discard(self, reason: str, first: str, data: bytes = b"") -> None:
         if reason not in self._bad:
@@ -235,7 +243,7 @@ class _Import:
         self._base = at
         first, last = _DATES
         dated = next((s for s in (at, seconds) if first < s < last), time.time())
-        recorder = self._recorder = Recorder(self._to, 0.0, zero=round(dated * 1e9))
+        recorder = self._recorder = Recorder(self.to, 0.0, zero=round(dated * 1e9))
         self._interpreter.learn(text := sensor_to_json(self.description.sensor))
         recorder.connected(text)
         self._map(recorder, at)
@@ -294,7 +302,7 @@ class _Import:
         recorder.disconnected(self._now)
         recorder.close()
         if recorder.written.trouble or recorder.written.lost:
-            raise Refusal(f"{self._request.to}: {recorder.written.trouble or 'the disk is slow'}")
+            raise Refusal(recorder.written.trouble or f"{self.to}: the disk is slow")
 
     def close(self) -> None:
         """Close what is open."""

@@ -1,6 +1,7 @@
 """Files that other libraries wrote, imported: recordings with the same numbers, or refused."""
 
 import csv
+import errno
 import io
 import json
 import os
@@ -32,6 +33,7 @@ from kappaskin.recording import (
     is_foreign,
 )
 from kappaskin.recording.cdr import encode
+from kappaskin.recording.disk import ReservedFile
 from kappaskin.recording.export.writing import export_steps
 from kappaskin.recording.importing import import_steps
 from kappaskin.recording.messages import STRING
@@ -404,6 +406,45 @@ def test_a_bag_that_is_being_written_is_imported_up_to_now(tmp_path: Path) -> No
     (tmp_path / "out.mcap").unlink()
     with pytest.raises(Refusal, match="got no topic"):
         _imported(tmp_path, tmp_path / "w.db3")
+
+
+def _full(at: int, once: bool) -> Callable[[ReservedFile, bytes], None]:
+    """A disk that is full once a file has so many bytes; for good, if not `once`."""
+    put, failed = ReservedFile.put, list[bool]()
+
+    def write(self: ReservedFile, data: bytes) -> None:
+        if self.tell() + len(data) > at and not (once and failed):
+            failed.append(True)
+            raise OSError(errno.ENOSPC, "No space left on device")
+        put(self, data)
+
+    return write
+
+
+def _no_room(*_: object) -> None:
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+FULL = {
+    "for its beginning": (ReservedFile, "put", _full(0, once=False), "cannot be written (%s)"),
+    "but for its end": (ReservedFile, "put", _full(10_000, once=True), "%s"),
+    "for its end": (ReservedFile, "put", _full(10_000, once=False), "%s"),
+    "for a reserve": (ReservedFile, "reserve", _no_room, "expected room for 1 MiB at least (%s)"),
+    "for its arrays": (zipfile.ZipFile, "extract", _no_room, "%s"),
+}
+
+
+@pytest.mark.parametrize("name", FULL)
+def test_a_disk_without_room_is_named_by_the_file_to_be_made(name, tmp_path, monkeypatch) -> None:
+    where, what, instead, why = FULL[name]
+    monkeypatch.setattr(where, what, instead)
+    np.savez(tmp_path / "a.npz", values=K, time=TIMES)
+    request = ImportRequest(tmp_path / "a.npz", tmp_path / "r.mcap", _sensor(tmp_path, "text"))
+    (tmp_path / ".scratch").mkdir()
+    with pytest.raises(Refusal) as refusal:
+        list(import_steps(request, tmp_path / ".scratch"))
+    said = f"{request.to}: {why % 'No space left on device'}; free space, or choose another folder"
+    assert str(refusal.value) == said
 
 
 @pytest.mark.parametrize("kind", ["text", "binary"])
