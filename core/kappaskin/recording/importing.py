@@ -30,8 +30,8 @@ _EVERY, _THEN = 10_000, 100  # first frames that have a recorded estimate; then 
 _TRIED = 1000  # rows, of which one must be a record
 _HELD = 2**16  # bytes of bad rows that wait for a good one
 _REPORT = 0.05  # s between two reports
-_DATES = 1e9, 4e9  # s: times from 2001 to 2096 are since 1970, others since any beginning
-_LONGEST = 1e9  # s of a recording
+_DATES = 1e9, 2.0**31 - 1  # s: from 2001 to 2038 they are since 1970, else since any beginning
+_JUMP = 1e9  # s between two records, which is none of a clock that goes on
 _SHOWN = 60  # characters of a bad row
 _ELSEWHERE = "free space, or choose another folder"
 _COMMA = re.compile(rb"\d,\d+\s*[;\t]")
@@ -151,7 +151,7 @@ class _Import:
         self._pipeline: Pipeline | None = None
         self.rows = self._headings = self._frames = self._back = 0
         self._heading = b""
-        self._base, self._last, self._now = 0.0, -math.inf, 0.0
+        self._base = self._last = self._now = self._room = 0.0  # s
         self._since = set[int]()  # sequence numbers since the last estimate
         self._bad, self._first = Counter[str](), dict[str, tuple[int, str]]()
 
@@ -228,11 +228,17 @@ class _Import:
         # The interpreter unwraps it once more, which changes nothing.
         at = self._clock.unwrap(samples.time) if self._timed else seconds
         recorder = self._recorder or self._begin(at, seconds)
-        if at < self._last or at - self._base > _LONGEST:
+        if at < self._last or at - self._last > _JUMP:
             self._back += 1
             self._base = at - self._now
             self._map(recorder, at)
         self._last, self._now = at, at - self._base
+        if self._now > self._room:
+            raise Refusal(
+                f"row {self.rows:,}: expected a time before 2038, where those of recordings end, "
+                f"got one {self._now:.6g} s after the first; check its unit: s, or that of "
+                "a column time_ms or time_us"
+            )
         self._record(recorder)
         if frame := self._interpreter.frame(samples, self._now):
             self._estimate(recorder, frame)
@@ -240,9 +246,10 @@ class _Import:
 
     def _begin(self, at: float, seconds: float) -> Recorder:
         """Begin a recording whose first record is of the time `at`, in a row of `seconds`, in s."""
-        self._base = at
+        self._base = self._last = at
         first, last = _DATES
         dated = next((s for s in (at, seconds) if first < s < last), time.time())
+        self._room = last - dated
         recorder = self._recorder = Recorder(self.to, 0.0, zero=round(dated * 1e9))
         self._interpreter.learn(text := sensor_to_json(self.description.sensor))
         recorder.connected(text)

@@ -408,6 +408,32 @@ def test_a_bag_that_is_being_written_is_imported_up_to_now(tmp_path: Path) -> No
         _imported(tmp_path, tmp_path / "w.db3")
 
 
+@pytest.mark.parametrize(("first", "step"), [(2.2e9, 0.01), (4.2e9, 0.01), (2.1e9, 1e5), (0, 1e6)])
+def test_times_before_2038_are_dates_and_others_count_from_any_beginning(
+    first: float, step: float, tmp_path: Path
+) -> None:
+    times = first + step * np.arange(T)
+    np.savez(tmp_path / "a.npz", values=K, time=times)
+    assert _imported(tmp_path, tmp_path / "a.npz").frames == T
+    found = _exported(tmp_path)["time"]
+    np.testing.assert_allclose(found - found[0], times - first, atol=1e-6)
+
+
+@pytest.mark.parametrize(("first", "step"), [(0, 1e7), (2.1e9, 1e6), (1.7e18, 1e7), (0, 5e8)])
+def test_times_that_pass_2038_are_refused_by_their_unit(
+    first: float, step: float, tmp_path: Path
+) -> None:
+    np.savez(tmp_path / "a.npz", values=K, time=first + step * np.arange(T))
+    with pytest.raises(Refusal, match=r"a.npz: row \d+: expected a time before 2038.*its unit"):
+        _imported(tmp_path, tmp_path / "a.npz")
+
+
+def test_a_clock_that_is_set_continues(tmp_path: Path) -> None:
+    times = np.r_[TIMES[:20], 1.7e9 + TIMES[20:40], 9e15, 1.7e9 + TIMES[41:]]
+    np.savez(tmp_path / "a.npz", values=K, time=times)
+    assert _imported(tmp_path, tmp_path / "a.npz").back == 3
+
+
 def _full(at: int, once: bool) -> Callable[[ReservedFile, bytes], None]:
     """A disk that is full once a file has so many bytes; for good, if not `once`."""
     put, failed = ReservedFile.put, list[bool]()
