@@ -268,6 +268,7 @@ def left_behind(path: Path, contents: bytes, at: int = 0) -> Generator[bool]:
 
 
 _MARK, _MARKED = "kappaskin.lock", b"in use by kappaskin\n"
+_HIDDEN = ".kappaskin-"
 
 
 def mark_folder(folder: Path) -> int:
@@ -282,10 +283,16 @@ def mark_folder(folder: Path) -> int:
 
 
 class TemporaryFolder(tempfile.TemporaryDirectory[str]):
-    """A folder that is removed when it is closed; if never, when the next process starts."""
+    """A folder that is removed when it is closed; if never, when the next process starts.
 
-    def __init__(self) -> None:
-        super().__init__(prefix="kappaskin-")
+    One `beside` a person's files is hidden, and then removed when the next is made there.
+    """
+
+    def __init__(self, beside: Path | None = None) -> None:
+        if beside is not None:
+            remove_folders_left_behind(beside)
+        prefix = "kappaskin-" if beside is None else _HIDDEN
+        super().__init__(prefix=prefix, dir=beside, ignore_cleanup_errors=True)
         self._mark = mark_folder(Path(self.name))
 
     def cleanup(self) -> None:
@@ -295,10 +302,14 @@ class TemporaryFolder(tempfile.TemporaryDirectory[str]):
         super().cleanup()
 
 
-def remove_folders_left_behind() -> None:
-    """Remove the marked temporary folders of processes that were ended by force."""
-    for prefix in ("kappaskin-", "pymp-"):  # the second are those of Python's `multiprocessing`
-        for folder in Path(tempfile.gettempdir()).glob(f"{prefix}*"):
+def remove_folders_left_behind(beside: Path | None = None) -> None:
+    """Remove the marked temporary folders of processes that were ended by force.
+
+    Those of the system's folder for them, or those `beside` a person's files.
+    """
+    # The last are those of Python's `multiprocessing`.
+    for prefix in ("kappaskin-", "pymp-") if beside is None else (_HIDDEN,):
+        for folder in (beside or Path(tempfile.gettempdir())).glob(f"{prefix}*"):
             with left_behind(folder / _MARK, _MARKED) as left:
                 if left and not folder.is_symlink():
                     shutil.rmtree(folder, ignore_errors=True)

@@ -1,13 +1,13 @@
 """Files on a disk that may fill up."""
 
 import os
-import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Generator, Iterable
 from pathlib import Path
 from typing import IO, Generic, Self, TypeVar, cast
 
+from kappaskin._files import TemporaryFolder
 from kappaskin._processes import BackgroundProcess
 from kappaskin.errors import Refusal
 
@@ -143,7 +143,8 @@ class ScratchTask(Generic[_Result]):
 
     They are in a temporary folder beside the file `to` until complete. Steps yield the share that
     is done now and then, and the `result` at the end. It ends when it is done, when `close` is
-    called, which leaves nothing of what is not whole, or when the process that started it is gone.
+    called, which leaves nothing of what is not whole, or when the process that started it is gone;
+    the next task there removes the folder then.
     """
 
     def __init__(
@@ -157,13 +158,14 @@ class ScratchTask(Generic[_Result]):
     ) -> None:
         self.files, self._to, self._result = files, to, result
         try:
-            self._scratch = Path(tempfile.mkdtemp(prefix=f".{to.name}.", dir=to.parent))
+            self._room = TemporaryFolder(to.parent)
         except OSError as error:
             raise _unwritable(to, error) from error
+        self._scratch = Path(self._room.name)
         try:
             self._task = BackgroundProcess[float | _Result](name, steps, about, self._scratch)
         except BaseException:  # Ctrl+C, while it begins
-            shutil.rmtree(self._scratch, ignore_errors=True)
+            self._room.cleanup()
             raise
 
     @property
@@ -205,7 +207,7 @@ class ScratchTask(Generic[_Result]):
     def close(self) -> None:
         """End it, done or not."""
         self._task.close()
-        shutil.rmtree(self._scratch, ignore_errors=True)
+        self._room.cleanup()
 
     def __enter__(self) -> Self:
         return self

@@ -7,7 +7,9 @@ import json
 import os
 import runpy
 import shutil
+import signal
 import sqlite3
+import subprocess
 import sys
 import tempfile
 import zipfile
@@ -648,6 +650,53 @@ def test_a_task_that_is_closed_leaves_nothing(tmp_path: Path) -> None:
     with ImportTask(ImportRequest(tmp_path / "a.csv", tmp_path / "r.mcap", sensor)) as task:
         next(task.wait())
     assert {file.name for file in tmp_path.iterdir()} == {"a.csv", "board.toml"}
+
+
+@pytest.mark.slow
+def test_a_name_that_fits_is_used(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_bytes(_rows(GOOD))
+    out = tmp_path / f"{'r' * 245}.mcap"
+    with ImportTask(ImportRequest(tmp_path / "a.csv", out, _sensor(tmp_path, "text"))) as task:
+        *_, done = task.wait()
+    assert isinstance(done, Imported)
+    assert {file.name for file in tmp_path.iterdir()} == {"a.csv", "board.toml", out.name}
+
+
+_IMPORTING = """
+import sys
+from pathlib import Path
+from kappaskin.recording import ImportRequest, ImportTask
+
+with ImportTask(ImportRequest(*map(Path, sys.argv[1:]))) as task:
+    for _ in task.wait():
+        print("begun", flush=True)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="nothing tells whose folder it is")
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGKILL"])
+def test_what_a_task_left_that_was_ended_is_removed_by_the_next(name: str, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_bytes(_rows(GOOD * 2000))
+    sensor = _sensor(tmp_path, "text")
+    words = [sys.executable, "-c", _IMPORTING, tmp_path / "a.csv", tmp_path / "r.mcap", sensor]
+    with subprocess.Popen(words, stdout=subprocess.PIPE) as ended:
+        assert ended.stdout is not None
+        ended.stdout.readline()
+        ended.send_signal(signal.Signals[name])
+    (left,) = set(tmp_path.iterdir()) - {tmp_path / "a.csv", sensor}
+    (tmp_path / ".kappaskin-own").mkdir()  # not marked
+
+    (tmp_path / "b.csv").write_bytes(_rows(GOOD))
+    with ImportTask(ImportRequest(tmp_path / "b.csv", tmp_path / "r.mcap", sensor)) as task:
+        assert not left.exists()
+        (used,) = set(tmp_path.glob(".kappaskin-*")) - {tmp_path / ".kappaskin-own"}
+        request = ImportRequest(tmp_path / "b.csv", tmp_path / "s.mcap", sensor)
+        with ImportTask(request):
+            assert used.exists()
+        list(task.wait())
+    assert {file.name for file in tmp_path.glob(".*")} == {".kappaskin-own"}
+    assert (tmp_path / "r.mcap").exists()
 
 
 @pytest.mark.slow
