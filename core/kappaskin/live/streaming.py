@@ -24,7 +24,8 @@ class Stream:
     Of the frames that the loop has not taken, the newest 64 wait; `dropped` counts the others. A
     source that waits itself, such as a file, drops none. `sensor` is the one connected, None until
     it is known. The loop ends with its source; it raises a `SourceError` where the connection is
-    lost, or nothing usable has come for three seconds. Estimates of a recording are computed anew.
+    lost, nothing usable has come for three seconds, or the source ended without a record. Estimates
+    of a recording are computed anew.
     """
 
     def __init__(self, source: str, setup: Setup | None, trust: bool) -> None:
@@ -66,7 +67,10 @@ class Stream:
             if isinstance(self._source, ReplayedSource) and self._source.ended:
                 self.close()
         except Refusal as reason:
-            self._failure = None if isinstance(reason, EndedSource) else reason
+            self._failure = reason
+            if isinstance(reason, EndedSource):
+                none = SourceError(f"{reason}; expected records as its description says, got none")
+                self._failure = None if self._source.accounting().accepted else none
             self.close()
 
     def _take(self, timeout: float) -> list[Frame]:

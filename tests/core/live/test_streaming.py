@@ -62,6 +62,18 @@ def test_estimates_are_those_of_the_pipeline(tmp_path, board) -> None:
     np.testing.assert_allclose(estimates[9].coefficients.ravel(), own, atol=1e-9)
 
 
+@pytest.mark.parametrize("text", ["hello world\n" * 500, ""])
+def test_a_file_without_a_record_raises(tmp_path, board, text) -> None:
+    file = tmp_path / "garbage.csv"
+    file.write_text(text)
+    with (
+        stream(str(file), sensor=board) as found,
+        pytest.raises(SourceError, match=r"garbage.csv: ended, 0 of 0 messages lost.*got none"),
+    ):
+        list(found)
+    assert list(found) == []
+
+
 def test_without_a_setup_there_are_as_many_functions_as_the_sensor_determines(board) -> None:
     with feed("glove", board) as glove, stream("feed:glove") as found:
         glove.push([0, 0, *[1e-4] * 16])
