@@ -172,7 +172,8 @@ class _Lines(LineDecoder):
     def __init__(self, columns: Columns, whole: bool = False) -> None:
         super().__init__(columns)
         # Of the first line the beginning may be missing, and what is left of it look like a line.
-        self._whole, self._longest = whole, max(_LONGEST, _NUMBER * len(columns))
+        self._whole = self._begins_whole = whole
+        self._longest = max(_LONGEST, _NUMBER * len(columns))
 
     @abstractmethod
     def _numbers(self, line: bytes) -> Array | str:
@@ -215,7 +216,7 @@ class _Lines(LineDecoder):
 
     def line_ended(self) -> None:
         super().line_ended()
-        self._whole = False
+        self._whole = self._begins_whole
 
 
 class TextDecoder(_Lines):

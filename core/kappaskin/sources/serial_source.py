@@ -126,6 +126,8 @@ class SerialSource:
         if self._description is not None:
             by_datagrams = self.url.startswith(UDP)
             self._identify(described_text(self._description.sensor, by_datagrams))
+            if held := self._decoder.held:  # that it begins with a whole line again
+                self._recording.received([(now, held)])
             return
         self._rates = BaudRateSearch(connection.baud_rate)
         self._commands.greet(now)

@@ -11,12 +11,13 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from kappaskin import Refusal
+from kappaskin import Pipeline, Refusal, Setup
 from kappaskin.cli import of_sensor
 from kappaskin.errors import EndedSource, SourceError
 from kappaskin.recording import Recorder, ReplayedSource, Verification
 from kappaskin.sources import WireMonitor, described_source, load_description, open_source
-from kappaskin.sources.inputs import StandardInput
+from kappaskin.sources.inputs import Input, StandardInput
+from kappaskin.sources.serial_source import SerialSource
 
 pytestmark = pytest.mark.slow
 HEAD = """
@@ -365,3 +366,43 @@ def test_the_monitor_tells_no_gaps_of_what_is_not_numbered(tmp_path, port, sende
 def test_udp_without_a_description_is_refused():
     with pytest.raises(Refusal, match="--sensor FILE"):
         of_sensor("udp://:9870", None)
+
+
+class Breaking(Input):
+    """Ten whole lines from each connection, which then breaks off."""
+
+    connections = 0
+
+    def __init__(self) -> None:
+        super().__init__()
+        first = 10 * Breaking.connections
+        Breaking.connections += 1
+        self._lines = [f"{n},{',1.5' * 8}".replace(",,", ",") for n in range(first, first + 10)]
+
+    def arriving(self) -> tuple[float, bytes]:
+        time.sleep(0.02)
+        if not self._lines:
+            raise OSError("broken off")
+        return self._clock(), f"{self._lines.pop(0)}\n".encode()
+
+
+def test_after_a_break_the_first_line_is_whole_again_live_and_in_the_recording(tmp_path) -> None:
+    description = load_description(written(tmp_path, UNTIMED))
+    Breaking.connections, path, found = 0, tmp_path / "r.mcap", []
+    source = SerialSource("breaking:", description=description, opened=Breaking)
+    with closing(source), closing(Recorder(path, time.monotonic())) as recorder:
+        source.record(recorder)
+        pipeline = Pipeline(source.sensor, Setup(Ni=2, Nj=2))
+        recorder.set_up(pipeline)
+        end = time.monotonic() + 20
+        while len(found) < 25 and time.monotonic() < end:
+            for frame in source.read(0.05):
+                estimate = pipeline(frame)
+                found.append(round(1e3 * estimate.curvature.ravel()[0]))
+                recorder.take(frame, estimate)
+
+    assert found == list(range(len(found)))
+    assert len(found) >= 25
+    *_, verdict = Verification.steps(path)
+    assert verdict.same
+    assert verdict.frames == len(found)
