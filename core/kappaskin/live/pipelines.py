@@ -49,9 +49,15 @@ class PipelineHost:
         self.excluded: tuple[FaultCodes, Array] | None = None
 
     def request(self, setup: Setup) -> None:
-        """Begin to build a pipeline for another setup, while the present one runs on."""
-        self._requested = setup
-        self._build(smaller=False)
+        """Begin to build a pipeline for another setup, while the present one runs on.
+
+        Where a sensor allows fewer functions than were requested, and as many are requested again,
+        as with a tare, it has fewer too.
+        """
+        was, self._requested = self._requested, setup
+        used = self.pipeline.setup if self.pipeline else was
+        fewer = (used.Ni, used.Nj) != (was.Ni, was.Nj) == (setup.Ni, setup.Nj)
+        self._build(smaller=fewer)
 
     def connect(self, sensor: Sensor | None) -> None:
         """Begin with another sensor; estimates of the last one are no longer shown."""
@@ -80,7 +86,7 @@ class PipelineHost:
         made, self._building = self._building.result(), None
         self.status = replace(self.status, computing=False)
         if made.requested != self._requested or made.sensor is not self._sensor:
-            self._build(smaller=self.pipeline is None)  # overtaken while it was built
+            self._build(smaller=self.pipeline is None or made.smaller)  # overtaken meanwhile
             return False
         self.status = replace(self.status, refusal=made.refusal)
         if made.pipeline is not None:
@@ -145,6 +151,7 @@ class _Built:
 
     sensor: Sensor
     requested: Setup
+    smaller: bool
     pipeline: Pipeline | None
     refusal: str = ""
 
@@ -152,9 +159,10 @@ class _Built:
 def _built(sensor: Sensor, requested: Setup, generation: int, smaller: bool) -> _Built:
     """A pipeline as requested, or if it may be `smaller` with as many functions as possible."""
     try:
-        return _Built(sensor, requested, *pipeline_for(sensor, requested, generation, smaller))
+        made = pipeline_for(sensor, requested, generation, smaller)
+        return _Built(sensor, requested, smaller, *made)
     except Refusal as reason:
-        return _Built(sensor, requested, None, str(reason))
+        return _Built(sensor, requested, smaller, None, str(reason))
 
 
 _SHOWN_EVERY = 1 / 60  # s between two frames that are computed
