@@ -65,7 +65,8 @@ def open_file(path: Path) -> BinaryIO:
 
     An `OSError` also for anything else than a file: a pipe that nobody writes to would block.
     """
-    at_once = getattr(os, "O_NONBLOCK", 0)
+    # Nor may a terminal become that of this process.
+    at_once = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0)
     file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | at_once))  # noqa: SIM115
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
         file.close()

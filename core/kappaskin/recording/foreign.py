@@ -484,6 +484,8 @@ def is_foreign(file: Path) -> bool:
     try:
         if file.is_dir():
             return bool(_parts_of(file))
+        if not file.is_file():  # a port that is opened may become this program's terminal
+            return False
         if (kind := _kind_of(file)) == MAGIC:
             with Recording(file):
                 return False
