@@ -32,6 +32,7 @@ from kappaskin.sources.recognition import NewSensor as NewSensor
 from kappaskin.sources.recognition import RawLines as RawLines
 from kappaskin.sources.recognition import RecognisedLines as RecognisedLines
 from kappaskin.sources.recognition import Recogniser as Recogniser
+from kappaskin.sources.recognition import by_rows as by_rows
 from kappaskin.sources.recognition import columns_of as columns_of
 from kappaskin.sources.recognition import description_text as description_text
 from kappaskin.sources.serial_source import SerialSource as SerialSource

@@ -5,7 +5,7 @@ import math
 import re
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from itertools import cycle, groupby
@@ -327,6 +327,18 @@ READS: Mapping[str, tuple[str, ...]] = {
 """What the elements of a sensor usually read, by its name on the screen."""
 
 
+def by_rows(columns: Sequence[str], grid: tuple[int, int]) -> tuple[str, ...]:
+    """The columns of elements that are counted along x first, as of such along y first."""
+    m, n = grid
+
+    def renamed(column: str) -> str:
+        what, found, element = column.partition(":")
+        row, place = divmod(int(element or 0), m)
+        return f"{what}:{place * n + row}" if found else column
+
+    return tuple(map(renamed, columns))
+
+
 def columns_of(
     found: RecognisedLines, reads: tuple[str, ...], interleaved: bool
 ) -> tuple[str, ...]:
@@ -375,7 +387,10 @@ def description_text(found: RecognisedLines, sensor: NewSensor) -> str:
         for path, count in found.paths:
             joined = _joined(sensor.columns[at : at + count])
             if len(joined) > 1:
-                raise Refusal(f"expected readings of one kind in {path}, got {', '.join(joined)}")
+                raise Refusal(
+                    f"expected readings of one kind in {path}, of elements in their order along y "
+                    f"first, got {', '.join(joined):.60}"
+                )
             if joined[0] or count > 1:
                 fields[path] = joined[0]
             at += count

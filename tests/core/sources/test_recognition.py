@@ -13,6 +13,7 @@ from kappaskin.sources import (
     NewSensor,
     RawLines,
     Recogniser,
+    by_rows,
     columns_of,
     description_text,
 )
@@ -256,3 +257,12 @@ def test_whole_numbers_are_no_decimal_commas(separator) -> None:
     whole = np.random.default_rng(2).integers(10, 1024, (99, 4))
 
     assert len(recognised([separator.join(map(str, row)) for row in whole]).labels) == 4
+
+
+def test_elements_counted_along_x_first_are_placed_along_y_first() -> None:
+    columns = ("time_ms", *(f"height:{k}" for k in range(6)))  # 3 in x, 2 in y
+
+    assert by_rows(columns, (3, 2)) == (
+        "time_ms",
+        *("height:0", "height:2", "height:4", "height:1", "height:3", "height:5"),
+    )

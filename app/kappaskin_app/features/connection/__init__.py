@@ -48,8 +48,10 @@ class ConnectionFeature:
         self.new_sensor = NewSensorDialog(shell.tasks, shell)
         self.new_sensor.opening.connect(guarded(self._free))
         self.new_sensor.made.connect(guarded(self._connect_new))
+        self.new_sensor.rejected.connect(guarded(self._connect_again))
+        self._freed = ""  # source whose port the dialog reads
         self.connection.new_requested.connect(guarded(self.new_sensor.begin))
-        shell.closing.connect(guarded(self.new_sensor.reject))
+        shell.closing.connect(guarded(self._close))
         add("new-sensor", SOURCE, f"&New sensor{ELLIPSIS}", self.new_sensor.begin, "", _NEW)
         add("open-sensor", FILE, f"Open &sensor{ELLIPSIS}", self._open, "", _OPEN)
         self._imported = Path()
@@ -104,11 +106,24 @@ class ConnectionFeature:
         """Let go of a port that the dialog is to read."""
         source = self._session.engine.source or ""
         if port in (source, parts_of(source)[1]):
+            self._freed = source
             self._session.disconnect_from()
+            self._shell.notify("Disconnected, as the new sensor is read from the same port")
+
+    def _connect_again(self) -> None:
+        """Connect the source whose port the dialog has read, as it makes nothing of it."""
+        source, self._freed = self._freed, ""
+        if source:
+            self._session.request_source(source)
+
+    def _close(self) -> None:
+        self._freed = ""
+        self.new_sensor.reject()
 
     def _connect_new(self, file: Path, port: str, topic: str) -> None:
         """Connect the sensor that a new file describes at a port, or import its lines."""
         self._shell.opening.note(file)
+        self._freed = ""
         if (lines := Path(port)).is_file() or is_foreign(lines):
             self._imported = unused(recordings_folder() / f"{lines.stem}.mcap")
             request = ImportRequest(lines, self._imported, file, topic)

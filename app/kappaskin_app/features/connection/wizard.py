@@ -5,7 +5,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPointF, QRectF, Qt, QTimer, Signal
+from PySide6.QtCore import (
+    QModelIndex,
+    QPersistentModelIndex,
+    QPointF,
+    QRectF,
+    Qt,
+    QTimer,
+    Signal,
+)
 from PySide6.QtGui import QCloseEvent, QFontDatabase, QPainter, QPalette, QPen, QPolygonF
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -37,6 +45,7 @@ from kappaskin.sources import (
     Port,
     RawLines,
     RecognisedLines,
+    by_rows,
     columns_of,
     description_text,
 )
@@ -56,6 +65,7 @@ _COURSE = 100  # newest numbers of a column that are drawn
 _CELL = 24  # px of the map's picture along a side of an element, so that it has edges
 _NOW = 5  # numbers that are now
 _SURE, _SHARE = 4.0, 0.3  # times the noise, and share of the most, of a column that answers
+_QUIET = 10.0  # times the scatter, that the map shows at least
 _HELD = 300  # looks for which a column may answer before that is its rest
 _STEPS = ("1 Port", "2 Columns", "3 Skin")
 _NUMBER, _NAME, _VALUE, _TRACE, _ROLE = range(5)
@@ -80,13 +90,13 @@ _UNITS = {
 }
 _HINTS = (
     "Plug the board in, or type its port or URL, such as /dev/ttyACM0, COM3 or udp://:9870.",
-    "Press the skin: the columns that answer light up. Select rows to change what they are.",
-    "Press the skin: the map shows where. Element 0 is at low x and low y, the next one above it.",
+    "Let go of the skin, then press it: columns that answer light up. Select rows to change them.",
+    "Press the skin: the map shows where. Element 0 is at low x and low y, at the lower left.",
 )
 _FILE_HINTS = (
     "The first rows of the file. For a board, plug it in, or type its port or URL.",
     "Select rows to change what they are.",
-    "Element 0 is at low x and low y, the next one above it.",
+    "Element 0 is at low x and low y, at the lower left.",
 )
 
 
@@ -241,6 +251,8 @@ class NewSensorDialog(QDialog):
         self.name = QLineEdit("My sensor")
         self.sides = [_length(40.0), _length(40.0)]
         self.grid = [QSpinBox(minimum=1, maximum=4096) for _ in range(2)]  # pyright: ignore[reportCallIssue]
+        self.along = QComboBox()
+        self.along.addItems(["Above it (along y first)", "To its right (along x first)"])
         self.scale = _Factor(decimals=9, minimum=-1e9, maximum=1e9, value=1.0)  # pyright: ignore[reportCallIssue]
         self.scale.setStepType(QDoubleSpinBox.StepType.AdaptiveDecimalStepType)
         self.unit = QComboBox()
@@ -257,25 +269,19 @@ class NewSensorDialog(QDialog):
         self.rigidity.setAccessibleName("Rigidity of the skin")
         self.rigidity.setEnabled(False)
         self.known.toggled.connect(self.rigidity.setEnabled)
-        names = (
-            "Size in x",
-            "Size in y",
-            "Elements in x",
-            "Elements in y",
-            "Scale",
-            "Unit",
-            "Rate",
-        )
-        boxes = (*self.sides, *self.grid, self.scale, self.unit, self.rate)
+        names = ("Size in x", "Size in y", "Elements in x", "Elements in y", "Next element is")
+        names += ("Scale", "Unit", "Rate")
+        boxes = (*self.sides, *self.grid, self.along, self.scale, self.unit, self.rate)
         for words, box in zip(names, boxes, strict=True):
             box.setAccessibleName(words)
         times = "\N{MULTIPLICATION SIGN}"
         form.addRow("Name", self.name)
         pairs = (in_a_row(a, Label(times), b) for a, b in (self.sides, self.grid))
-        for words, pair in zip(("Size", "Elements"), pairs, strict=True):
+        for words, pair in zip(("Size in mm", "Elements"), pairs, strict=True):
             for place in (0, 2):
                 pair.setStretch(place, 1)
             form.addRow(words, pair)
+        form.addRow("Next element is", self.along)
         form.addRow("A number of 1 is", in_a_row(self.scale, self.unit))
         form.addRow("Rate", self.rate)
         form.addRow("", self.free)
@@ -301,7 +307,8 @@ class NewSensorDialog(QDialog):
             (self.sides[0], "Length of the skin in x."),
             (self.sides[1], "Length of the skin in y."),
             (self.grid[0], "Number of elements in x."),
-            (self.grid[1], "Number of elements in y; element numbers run along y first."),
+            (self.grid[1], "Number of elements in y."),
+            (self.along, "Where element 1 is, beside element 0."),
             (self.scale, "A reading for each unit of the board's numbers."),
             (self.unit, "Unit of a reading."),
             (self.rate, "Rows of the file in a second, as it has no times."),
@@ -385,15 +392,19 @@ class NewSensorDialog(QDialog):
         self._show_fact()
 
     def _show_fact(self) -> None:
-        text = self.found.text
+        text, ready = self.found.text, bool(self.found.roles)
+        if self.found.kind and not ready:
+            text += f" Looking for times{ELLIPSIS}"
         if self.lines is not None and self.lines.trouble:
             text = self.lines.trouble
-        elif self.lines is not None and not self.found.kind:
-            text = self.lines.recogniser.found().text
-        ready = bool(self.found.roles)
+        elif self.lines is not None and not (now := self.lines.recogniser.found()).kind:
+            text, ready = now.text, ready and not now.trouble
         if self.pages.currentIndex() == 2 and ready:
+            wrong, ready = self._miscounted()
+            text = wrong or text
             try:
-                self._text()
+                if ready:
+                    self._text()
             except Refusal as refusal:
                 text, ready = sentence(_PLACE.sub("", str(refusal))), False
         self.fact.setText(printable(text) if self.lines is not None else "")
@@ -468,7 +479,7 @@ class NewSensorDialog(QDialog):
         numbers = np.nan_to_num(self.found.numbers)  # a missing one is no answer
         if self._rest is None or len(self._rest) != len(self.columns) or len(numbers) < 4 * _NOW:
             return []
-        noise = np.percentile(np.abs(np.diff(numbers, axis=0)), 90, axis=0)
+        noise = _scatter(numbers)
         moved = np.abs(np.mean(numbers[-_NOW:], axis=0) - self._rest)
         moved[[":" not in column for column in self.columns]] = 0.0
         most = moved.max(initial=0.0)
@@ -482,13 +493,28 @@ class NewSensorDialog(QDialog):
             self.name.text().strip() or "My sensor",
             (round(x, 9), round(y, 9)),
             (self.grid[0].value(), self.grid[1].value()),
-            self.columns,
+            self._placed(),
             float(f"{self.scale.value() * (self.unit.currentData() or 1.0):.9g}"),
             self.rigidity.value() if self.known.isChecked() else None,
             self.free.isChecked(),
             self.lines.baud if self.lines is not None else 115_200,
             self.rate.value() if self._untimed else None,
         )
+
+    def _placed(self) -> tuple[str, ...]:
+        """The columns, with elements by their places: along y first."""
+        grid = self.grid[0].value(), self.grid[1].value()
+        return by_rows(self.columns, grid) if self.along.currentIndex() else self.columns
+
+    def _miscounted(self) -> tuple[str, bool]:
+        """What is wrong with the number of elements, and whether they all have a place."""
+        numbers = {column.partition(":")[2] for column in self.columns if ":" in column}
+        m, n = (box.value() for box in self.grid)
+        count, fits = len(numbers), all(int(number) < m * n for number in numbers)
+        if not fits:
+            return f"{count} elements have columns, but Elements is {m} x {n} = {m * n}.", False
+        missing = f"Of {m} x {n} = {m * n} elements {m * n - count} have no column."
+        return missing if count < m * n else "", True
 
     @property
     def _untimed(self) -> bool:
@@ -506,11 +532,13 @@ class NewSensorDialog(QDialog):
         first = next((c.partition(":")[0] for c in self.columns if ":" in c), "")
         if len(numbers) and self._rest is not None:
             change = np.mean(np.nan_to_num(numbers[-3:]), axis=0) - self._rest
-            for place, column in enumerate(self.columns):
+            for place, column in enumerate(self._placed()):
                 what, found, element = column.partition(":")
                 if found and what == first and int(element) < m * n:
                     values[int(element)] = change[place] * self.scale.value()
-        most = float(np.nan_to_num(np.abs(values)).max(initial=0.0)) or 1.0
+        scatter = float(np.median(_scatter(numbers))) if len(numbers) > 1 else 0.0
+        most = float(np.nan_to_num(np.abs(values)).max(initial=0.0))
+        most = max(most, _QUIET * scatter * abs(self.scale.value())) or 1.0
         sides = (self.sides[0].value(), self.sides[1].value())
         nowhere = np.full(2, np.nan)
         self.map.title.setText(f"Change of {first} now, in {self.unit.currentText()}")
@@ -562,7 +590,8 @@ class NewSensorDialog(QDialog):
         self.made.emit(file, url, topic)
 
     def begin(self, file: Path | None = None) -> None:
-        """Show the dialog as it was left, or with the lines of a `file`."""
+        """Show the dialog, with the port that was typed last, or the lines of a `file`."""
+        self._show_step()
         self.show()
         self.raise_()
         self.ports.setFocus()
@@ -575,6 +604,8 @@ class NewSensorDialog(QDialog):
     def done(self, result: int) -> None:
         self._timer.stop()
         self._let_go()
+        self.found, self.columns = RecognisedLines(), ()
+        self.raw.clear()
         self.pages.setCurrentIndex(0)
         self._show_step()
         super().done(result)
@@ -582,6 +613,11 @@ class NewSensorDialog(QDialog):
     def closeEvent(self, event: QCloseEvent) -> None:
         self.done(QDialog.DialogCode.Rejected)
         super().closeEvent(event)
+
+
+def _scatter(numbers: Array) -> Array:
+    """How much each of the columns (n, columns) scatters, without what moves slowly."""
+    return np.percentile(np.abs(np.diff(np.nan_to_num(numbers), axis=0)), 90, axis=0)
 
 
 def _times() -> list[str]:
@@ -596,6 +632,4 @@ class _Factor(QDoubleSpinBox):
 
 
 def _length(value: float) -> QDoubleSpinBox:
-    box = QDoubleSpinBox(decimals=2, minimum=0.1, maximum=1e5, value=value)  # pyright: ignore[reportCallIssue]
-    box.setSuffix(" mm")
-    return box
+    return QDoubleSpinBox(decimals=2, minimum=0.1, maximum=1e5, value=value)  # pyright: ignore[reportCallIssue]

@@ -15,7 +15,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog
 
-from kappaskin.sources import load_description
+from kappaskin.sources import Recogniser, load_description
 
 tty = pytest.importorskip("tty", reason="no pseudo-terminals on this system")
 pytestmark = pytest.mark.slow
@@ -145,7 +145,7 @@ def test_columns_are_set_by_selection_and_what_cannot_be_is_said(window, until, 
     dialog.reads.activated.emit(0)
     click(dialog.next)
     dialog.grid[0].setValue(1)
-    until(lambda: "Expected elements from 0 to" in dialog.fact.text())
+    until(lambda: "but Elements is 1 x" in dialog.fact.text())
     QTest.keyClick(dialog, Qt.Key.Key_Escape)
     assert not dialog.isVisible()
 
@@ -302,3 +302,88 @@ def test_json_in_lines_is_described_by_its_keys(window, until, tmp_path, monkeyp
     assert made == [(file, str(lines), "")]
     fields = tomllib.loads(file.read_text())["line"]["fields"]
     assert fields == {"n": "sequence", "skin.h": "height:0..5"}
+
+
+def described(dialog, until, lines):
+    dialog.begin(lines)
+    until(lambda: "13 columns" in dialog.fact.text())
+    for _ in range(2):
+        until(dialog.next.isEnabled)
+        click(dialog.next)
+    until(dialog.next.isEnabled)
+
+
+@pytest.fixture
+def lines(tmp_path):
+    file = tmp_path / "lines.csv"
+    rows = (f"{n / 100},{','.join(f'{n * k % 7}' for k in range(1, 13))}" for n in range(300))
+    file.write_text("time," + ",".join(f"h{k}" for k in range(12)) + "\n" + "\n".join(rows) + "\n")
+    return file
+
+
+def test_elements_that_are_counted_along_x_are_placed_so(
+    window, until, lines, tmp_path, monkeypatch
+) -> None:
+    dialog, file = window.new_sensor, tmp_path / "rows.toml"
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(file), ""))
+    dialog.made.disconnect()
+    described(dialog, until, lines)
+    dialog.along.setCurrentIndex(1)
+    click(dialog.next)
+
+    columns = tomllib.loads(file.read_text())["line"]["columns"]
+    # 4 in x and 3 in y: the second column is element 3, right of the first.
+    assert columns[:4] == ["time", "height:0", "height:3", "height:6"]
+
+
+def test_numbers_of_elements_that_differ_from_the_columns_are_said(window, until, lines) -> None:
+    dialog = window.new_sensor
+    described(dialog, until, lines)
+    dialog.grid[0].setValue(3)
+    until(lambda: not dialog.next.isEnabled())
+    assert dialog.fact.text() == "12 elements have columns, but Elements is 3 x 3 = 9."
+    dialog.grid[0].setValue(5)
+    until(dialog.next.isEnabled)
+    assert dialog.fact.text() == "Of 5 x 3 = 15 elements 3 have no column."
+
+
+def test_a_dialog_that_is_opened_again_begins_anew(window, until, lines) -> None:
+    dialog = window.new_sensor
+    described(dialog, until, lines)
+    QTest.keyClick(dialog, Qt.Key.Key_Escape)
+    until(lambda: not dialog.isVisible())
+    dialog.begin()
+
+    assert dialog.raw.toPlainText() == ""
+    assert not dialog.next.isEnabled()
+    assert dialog.ports.currentText() == str(lines)
+    QTest.keyClick(dialog.ports.lineEdit(), Qt.Key.Key_Return)
+    until(lambda: "13 columns" in dialog.fact.text())
+
+
+def test_words_after_numbers_are_said(window, until, board) -> None:
+    dialog = window.new_sensor
+    dialog.begin()
+    QTest.keyClicks(dialog.ports.lineEdit(), board.port)
+    QTest.keyClick(dialog.ports.lineEdit(), Qt.Key.Key_Return)
+    until(dialog.next.isEnabled)
+    dialog.lines.recogniser = Recogniser()
+    for n in range(50):
+        dialog.lines.recogniser.feed(n / 10, b"sensor fail\n")
+    dialog.lines.poll = lambda: None
+    until(lambda: "The lines are no numbers" in dialog.fact.text())
+    assert not dialog.next.isEnabled()
+
+
+def test_the_source_whose_port_was_read_is_connected_again(
+    window, until, board, tmp_path, monkeypatch
+) -> None:
+    dialog, file = window.new_sensor, tmp_path / "board.toml"
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(file), ""))
+    described(dialog, until, Path(board.port))
+    click(dialog.next)
+    until(lambda: window.display.badge.state == "LIVE")
+    dialog.begin(Path(board.port))
+    until(lambda: window.display.badge.state == "OFF")
+    QTest.keyClick(dialog, Qt.Key.Key_Escape)
+    until(lambda: window.display.badge.state == "LIVE")
