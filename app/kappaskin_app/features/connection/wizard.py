@@ -179,7 +179,7 @@ class NewSensorDialog(QDialog):
         self.search = PortSearch(self.ports, tasks, self)
         self.search.found.connect(guarded(self.show_ports))
         self._timer = QTimer(self, interval=_PERIOD)  # pyright: ignore[reportCallIssue]
-        self._timer.timeout.connect(guarded(self._look))
+        self._timer.timeout.connect(guarded(self.look))
         self._show_step()
 
     # The pages.
@@ -358,7 +358,7 @@ class NewSensorDialog(QDialog):
             self.topics.setCurrentText(lines.topic)
         self.found, self.columns = RecognisedLines(), ()
         self.raw.clear()
-        self._look()
+        self.look()
         self._show_step()
 
     def _let_go(self) -> None:
@@ -368,7 +368,7 @@ class NewSensorDialog(QDialog):
 
     # What arrives.
 
-    def _look(self) -> None:
+    def look(self) -> None:
         """Show what has arrived since the last look."""
         if self.lines is None:
             return
@@ -466,21 +466,30 @@ class NewSensorDialog(QDialog):
         self.table.viewport().update()
 
     def _follow_rest(self) -> None:
-        """Follow what the columns are at rest, while none answers or one does for very long."""
+        """Follow what the columns are at rest, while none answers or one does for very long.
+
+        Not right after a press, when most of the newest numbers are of that.
+        """
         numbers = np.nan_to_num(self.found.numbers)  # a missing one is no answer
         if len(numbers) < 4 * _NOW:
             return
-        self._held = self._held + 1 if self.answering() else 0
-        if self._rest is None or not self._held or self._held > _HELD:
-            self._rest, self._held = np.median(numbers[-_COURSE:], axis=0), 0
+        self._held, rest = self._held + 1 if self.answering() else 0, self._rest
+        usual = np.median(numbers[-_COURSE:], axis=0)
+        if rest is None or self._held > _HELD or not (self._held or self._answers(usual)):
+            self._rest, self._held = usual, 0
 
     def answering(self) -> list[int]:
         """The columns that differ now by far more than they scatter; none of times and counts."""
-        numbers = np.nan_to_num(self.found.numbers)  # a missing one is no answer
-        if self._rest is None or len(self._rest) != len(self.columns) or len(numbers) < 4 * _NOW:
+        rest = self._rest
+        return [] if rest is None or len(rest) != len(self.columns) else self._answers(rest)
+
+    def _answers(self, rest: Array) -> list[int]:
+        """Those that differ now from what they are at `rest` (columns,)."""
+        numbers = np.nan_to_num(self.found.numbers)
+        if len(numbers) < 4 * _NOW:
             return []
         noise = _scatter(numbers)
-        moved = np.abs(np.mean(numbers[-_NOW:], axis=0) - self._rest)
+        moved = np.abs(np.mean(numbers[-_NOW:], axis=0) - rest)
         moved[[":" not in column for column in self.columns]] = 0.0
         most = moved.max(initial=0.0)
         return np.flatnonzero((moved > _SURE * noise) & (moved > _SHARE * most)).tolist()
@@ -553,7 +562,7 @@ class NewSensorDialog(QDialog):
             return
         self.pages.setCurrentIndex(self.pages.currentIndex() + by)
         self._show_step()
-        self._look()
+        self.look()
 
     def _show_step(self) -> None:
         at, of_file = self.pages.currentIndex(), isinstance(self.lines, FileLines)

@@ -361,6 +361,31 @@ def test_a_dialog_that_is_opened_again_begins_anew(window, until, lines) -> None
     until(lambda: "13 columns" in dialog.fact.text())
 
 
+def test_right_after_a_press_it_is_not_taken_for_the_rest(window, until, lines) -> None:
+    dialog = window.new_sensor
+    dialog.begin(lines)
+    until(lambda: "13 columns" in dialog.fact.text())
+    dialog.lines.poll = lambda: None
+    dialog.lines.recogniser = Recogniser(arrived=False)
+    rng = np.random.default_rng(0)
+
+    def come(count, pressed):
+        for _ in range(count):
+            heights = rng.normal(0, 1.0, 12)
+            heights[4] += 200.0 * pressed
+            line = ",".join(f"{number:.2f}" for number in (*heights, 7.0))
+            dialog.lines.recogniser.feed(0.0, f"{line}\n".encode())
+        dialog.look()
+
+    come(150, pressed=False)
+    for _ in range(10):
+        come(20, pressed=True)
+        assert dialog.answering() == [4]
+    for _ in range(20):
+        come(10, pressed=False)
+        assert dialog.answering() == []
+
+
 def test_words_after_numbers_are_said(window, until, board) -> None:
     dialog = window.new_sensor
     dialog.begin()
