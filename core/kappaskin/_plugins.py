@@ -43,7 +43,7 @@ _found: dict[tuple[str, str, str], PlugIn] = {}
 
 
 def error_text(error: BaseException) -> str:
-    """What a plug-in raised, in words; a `KeyboardInterrupt` is raised again, as a person's."""
+    """The type and text of an error of a plug-in; a `KeyboardInterrupt` is raised again."""
     if isinstance(error, KeyboardInterrupt):
         raise error
     try:

@@ -500,8 +500,8 @@ class FileLines:
     """The first lines of a file, as `RawLines` has those of a board.
 
     Of arrays in an NPZ file and of a Parquet table they are the first rows; of a bag the messages
-    of a `topic`, the first of its `topics` that have numbers if left out. It is `timed` where each
-    row has a time beside it.
+    of a `topic`, the first of its `topics` that have numbers if left out. It is `timed` where they
+    are messages, each with a time.
     """
 
     baud = 115_200
