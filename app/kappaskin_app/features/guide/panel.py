@@ -167,6 +167,8 @@ class _Text(QTextBrowser):
         """Format code, headings and tables."""
         document, theme = self.document(), current()
         document.setDocumentMargin(_MARGIN)
+        all_of_it = QTextCursor(document)
+        all_of_it.beginEditBlock()  # laid out once, at its end
         for frame in document.rootFrame().childFrames():
             if isinstance(frame, QTextTable):
                 _rule(frame, theme)
@@ -176,6 +178,7 @@ class _Text(QTextBrowser):
             elif block.blockFormat().headingLevel():
                 _space(block)
             _enlarge(block, self.font().pointSizeF())
+        all_of_it.endEditBlock()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
