@@ -7,7 +7,7 @@
     python3 packaging/start.py lint                runs those that read, and run nothing
     python3 packaging/start.py fast [ARGUMENTS]    runs what of the library's tests takes a minute
     python3 packaging/start.py cover [ARGUMENTS]   tells which lines of the library no test runs
-    python3 packaging/start.py bench [ARGUMENTS]   runs the benchmarks; --history tells how it went
+    python3 packaging/start.py bench [ARGUMENTS]   runs the benchmarks; --history plots how it went
     python3 packaging/start.py fuzz [SECONDS]      gives every reader mutated bytes, for an hour
     python3 packaging/start.py drill [ARGUMENTS]   kills, stops, fills and floods what runs, and
                                                    writes the results to the guide's validation page

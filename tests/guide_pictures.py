@@ -18,7 +18,7 @@ from kappaskin.cli import main
 
 GUIDE = Path(__file__).parents[1] / "resources" / "kappaskin_resources" / "guide"
 _WINDOW, _FIGURE = 1280, 780  # px wide, of a window and of a figure that is printed finer
-_SHOWN = re.compile(r"!\[[^\]]+\]\(([^)]+)\)\n\n\*[^*`]*`(kappaskin [^`]+)`\*")
+_SHOWN = re.compile(r"!\[[^\]]+\]\(([^)]+)\)\n\n\*[^*`]*`((?:kappaskin|python3) [^`]+)`\*")
 
 
 def shown_on(page: Path) -> list[tuple[Path, str]]:

@@ -1,79 +1,90 @@
-"""What benchmarks measured is kept, and told."""
+"""What benchmarks measured is kept, and shown on the guide's page."""
 
 import json
-import runpy
 from pathlib import Path
 
+import history
 import pytest
-
-_CONFTEST = Path(__file__).with_name("benchmarks") / "conftest.py"
+from history import Ratio, Run
 
 
 @pytest.fixture
-def bench(tmp_path: Path) -> dict:
-    """What the benchmarks share, with a history of its own."""
-    names = runpy.run_path(str(_CONFTEST))
-    # A function that is run from a path keeps its own names.
-    names["pytest_sessionfinish"].__globals__["HISTORY"] = tmp_path / "history.jsonl"
-    return names
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A history of its own, of two tests in one file."""
+    monkeypatch.setattr(history, "FILE", tmp_path / "history.jsonl")
+    history.FILE.write_text("")
+    source = '"""Ours, against theirs.\n\nMore of it."""\n'
+    source += "def test_b(): ...\ndef test_a(): ...\n"
+    (tmp_path / "bench_one.py").write_text(source)
+    return history.FILE
 
 
-def lines(bench: dict) -> list[dict]:
-    path = bench["pytest_sessionfinish"].__globals__["HISTORY"]
-    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+def run(test: str, *values: float, note: str = "", asked: str = "at most 2") -> Run:
+    ratios = [Ratio(f"{test} {place}", value, asked) for place, value in enumerate(values)]
+    return Run(f"bench_one.py::{test}", notes=[note] if note else [], ratios=ratios)
 
 
-def test_a_ratio_is_kept_with_its_commit_its_machine_and_what_is_asked(bench: dict) -> None:
-    keep = bench["ratio"].__wrapped__()
-    keep("ours, against theirs", 1.23456, at_most=2)
-    keep("theirs, against ours", 0.81)
-    bench["pytest_sessionfinish"]()
+def test_a_run_is_kept_with_its_commit_and_machine_after_those_before(own: Path) -> None:
+    history.keep([run("test_a", 1.0, note="a sentence")])
+    history.keep([run("test_a", 3.0)])
 
-    first, second = lines(bench)
-    assert (first["figure"], first["value"]) == ("ours, against theirs", 1.23)
-    assert (first["asked"], second["asked"]) == ("at most 2", "")
-    assert first.keys() == {"date", "commit", "machine", "figure", "value", "asked"}
+    first, second = map(json.loads, own.read_text().splitlines())
+    assert first["ratios"] == [["test_a 0", 1.0, "at most 2"]]
     assert "cores" in first["machine"]
+    assert first["commit"]
+    assert [each.ratios for each in history.kept()] == [run("test_a", n).ratios for n in (1.0, 3.0)]
+    assert second["notes"] == []
 
 
-def test_a_history_is_extended_and_never_written_anew(bench: dict) -> None:
-    for value in (1.0, 2.0):
-        bench["_ratios"][:] = []
-        bench["ratio"].__wrapped__()("one", value)
-        bench["pytest_sessionfinish"]()
-
-    assert [line["value"] for line in lines(bench)] == [1.0, 2.0]
-
-
-@pytest.mark.parametrize("asked", [{"at_least": 2.1}, {"at_most": 1.9}])
-def test_a_ratio_that_is_not_what_is_asked_fails_and_is_kept(bench: dict, asked: dict) -> None:
-    with pytest.raises(AssertionError, match="one"):
-        bench["ratio"].__wrapped__()("one", 2.0, **asked)
-    bench["pytest_sessionfinish"]()
-
-    assert [line["value"] for line in lines(bench)] == [2.0]
+@pytest.mark.parametrize(
+    ("value", "asked", "missed"),
+    [
+        (2.0, "at most 2", False),
+        (2.1, "at most 2", True),
+        (2.0, "at least 2", False),
+        (1.9, "at least 2", True),
+        (9.0, "", False),
+    ],
+)
+def test_a_figure_is_missed_where_it_is_not_what_is_asked(value, asked, missed) -> None:
+    assert Ratio("one", value, asked).missed is missed
 
 
-def test_where_nothing_was_measured_nothing_is_kept(bench: dict) -> None:
-    bench["pytest_sessionfinish"]()
+def test_the_table_has_missed_figures_first_and_the_ratio_to_the_last_value() -> None:
+    text = history.table([run("test_a", 1.0, 3.0)], [run("test_a", 4.0, 4.0), run("test_a", 2.0)])
 
-    assert not lines(bench)
+    head, first, second = text.splitlines()
+    assert head.split() == ["figure", "asked", "got", "of", "last"]
+    assert first.split()[-3:] == ["3", "0.75", "missed"]
+    assert second.split()[-2:] == ["1", "0.50"]
 
 
-def test_each_figure_is_told_with_its_newest_values_in_order(bench: dict) -> None:
-    def line(figure: str, n: int) -> dict:
-        return {"figure": figure, "value": float(n), "commit": f"c{n}", "asked": "at most 9"}
+def test_the_page_has_the_newest_run_of_each_test_that_there_is(own: Path) -> None:
+    runs = [run("test_a", 1.0, note="old"), run("test_gone", 1.0), run("test_a", 3.0, note="new")]
+    text = history.page_text([*runs, run("test_b[case]", 0.5)])
 
-    text = bench["told"]([line(name, n) for n in range(10) for name in ("one", "two")])
+    assert "Of 2 figures that are asked, 1 is missed:" in text
+    assert text.count("| test_a 0 | at most 2 | **3** |") == 2  # among the missed, and in its place
+    assert "### Ours, against theirs\n" in text
+    assert "- new\n" in text
+    assert "old" not in text
+    assert "test_gone" not in text
+    assert text.index("test_b[case] 0") < text.rindex("test_a 0")
 
-    one, two = text.splitlines()
-    assert one.startswith("one: 2.0 (c2), 3.0 (c3), ")
-    assert two.endswith(", 9.0 (c9); at most 9")
+
+def test_figures_are_plotted(own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(history, "PLOT", tmp_path / "plot.png")
+    history.keep([run("test_a", 1.0, 3.0, 0.0)])
+
+    assert history.plot().stat().st_size > 1000
+
+
+def test_the_guides_page_shows_the_history_that_is_kept() -> None:
+    assert history.PAGE.read_text("utf-8").endswith(history.page_text(history.kept()))
 
 
 def test_the_history_kept_is_readable_and_names_no_host() -> None:
-    history = (_CONFTEST.parent / "history.jsonl").read_text("utf-8")
-    kept = [json.loads(line) for line in history.splitlines()]
+    kept = history.kept()
 
     assert kept
-    assert all(" cores, " in line["machine"] for line in kept)
+    assert all(" cores, " in run.machine for run in kept)

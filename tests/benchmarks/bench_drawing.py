@@ -32,7 +32,6 @@ def test_the_window_draws_nearly_as_often_as_a_bare_interactor(
     assert app["lost"] == 0
     ratio("drawings, against a bare QtInteractor", app["drawn"] / bare, at_least=0.85)
     ratio("drawings, of the 45 a second asked", app["drawn"] / 45, at_least=1)
-    ratio("age of a frame when drawn, of the 50 ms allowed", app["age_p99_ms"] / 50, at_most=1)
     ratio("gap of a reader, of the 10 ms allowed", app["reader_gap_p99_ms"] / 10, at_most=1)
 
 
@@ -47,11 +46,14 @@ def test_with_a_thousand_frames_a_second_it_draws_nearly_as_often_as_a_bare_inte
         float(np.mean([run["drawn"] for run in runs])) for runs in zip(*turns, strict=True)
     )
     frames = min(run["frames"] for _, run in turns)
+    age = float(np.median([run["age_p99_ms"] for _, run in turns]))
     figure(
         f"{shown} at 1280 x 800 with {frames:.0f} frames/s, {_TURNS} turns of {seconds:g} s: "
-        f"{drawn:.1f} drawings/s, {drawn / bare:.2f} of a bare QtInteractor ({bare:.1f})"
+        f"{drawn:.1f} drawings/s, {drawn / bare:.2f} of a bare QtInteractor ({bare:.1f}); frame "
+        f"age when drawn {age:.1f} ms (99th percentile, median of the turns)"
     )
     assert frames > 950
+    ratio(f"age of a frame drawn by {shown}, of the 40 ms allowed", age / 40, at_most=1)
     ratio(
         f"drawings of {shown} at 1,000 frames/s, against a bare QtInteractor",
         drawn / bare,

@@ -6,12 +6,17 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from kappaskin import Simulator, load_scene
 from kappaskin.live import Engine
+from kappaskin.sources.information import sensor_to_json
 
 _PUBLISHING = Path(__file__).with_name("publishing.py")
 
@@ -81,12 +86,69 @@ def test_messages_are_sent_soon_whoever_receives_them(
         )
 
 
-def test_without_a_window_messages_are_sent_sooner(play, figure, ratio, seconds, receiver) -> None:
+def without_window(port: str, seconds: float, receiver: int) -> dict[str, float]:
+    """As `published`, by an engine alone."""
     with Engine() as engine:
-        engine.connect(play("--rate", 1000))
+        engine.connect(port)
         engine.publish([f"udp://127.0.0.1:{receiver}"])
-        threading.Event().wait(seconds + 3)
-        latency = engine.status().publishing.latency
+        time.sleep(3)
+        before = engine.status()
+        time.sleep(seconds)
+        after = engine.status()
+    sent = after.publishing.targets[0].sent - before.publishing.targets[0].sent
+    frames = after.accounting.accepted - before.accounting.accepted
+    latency = after.publishing.latency
     parts = {name: 1e3 * getattr(latency, name) for name in ("whole", "wait", "compute", "send")}
-    figure(f"publishing without a window: 99 % within {parts['whole']:.2f} ms, {parts}")
-    ratio("latency without a window, of the 50 ms allowed", parts["whole"] / 50, at_most=1)
+    return parts | {
+        "sent": sent / seconds,
+        "dropped": 0.0,
+        "frames": frames / seconds,
+        "drawn": 0.0,
+        "skipped": (after.skipped - before.skipped) / seconds,
+    }
+
+
+def test_without_a_window_messages_are_sent_sooner(play, figure, ratio, seconds, receiver) -> None:
+    told = without_window(play("--rate", 1000), seconds, receiver)
+    figure(f"publishing at 1,000 frames/s without a window: {words(told)}")
+    ratio("latency without a window, of the 50 ms allowed", told["whole"] / 50, at_most=1)
+
+
+@pytest.fixture
+def pressed(play, tmp_path: Path) -> str:
+    """A device that a contact moves around on, at 2,000 frames/s of 300 channels."""
+    scene = load_scene("circle")
+    chain = scene.transduction
+    quick = replace(chain, converter=replace(chain.converter, conversion_time=1e-6))
+    simulator = Simulator(replace(scene, transduction=quick))
+    frames = [simulator.frame(number, time.monotonic).counts for number in range(2000)]
+    counts, information = tmp_path / "counts.bin", tmp_path / "information.json"
+    counts.write_bytes(np.array(frames).astype("<i2").tobytes())
+    information.write_text(sensor_to_json(replace(scene, transduction=quick).sensor()))
+    return play("--rate", 2000, "--counts", counts, "--information", information)
+
+
+def test_2000_frames_a_second_are_published(pressed, figure, ratio, seconds, receiver) -> None:
+    told = without_window(pressed, seconds, receiver)
+    figure(
+        f"publishing at 2,000 frames/s of a moving contact without a window: {words(told)}; "
+        f"{told['skipped']:.0f} counted as skipped"
+    )
+    assert told["frames"] == pytest.approx(2000, rel=0.1)
+    share = told["sent"] / told["frames"]
+    ratio("share of 2,000 frames/s published", share, at_least=0.98)
+    ratio("latency at 2,000 frames/s, of the 1.5 ms allowed", told["whole"] / 1.5, at_most=1)
+
+
+def test_2000_frames_a_second_are_published_with_the_window_drawing(
+    pressed, figure, ratio, seconds, receiver
+) -> None:
+    told = published(pressed, seconds, f"udp://127.0.0.1:{receiver}")
+    figure(f"publishing at 2,000 frames/s of a moving contact with the window: {words(told)}")
+    assert told["frames"] == pytest.approx(2000, rel=0.1)
+    share = told["sent"] / told["frames"]
+    ratio("share of 2,000 frames/s published while drawing", share, at_least=0.95)
+    ratio(
+        "latency at 2,000 frames/s while drawing, of the 3 ms allowed", told["whole"] / 3, at_most=1
+    )
+    ratio("drawings while publishing, of the 20 a second asked", told["drawn"] / 20, at_least=1)

@@ -1,6 +1,8 @@
-"""Prints as JSON for how many ms each registered action blocks the window, the least of its turns.
+"""Prints as JSON for how many ms each registered action holds the window: used first, and later.
 
-What an action opens is closed again after it. `python blocking.py TURNS`
+A watchdog takes the time of the action itself and of every turn of the event loop after it; the
+longest counts, of later uses the least. What an action opens is closed again after it.
+`python blocking.py TURNS`
 """
 
 import json
@@ -13,24 +15,28 @@ from kappaskin_app.features import FEATURES
 from kappaskin_app.shell.window import MainWindow
 
 _SPARED = ("quit",)
+_AFTER = 0.3  # s that are watched after an action: what it opens is drawn by then
 
 
-def _live(application: QApplication, seconds: float) -> None:
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
+def _longest_turn(application: QApplication, seconds: float) -> float:
+    """The longest turn of the event loop in s, while it runs for so many."""
+    longest, end = 0.0, time.perf_counter() + seconds
+    while (start := time.perf_counter()) < end:
         application.processEvents()
+        longest = max(longest, time.perf_counter() - start)
         time.sleep(0.001)
+    return longest
 
 
-def _blocked(application: QApplication, window: MainWindow, name: str) -> float:
-    """How long in s the window does nothing else after an action; then all is as before."""
+def _held(application: QApplication, window: MainWindow, name: str) -> tuple[float, float]:
+    """How long in ms an action takes itself, and the longest turn after it; then all is closed."""
     start = time.perf_counter()
     window.actions_by_name[name].trigger()
     taken = time.perf_counter() - start
-    _live(application, 0.15)
+    after = _longest_turn(application, _AFTER)
     for dialog in window.findChildren(QDialog):
         dialog.reject()
-    return taken
+    return 1e3 * taken, 1e3 * after
 
 
 def main(turns: int) -> None:
@@ -40,16 +46,16 @@ def main(turns: int) -> None:
         setattr(QFileDialog, ask, lambda *_: ("", ""))
     window = MainWindow([made() for made in FEATURES], "sim:")
     window.show()
-    _live(application, 4.0)
-    times: dict[str, float] = {}
+    _longest_turn(application, 4.0)
+    idle = 1e3 * _longest_turn(application, 4.0)
+    names = [name for name in window.actions_by_name.entries if name not in _SPARED]
+    uses: dict[str, list[tuple[float, float]]] = {name: [] for name in names}
     for _ in range(turns):
-        for name in window.actions_by_name.entries:
-            if name not in _SPARED:
-                taken = 1e3 * _blocked(application, window, name)
-                times[name] = min(taken, times.get(name, taken))
+        for name in names:
+            uses[name].append(_held(application, window, name))
         window.layouts.leave_full_screen()
     window.close()
-    print(json.dumps(times))
+    print(json.dumps({"idle": idle, "uses": uses}))
 
 
 if __name__ == "__main__":

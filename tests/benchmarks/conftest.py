@@ -1,104 +1,93 @@
 """Benchmarks: each figure is a ratio to a named baseline of the same run, or to what is allowed.
 
-They are printed at the end and kept in history.jsonl, a line each; `start.py bench --history`
-tells how they went.
+They are printed at the end as one table, kept in history.jsonl, and written to the guide's page
+Performance; `start.py bench --history` plots how they went.
 """
 
 import json
-import os
-import platform
 import shutil
 import statistics
 import subprocess
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
+import history
 import pytest
+from history import Ratio, Run
 
 from kappaskin import load_scene, write_scene
 
-HISTORY = Path(__file__).with_name("history.jsonl")
-_TOLD = 8  # of a figure's values, the newest
 _FIRMWARE = Path(__file__).parents[2] / "resources" / "kappaskin_resources" / "firmware"
 _CONVERSION = 2e-6  # s: 300 channels in less than a millisecond
 
 Play = Callable[..., str]
 
-Figures = list[str]
-_figures: Figures = []
-_ratios: list[dict[str, object]] = []
+_runs: dict[str, Run] = {}  # by the name of the test
+_BEFORE = pytest.StashKey[list[Run]]()
+
+
+def _run_of(request: pytest.FixtureRequest) -> Run:
+    name = request.node.nodeid.rpartition("/")[2]
+    return _runs.setdefault(name, Run(name))
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--long", action="store_true", help="measure for as long as the figures ask")
     parser.addoption("--soak", type=float, help="hold a load for so many s, such as 1800")
-    parser.addoption("--history", action="store_true", help="measure nothing, tell how it went")
+    parser.addoption("--history", action="store_true", help="measure nothing, plot how it went")
 
 
 def pytest_cmdline_main(config: pytest.Config) -> int | None:
     if not config.getoption("--history"):
         return None
-    print(told(map(json.loads, HISTORY.read_text("utf-8").splitlines())))
+    every = history.kept()
+    newest = history.newest(every)
+    print(history.table(newest, (run for run in every if run not in newest)))
+    print(f"Plotted: {history.plot()}")
     return 0
 
 
-def told(lines: Iterable[dict[str, object]]) -> str:
-    """Each figure of the history with its newest values, from the oldest of them on."""
-    figures: dict[object, list[dict[str, object]]] = {}
-    for line in lines:
-        figures.setdefault(line["figure"], []).append(line)
-    return "\n".join(
-        f"{name}: "
-        + ", ".join(f"{line['value']} ({line['commit']})" for line in kept[-_TOLD:])
-        + f"; {kept[-1]['asked']}"
-        for name, kept in figures.items()
-    )
-
-
-def pytest_sessionfinish() -> None:
-    if not _ratios:
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Keep what was measured; fail where a figure is missed."""
+    if not _runs:
         return
-    say = ["git", "describe", "--always", "--dirty=+", "--exclude=*"]
-    commit = subprocess.run(say, cwd=HISTORY.parent, capture_output=True, text=True, check=False)
-    run = {
-        "date": f"{datetime.now(UTC):%Y-%m-%d %H:%M}",
-        "commit": commit.stdout.strip() or "unknown",
-        "machine": f"{os.cpu_count()} cores, {platform.machine()}, {platform.system()}, Python "
-        f"{platform.python_version()}",
-    }
-    with HISTORY.open("a", encoding="utf-8") as file:
-        file.writelines(json.dumps(run | ratio) + "\n" for ratio in _ratios)
+    session.config.stash[_BEFORE] = history.kept()
+    history.keep(_runs.values())
+    history.write_page()
+    missed = any(ratio.missed for run in _runs.values() for ratio in run.ratios)
+    if missed and session.exitstatus == pytest.ExitCode.OK:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    if _figures:
-        terminalreporter.section("figures")
-    for figure in _figures:
-        terminalreporter.write_line(figure)
+    if not _runs:
+        return
+    terminalreporter.section("figures")
+    for run in _runs.values():
+        for note in run.notes:
+            terminalreporter.write_line(note)
+    before = terminalreporter.config.stash[_BEFORE]
+    terminalreporter.write_line("\n" + history.table(_runs.values(), before))
 
 
 @pytest.fixture
-def figure() -> Callable[[str], None]:
-    """Print a line in the summary."""
-    return _figures.append
+def figure(request: pytest.FixtureRequest) -> Callable[[str], None]:
+    """Tell a sentence in the summary and on the guide's page."""
+    return _run_of(request).notes.append
 
 
 @pytest.fixture
-def ratio() -> Callable[..., None]:
-    """Keep a figure in the history, and fail where it is not what is asked."""
+def ratio(request: pytest.FixtureRequest) -> Callable[..., None]:
+    """Keep a figure in the history; the session fails where one is not what is asked."""
 
     def keep(
         figure: str, value: float, *, at_least: float | None = None, at_most: float | None = None
     ) -> None:
         bounds = {"at least": at_least, "at most": at_most}
         asked = [f"{words} {bound:g}" for words, bound in bounds.items() if bound is not None]
-        kept = {"figure": figure, "value": float(f"{value:.3g}"), "asked": " ".join(asked)}
-        _ratios.append(kept)
-        assert at_least is None or value >= at_least, kept
-        assert at_most is None or value <= at_most, kept
+        _run_of(request).ratios.append(Ratio(figure, float(f"{value:.3g}"), " ".join(asked)))
 
     return keep
 
