@@ -1,7 +1,9 @@
 """What benchmarks measured is kept, and shown on the guide's page."""
 
 import json
+import runpy
 from pathlib import Path
+from types import SimpleNamespace
 
 import history
 import pytest
@@ -77,6 +79,24 @@ def test_figures_are_plotted(own: Path, tmp_path: Path, monkeypatch: pytest.Monk
     history.keep([run("test_a", 1.0, 3.0, 0.0)])
 
     assert history.plot().stat().st_size > 1000
+
+
+@pytest.mark.parametrize(("value", "failed"), [(2.0, 0), (2.1, 1)])
+def test_a_session_fails_where_a_figure_is_missed(
+    own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, value: float, failed: int
+) -> None:
+    monkeypatch.setattr(history, "PAGE", tmp_path / "page.md")
+    history.PAGE.write_text("# Performance\n\n## What is measured\n")
+    names = runpy.run_path(str(Path(__file__).with_name("benchmarks") / "conftest.py"))
+    request = SimpleNamespace(node=SimpleNamespace(nodeid="tests/bench_one.py::test_a"))
+    names["ratio"].__wrapped__(request)("one", value, at_most=2)
+    session = SimpleNamespace(exitstatus=0, config=SimpleNamespace(stash={}))
+
+    names["pytest_sessionfinish"](session)
+
+    assert session.exitstatus == failed
+    assert history.kept()[-1].ratios == [Ratio("one", value, "at most 2")]
+    assert "| one | at most 2 |" in history.PAGE.read_text()
 
 
 def test_the_guides_page_shows_the_history_that_is_kept() -> None:
