@@ -47,10 +47,11 @@ def publish(
 ) -> int:
     """Publish contact, shape and error bars of every estimate, until stopped (Ctrl+C).
 
-    Prints a line a second: frames/s, messages sent and dropped, and the 99th percentile of the
-    time from the arrival of a frame until it was sent. The messages are explained in
-    `publishing/messages.md` among the resources. Exit code 1 if there was nothing
-    to send, or if the connection was lost in the end.
+    Prints a line a second: frames/s, how many of them are computed and the time that each takes,
+    those skipped since they came faster than that, messages sent and dropped, and the 99th
+    percentile of the time from the arrival of a frame until it was sent. The messages are explained
+    in `publishing/messages.md` among the resources. Exit code 1 if there was nothing to send, or if
+    the connection was lost in the end.
 
     Example: `kappaskin publish /dev/ttyACM0 --udp 192.168.1.20:9870 --foxglove`
 
@@ -145,7 +146,11 @@ def _print_notices(notices: list[tuple[str, str]], printed: set[str]) -> None:
 
 def _line(status: "Status") -> str:
     publishing = status.publishing
-    parts = [f"{status.state:9}", f"{status.rate:6.0f} frames/s", *map(_words, publishing.targets)]
+    parts = [f"{status.state:9}", f"{status.rate:6.0f} frames/s"]
+    if math.isfinite(each := status.computed.each):
+        skipped = f", {status.skipped} skipped" if status.skipped else ""
+        parts.append(f"{status.computed.rate:.0f} computed in {1e3 * each:.2f} ms each{skipped}")
+    parts += map(_words, publishing.targets)
     if math.isfinite(publishing.latency.whole):
         parts.append(f"99 % within {1e3 * publishing.latency.whole:.1f} ms")
     return "  ".join([*parts, *filter(None, (status.message, status.refusal))])

@@ -11,3 +11,4 @@ from kappaskin.live.status import STREAMING as STREAMING
 from kappaskin.live.status import Status as Status
 from kappaskin.live.streaming import Stream as Stream
 from kappaskin.live.streaming import stream as stream
+from kappaskin.live.timing import ComputedFrames as ComputedFrames

@@ -32,7 +32,7 @@ from kappaskin.live.resume import RequestReceiver
 from kappaskin.live.ring import Ring
 from kappaskin.live.status import LOST, STREAMING, WAITING, Status
 from kappaskin.live.tare_taking import TareCapture
-from kappaskin.live.timing import ArrivalTimes, RateLimit
+from kappaskin.live.timing import ArrivalTimes, ComputingTimes, RateLimit
 from kappaskin.pipeline import Pipeline
 from kappaskin.publish import Publishing
 from kappaskin.recording import ReplayedSource
@@ -69,6 +69,7 @@ class EngineLoop:
         self._publishing, self._reported_events = Publishing(), self._status.event_count
         self._haste = ProcessPriority()
         self._arrivals, self._rate_limit = ArrivalTimes(), RateLimit()
+        self._computing = ComputingTimes()
         self._changing, self._again = False, math.inf
 
     def run(self) -> None:
@@ -279,7 +280,9 @@ class EngineLoop:
             estimate = pipeline(frame)
             if isinstance(source, ReplayedSource):
                 estimate = source.as_recorded(estimate, pipeline)
+            estimated = time.monotonic()
             self._publishing.send(estimate, pipeline, begun)
+            published = time.monotonic()
             self._main.ring.write(estimate)
             self._tare.take(estimate)
             self._arrivals.used(frame)
@@ -288,6 +291,8 @@ class EngineLoop:
                 self._tracking(estimate.contact, pipeline.fit)
             self._recorder.take(frame, estimate)
             self._compared.take(frame, paused)
+            kept = time.monotonic() - published
+            self._computing.add(estimated - begun, published - estimated, kept)
         self._rate_limit.spend(len(frames) - late, time.monotonic() - began)
 
     def _follow(self, source: Source) -> None:
@@ -356,6 +361,7 @@ class EngineLoop:
                 temperature=source.temperature,
                 drift=watch.current() if watch else None,
                 rate=self._arrivals.rate(now),
+                computed=self._computing.means(),
                 reader_gap=self._arrivals.gap(now),
                 last_frame=self._arrivals.last,
                 playing=source.playing if isinstance(source, SimulatedSource) else Playback(),

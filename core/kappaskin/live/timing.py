@@ -4,6 +4,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -58,6 +59,51 @@ class RateLimit:
         self._cost = self._cost + _LATEST * (each - self._cost) if self._cost else each
         self._credit = max(-_SAVED, self._credit - seconds)
         self._seen = self._clock()
+
+
+@dataclass(frozen=True)
+class ComputedFrames:
+    """How many frames a second are computed, and the mean seconds that one takes.
+
+    The `estimate` is everything that is computed; then it is published, and kept: recorded, and
+    written where the window reads it. NaN before any is computed.
+    """
+
+    rate: float = 0.0
+    estimate: float = math.nan
+    publishing: float = math.nan
+    keeping: float = math.nan
+
+    @property
+    def each(self) -> float:
+        """Seconds that one takes in all."""
+        return self.estimate + self.publishing + self.keeping
+
+
+class ComputingTimes:
+    """Adds up what frames take, by its parts."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock, self._since = clock, clock()
+        self._count, self._spent, self._last = 0, [0.0, 0.0, 0.0], ComputedFrames()
+
+    def add(self, estimate: float, publishing: float, keeping: float) -> None:
+        """A frame took so many s."""
+        self._count += 1
+        self._spent = [
+            spent + seconds
+            for spent, seconds in zip(self._spent, (estimate, publishing, keeping), strict=True)
+        ]
+
+    def means(self) -> ComputedFrames:
+        """Of the last half second or more."""
+        passed = self._clock() - self._since
+        if passed < _WHILE:
+            return self._last
+        means = [spent / self._count if self._count else math.nan for spent in self._spent]
+        self._last = ComputedFrames(self._count / passed, *means)
+        self._since, self._count, self._spent = self._clock(), 0, [0.0, 0.0, 0.0]
+        return self._last
 
 
 _LAST = 4096  # frames, and gaps between them

@@ -1,8 +1,10 @@
 """How many frames are computed when more come than there is time for."""
 
+import math
+
 import pytest
 
-from kappaskin.live.timing import RateLimit
+from kappaskin.live.timing import ComputingTimes, RateLimit
 
 
 class Played:
@@ -88,3 +90,22 @@ def test_of_frames_that_came_together_only_so_many_are_computed_as_are_not_late(
     slow = Played(100, 3e-3).go(2.0).pace
     assert slow.affordable(20, wanted=True) == 1  # the newest, however long it takes
     assert pace.affordable(0, wanted=True) == 0
+
+
+def test_what_computed_frames_take_is_the_mean_of_half_a_second() -> None:
+    now = [0.0]
+    times = ComputingTimes(lambda: now[0])
+    for _ in range(100):
+        times.add(3e-4, 1e-4, 0.0)
+        times.add(5e-4, 1e-4, 2e-5)
+    assert math.isnan(times.means().each)
+
+    now[0] = 0.5
+    found = times.means()
+    assert found.rate == pytest.approx(400)
+    assert (found.estimate, found.publishing, found.keeping) == pytest.approx((4e-4, 1e-4, 1e-5))
+    assert found.each == pytest.approx(5.1e-4)
+
+    now[0] = 1.0  # none came since
+    assert times.means().rate == 0
+    assert math.isnan(times.means().each)

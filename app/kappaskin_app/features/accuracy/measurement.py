@@ -10,7 +10,7 @@ from PySide6.QtCore import QObject, Signal
 from kappaskin.errors import Refusal
 from kappaskin.estimation import METHODS
 from kappaskin.frames import Estimate
-from kappaskin.live import Status
+from kappaskin.live import ComputedFrames, Status
 from kappaskin.scenes import Scene
 from kappaskin.scenes.effects import GaussianNoise, UniformNoise
 from kappaskin.studies import (
@@ -204,6 +204,11 @@ class CostMeasurement(QObject):
             return _REAL
         found = self.effect_costs()
         return found.reason if isinstance(found, Refused) else ""
+
+    @property
+    def computed(self) -> ComputedFrames:
+        """What the frames that the engine computes take."""
+        return self._session.status.computed
 
     def measured(self) -> tuple[float, float]:
         """Error in m and time in s of the present frames; NaN where unknown."""

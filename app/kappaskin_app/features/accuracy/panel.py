@@ -12,6 +12,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from kappaskin.live import ComputedFrames
 from kappaskin.studies import Cost, Refused
 from kappaskin_app.features.accuracy.cost_plot import CostPlot
 from kappaskin_app.features.accuracy.measurement import (
@@ -87,6 +88,7 @@ class CostPanel(QWidget):
             for row in ("Predicted", "Measured")
             for column in ("RMS error", "time")
         }
+        self.computed, self.each = Line(NONE), Line(NONE)
 
     def _lay_out(self) -> None:
         right = QVBoxLayout()
@@ -106,6 +108,9 @@ class CostPanel(QWidget):
             for column, what in enumerate(("RMS error", "time"), 1):
                 self.figures[name, what].setToolTip(tip)
                 grid.addWidget(self.figures[name, what], row, column)
+        for column, widget in enumerate((Label("All of it"), self.computed, self.each)):
+            widget.setToolTip("Frames computed per second, and the time that each takes in all.")
+            grid.addWidget(widget, len(tips), column)
         grid.setColumnStretch(1, 2)
         grid.setColumnStretch(2, 3)
         right.addLayout(grid)
@@ -246,6 +251,19 @@ class CostPanel(QWidget):
             self.figures[name, "RMS error"].show_text(length(e))
             text = f"in {duration(t)}" if math.isfinite(t) else NONE
             self.figures[name, "time"].show_text(text)
+        self._show_computed(now.computed)
+
+    def _show_computed(self, computed: ComputedFrames) -> None:
+        known = math.isfinite(computed.each)
+        self.computed.show_text(f"{computed.rate:.0f} frames/s" if known else NONE)
+        self.each.show_text(f"in {duration(computed.each)} each" if known else NONE)
+        if known:
+            parts = (
+                ("Fit, contact, geometry, error bars, surface", computed.estimate),
+                ("Publishing", computed.publishing),
+                ("Recording, and for the window to read", computed.keeping),
+            )
+            self.each.setToolTip("\n".join(f"{name}: {duration(of)}" for name, of in parts))
 
     def _show_slider(self, present: Cost | None) -> None:
         best = self._frontier.best

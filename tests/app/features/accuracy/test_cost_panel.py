@@ -67,6 +67,10 @@ def test_what_is_predicted_and_what_is_measured_stand_beside_each_other(
     assert isinstance(predicted, Cost)
     until(lambda: measured.measurement.measured()[0] == pytest.approx(predicted.rms, rel=0.7))
     assert 0 < measured.measurement.measured()[1] < 1
+    until(lambda: measured.cost.computed.text().endswith(" frames/s"))
+    assert measured.cost.each.text().endswith(" each")
+    assert measured.cost.each.toolTip().count("\n") == 2
+    assert measured.measurement.computed.each > measured.measurement.measured()[1]
 
 
 @pytest.mark.cases("least-squares", "as-printed", "robust")
