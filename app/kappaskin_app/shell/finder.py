@@ -137,7 +137,7 @@ def _setting(window: Parts, form: Form, editor: QWidget) -> Iterator[FinderEntry
     """The setting of `editor`, and each value of a choice."""
     name = editor.objectName()
     how, place = form_field(name), f"{_where(form)}, {form.title()}"
-    why_not = "" if form.form.isRowVisible(editor) else _NOT_NOW
+    why_not = "" if form.has_row(name) else _NOT_NOW
     if not editor.isEnabled():
         why_not = form.message.text() or _NOT_NOW
     title = how.label if how.label == form.title() else f"{form.title()}: {how.label}"

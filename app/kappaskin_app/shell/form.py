@@ -339,6 +339,7 @@ class Form(Panel):
         self.form.setVerticalSpacing(5)
         self.body.addLayout(self.form)
         self._editors: dict[str, _Editor] = {}
+        self._fields: dict[str, QWidget] = {}
         for name in names:
             self._add(name)
         self.reset = QToolButton(text="Reset")  # pyright: ignore[reportCallIssue]
@@ -359,7 +360,8 @@ class Form(Panel):
         label = Label("" if isinstance(how, Switch) else how.label)
         label.setBuddy(editor.widget)
         label.setToolTip(how.tip)
-        self.form.addRow(label, self.field(name, editor.widget))
+        self._fields[name] = self.field(name, editor.widget)
+        self.form.addRow(label, self._fields[name])
 
     def field(self, name: str, editor: QWidget) -> QWidget:
         """The widget beside the label of a setting: its editor, or more."""
@@ -387,8 +389,12 @@ class Form(Panel):
 
     def show_rows(self, names: set[str]) -> None:
         """Show only the rows of these settings."""
-        for name, editor in self._editors.items():
-            self.form.setRowVisible(editor.widget, name in names)
+        for name, field in self._fields.items():
+            self.form.setRowVisible(field, name in names)
+
+    def has_row(self, name: str) -> bool:
+        """Whether the row of a setting is shown."""
+        return self.form.isRowVisible(self._fields[name])
 
     def offer(self, name: str, values: Collection[str]) -> None:
         """Enable only these values of the choice called `name`."""

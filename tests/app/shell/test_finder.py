@@ -129,6 +129,8 @@ def test_ctrl_k_finds_every_kind_of_thing_in_the_window(
     assert window.history.settings == settings
     do("foam")
     assert window.focusWidget() is window.support.editor("foam")
+    do("noise of curvatures")  # whose row has a slider beside the editor
+    until(lambda: window.focusWidget() is window.design.form.editor("design_noise"))
     do("scene effects")
     assert window.scene.effects.isVisible()
     do("disconnect")

@@ -88,10 +88,7 @@ class DesignForm(Form):
         shown = {f"design_{length}" for length in SHAPES[settings.design_shape].lengths}
         shown |= (noise := set(noise_settings(settings).values()))
         shown |= {"design_conversion"} if noise == {"design_noise"} else set()
-        for name in (*_LENGTHS, *_NOISE, "design_conversion"):
-            editor = self.editor(name).parentWidget()
-            if editor is not None:
-                self.form.setRowVisible(editor, name in shown)
+        self.show_rows(shown | (set(_NAMES) - {*_LENGTHS, *_NOISE, "design_conversion"}))
 
 
 def _logarithmic(how: Range) -> bool:
