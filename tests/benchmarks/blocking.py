@@ -11,7 +11,7 @@ import time
 
 from PySide6.QtWidgets import QApplication, QDialog, QFileDialog
 
-from kappaskin_app.features import FEATURES
+from kappaskin_app.launch import opened
 from kappaskin_app.shell.window import MainWindow
 
 _SPARED = ("quit",)
@@ -40,12 +40,9 @@ def _held(application: QApplication, window: MainWindow, name: str) -> tuple[flo
 
 
 def main(turns: int) -> None:
-    application = QApplication([])
-    application.setStyle("Fusion")
+    application, window = opened("sim:")
     for ask in ("getOpenFileName", "getSaveFileName"):
         setattr(QFileDialog, ask, lambda *_: ("", ""))
-    window = MainWindow([made() for made in FEATURES], "sim:")
-    window.show()
     _longest_turn(application, 4.0)
     idle = 1e3 * _longest_turn(application, 4.0)
     names = [name for name in window.actions_by_name.entries if name not in _SPARED]

@@ -129,14 +129,15 @@ def enter(panel: QWidget) -> None:
 
 def _settings(window: Parts) -> Iterator[FinderEntry]:
     for form in window.findChildren(Form):
+        place = f"{_where(form)}, {form.title()}"
         for editor in form.editors():
-            yield from _setting(window, form, editor)
+            yield from _setting(window, form, editor, place)
 
 
-def _setting(window: Parts, form: Form, editor: QWidget) -> Iterator[FinderEntry]:
+def _setting(window: Parts, form: Form, editor: QWidget, place: str) -> Iterator[FinderEntry]:
     """The setting of `editor`, and each value of a choice."""
     name = editor.objectName()
-    how, place = form_field(name), f"{_where(form)}, {form.title()}"
+    how = form_field(name)
     why_not = "" if form.has_row(name) else _NOT_NOW
     if not editor.isEnabled():
         why_not = form.message.text() or _NOT_NOW

@@ -1,6 +1,7 @@
 """The settings of the window, with the label, unit, range and tooltip of each."""
 
 from dataclasses import dataclass, fields
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -80,6 +81,7 @@ def part(settings: Settings, kind: Kind) -> tuple[Any, ...]:
     return tuple(getattr(settings, field.name) for field in fields(kind))
 
 
+@cache
 def form_field(name: str) -> FormField:
     """The form field of the setting `name`."""
     return next(f.metadata["form"] for f in fields(Settings) if f.name == name)
