@@ -65,7 +65,7 @@ def test_the_page_has_the_newest_run_of_each_test_that_there_is(own: Path) -> No
     runs = [run("test_a", 1.0, note="old"), run("test_gone", 1.0), run("test_a", 3.0, note="new")]
     text = history.page_text([*runs, run("test_b[case]", 0.5)])
 
-    assert "Of 2 figures that are asked, 1 is missed:" in text
+    assert "Of 2 figures that are asked, 1 is missed.\n" in text
     assert text.count("| test_a 0 | at most 2 | **3** |") == 2  # among the missed, and in its place
     assert "### Ours, against theirs\n" in text
     assert "- new\n" in text

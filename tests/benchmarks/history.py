@@ -119,8 +119,9 @@ def page_text(runs: Iterable[Run]) -> str:
     missed = [ratio for ratio in every if ratio.missed]
     asked = sum(bool(ratio.asked) for ratio in every)
     are = "is" if len(missed) == 1 else "are"
-    text = f"\nOf {asked} figures that are asked, {len(missed)} {are} missed:\n\n"
-    text += _COLUMNS + "".join(ratio.row for ratio in missed)
+    text = f"\nOf {asked} figures that are asked, {len(missed)} {are} missed.\n"
+    if missed:
+        text += "\n" + _COLUMNS + "".join(ratio.row for ratio in missed)
     for file, each in groupby(shown, lambda run: run.test.partition("::")[0]):
         of_file, source = list(each), FILE.with_name(file).read_text("utf-8")
         title = (ast.get_docstring(ast.parse(source)) or "").partition("\n")[0]

@@ -8,7 +8,7 @@ NONE = "\N{EN DASH}"
 COMMAND = re.compile("`([^`]+)`")
 """A command in a message."""
 _LENGTHS = ((1e-6, 1e-3, "mm"), (1e-9, 1e-6, "\N{MICRO SIGN}m"), (0.0, 1e-9, "nm"))
-_TIMES = ((1.0, 1.0, "s"), (1e-3, 1e-3, "ms"), (0.0, 1e-6, "\N{MICRO SIGN}s"))
+_TIMES = ((120.0, 60.0, "min"), (1.0, 1.0, "s"), (1e-3, 1e-3, "ms"), (0.0, 1e-6, "\N{MICRO SIGN}s"))
 
 
 def length(metres: float) -> str:

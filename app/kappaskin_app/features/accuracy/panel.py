@@ -108,7 +108,7 @@ class CostPanel(QWidget):
             for column, what in enumerate(("RMS error", "time"), 1):
                 self.figures[name, what].setToolTip(tip)
                 grid.addWidget(self.figures[name, what], row, column)
-        for column, widget in enumerate((Label("All of it"), self.computed, self.each)):
+        for column, widget in enumerate((Label("Whole frame"), self.computed, self.each)):
             widget.setToolTip("Frames computed per second, and the time that each takes in all.")
             grid.addWidget(widget, len(tips), column)
         grid.setColumnStretch(1, 2)

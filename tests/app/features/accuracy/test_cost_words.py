@@ -37,7 +37,13 @@ def test_a_length_is_said_with_two_digits(value: float, words: str) -> None:
 
 @pytest.mark.parametrize(
     ("value", "words"),
-    [(2.51e-5, "25 \N{MICRO SIGN}s"), (9.99e-4, "1.0 ms"), (0.0456, "46 ms"), (2.0, "2.0 s")],
+    [
+        (2.51e-5, "25 \N{MICRO SIGN}s"),
+        (9.99e-4, "1.0 ms"),
+        (0.0456, "46 ms"),
+        (2.0, "2.0 s"),
+        (1100, "18 min"),
+    ],
 )
 def test_a_time_is_said_with_two_digits(value: float, words: str) -> None:
     assert duration(value) == words
