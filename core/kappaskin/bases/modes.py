@@ -28,18 +28,18 @@ _MOST = 1024  # modes: more take minutes to make
 class PointMap:
     """A map from coefficients to values on a grid by one dense product; NaN off the skin.
 
-    Reading its matrix takes all of the time: single precision, exact to a ten-millionth of the
-    coefficients, halves it.
+    Reading its matrix takes most of the time: single precision, exact to a ten-millionth of the
+    coefficients, halves it, and no point off the skin is in it. Its columns are the points on the
+    skin and one off it, of NaN; `column` (ny, nx) is that of each point of the grid.
     """
 
     values: NDArray[np.float32]
-    grid: tuple[int, int]
+    column: NDArray[np.intp]
 
     def __call__(self, coefficients: Array) -> Array:
         """Values (..., ny, nx) for `coefficients` (..., Ni, Nj)."""
-        flat = coefficients.reshape(*coefficients.shape[:-2], -1).astype(np.float32)
-        values = np.dot(flat, self.values.T)
-        return values.astype(float).reshape(*flat.shape[:-1], *self.grid)
+        flat = coefficients.reshape(*coefficients.shape[:-2], -1).astype(np.float32, copy=False)
+        return np.dot(flat, self.values).astype(float).take(self.column, axis=-1)
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,13 @@ class ModeBasis(FunctionBasis):
     def on_grid(self, x: Array, y: Array, dx: int = 0, dy: int = 0) -> PointMap:
         """The map from coefficients to that derivative on the grid of `x` (nx,), `y` (ny,)."""
         points = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
-        return PointMap(self.at(points, dx, dy).astype(np.float32), (len(y), len(x)))
+        values = self.at(points, dx, dy).T
+        on = np.flatnonzero(np.isfinite(values[0]))
+        column = np.full(len(points), len(on))
+        column[on] = np.arange(len(on))
+        nan = np.full((self.size, 1), np.nan)
+        of_skin = np.hstack([values[:, on], nan]).astype(np.float32)
+        return PointMap(of_skin, column.reshape(len(y), len(x)))
 
 
 Complex = NDArray[np.complex128]
