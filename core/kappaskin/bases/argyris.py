@@ -145,13 +145,17 @@ _FAR = 1e9  # m: off any skin
 
 _I, _J = np.array([(i, j) for i in range(6) for j in range(6 - i)]).T
 _FACTORS = np.array([perm(_I, a) * perm(_J, b) for a, b in ORDERS], float)
-_POWERS = np.array([(np.maximum(_I - a, 0), np.maximum(_J - b, 0)) for a, b in ORDERS])
+_POWERS: Indices = np.array(
+    [[np.maximum(_I - a, 0) for a, _ in ORDERS], [np.maximum(_J - b, 0) for _, b in ORDERS]]
+)
 
 
 def monomials(xi: Array) -> Array:
     """The 21 monomials xi^i eta^j of `xi` (..., 2), with their derivatives, (..., 6, 21)."""
-    powers = xi[..., None] ** np.arange(6)
-    return _FACTORS * powers[..., 0, _POWERS[:, 0]] * powers[..., 1, _POWERS[:, 1]]
+    powers: Array = xi[..., None] ** np.arange(6)
+    of_xi: Array = np.take(powers[..., 0, :], _POWERS[0], axis=-1)
+    of_eta: Array = np.take(powers[..., 1, :], _POWERS[1], axis=-1)
+    return _FACTORS * of_xi * of_eta
 
 
 def chain_rule(inverse: Array) -> Array:
@@ -233,7 +237,7 @@ class Quintics:
         t, xi, depth = self._searched(x, y) if finite else self._searched(_FAR, _FAR)
         if not depth > -_ROUNDING:
             return np.full((len(ORDERS), self.coefficients.shape[-1]), np.nan)
-        return self._chained[t] @ monomials(xi) @ self.coefficients[t]
+        return self._chained[t].dot(monomials(xi)).dot(self.coefficients[t])
 
     def derivative(self, positions: Array, order: Order) -> Array:
         """The derivative (P, N) of one order at `positions` (P, 2); NaN off the mesh."""

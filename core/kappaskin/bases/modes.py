@@ -122,10 +122,7 @@ class DiskBasis(ModeBasis):
         z = complex(x - R, y - R) / R
         if not abs(z) <= 1 + _ROUNDING:
             return np.full((len(ORDERS), self.size), np.nan)
-        jet = self._modes.jet(z)
-        jet[1:3] /= R
-        jet[3:] /= R * R
-        return jet
+        return self._modes.jet(z, R)
 
     def quadrature(self) -> tuple[Array, Array]:
         """Points (Q, 2) in m and weights (Q,) in m^2: Gauss along the radius, even in angle."""
@@ -154,6 +151,7 @@ _BY_STEPS = np.array(
     ]
 )
 _TURNS = np.array([q - p for p, q in _STEPS])
+_SUMS = np.array([[sum(order)] for order in ORDERS])
 
 
 class _DiskModes:
@@ -193,17 +191,19 @@ class _DiskModes:
                 values += factor * turn ** _TURNS[step] * (polynomials @ self._series[step])
         return self._parts(values * np.exp(1j * np.multiply.outer(np.angle(z), self.m)))
 
-    def jet(self, z: complex) -> Array:
-        """All derivatives (6, N) at one point z = x + i y of the disk."""
+    def jet(self, z: complex, R: float) -> Array:
+        """All derivatives (6, N) at one point, z = x + i y on the disk of radius 1, of radius R."""
         r, angle = cmath.polar(z)
         t = math.acos(min(max(2 * r - 1, -1.0), 1.0))
-        steps = (np.cos(t * self._degrees) @ self._flat).reshape(6, -1)
-        turned: Complex = _BY_STEPS * np.exp(1j * angle * _TURNS)
-        return self._parts((turned @ steps) * np.exp(1j * angle * self.m))
+        steps = np.cos(t * self._degrees).dot(self._flat).reshape(6, -1)
+        turn = cmath.rect(1.0, angle)
+        turned: Complex = _BY_STEPS * turn**_TURNS / R**_SUMS
+        values: Complex = (turned @ steps) * turn**self.m
+        return self._parts(values)
 
     def _parts(self, values: Complex) -> Array:
         """The modes (..., N): the real parts of `values` (..., U) are cosines, the others sines."""
-        return values.view(float)[..., self._columns]
+        return values.view(float).take(self._columns, axis=-1)
 
 
 _disk_modes = lru_cache(8)(_DiskModes)
