@@ -10,6 +10,7 @@ from kappaskin.bases.basis import ValueMap as ValueMap
 from kappaskin.bases.basis import curvature_at as curvature_at
 from kappaskin.bases.basis import hoop_at as hoop_at
 from kappaskin.bases.modes import DiskBasis, PolygonBasis
+from kappaskin.bases.modes import ModeBasis as ModeBasis
 from kappaskin.bases.product import ClampedBasis
 from kappaskin.bases.product import ElasticBasis as ElasticBasis
 from kappaskin.bases.product import ProductBasis as ProductBasis

@@ -10,6 +10,7 @@ import numpy as np
 from kappaskin.bases import (
     Basis,
     ElasticBasis,
+    ModeBasis,
     ProductBasis,
     SineBasis,
     curvature_at,
@@ -46,6 +47,16 @@ class Compliance:
         under_pressure = replace(self, volume=None).after(self.volume[None])[0]
         share = (M @ under_pressure) / (self.volume @ under_pressure)
         return free - np.multiply.outer(share, under_pressure)
+
+
+_UNMIXED = 1e-10  # of two functions' own compliances: what they share by rounding
+
+
+def _unmixed(values: Array) -> Array:
+    """A compliance (N, N) as (N,) where no functions are mixed, as a plate's own modes are not."""
+    own = values.diagonal()
+    shared = values**2 - np.diag(own**2)
+    return own.copy() if (shared <= _UNMIXED**2 * np.multiply.outer(own, own)).all() else values
 
 
 USUAL_THICKNESS = 0.25e-3
@@ -203,6 +214,8 @@ class Plate:
             values: Array = 1 / (area * stiffness)
         else:
             values = self._by_ritz(basis)
+            if isinstance(basis, ModeBasis):
+                values = _unmixed(values)
         return self._over_fluid(values, basis) if self.fluid else Compliance(values)
 
     def _over_fluid(self, values: Array, basis: Basis) -> Compliance:

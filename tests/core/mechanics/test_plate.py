@@ -18,6 +18,7 @@ from kappaskin import (
     Patch,
     Plate,
     PointLoad,
+    Polygon,
     RectangleLoad,
     Refusal,
     Scene,
@@ -464,6 +465,17 @@ def test_an_operator_after_compliance_is_the_product(fluid):
     whole = np.column_stack([compliance(e[:, None]).ravel() for e in np.eye(12)])
 
     np.testing.assert_allclose(compliance.after(M), M @ whole, rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize("edge", ["hinged", "clamped"])
+@pytest.mark.parametrize("skin", [Disk(0.05), Polygon([(0, 0), (0.1, 0), (0.1, 0.05), (0, 0.1)])])
+def test_a_plate_mixes_its_own_modes_only_in_tension(skin, edge):
+    plate, basis = Plate(skin, foundation=1e4), basis_for(skin, edge, 4, 4)
+
+    own, mixed = (one.compliance(basis).values for one in (plate, replace(plate, tension=1e-3)))
+
+    assert own.shape == (16,)
+    np.testing.assert_allclose(mixed, np.diag(own), rtol=0, atol=1e-4 * own.max())
 
 
 FLUID = {"flat": Patch(0.1, 0.06), "bent": Patch(0.1, 0.06, 0.05)}
