@@ -8,7 +8,7 @@ from typing import Protocol, cast
 import numpy as np
 import scipy
 
-from kappaskin.bases import ProductBasis, SineBasis, basis_for
+from kappaskin.bases import Basis, ProductBasis, SineBasis, basis_for
 from kappaskin.frames import Array
 from kappaskin.mechanics import Compliance, Plate, Shell
 from kappaskin.sensing import Readings, SensorLayout
@@ -60,6 +60,16 @@ def influence_of(
     return _OfPlate(plate, layout, edge, out)
 
 
+@lru_cache(1)  # the same array for all, which is read in half the time
+def read_of_modes(
+    plate: Plate, layout: SensorLayout, edge: str, functions: int
+) -> tuple[Basis, Compliance, Array]:
+    """So many functions each way, and what the channels read of a unit force on each, (C, N)."""
+    basis = basis_for(plate.patch, edge, functions, 1 if plate.patch.strip else functions)
+    compliance = plate.compliance(basis)
+    return basis, compliance, compliance.after(layout.operator(basis, plate))
+
+
 _FINE = 32  # functions each way that heights and slopes are followed by
 
 # Seven points of the unit disc, and shares: their mean is that over the disc of all powers of x and
@@ -77,10 +87,8 @@ class _OfFunctions:
     def __init__(
         self, plate: Plate, layout: SensorLayout, edge: str, functions: int, out: Array
     ) -> None:
-        self._basis = basis_for(plate.patch, edge, functions, 1 if plate.patch.strip else functions)
-        compliance = plate.compliance(self._basis)
-        self._readings = compliance.after(layout.operator(self._basis, plate)).T.copy()
-        self._compliance, self._out = compliance, out
+        self._basis, self._compliance, M = read_of_modes(plate, layout, edge, functions)
+        self._readings, self._out = M.T, out
         self.sized = layout.reads is not None and not plate.patch.strip
 
     def at(self, x: float, y: float, s: float) -> None:

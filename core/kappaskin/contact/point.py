@@ -11,8 +11,8 @@ import scipy
 from numpy.typing import ArrayLike
 from scipy.linalg import lapack
 
-from kappaskin.bases import Basis, SineBasis, basis_for, held_near
-from kappaskin.contact.influence import influence_of
+from kappaskin.bases import Basis, SineBasis, held_near
+from kappaskin.contact.influence import influence_of, read_of_modes
 from kappaskin.contact.stretched import StretchedSkin
 from kappaskin.estimation import Fit, PatternCache
 from kappaskin.frames import Array, Contact, Mask
@@ -192,9 +192,7 @@ class PointContact:
         self._scale = None if sigma is None else 1 / sigma.ravel()
         layout = replace(layout, scale=self._scale)
         self.patch, strip = plate.patch, plate.patch.strip
-        self.basis = basis_for(self.patch, edge, _FUNCTIONS, 1 if strip else _FUNCTIONS)
-        compliance = plate.compliance(self.basis)
-        self._M = compliance.after(layout.operator(self.basis, plate))
+        self.basis, compliance, self._M = read_of_modes(plate, layout, edge, _FUNCTIONS)
         self._modal = modal_projection(layout, self.basis, compliance, self._M)
         self._free = layout.offsets.T if free is None else free
         if self._scale is not None:

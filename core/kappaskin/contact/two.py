@@ -7,10 +7,10 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from kappaskin.bases import basis_for, held_near
+from kappaskin.bases import held_near
 from kappaskin.contact.drift import FittedDrift, SmoothDrift
 from kappaskin.contact.geometry import contact_geometry
-from kappaskin.contact.influence import influence_of
+from kappaskin.contact.influence import influence_of, read_of_modes
 from kappaskin.contact.point import NO_CONTACT, PointContact, left_by_chance
 from kappaskin.estimation import Fit, PatternCache
 from kappaskin.frames import Array, Contact, LocalGeometry, Mask
@@ -268,13 +268,11 @@ class _Pairs:
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str) -> None:
         self.patch, strip = plate.patch, plate.patch.strip
         self._live, self._loads = layout.live.ravel(), _Loads(plate, layout, edge)
-        self._basis = basis_for(self.patch, edge, _FUNCTIONS, 1 if strip else _FUNCTIONS)
-        self._compliance = plate.compliance(self._basis)
+        self._basis, self._compliance, M = read_of_modes(plate, layout, edge, _FUNCTIONS)
         x, y = self.patch.grid(_SEARCHED + 2, 3 if strip else _SEARCHED + 2)
         places = np.stack(np.meshgrid(x[1:-1], y[1:-1]), -1).reshape(-1, 2)
         self._places = places[self.patch.moves(places)]
         self._felt = self._basis.at(self._places)
-        M = self._compliance.after(layout.operator(self._basis, plate))
         self._M = M * self._loads.influence.unit
         self._pairs = PatternCache[tuple[Array, Array, Array]]()
         self.left = math.nan
