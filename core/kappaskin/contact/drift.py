@@ -87,8 +87,8 @@ class SmoothDrift:
         """
         used = self._live & np.isfinite(curvature.ravel())
         Q = self._directions(used, self._orthonormal)
-        spare = max(int(used.sum()) - len(Q), 1)
-        score = float(np.square(Q @ rest).sum())
+        spare, along = max(int(np.count_nonzero(used)) - len(Q), 1), Q.dot(rest)
+        score = float(along.dot(along))
         if not score > _HINT * max(float(rest.dot(rest)) - score, 0.0) / spare:
             return None
         told = self._noise(curvature, fit, used)
