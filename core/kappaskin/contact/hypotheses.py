@@ -92,17 +92,18 @@ def _resolved(skin: ElasticSkin, optimum: Optimum) -> Array:
     return np.append(optimum.parameters[:-1], max(optimum.parameters[-1], skin.half_wave**2))
 
 
-def _rise(skin: ElasticSkin, forces: PointForces, centre: Array, points: Array) -> Array:
-    """Displacement along the force in m at `centre` (2,), less that at `points` (k, 2)."""
-    gives = skin.gives(forces, np.vstack([centre, points]))
-    return math.copysign(1.0, forces.weights.sum()) * (gives[0] - gives[1:])
+def _rise(skin: ElasticSkin, forces: PointForces, centres: Array, points: Array) -> Array:
+    """Displacement along the force in m at each of `centres` (m, 2), less that at (m, k, 2)."""
+    places = np.concatenate([centres[:, None], points], axis=1)
+    gives = skin.gives(forces, places.reshape(-1, 2)).reshape(len(places), -1)
+    return math.copysign(1.0, forces.weights.sum()) * (gives[:, :1] - gives[:, 1:])
 
 
 def _inside_ring(skin: ElasticSkin, forces: PointForces) -> tuple[float, Array]:
     """Curvature in 1/m of an object that presses on a ring, and its tilt (2,)."""
     centre = np.abs(forces.weights) @ forces.points / np.abs(forces.weights).sum()
     out = forces.points - centre
-    rise = _rise(skin, forces, centre, forces.points)
+    rise = _rise(skin, forces, centre[None], forces.points[None])[0]
     # A bent skin is bent back by its own curvature too.
     rise -= skin.patch.base_curvature / 2 * out[:, 0] ** 2
     columns = np.column_stack([np.sum(out**2, axis=1) / 2, -out])
@@ -132,19 +133,17 @@ def ring_pattern(skin: ElasticSkin, sphere: Optimum) -> Array:
     return np.column_stack([unit / size, share]) if size else ROUND
 
 
-def _parts(forces: PointForces) -> list[Array]:
-    """The points of each arc, that in the middle last if there is one."""
-    return np.split(forces.points, len(forces.points) // ARC)
+def _arcs(forces: PointForces) -> Array:
+    """The points (2, k, 2) of the two arcs."""
+    return forces.points[: 2 * ARC].reshape(2, ARC, 2)
 
 
-def _inside_arcs(skin: ElasticSkin, forces: PointForces) -> tuple[float, float]:
-    """The skin's curvature in 1/m along each of the two arcs."""
-    found: list[float] = []
-    for points in _parts(forces)[:2]:
-        middle = points.mean(axis=0)
-        rise = _rise(skin, forces, middle, points)
-        found.append(2 * float(rise.sum() / np.sum((points - middle) ** 2)))
-    return found[0], found[1]
+def _inside_arcs(skin: ElasticSkin, forces: PointForces) -> Array:
+    """The skin's curvature (2,) in 1/m along each of the two arcs."""
+    points = _arcs(forces)
+    middles = points.mean(axis=1)
+    rise = _rise(skin, forces, middles, points)
+    return 2 * rise.sum(axis=1) / np.sum((points - middles[:, None]) ** 2, axis=(1, 2))
 
 
 def middle(skin: ElasticSkin, edge: Optimum) -> float:
@@ -153,7 +152,8 @@ def middle(skin: ElasticSkin, edge: Optimum) -> float:
     for share in (0.0, _TRIAL):
         forces = ends(share)(edge.parameters[:6])
         first, second = forces.points[:2]
-        rise = _rise(skin, forces, (first + second) / 2, np.stack([first, second]))
+        halfway = (first + second) / 2
+        rise = _rise(skin, forces, halfway[None], np.stack([first, second])[None])
         gaps.append(float(rise.mean()))
     lifted, pressed = gaps
     gained = pressed - lifted  # none where both ends and the middle are one place
@@ -161,11 +161,12 @@ def middle(skin: ElasticSkin, edge: Optimum) -> float:
     return share if share > _NOTHING else 0.0
 
 
-def _slope(skin: ElasticSkin, forces: PointForces, place: Array) -> Array:
-    """Slope (2,) of the skin at `place` (2,) in m, downward along the force."""
+def _slopes(skin: ElasticSkin, forces: PointForces, places: Array) -> Array:
+    """Slope (m, 2) of the skin at `places` (m, 2) in m, downward along the force."""
     step = skin.half_wave / 4
-    fall = _rise(skin, forces, place, place + step * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]]))
-    return np.array([fall[1] - fall[0], fall[3] - fall[2]]) / (2 * step)
+    around = step * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
+    fall = _rise(skin, forces, places, places[:, None] + around)
+    return (fall[:, 1::2] - fall[:, ::2]) / (2 * step)
 
 
 def arc_widths(skin: ElasticSkin, cylinder: Optimum, middle: float) -> tuple[float, float]:
@@ -175,7 +176,7 @@ def arc_widths(skin: ElasticSkin, cylinder: Optimum, middle: float) -> tuple[flo
     force, share = abs(parameters[2]), parameters[5]
     strong = 0 if share > 0 else 1
     weaker = force * (1 - middle) * (0.5 - abs(share))
-    short = max(curvatures[strong] - curvatures[1 - strong], 0.0)
+    short = max(float(curvatures[strong] - curvatures[1 - strong]), 0.0)
     width = max(math.exp(-short / (skin.bend * weaker)), 0.02)
     return (1.0, width) if strong == 0 else (width, 1.0)
 
@@ -205,10 +206,10 @@ def fitted_cylinder(skin: ElasticSkin, cylinder: Optimum) -> Hypothesis:
     forces = contact(cylinder.parameters)
     of_ends = [float(forces.weights[part].sum()) for part in (slice(ARC), slice(ARC, 2 * ARC))]
     strong = int(abs(of_ends[1]) > abs(of_ends[0]))
-    width = _width(skin, cylinder, inside[strong] - base, of_ends[strong])
-    first, second = (points.mean(axis=0) for points in _parts(forces)[:2])
-    slopes = _slope(skin, forces, first) - _slope(skin, forces, second)
-    return Hypothesis(cylinder, width, first - second, slopes)
+    width = _width(skin, cylinder, float(inside[strong]) - base, of_ends[strong])
+    two_ends = _arcs(forces).mean(axis=1)
+    first, second = _slopes(skin, forces, two_ends)
+    return Hypothesis(cylinder, width, two_ends[0] - two_ends[1], first - second)
 
 
 SHARE = 0.2
