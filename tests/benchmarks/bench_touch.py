@@ -17,8 +17,8 @@ from kappaskin import (
     SineBasis,
 )
 from kappaskin.contact import contact_geometry
+from kappaskin.contact.element_grid import modal_projection
 from kappaskin.contact.influence import influence_of
-from kappaskin.contact.point import modal_projection
 from navier import HingedPlate, Load
 
 PATCH = Patch(0.1, 0.1)

@@ -46,7 +46,7 @@ _ARGUMENTS = ["-x", "-q", "--assert=plain", "--rootdir", str(ROOT)]
 ROOMS = {
     "contact": (
         "contact/point contact/load_detection contact/objects contact/hypotheses "
-        "contact/elastic_skin",
+        "contact/elastic_skin contact/element_grid",
         "contact/contact contact/point_products contact/objects contact/hypotheses "
         "contact/elastic_skin contact/rigid_object_of_a_kind contact/every_skin calibration/tare",
     ),

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from kappaskin.bases import basis_for
+from kappaskin.contact.element_grid import element_grid
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import Plate
 from kappaskin.sensing import SensorLayout
+from kappaskin.skin import Patch
 
 # A thin skin touches a rigid object only where it can press without being bent further than the
 # object is: a sphere on a ring, inside which the skin takes the sphere's curvature; a straight edge
@@ -72,37 +74,48 @@ def ends(middle: float) -> ForceModel:
     The share `middle` of the force acts between them; the ends have (1/2 + share) and
     (1/2 - share) of the rest.
     """
-    return lambda parameters: _at_ends(parameters, np.zeros((2, 1)), middle)
+    return _at_ends(np.zeros((2, 1)), middle)
 
 
 def arcs(widths: tuple[float, float], middle: float) -> ForceModel:
     """Parameters of `ends` and q: forces on arcs across the ends, half width sqrt(q) `widths`."""
-    return lambda parameters: _at_ends(parameters, np.multiply.outer(widths, _ARC), middle)
+    return _at_ends(np.multiply.outer(widths, _ARC), middle)
 
 
-def _at_ends(parameters: Array, across: Array, middle: float) -> PointForces:
+def _at_ends(across: Array, middle: float) -> ForceModel:
     """Forces beside the axis by `across` (2, k) times the root of the last parameter."""
-    force, angle, length, share = *parameters[2:4], math.sqrt(parameters[4]), parameters[5]
-    axis = np.array([math.cos(angle), math.sin(angle)])
-    normal = np.array([-axis[1], axis[0]])
-    k, n, rest, sign = across.shape[1], len(parameters), 1 - middle, np.array([1.0, -1.0])
-    of_end = rest * (0.5 + sign * share)
-    if middle:
-        across = np.vstack([across, across.mean(axis=0)])
-        sign, of_end = np.append(sign, 0.0), np.append(of_end, middle)
-    sign, growth, off = np.repeat(sign, k), np.zeros((n, across.size)), across.ravel()
-    place, a = sign / 2 - rest * share, math.sqrt(parameters[6]) if n > 6 else 0.0
-    u, v = place * length, off * a
-    moves = np.zeros((n, across.size, 2))
+    k, rest = across.shape[1], 1 - middle
+    off = np.append(across, across.mean(axis=0)) if middle else across.ravel()
+    end = np.arange(len(off)) // k  # or between them
+    sign, even = np.array([[1.0, -1.0, 0.0], [rest / 2, rest / 2, middle]])[:, end]
+    even, uneven = even / k, rest * sign / k
+
+    def forces(parameters: Array) -> PointForces:
+        n, length, share = len(parameters), math.sqrt(parameters[4]), parameters[5]
+        places, moves = np.zeros((len(off), 2)), np.zeros((n, len(off), 2))
+        growth, place = np.zeros((n, len(off))), sign / 2 - rest * share
+        places[:, 0], moves[5, :, 0] = place * length, -rest * length
+        moves[4, :, 0] = place / (2 * length)
+        if n > 6:
+            a = math.sqrt(parameters[6])
+            places[:, 1], moves[6, :, 1] = off * a, off / (2 * a)
+        growth[2], growth[5] = even + share * uneven, parameters[2] * uneven
+        return _turned(parameters, places, moves, growth)
+
+    return forces
+
+
+def _turned(parameters: Array, places: Array, moves: Array, growth: Array) -> PointForces:
+    """Forces by their `places` (k, 2) along and across an axis, from the centre of force.
+
+    `moves` (n, k, 2) are those of length, share and q along and across it too.
+    """
+    c, s = math.cos(parameters[3]), math.sin(parameters[3])
+    axes = np.array([[c, s], [-s, c]])
+    moves[3, :, 0], moves[3, :, 1] = -places[:, 1], places[:, 0]
+    moves[3:] = moves[3:] @ axes
     moves[0, :, 0] = moves[1, :, 1] = 1
-    moves[3] = np.multiply.outer(u, normal) - np.multiply.outer(v, axis)
-    moves[4] = np.multiply.outer(place / (2 * length), axis)
-    moves[5] = -rest * length * axis
-    if n > 6:
-        moves[6] = np.multiply.outer(off / (2 * a), normal)
-    growth[2], growth[5] = np.repeat(of_end, k) / k, rest * sign * force / k
-    points = parameters[:2] + np.multiply.outer(u, axis) + np.multiply.outer(v, normal)
-    return PointForces(points, force * growth[2], moves, growth)
+    return PointForces(parameters[:2] + places @ axes, parameters[2] * growth[2], moves, growth)
 
 
 def oval(parameters: Array) -> PointForces:
@@ -110,22 +123,13 @@ def oval(parameters: Array) -> PointForces:
 
     They are as 1 + 2 share to 1 - 2 share at its two ends, and change evenly from one to the other.
     """
-    force, angle, length, share = *parameters[2:4], math.sqrt(parameters[4]), parameters[5]
-    n, b = len(_AROUND), math.sqrt(parameters[6])
-    axis = np.array([math.cos(angle), math.sin(angle)])
-    normal = np.array([-axis[1], axis[0]])
-    along, across = np.cos(_AROUND), np.sin(_AROUND)
-    place = (along - share) / 2
-    u, v = length * place, b * across
-    moves, growth = np.zeros((7, n, 2)), np.zeros((7, n))
-    moves[0, :, 0] = moves[1, :, 1] = 1
-    moves[3] = np.multiply.outer(u, normal) - np.multiply.outer(v, axis)
-    moves[4] = np.multiply.outer(place / (2 * length), axis)
-    moves[5] = -length / 2 * axis
-    moves[6] = np.multiply.outer(across / (2 * b), normal)
-    growth[2], growth[5] = (1 + 2 * share * along) / n, 2 * along * force / n
-    points = parameters[:2] + np.multiply.outer(u, axis) + np.multiply.outer(v, normal)
-    return PointForces(points, force * growth[2], moves, growth)
+    length, share, b = math.sqrt(parameters[4]), parameters[5], math.sqrt(parameters[6])
+    n, along, across = len(_AROUND), np.cos(_AROUND), np.sin(_AROUND)
+    place, moves, growth = (along - share) / 2, np.zeros((7, n, 2)), np.zeros((7, n))
+    moves[4, :, 0], moves[5, :, 0] = place / (2 * length), -length / 2
+    moves[6, :, 1] = across / (2 * b)
+    growth[2], growth[5] = (1 + 2 * share * along) / n, 2 * along * parameters[2] / n
+    return _turned(parameters, np.column_stack([length * place, b * across]), moves, growth)
 
 
 _GRID = 13  # places along each side
@@ -151,11 +155,15 @@ class ElasticSkin:
         if len(layout) > _MOST:
             raise Refusal(f"object recognition takes at most {_MOST} elements, got {len(layout)}")
         self.patch, self.side, self._layout = patch, min(patch.a, patch.b), layout
+        self._corners = None
+        if type(patch) is Patch:
+            self._corners = patch.inward(-math.inf, -math.inf), patch.inward(math.inf, math.inf)
         self._basis = basis_for(patch, edge, functions, functions)
         self._compliance = plate.compliance(self._basis)
-        # Most of the time goes into reading it: half of the memory.
-        M = self._compliance.after(layout.operator(self._basis, plate))
-        self._M: NDArray[np.float32] = M.astype(np.float32)
+        self._grid = element_grid(layout, self._basis, self._compliance)
+        if self._grid is None:  # most of the time goes into reading it: half of the memory
+            M = self._compliance.after(layout.operator(self._basis, plate))
+            self._M: NDArray[np.float32] = M.astype(np.float32)
         self.half_wave = max(patch.a, patch.b) / functions
         self.bend = 1 / (4 * math.pi * plate.rigidity)
         """Curvature in 1/m lost inside a ring or an arc per N and e-fold of its size."""
@@ -163,26 +171,41 @@ class ElasticSkin:
         x, y = np.meshgrid(patch.a * steps, patch.b * steps)
         self.grid = np.stack([x.ravel(), y.ravel()], axis=-1)
         """Places (k, 2) in m all over the skin."""
-        self.under = (self._M @ self._felt(self.grid).T.astype(np.float32)).astype(float)
-        """Curvature (R, k) in 1/m of all channels for 1 N at each of them."""
+        self.under = self._read(self._felt(self.grid))
+        """Curvature (k, R) in 1/m of all channels for 1 N at each of them."""
 
     def _on_skin(self, points: Array) -> Array:
+        if self._corners is not None:
+            return np.minimum(np.maximum(points, self._corners[0]), self._corners[1])
         return np.array([self.patch.inward(x, y) for x, y in points.tolist()])
 
     def _felt(self, points: Array) -> Array:
         return self._basis.at(self._on_skin(points))
 
+    def _read(self, modal: Array) -> Array:
+        """Readings (n, R) in 1/m under modal forces (n, N) in N."""
+        return modal @ self._M.T if self._grid is None else self._grid.read(modal)
+
     def readings(self, forces: PointForces) -> tuple[Array, Array]:
         """Curvature (R,) in 1/m of all channels, and its derivatives (R, n)."""
-        points = self._on_skin(forces.points)
-        f, fx, fy = (self._basis.at(points, *order) for order in ((0, 0), (1, 0), (0, 1)))
+        points, (n, k) = self._on_skin(forces.points), forces.growth.shape
         moved = forces.weights * forces.moves.transpose(2, 0, 1)
+        if self._grid is not None:
+            adds = np.zeros((2, k, 1 + n, 2))
+            adds[0, :, 0, 0], adds[0, :, 1:, 0] = forces.weights, forces.growth.T
+            adds[1, :, 1:, 0], adds[0, :, 1:, 1] = moved.mT
+            answer = self._grid.under(points, adds)
+            return answer[0], answer[1:].T
+        f, fx, fy = (self._basis.at(points, *order) for order in ((0, 0), (1, 0), (0, 1)))
         modal = np.vstack([forces.weights @ f, forces.growth @ f + moved[0] @ fx + moved[1] @ fy])
         answer = (self._M @ modal.T.astype(np.float32)).astype(float)
         return answer[:, 0], answer[:, 1:]
 
     def gives(self, forces: PointForces, points: Array) -> Array:
         """Displacement (k,) in m at `points` (k, 2)."""
+        if self._grid is not None:
+            places = self._on_skin(points)
+            return self._grid.gives(self._on_skin(forces.points), forces.weights, places)
         modal = forces.weights @ self._felt(forces.points)
         return self._felt(points) @ self._compliance.after(modal[None])[0]
 
@@ -222,7 +245,7 @@ class ElasticSkin:
         angles = 2 * np.pi * np.arange(_ANGLES) / _ANGLES
         out = np.stack([np.multiply.outer(_SEARCHED, f(angles)).ravel() for f in (np.cos, np.sin)])
         points = self._on_skin(around + self.side * np.vstack([np.zeros(2), out.T]))
-        T = (self._felt(points) @ self._M.T) * used
+        T = self._read(self._felt(points)) * used
         G, h = T @ T.T, T @ readings
         own = np.diag(G)
         squares = np.multiply.outer(own, own)
@@ -283,7 +306,7 @@ def optimise(
     p, damping = start, _DAMPING
     here = _linearised(skin, contact, p, prior, readings, weight)
     for _ in range(steps):
-        q = np.clip(p + here.step(damping), prior.low, prior.high)
+        q = np.minimum(np.maximum(p + here.step(damping), prior.low), prior.high)
         there = _linearised(skin, contact, q, prior, readings, weight)
         if not there.cost < here.cost:
             damping = max(10 * damping, 0.01)
@@ -318,12 +341,12 @@ def _linearised(
     skin: ElasticSkin, contact: ForceModel, p: Array, prior: Prior, readings: Array, weight: Array
 ) -> _NormalEquations:
     K, slopes = skin.readings(contact(p))
-    left, J, off = weight * (readings - K), weight[:, None] * slopes, (p - prior.mean) / prior.sd
-    squares = float(left @ left)
-    normal = J.T @ J + np.diag(prior.sd**-2)
+    left, J, off = weight * (readings - K), slopes.T * weight, (p - prior.mean) / prior.sd
+    squares, normal = float(left @ left), J @ J.T
+    normal.flat[:: len(p) + 1] += prior.sd**-2
     scale = np.sqrt(np.diag(normal))
     scale[scale == 0] = 1.0  # a parameter that nothing feels, as on the rim
-    gradient = (J.T @ left - off / prior.sd) / scale
+    gradient = (J @ left - off / prior.sd) / scale
     return _NormalEquations(
         squares + float(off @ off),
         squares,

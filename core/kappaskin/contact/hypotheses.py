@@ -262,9 +262,10 @@ def fit_hypotheses(
     frame.trust(noise, *(o.contact(o.parameters) for o in tried))
     sphere = frame.shaped(sphere)
     edge = min((frame.edged(edge), frame.edged(cylinder)), key=_cost)
-    cylinder = frame.rounded(cylinder, edge)
+    between = middle(skin, edge)
+    cylinder = frame.rounded(cylinder, between)
     if cylinder.cost > edge.cost:  # of which an edge is the narrowest
-        cylinder = min(cylinder, frame.rounded(frame.next_to(edge), edge), key=_cost)
+        cylinder = min(cylinder, frame.rounded(frame.next_to(edge), between), key=_cost)
     noise *= frame.spread((sphere, edge, cylinder))
     return Hypotheses(
         fitted_sphere(skin, sphere),
@@ -377,19 +378,21 @@ class WeightedReadings:
         contact, and of a t test of the one place anywhere that explains most.
         """
         K, slopes = self.skin.readings(optimum.contact(optimum.parameters))
-        n = slopes.shape[1]
-        columns = self._weight[:, None] * np.hstack([slopes, self.skin.under])
-        columns /= np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-        Q, _ = np.linalg.qr(columns[:, :n])
+        J = self._weight[:, None] * slopes
+        Q, _ = np.linalg.qr(J / np.maximum(np.linalg.norm(J, axis=0), 1e-300))
         left = self._weight * (self._readings - K)
-        left, free = left - Q @ (Q.T @ left), columns[:, n:] - Q @ (Q.T @ columns[:, n:])
-        size = np.linalg.norm(free, axis=0)
-        one = float(np.max((free.T @ left) ** 2 / np.where(size > _ALIKE, size, np.inf) ** 2))
-        rest, squares = int(self._used.sum()) - n, float(left @ left)
+        left -= Q @ (Q.T @ left)
+        rows = self._weight * self.skin.under
+        rows /= np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
+        size = 1 - np.sum((rows @ Q) ** 2, axis=1)  # of what of each the parameters do not explain
+        one = float(np.max((rows @ left) ** 2 / np.where(size > _ALIKE**2, size, np.inf)))
+        rest, squares = int(self._used.sum()) - Q.shape[1], float(left @ left)
         away = np.hypot(*(self.skin.grid - optimum.parameters[:2]).T)
-        near = np.argsort(away)[: min(_NEAR, rest // 2)]
-        U, s, _ = np.linalg.svd(free[:, near], full_matrices=False)
-        explained, k = float(np.sum((U[:, s > _ALIKE].T @ left) ** 2)), int((s > _ALIKE).sum())
+        near = rows[np.argsort(away)[: min(_NEAR, rest // 2)]]
+        near -= near @ Q @ Q.T
+        s2, V = np.linalg.eigh(near @ near.T)
+        kept = s2 > _ALIKE**2
+        explained, k = float(np.sum((V.T @ (near @ left))[kept] ** 2 / s2[kept])), int(kept.sum())
         remains = max(squares - explained, _EXACT) / (rest - k)
         many = cast(
             "float", scipy.special.fdtrc(float(k), float(rest - k), explained / k / remains)
@@ -398,9 +401,8 @@ class WeightedReadings:
         single = 2 * len(size) * float(scipy.special.stdtr(float(rest - 1), -t))
         return min(2 * min(many, single), 1.0)
 
-    def rounded(self, cylinder: Optimum, edge: Optimum) -> Optimum:
-        """The cylinder with one curvature at both ends and the force between them of an edge."""
-        share = middle(self.skin, edge)
+    def rounded(self, cylinder: Optimum, share: float) -> Optimum:
+        """The cylinder with one curvature at both ends and that `share` of the force between."""
         return self.again(cylinder, arcs(arc_widths(self.skin, cylinder, share), share), 7)
 
 

@@ -1,7 +1,6 @@
 """Point contact: position and force of the point load that fits the readings best."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple, cast
@@ -12,12 +11,13 @@ from numpy.typing import ArrayLike
 from scipy.linalg import lapack
 
 from kappaskin.bases import Basis, SineBasis, held_near
+from kappaskin.contact.element_grid import modal_projection
 from kappaskin.contact.influence import influence_of, read_of_modes
 from kappaskin.contact.stretched import StretchedSkin
 from kappaskin.estimation import Fit, PatternCache
 from kappaskin.frames import Array, Contact, Mask
-from kappaskin.mechanics import Compliance, Plate
-from kappaskin.sensing import SensorLayout, gage_multipliers
+from kappaskin.mechanics import Plate
+from kappaskin.sensing import SensorLayout
 
 
 def _squares_on_grid(basis: Basis, G: Array, x: Array, y: Array) -> Array:
@@ -47,66 +47,6 @@ def _waves(count: int) -> Array:
     n = np.arange(2 * count + 1)[:, None, None]
     difference = np.abs(i - j)
     return ((n > difference) & (n < i + j) & ((n - difference) % 2 == 1)).astype(float)
-
-
-_SECOND = (2, 0), (0, 2), (1, 1)  # orders of the derivatives that flat skins read (Eqs. 3-5)
-_ROUNDING = 1e-15  # of the largest: a part as small is none
-
-ModalProjection = Callable[[Array], Array]
-"""From readings K (C,) in 1/m, zero where missing, to M'K (N,)."""
-
-
-def modal_projection(
-    layout: SensorLayout, basis: Basis, compliance: Compliance, M: Array
-) -> ModalProjection:
-    """The map from readings K to M'K, where M (3 P, N) are the readings of unit modal forces.
-
-    Where the elements stand on a grid, and the functions are sines that a load does not mix, M is
-    for each component a matrix for x times one for y: a hundredth of the numbers.
-    """
-    unmixed = compliance.values.ndim == 1 and compliance.volume is None
-    if isinstance(basis, SineBasis) and unmixed and not layout.reads and _is_grid(layout):
-        return _OnGrid(layout, basis, compliance.values)
-    return lambda K: K @ M
-
-
-def _sides(layout: SensorLayout) -> tuple[Array, Array]:
-    """x of the columns and y of the rows of elements, for a grid."""
-    m = layout.shape[0] if layout.shape else 1
-    return layout.positions[:m, 0], layout.positions[::m, 1]
-
-
-def _is_grid(layout: SensorLayout) -> bool:
-    x, y = _sides(layout)
-    grid = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
-    return layout.shape is not None and np.array_equal(grid, layout.positions)
-
-
-class _OnGrid:
-    def __init__(self, layout: SensorLayout, basis: SineBasis, compliance: Array) -> None:
-        maps = [basis.on_grid(*_sides(layout), *order) for order in _SECOND]
-        terms = _products(gage_multipliers(basis, layout.gage_length))
-        self._X = np.hstack([(maps[c].X * along_x).T for c, along_x, _ in terms])
-        self._Y = np.stack([maps[c].Y * along_y for c, _, along_y in terms])
-        self._compliance = compliance.reshape(basis.shape)
-        self._cells = 3, len(maps[0].Y), len(maps[0].X)
-        components = [c for c, _, _ in terms]
-        self._components = ... if components == [0, 1, 2] else components
-
-    def __call__(self, readings: Array) -> Array:
-        K = readings.reshape(self._cells)[self._components]
-        along_y = np.matmul(K.mT, self._Y)
-        modes: Array = self._X.dot(along_y.reshape(-1, along_y.shape[2]))
-        modes *= self._compliance
-        return modes.ravel()
-
-
-def _products(factors: Array) -> list[tuple[int, Array, Array]]:
-    """Factors (3, Ni, Nj) as sums of products of one in x and one in y, with their component."""
-    terms: list[tuple[int, Array, Array]] = []
-    for c, (U, s, Vt) in enumerate(np.linalg.svd(one) for one in factors):
-        terms += [(c, U[:, r] * s[r], Vt[r]) for r in np.flatnonzero(s > _ROUNDING * s[0])]
-    return terms
 
 
 _SIGNIFICANT = 30.0  # drop of chi-squared below which a contact may be noise found by searching

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Patch, Plate, SensorLayout, SineBasis
-from kappaskin.contact.point import _squares_on_grid, modal_projection
+from kappaskin.contact.element_grid import element_grid, modal_projection
+from kappaskin.contact.point import _squares_on_grid
 
 OBLONG = Patch(0.1, 0.07)
 BASIS = SineBasis(OBLONG, 7, 5)
@@ -51,6 +52,28 @@ def test_readings_on_a_grid_meet_the_functions_as_by_the_whole_matrix(patch, gag
     )  # which need not be read
 
     np.testing.assert_allclose(small(K), K @ M, rtol=0, atol=1e-13 * np.abs(K @ M).max())
+
+
+@pytest.mark.parametrize("gage_length", [0.0, 0.009])
+@given(inside, inside)
+def test_a_grid_reads_forces_and_their_moves_as_the_whole_matrix_does(gage_length, x, y):
+    layout = replace(SensorLayout.regular(OBLONG, 6, 4), gage_length=gage_length)
+    compliance = Plate(OBLONG, tension=3.0).compliance(BASIS)
+    M = compliance.after(layout.operator(BASIS))
+    places = np.array([[x, y], [0.5, 0.4]]) * [OBLONG.a, OBLONG.b]
+    f, fx, fy = (BASIS.at(places, *order) for order in ((0, 0), (1, 0), (0, 1)))
+    force, along_x, along_y = np.random.default_rng(0).normal(size=(3, 2, 5))
+    grid = element_grid(layout, BASIS, compliance)
+    assert grid is not None
+
+    read = grid.under(
+        places, np.stack([np.stack([force, along_y], -1), np.stack([along_x, 0 * force], -1)])
+    )
+
+    modal = force.T @ f + along_x.T @ fx + along_y.T @ fy
+    scale = 1e-13 * np.abs(modal) @ np.abs(M).T
+    assert (np.abs(read - modal @ M.T) <= scale).all()
+    assert (np.abs(grid.read(modal) - modal @ M.T) <= scale).all()
 
 
 def scattered():
