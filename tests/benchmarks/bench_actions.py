@@ -31,9 +31,9 @@ def test_no_action_holds_the_window(figure, ratio, seconds: float, tmp_path: Pat
     opened, of_opened = _slowest(uses, lambda of_action: max(of_action[0]))
     later, of_later = _slowest(uses, lambda of_action: min(map(max, of_action[1:])))
     figure(
-        f"{len(uses)} actions hold the window, in ms, when first used: {of_first}; with the turns "
-        f"of the event loop after it: {of_opened}; the least of later uses: {of_later}; with no "
-        f"action {found['idle']:.0f}"
+        f"{len(uses)} actions hold the window, in ms, when first used: {of_first}; with the "
+        f"longest turn of the event loop after it, in processor time: {of_opened}; the least of "
+        f"later uses: {of_later}; no action: {found['idle']:.0f}"
     )
     ratio("first use of an action, of the 30 ms allowed", first / _FIRST, at_most=1)
     ratio("what an action first opens, of the 50 ms allowed", opened / _MOST, at_most=1)
