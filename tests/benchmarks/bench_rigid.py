@@ -32,6 +32,13 @@ def path():
         yield 0.05 + 0.02 * np.cos(angle), 0.05 + 0.015 * np.sin(2 * angle), 0.3 * angle
 
 
+def _words(object_, depth: float = 0.0, force: float = 0.0) -> str:
+    name = type(object_).__name__
+    if isinstance(object_, Sphere):
+        name += f" of {1e3 * object_.radius:g} mm"
+    return f"{name}, {f'{1e3 * depth:g} mm deep' if depth else f'by {force:g} N'},"
+
+
 @pytest.mark.parametrize("edge", ["hinged", "clamped"])
 def test_a_dragged_object_takes_less_than_fifty_products(edge, figure, ratio) -> None:
     basis = basis_for(PATCH, edge, 15, 15)
@@ -54,14 +61,15 @@ def test_a_dragged_object_takes_less_than_fifty_products(edge, figure, ratio) ->
             assert np.allclose(answer.coefficients, alone.coefficients, rtol=1e-5, atol=1e-9)
             assert answer.residual < 1e-6
         dragged_s, put_s, product_s = map(statistics.median, (dragged, put, product))
+        name = f"{edge}, {_words(object_, **asked)}"
         figure(
-            f"{edge}, {type(object_).__name__} {asked}: dragged {dragged_s * 1e3:.1f} ms "
+            f"{name} dragged {dragged_s * 1e3:.1f} ms "
             f"({statistics.median(steps):g} steps, at most {max(dragged) * 1e3:.1f} ms), put there "
             f"anew {put_s * 1e3:.1f} ms, {dragged_s / product_s:.0f} products of all nodes with "
             f"all functions ({product_s * 1e3:.2f} ms)"
         )
         ratio(
-            f"{edge}, {type(object_).__name__} {asked} dragged, against a product",
+            f"{name} dragged, against a product",
             dragged_s / product_s,
             at_most=50,
         )

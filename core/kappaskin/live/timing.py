@@ -12,7 +12,7 @@ from kappaskin.frames import Frame
 
 _ALL = 0.8  # of the time: where estimates of all frames take less, every one is computed
 _SHARE = 0.4  # of it, for estimates where they take more: reading and drawing must not wait
-_WANTED = 0.75  # of it, where receivers wait for each
+_WANTED = 0.85  # of it, where receivers wait for each
 _SAVED = 0.05  # s of computing that may be saved up for a burst, or be owed
 _AT_ONCE = 0.02  # s of computing between two reads at most
 _FRESH = 1.5e-3  # s of it where receivers wait for the newest

@@ -41,7 +41,7 @@ def test_every_frame_is_computed_where_there_is_time(rate, cost) -> None:
     assert played.came - played.computed <= 10  # until it is known what one costs
 
 
-@pytest.mark.parametrize(("wanted", "share"), [(False, 0.4), (True, 0.75)])
+@pytest.mark.parametrize(("wanted", "share"), [(False, 0.4), (True, 0.85)])
 @pytest.mark.parametrize(("rate", "cost"), [(2000, 0.5e-3), (2000, 2e-3), (20_000, 0.3e-3)])
 def test_where_there_is_not_a_share_of_the_time_is_spent(rate, cost, wanted, share) -> None:
     played = Played(rate, cost, 1e-4, wanted).go(2.0)  # until it knows rate and cost
