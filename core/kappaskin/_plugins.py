@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable, Container
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import metadata
 from typing import Any
@@ -52,6 +53,16 @@ def error_text(error: BaseException) -> str:
         return type(error).__name__
 
 
+def _known(point: metadata.EntryPoint) -> dict[str, Any]:
+    """What is said of the package of an entry point: nothing where its metadata is not there.
+
+    The finder of the package importlib_metadata, once any program loads it, raises for that.
+    """
+    with suppress(FileNotFoundError):
+        return point.dist.metadata.json if point.dist else {}
+    return {}
+
+
 def plug_ins(
     group: str, check: Callable[[str, Any], None], ours: Container[str] = ()
 ) -> dict[str, Any]:
@@ -64,7 +75,7 @@ def plug_ins(
     for point in metadata.entry_points(group=group):
         package, version, trouble = "an unknown package", "", ""
         try:
-            known: dict[str, Any] = point.dist.metadata.json if point.dist else {}
+            known = _known(point)
             package, version = known.get("name") or package, known.get("version") or ""
             if point.name in ours or point.name in loaded:
                 raise ValueError("the name is taken")

@@ -1,6 +1,7 @@
 """Plug-ins of other packages: found, checked, and left out by name where they are broken."""
 
 import importlib
+import importlib.util
 import json
 import os
 import subprocess
@@ -170,6 +171,9 @@ def test_what_is_not_said_of_a_package_is_unknown(installed, tmp_path, said, tex
     installed("bare_one", "made = 7", sources=["x=bare_one:made"])
     metadata = tmp_path / "bare_one-1.5.dist-info" / "METADATA"
     metadata.unlink() if said is None else metadata.write_text(said)
+
+    if importlib.util.find_spec("importlib_metadata"):  # whose finder replaces Python's
+        importlib.import_module("importlib_metadata")
 
     found = plug_ins(SOURCES, accept)
     assert [one.text for one in found_plug_ins()] == [text]
