@@ -76,10 +76,13 @@ def script_of(session: Session, settings: Settings, folder: Path) -> Script:
     if settings.targets:
         origins = f", {settings.origins!r}" if settings.origins else ""
         requests.append(f"engine.publish({settings.targets!r}{origins})")
-    requests.append(f"engine.connect({_literal(_source(session))})")
+    connect = f"engine.connect({_literal(_source(session))})"
     if session.inside:
         made.append(f"SCENE = {_scene(session, settings)}")
-        requests += ["engine.play(planned(SCENE))", "engine.seek(0.0)"]
+        # Planned before it connects: meanwhile the engine would show the first scene.
+        requests += ["scene = planned(SCENE)", connect, "engine.play(scene)", "engine.seek(0.0)"]
+    else:
+        requests.append(connect)
     sensor = session.status.sensor
     times, unit = sensor.noise_unit if sensor else (1.0, "1/m")
     noise = "e.noise" if times == 1 else f"{times:g} * e.noise"

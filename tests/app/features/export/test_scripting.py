@@ -61,10 +61,11 @@ class Asked:
         if not (self.noted or session.making):
             session.engine.note("asked for")  # told once the engine has taken all before it
             self.noted = True
+        noted = [event.time for event in status.events if event.kind == "note"]
         return (
             estimate is not None
-            and bool(status.events)
-            and estimate.host_time > status.events[-1].time
+            and bool(noted)
+            and estimate.host_time > noted[-1]
             and status.setup == session.engine.requested.setup
             and estimate.generation == status.generation
             and math.isfinite(estimate.contact.force)
