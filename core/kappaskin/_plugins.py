@@ -53,10 +53,10 @@ def error_text(error: BaseException) -> str:
         return type(error).__name__
 
 
-def _known(point: metadata.EntryPoint) -> dict[str, Any]:
-    """What is said of the package of an entry point: nothing where its metadata is not there.
+def _metadata_of(point: metadata.EntryPoint) -> dict[str, Any]:
+    """The metadata of the package of an entry point; empty where it has none.
 
-    The finder of the package importlib_metadata, once any program loads it, raises for that.
+    The package importlib_metadata, once it is imported, raises for missing metadata.
     """
     with suppress(FileNotFoundError):
         return point.dist.metadata.json if point.dist else {}
@@ -75,7 +75,7 @@ def plug_ins(
     for point in metadata.entry_points(group=group):
         package, version, trouble = "an unknown package", "", ""
         try:
-            known = _known(point)
+            known = _metadata_of(point)
             package, version = known.get("name") or package, known.get("version") or ""
             if point.name in ours or point.name in loaded:
                 raise ValueError("the name is taken")

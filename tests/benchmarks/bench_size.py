@@ -25,7 +25,7 @@ PLOT = PAGE.parent / "pictures" / "bench_size.png"
 _LONG = 5.0  # s of a call, after which a larger size is not tried
 _MATRIX = 1e9  # bytes of a matrix, beyond which it is not made
 _MEASURED = 0.3  # s for which calls are repeated
-_SLOW = 0.3  # s of a set-up, from which it is told
+_SLOW = 0.3  # s of a set-up, from which the table has it
 
 
 @dataclass(frozen=True)
@@ -158,10 +158,10 @@ def time_of(seconds: float) -> str:
 def in_words(cost: Cost | None) -> str:
     if cost is None:
         return "stops"
-    told = time_of(cost.frame)
+    text = time_of(cost.frame)
     if cost.memory:
-        told += f", {scaled(cost.memory, {'MB': 1e6, 'kB': 1e3})}"
-    return told + (f", made in {time_of(cost.made)}" if cost.made > _SLOW else "")
+        text += f", {scaled(cost.memory, {'MB': 1e6, 'kB': 1e3})}"
+    return text + (f", made in {time_of(cost.made)}" if cost.made > _SLOW else "")
 
 
 def plotted(costs: dict[str, list[Cost | None]]) -> None:
@@ -186,13 +186,13 @@ def test_cost_against_size(figure, ratio) -> None:
             ended = bool(costs[name]) and (last is None or last.made + last.frame > _LONG)
             costs[name].append(None if ended else measured(way, Case(n)))
     plotted(costs)
-    told = [name for name in WAYS if name != READ]
+    columns = [name for name in WAYS if name != READ]
     rows = [
-        f"| readings | functions | {' | '.join(told)} | `fast`, of one read |\n",
-        "|---" * (len(told) + 3) + "|\n",
+        f"| readings | functions | {' | '.join(columns)} | `fast`, of one read |\n",
+        "|---" * (len(columns) + 3) + "|\n",
     ]
     for place, n in enumerate(SIDES):
-        cells = " | ".join(in_words(costs[name][place]) for name in told)
+        cells = " | ".join(in_words(costs[name][place]) for name in columns)
         share = costs["`fast`"][place].frame / costs[READ][place].frame
         rows.append(f"| {n * n:,} | {n // 2} x {n // 2} | {cells} | {share:.0f} times |\n")
     figure("".join(rows))

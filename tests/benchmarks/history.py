@@ -47,7 +47,7 @@ class Ratio:
 
 @dataclass
 class Run:
-    """What one run of a test told: sentences and ratios."""
+    """What one run of a test measured: sentences and ratios."""
 
     test: str
     date: str = ""
@@ -92,8 +92,8 @@ def table(runs: Iterable[Run], before: Iterable[Run]) -> str:
     for ratio in sorted(ratios, key=lambda ratio: not ratio.missed):
         old = last.get(ratio.figure)
         of_last = f"{ratio.value / old:.2f}" if old else ""
-        said = "missed" if ratio.missed else ""
-        rows.append((ratio.figure, ratio.asked, f"{ratio.value:g}", of_last, said))
+        missed = "missed" if ratio.missed else ""
+        rows.append((ratio.figure, ratio.asked, f"{ratio.value:g}", of_last, missed))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return "\n".join("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
 

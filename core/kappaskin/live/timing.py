@@ -84,25 +84,22 @@ class ComputingTimes:
     """Adds up what frames take, by its parts."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock, self._since = clock, clock()
-        self._count, self._spent, self._last = 0, [0.0, 0.0, 0.0], ComputedFrames()
+        self._clock, self._last = clock, ComputedFrames()
+        self._since, self._count, self._spent = clock(), 0, (0.0, 0.0, 0.0)
 
     def add(self, estimate: float, publishing: float, keeping: float) -> None:
         """A frame took so many s."""
+        before = self._spent
+        self._spent = before[0] + estimate, before[1] + publishing, before[2] + keeping
         self._count += 1
-        self._spent = [
-            spent + seconds
-            for spent, seconds in zip(self._spent, (estimate, publishing, keeping), strict=True)
-        ]
 
     def means(self) -> ComputedFrames:
         """Of the last half second or more."""
-        passed = self._clock() - self._since
-        if passed < _WHILE:
-            return self._last
-        means = [spent / self._count if self._count else math.nan for spent in self._spent]
-        self._last = ComputedFrames(self._count / passed, *means)
-        self._since, self._count, self._spent = self._clock(), 0, [0.0, 0.0, 0.0]
+        now = self._clock()
+        if now - self._since >= _WHILE:
+            means = [spent / self._count if self._count else math.nan for spent in self._spent]
+            self._last = ComputedFrames(self._count / (now - self._since), *means)
+            self._since, self._count, self._spent = now, 0, (0.0, 0.0, 0.0)
         return self._last
 
 

@@ -257,13 +257,11 @@ class CostPanel(QWidget):
         known = math.isfinite(computed.each)
         self.computed.show_text(f"{computed.rate:.0f} frames/s" if known else NONE)
         self.each.show_text(f"in {duration(computed.each)} each" if known else NONE)
-        if known:
-            parts = (
-                ("Fit, contact, geometry, error bars, surface", computed.estimate),
-                ("Publishing", computed.publishing),
-                ("Recording, and for the window to read", computed.keeping),
-            )
-            self.each.setToolTip("\n".join(f"{name}: {duration(of)}" for name, of in parts))
+        self.each.setToolTip(
+            f"Fit, contact, geometry, error bars, surface: {duration(computed.estimate)}\n"
+            f"Publishing: {duration(computed.publishing)}\n"
+            f"Recording, and for the window to read: {duration(computed.keeping)}"
+        )
 
     def _show_slider(self, present: Cost | None) -> None:
         best = self._frontier.best

@@ -76,13 +76,12 @@ def script_of(session: Session, settings: Settings, folder: Path) -> Script:
     if settings.targets:
         origins = f", {settings.origins!r}" if settings.origins else ""
         requests.append(f"engine.publish({settings.targets!r}{origins})")
-    connect = f"engine.connect({_literal(_source(session))})"
-    if session.inside:
+    if session.inside:  # planned before it connects, or the engine would show the first scene
         made.append(f"SCENE = {_scene(session, settings)}")
-        # Planned before it connects: meanwhile the engine would show the first scene.
-        requests += ["scene = planned(SCENE)", connect, "engine.play(scene)", "engine.seek(0.0)"]
-    else:
-        requests.append(connect)
+        requests.append("scene = planned(SCENE)")
+    requests.append(f"engine.connect({_literal(_source(session))})")
+    if session.inside:
+        requests += ["engine.play(scene)", "engine.seek(0.0)"]
     sensor = session.status.sensor
     times, unit = sensor.noise_unit if sensor else (1.0, "1/m")
     noise = "e.noise" if times == 1 else f"{times:g} * e.noise"
