@@ -70,6 +70,7 @@ def record(
     """
     from kappaskin.estimation import slope_warning
     from kappaskin.live import LOST, Engine
+    from kappaskin.pipeline import Setup
     from kappaskin.recording import ReplayedSource
 
     check_time(seconds, "record")
@@ -77,7 +78,7 @@ def record(
     if source.startswith(ReplayedSource.SCHEME):
         raise Refusal(f"expected a live source to record, got {source}; copy its file")
     stopped = stops()
-    with Engine() as engine:
+    with Engine(Setup(quantities=())) as engine:
         # Before there is a source, so that nothing of it is missed.
         engine.record(out)
         engine.connect(source, trust)
