@@ -373,6 +373,7 @@ class EngineLoop:
                 reader_gap=self._arrivals.gap(now),
                 last_frame=self._arrivals.last,
                 playing=source.playing if isinstance(source, SimulatedSource) else Playback(),
+                pace=source.pace if isinstance(source, SimulatedSource) else 1.0,
                 health=self._health.health(pipeline, self._place),
                 replay=source.replay if isinstance(source, ReplayedSource) else None,
                 slope=fit.neglected_slope if fit else 0.0,

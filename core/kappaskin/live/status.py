@@ -37,14 +37,14 @@ class Status:
     computed, `computed` how long the others take, `quantities` those of `QUANTITIES` that they
     have. `rate` in frames/s; `reader_gap` in s is the 99th percentile of the time between two
     arrivals; `last_frame` and `reported` in s on the monotonic clock. `playing` maps device time to
-    the time of a simulated scene. `events` are the last of `event_count`. `temperature` of the
-    device in degrees Celsius, NaN if it sends none. `tare` is the state of tares, `drift` the drift
-    since the tare of the `setup`, None without one. `health` lists faulty channels, `publishing`
-    the state of each target, `recording` that of the file being written, `replay` the position in a
-    recording (None for any other source), `compared` the state of the second pipeline (None without
-    one). `slope` is the largest of the newest shape, if the method neglects it though it matters
-    (`Fit.neglected_slope`), else 0. `requested` is the number of the newest request that the engine
-    has received.
+    the time of a simulated scene, which goes on by `pace` seconds per second. `events` are the last
+    of `event_count`. `temperature` of the device in degrees Celsius, NaN if it sends none. `tare`
+    is the state of tares, `drift` the drift since the tare of the `setup`, None without one.
+    `health` lists faulty channels, `publishing` the state of each target, `recording` that of the
+    file being written, `replay` the position in a recording (None for any other source), `compared`
+    the state of the second pipeline (None without one). `slope` is the largest of the newest shape,
+    if the method neglects it though it matters (`Fit.neglected_slope`), else 0. `requested` is the
+    number of the newest request that the engine has received.
     """
 
     state: str = OFF
@@ -69,6 +69,7 @@ class Status:
     last_frame: float = -math.inf
     reported: float = -math.inf
     playing: Playback = field(default_factory=Playback)
+    pace: float = 1.0
     events: tuple[Event, ...] = ()
     event_count: int = 0
     temperature: float = math.nan
@@ -105,6 +106,7 @@ class Status:
             accounting=Accounting(),
             rate=0.0,
             last_frame=-math.inf,
+            pace=1.0,
             temperature=math.nan,
             drift=None,
             health=Health(),
