@@ -4,6 +4,7 @@ import time
 from functools import partial
 from pathlib import Path
 
+from PySide6.QtCore import QRect, QTimer
 from PySide6.QtGui import QGuiApplication
 
 from kappaskin._files import write_whole
@@ -20,6 +21,7 @@ from kappaskin_app.shell.window import MainWindow
 
 _PYTHON = "Copy a Python script with the present source, scene and setup; it prints the contact"
 
+_SETTLED = 1500  # ms from the start: the window is drawn
 _WINDOW = "Save the whole window as a PNG in the folder the program was started in"
 _FIGURE = "Compute this figure of the paper, and show it in a window"
 _INITIAL = "Compute section 6.2 of the paper, and show it in a window"
@@ -40,6 +42,12 @@ class ExportFeature:
         self._register(shell)
         self.exports.notified.connect(guarded(shell.notify))
         shell.closing.connect(guarded(self.exports.close))
+        QTimer.singleShot(_SETTLED, shell, guarded(self._settle))
+
+    def _settle(self) -> None:
+        """Give hidden widgets their sizes, for which the first picture would wait."""
+        if self._shell.isVisible():
+            self._shell.grab(QRect(0, 0, 1, 1))
 
     def _register(self, shell: MainWindow) -> None:
         """Register pictures of all views and docks."""
