@@ -9,6 +9,7 @@ from collections.abc import Collection, Sequence
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
+from kappaskin._text import rounded
 from kappaskin.estimation import FAULTS
 from kappaskin.frames import Estimate
 from kappaskin.pipeline import REPORTED, Reported, readouts
@@ -29,12 +30,9 @@ Rows = list[tuple[str, ...]]
 def facts_of(estimate: Estimate, object_: str) -> Rows:
     """Rows of the contact, the `object_` in words, and the accuracy of the shape."""
     rows = [
-        (
-            each.label,
-            _text(each.value, each.digits),
-            _text(each.half_width, each.digits),
-            each.unit,
-        )
+        (each.label, *rounded(each.value, each.half_width, each.digits), each.unit)
+        if not each.words
+        else (each.label, each.words, "", "")
         for each in readouts(estimate)
     ]
     return [*rows, ("Object", object_ or "unknown", "", "")]
@@ -77,7 +75,7 @@ def csv_of(*tables: tuple[Sequence[str], Rows]) -> str:
     for number, (head, rows) in enumerate(tables):
         text.write("\n" if number else "")
         csv.writer(text, lineterminator="\n").writerows([head, *rows])
-    return text.getvalue()
+    return text.getvalue().translate({0x2212: "-", 0x2013: ""})  # for programs
 
 
 def _text(value: float, digits: int) -> str:
