@@ -61,8 +61,12 @@ def elements_of(estimate: Estimate, sensor: Sensor) -> Rows:
     return [
         (
             str(number),
-            *(_text(value, 1) for value in place),
-            *(_text(value, digits) for values, digits in read for value in values[:, number]),
+            *(rounded(value, math.nan, 1)[0] for value in place),
+            *(
+                rounded(value, math.nan, digits)[0]
+                for values, digits in read
+                for value in values[:, number]
+            ),
             FAULTS[estimate.suspect[number]],
         )
         for number, place in enumerate(places)
@@ -76,11 +80,6 @@ def csv_of(*tables: tuple[Sequence[str], Rows]) -> str:
         text.write("\n" if number else "")
         csv.writer(text, lineterminator="\n").writerows([head, *rows])
     return text.getvalue().translate({0x2212: "-", 0x2013: ""})  # for programs
-
-
-def _text(value: float, digits: int) -> str:
-    """A number with an ASCII minus for programs; empty where there is none."""
-    return f"{value + 0.0:.{digits}f}" if math.isfinite(value) else ""
 
 
 _MARGIN = 14  # px, margins of a column's head
