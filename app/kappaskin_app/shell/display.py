@@ -163,7 +163,8 @@ class Display(QObject):
             values = self.colouring.of_elements(name, estimate)
         elif name == "displacement":
             values = 1e3 * estimate.surface
-        limit = self.ranges.limit(name, values - at_rest, self.settings, now)
+        noise = self.colouring.noise(name, estimate)
+        limit = self.ranges.limit(name, values - at_rest, self.settings, now, noise)
         pulled = name == "displacement" and self.ranges.pulled(values)
         return shade.tint(limit, at_rest, pulled)
 

@@ -277,13 +277,9 @@ def _check_unloaded(sensor: Sensor, seeker: LoadDetector, found: _Found, rest: R
             f"{rest.tare.date:%Y-%m-%d %H:%M}: undo that tare first"
         )
     raise Refusal(
-        f"the skin is loaded: {_force(load.force)} at ({x:.0f}, {y:.0f}) mm; this contact explains "
+        f"the skin is loaded: {load.force:.3g} N at ({x:.0f}, {y:.0f}) mm; this contact explains "
         f"{100 * load.share:.0f} % of the signal; {then}"
     )
-
-
-def _force(force: float) -> str:
-    return f"{force:.3g} N" if abs(force) >= 1 else f"{1e3 * force:.3g} mN"
 
 
 @dataclass(frozen=True)

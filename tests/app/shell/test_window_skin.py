@@ -9,6 +9,7 @@ from PySide6.QtCore import QPoint, Qt
 from kappaskin import Disk, Patch
 from kappaskin.bases import edges_of
 from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.theme import current
 
 
 def _shown(window: MainWindow) -> bool:
@@ -40,6 +41,19 @@ def test_a_load_dragged_on_the_skin_is_where_the_mouse_let_go(
     assert (end - start - QPoint(72, 24)).manhattanLength() <= 12
     window.history.stack.undo()
     assert window.history.settings.x == 0.05
+
+
+def test_the_mark_of_a_contact_near_the_rim_is_grey(window: MainWindow, until) -> None:
+    mark = window.membrane._contacts[0]  # noqa: SLF001
+
+    def near(x: float) -> bool:
+        window.history.change("Place", -1, load_case="point", x=x, y=0.05, force=0.05)
+        until(lambda: _shown(window))
+        until(lambda: mark.prop.color == (current().faint if x < 0.01 else "#1fd17a"))
+        return window.session.estimate.contact.near_rim
+
+    assert [near(x) for x in (0.05, 0.004, 0.05)] == [False, True, False]
+    until(lambda: " N" in window.readouts.text("force"))
 
 
 def test_letters_typed_over_the_skin_do_not_reach_vtk(window: MainWindow, qtbot) -> None:

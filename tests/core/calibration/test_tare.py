@@ -235,7 +235,7 @@ def test_a_load_is_told_from_elements_that_are_off_by_as_much(load):
     scene = spoilt(SCENE.touched_by(load), replace(OFF, offset_sd=0.3))
 
     with pytest.raises(
-        Refusal, match=r"loaded: .* mN at \(\d+, \d+\) mm; this contact explains \d+ % of"
+        Refusal, match=r"loaded: .* N at \(\d+, \d+\) mm; this contact explains \d+ % of"
     ):
         taken(scene)
 

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from kappaskin._text import with_error
 from kappaskin.calibration import GRAVITY, WEIGHT_ADVICE, KnownWeights, Weighing
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
@@ -24,7 +25,6 @@ from kappaskin_app.widgets.parts import (
     Label,
     button,
     in_a_row,
-    number,
     seconds_box,
     sentence,
     text_label,
@@ -179,7 +179,7 @@ class _StepPage(QWidget):
         places = (1e3 * contact.position for contact in weighing.contacts)
         self.places.setText(
             "\n".join(
-                f"{mass:g} g at ({number(x, '.1f')}, {number(y, '.1f')}) mm"
+                f"{mass:g} g at ({x:.1f}, {y:.1f}) mm"
                 for mass, (x, y) in zip(weighing.masses, places, strict=False)
             )
         )
@@ -217,14 +217,14 @@ class _ResultPage(QWidget):
         self._shown = known
         self.verdict.setText("Passed" if known.passed else "Failed")
         head, *_, why = known.lines()
-        self.found.setText(sentence(head.replace("+-", "\N{PLUS-MINUS SIGN}")))
+        self.found.setText(sentence(head))
         self.why.setText(sentence(why.partition(": ")[2]))
         rows = [("<i>weight</i>", "<i>told</i>", "<i>by the others</i>")]
         rows += [
             (
-                f"{number(1e3 * laid / GRAVITY, '.4g')} g",
-                f"{number(1e3 * told / GRAVITY, '.4g')} g",
-                f"{number(100 * left, '+.1f')} %",
+                f"{1e3 * laid / GRAVITY:.4g} g",
+                f"{1e3 * told / GRAVITY:.4g} g",
+                with_error(100 * left, unit="%", digits=1, sign="+"),
             )
             for laid, told, left in zip(known.weights, known.told, known.left_out, strict=True)
         ]

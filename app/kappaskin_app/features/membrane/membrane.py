@@ -29,6 +29,7 @@ from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, curre
 _LETTERS = 14  # px, of the caption
 _LIFT = 0.006  # of the skin's size above the surface, which would hide half of a line
 _POINT, _POINTS = 5, 80  # px of an element, and of many in a row: or they would hide the skin
+_CONTACT = "#1fd17a"  # the mark of a contact
 _PIN = 0.3  # of the skin's size, length of the mark of a contact
 _STRIDE = 8  # surface lines between two lines of the true surface's wireframe
 
@@ -106,7 +107,7 @@ class MembraneView(QWidget):
         )
         pin = needle.append_polydata(pv.Sphere(radius=0.018))
         self._contacts = [
-            plotter.add_mesh(pin, color="#1fd17a", ambient=0.6, reset_camera=False, render=False)
+            plotter.add_mesh(pin, color=_CONTACT, ambient=0.6, reset_camera=False, render=False)
             for _ in range(2)
         ]
         self.sides = Sides(plotter)
@@ -234,6 +235,7 @@ class MembraneView(QWidget):
         self._follow_pointed()
         for ball, contact in zip(self._contacts, (estimate.contact, estimate.second), strict=True):
             put_upright(ball, skin, contact.position)
+            ball.prop.color = current().faint if contact.near_rim else _CONTACT
         if self._box.shares != WHOLE:
             self._box.cut(self.plotter.actors.values())  # some may be new
         known = math.isfinite(estimate.taken)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
+from kappaskin._text import with_error
 from kappaskin.calibration import Calibration
 from kappaskin.estimation import amplitude_spectrum
 from kappaskin.frames import COMPONENTS, Array, Estimate
@@ -25,7 +26,6 @@ from kappaskin_app.shell.history import History
 from kappaskin_app.shell.selection import Selection
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.widgets.parts import with_error
 
 SECONDS = 10.0
 """Length of the history."""
@@ -93,7 +93,7 @@ def facts(element: int, sensor: Sensor, status: Status, estimate: Estimate) -> s
 def title(element: int, sensor: Sensor, displacement: float, sd: float) -> str:
     """Number and position of an element, and the `displacement` of the skin there in mm."""
     x, y = 1e3 * sensor.layout.positions[element]
-    inward = with_error(displacement, sd, 3, "mm")
+    inward = with_error(displacement, sd, "mm")
     return f"<b>Element {element}</b> at ({x:.1f}, {y:.1f}) mm; displacement {inward}"
 
 
@@ -118,7 +118,7 @@ def _read(quantity: ReportedQuantity, reported: Reported, channel: int, scale: f
     found = [of(reported) for suffix, _, of in quantity.forms if suffix != "_95"]
     each = np.broadcast_arrays(*found, math.nan)[:2]
     value, sd = (scale * float(one.flat[channel]) for one in each)
-    return with_error(value, sd, quantity.shown[2], sign="+")
+    return with_error(value, sd, digits=quantity.shown[2], sign="+")
 
 
 def _calibration_cells(calibration: Calibration | None, channel: int) -> tuple[str, str]:
@@ -126,8 +126,8 @@ def _calibration_cells(calibration: Calibration | None, channel: int) -> tuple[s
         return "1 (nominal)", "0 (nominal)"
     c = calibration
     return (
-        with_error(c.gain[channel], c.gain_sd[channel], 3),
-        with_error(c.offset[channel], c.offset_sd[channel], 2, sign="+"),
+        with_error(c.gain[channel], c.gain_sd[channel]),
+        with_error(c.offset[channel], c.offset_sd[channel], sign="+"),
     )
 
 
