@@ -14,6 +14,7 @@ from kappaskin.live import Status
 from kappaskin.pipeline import REPORTED, Reported, ReportedQuantity
 from kappaskin.sensing import Sensor, SensorLayout
 from kappaskin_app.features.traces.element_panel import (
+    SECONDS,
     TRACED,
     ElementPanel,
     Traces,
@@ -27,8 +28,6 @@ from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.widgets.parts import with_error
 
-SECONDS = 10.0
-"""Length of the history."""
 _LEAST_PERIOD = 0.002  # s between two stored frames
 _ROUNDING = 1e-6  # of a period: at exactly that rate all frames are stored
 _MOST_BYTES = 24e6  # of the buffer: with many elements fewer frames are stored
@@ -239,7 +238,7 @@ class SelectedElement(QObject):
     def _show_panel(self, estimate: Estimate, now: float) -> None:
         if now >= self._next_plots:
             times, values = self._buffer.of([self.element])
-            self.panel.show_history(times, values[:, :, 0], SECONDS)
+            self.panel.show_history(times, values[:, :, 0])
         if now >= self._next_facts:
             self._next_facts = now + _FACTS_PERIOD
             self._show_facts(estimate)
@@ -277,7 +276,7 @@ class SelectedElement(QObject):
 
     def _show_traces(self, elements: int) -> None:
         traced = [one for one in self._history.settings.traced if one < elements]
-        self.traces.show_history(traced, *self._buffer.of(traced), SECONDS)
+        self.traces.show_history(traced, *self._buffer.of(traced))
 
     # Display.
 
