@@ -29,6 +29,7 @@ from kappaskin_app.widgets.tint import Tint
 _OLD = (LOST, OFF, STALE, WAITING, GAP)  # the values shown are not the present ones
 _HINT, _NO_LOAD_HINT = "Drag the red arrow to move the load; F1: shortcuts", "F1: shortcuts"
 _NUMBERS = 0.2  # s between two updates of numbers
+_SLOW = 0.95  # times real time: a slower simulation is marked
 
 Kinds = NDArray[np.uint8]
 
@@ -141,6 +142,8 @@ class Display(QObject):
             slope = self._slope(self._session.status.slope, time.monotonic())
             method = self._session.engine.requested.setup.method
             texts.append(warnings(estimate, int(crossed.sum()), method, slope))
+        if (pace := self._session.status.pace) < _SLOW:
+            texts.append(f"simulated at {pace:.1f} x real time: this computer is not fast enough")
         self.notice.show_warning("; ".join(filter(None, texts)))
 
     def estimate_shown(self) -> Estimate | None:

@@ -85,7 +85,19 @@ def test_a_load_too_near_the_rim_is_warned_of_and_no_more_further_inside(
     assert "near rim" in window.readouts.text("contact")
     assert notice.toolTip()
     window.history.change("Load", -1, x=0.05)
-    until(lambda: not notice.warning and "Drag the red arrow" in notice.text())
+    until(lambda: "near the rim" not in notice.text())
+
+
+def test_a_simulation_slower_than_real_time_is_marked(window: MainWindow) -> None:
+    session, notice = window.session, window.display.notice
+    session.status = replace(session.status, pace=0.64)
+    window.display.show_numbers_soon()
+    session.reported.emit(session.status)
+    assert "imulated at 0.6 x real time" in notice.text()
+    session.status = replace(session.status, pace=0.97)
+    window.display.show_numbers_soon()
+    session.reported.emit(session.status)
+    assert "real time" not in notice.text()
 
 
 def test_a_load_over_the_rim_is_explained_where_it_is_placed(window: MainWindow, until) -> None:

@@ -135,13 +135,13 @@ class SceneControl(QObject):
         if planner.refusal or planner.waiting:
             effects.show_waiting(planner.refusal or _PLANNING)
 
-    def _show_status(self, status: Status) -> None:
+    def _show_status(self, _: Status) -> None:
         self._panel.show_simulated(self._session.inside)
         self._show_card()
         if not self._session.inside:
             self._timeline.show_scene(None)
             return
-        self._timeline.show_time(self._session.time, self._session.running, status.pace)
+        self._timeline.show_time(self._session.time, self._session.running)
 
 
 def _is_built_in(file: Path) -> bool:

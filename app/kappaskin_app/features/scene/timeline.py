@@ -77,11 +77,7 @@ class Track(Course):
                 painter.drawLine(QPointF(x, area.bottom() - 5), QPointF(x, area.bottom()))
 
 
-_SLOW = 0.95  # times real time: a slower simulation is marked
-_TIP = (
-    "Time in the scene, which repeats. A simulation that this computer cannot compute in time goes "
-    "slower than real time; no frame of it is lost."
-)
+_TIP = "Time in the scene, which repeats."
 
 
 class Timeline(QWidget):
@@ -121,12 +117,8 @@ class Timeline(QWidget):
             self.track.show_scene(self._scene)
             self._show_clock(0.0, self._scene.duration)
 
-    def show_time(self, seconds: float, playing: bool, pace: float = 1.0) -> None:
-        """Show a time in s since the first start of the scene, and whether it is playing.
-
-        It goes on by `pace` seconds per second.
-        """
-        slow = f"simulated at {pace:.1f} x real time, " if pace < _SLOW else ""
+    def show_time(self, seconds: float, playing: bool) -> None:
+        """Show a time in s since the first start of the scene, and whether it is playing."""
         if playing != self._playing:
             self._playing = playing
             self._show_playing()
@@ -135,11 +127,11 @@ class Timeline(QWidget):
         time = seconds % self._scene.duration
         if time != self.track.time:
             self.track.show_time(time)
-            self._show_clock(time, self._scene.duration, slow)
+            self._show_clock(time, self._scene.duration)
 
-    def _show_clock(self, seconds: float, duration: float, slow: str = "") -> None:
+    def _show_clock(self, seconds: float, duration: float) -> None:
         whole = f"{duration:.2f}"
-        self.clock.show_text(f"{slow}{seconds:.2f} s of {whole} s", f"{slow}{whole} s of {whole} s")
+        self.clock.show_text(f"{seconds:.2f} s of {whole} s", f"{whole} s of {whole} s")
 
     def _show_playing(self) -> None:
         verb = "Pause" if self._playing else "Play"

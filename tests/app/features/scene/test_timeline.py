@@ -71,13 +71,6 @@ def test_the_time_is_told_and_begins_anew(row):
     assert not row.asked  # what is shown is not asked for
 
 
-def test_a_simulation_slower_than_real_time_is_marked(row):
-    row.show_time(1.32, True, 0.8)
-    assert row.clock.text == "simulated at 0.8 x real time, 1.32 s of 2.25 s"
-    row.show_time(1.33, True, 0.97)
-    assert row.clock.text == "1.33 s of 2.25 s"
-
-
 @pytest.mark.parametrize(
     ("key", "to"),
     [
