@@ -505,6 +505,20 @@ def _nearest(x: Array, y: Array, at: QPointF, joined: bool) -> tuple[float, int]
     return float(away[index]), index
 
 
+def _enclosed(x: Array, low: Array, high: Array) -> tuple[Array, Array, Array]:
+    """The outline (2 n,) around what lies between `low` and `high` (n,), broken at unknown points.
+
+    And whether each point of it is joined to the next.
+    """
+    known = np.flatnonzero(np.isfinite(x + low + high))
+    runs = np.split(known, np.flatnonzero(np.diff(known) > 1) + 1)
+    around = np.concatenate([np.concatenate([x[run], x[run][::-1]]) for run in runs])
+    edge = np.concatenate([np.concatenate([low[run], high[run][::-1]]) for run in runs])
+    joined = np.ones(len(around), np.int32)
+    joined[2 * np.cumsum([len(run) for run in runs if len(run)], dtype=np.intp) - 1] = 0
+    return around, edge, joined
+
+
 @cache
 def _axis_class() -> type:
     """The class of the axes; pyqtgraph, which takes 0.3 s to load, is loaded with the first."""
@@ -619,10 +633,8 @@ class _View(QObject):
             ink = each.ink
             ink.setAlpha(_BAND)
             at, low, high = x.shown(each.x), y.shown(each.y - band), y.shown(each.y + band)
-            good = np.isfinite(at + low + high)
-            at, edge = at[good], np.concatenate([low[good], high[good][::-1]])
-            around = np.concatenate([at, at[::-1]])
-            item.setData(around, edge, pen=None, fillLevel="enclosed", brush=ink)
+            around, edge, joined = _enclosed(at, low, high)
+            item.setData(around, edge, connect=joined, pen=None, fillLevel="enclosed", brush=ink)
             item.setZValue(-1)
         drawn = self._pooled(self._lines, len(lines), self._pg.InfiniteLine)
         for item, line in zip(drawn, lines, strict=False):

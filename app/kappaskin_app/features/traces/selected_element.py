@@ -66,6 +66,13 @@ class ReadingBuffer:
 
 
 _READ = tuple(quantity for quantity in REPORTED if quantity.element_head)
+_PATHS = [str(quantity.value) for quantity in TRACED]
+
+
+def _by_kind(values: list[Array], layout: SensorLayout) -> Array:
+    """Values (T, n k, P) of k traced quantities, each in the n kinds of readings of a layout."""
+    each = [v if v.ndim == 3 else layout.by_kind(v) for v in values]
+    return np.concatenate(each, axis=1)
 
 
 def _heads(layout: SensorLayout) -> tuple[str, ...]:
@@ -226,8 +233,10 @@ class SelectedElement(QObject):
         key = status.connections, estimate.generation
         if key != self._key:
             self._key, self._last_number = key, 0
-        times, readings, self._last_number = self._session.engine.recent(status, self._last_number)
-        self._buffer.append(times, readings)
+        engine = self._session.engine
+        times, traced, self._last_number = engine.recent(status, self._last_number, _PATHS)
+        if traced and status.sensor is not None:
+            self._buffer.append(times, _by_kind(traced, status.sensor.layout))
         if self.panel.isVisible() and self.element >= 0:
             self._show_panel(estimate, now)
         if now >= self._next_plots:
