@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QBuffer, QEvent, QObject, QPoint, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QColor,
@@ -206,11 +207,12 @@ class Chart(QWidget):
     """Series over two axes; an empty chart says what to do.
 
     The wheel zooms, dragging pans, a double click shows all. `pointed` emits the `ChartPoint` next
-    to the mouse, or None; `clicked` the one that is clicked.
+    to the mouse, or None; `clicked` the one that is clicked, `clicked_at` the x of any click.
     """
 
     pointed = Signal(object)
     clicked = Signal(object)
+    clicked_at = Signal(float)
 
     def __init__(self, y: ChartAxis, x: ChartAxis, tip: str) -> None:
         super().__init__()
@@ -362,8 +364,12 @@ class Chart(QWidget):
     def _release(self, at: QPointF) -> None:
         point, began = self.nearest(at), self._pressed
         moved = math.inf if began is None else (at - began).manhattanLength()
-        if point is not None and moved < QApplication.startDragDistance():
+        if moved >= QApplication.startDragDistance():
+            return
+        if point is not None:
             self.clicked.emit(point)
+        if self._view is not None:
+            self.clicked_at.emit(self._view.value_at(at.x()))
 
     def _leave_fit(self) -> None:
         self._fits = False
@@ -505,7 +511,7 @@ def _nearest(x: Array, y: Array, at: QPointF, joined: bool) -> tuple[float, int]
     return float(away[index]), index
 
 
-def _enclosed(x: Array, low: Array, high: Array) -> tuple[Array, Array, Array]:
+def _enclosed(x: Array, low: Array, high: Array) -> tuple[Array, Array, NDArray[np.int32]]:
     """The outline (2 n,) around what lies between `low` and `high` (n,), broken at unknown points.
 
     And whether each point of it is joined to the next.
@@ -680,6 +686,12 @@ class _View(QObject):
         """How much is shown along each axis."""
         (left, right), (low, high) = self._box.viewRange()
         return right - left, high - low
+
+    def value_at(self, x: float) -> float:
+        """The position along the x axis that is seen x px from the left of the view."""
+        (left, _), _ = self._box.viewRange()
+        area = self._box.sceneBoundingRect()
+        return left + (x - area.left()) / area.width() * self.spans[0]
 
     def places(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Where positions along both axes are seen in the view, in px."""

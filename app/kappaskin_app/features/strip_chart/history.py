@@ -61,6 +61,30 @@ class Span:
         return np.repeat(self.times, 2), y.ravel()
 
 
+class Bins:
+    """Least, mean and largest of `columns` numbers in each of the last `most` bins of `width` s."""
+
+    def __init__(self, columns: int, width: float, most: int) -> None:
+        self._width, self._rows = width, _Rows(most, 3, columns)
+        self._open = np.empty(0), np.empty((columns, 0))  # of a span that is not complete
+
+    def append(self, times: Array, values: Array) -> None:
+        """Append `values` (columns, T) at `times` (T,) in s, which never decrease."""
+        times = np.concatenate([self._open[0], times])
+        values = np.concatenate([self._open[1], values], axis=1)
+        number = np.floor(times / self._width)
+        whole = int(np.searchsorted(number, number[-1])) if len(times) else 0
+        self._open = times[whole:], values[:, whole:]
+        if whole:
+            first = np.flatnonzero(np.diff(number[:whole], prepend=-np.inf))
+            self._rows.append(*_combined(times[:whole], np.stack([values[:, :whole]] * 3), first))
+
+    def between(self, column: int, begin: float, end: float) -> tuple[Array, Array]:
+        """Times (n,) in s from `begin` until before `end`, and least, mean and largest (3, n)."""
+        part = slice(*np.searchsorted(self._rows.times, [begin, end]))
+        return self._rows.times[part], self._rows.values[:, column, part].astype(float)
+
+
 class History:
     """Numbers of frames over time, in so many `columns`.
 
@@ -74,8 +98,7 @@ class History:
 
     def clear(self) -> None:
         self._rows = _Rows(_MOST, self._columns)
-        self._bins = _Rows(round(LONG / _BIN), 3, self._columns)
-        self._open = np.empty(0), np.empty((self._columns, 0))  # of a bin that is not complete
+        self._bins = Bins(self._columns, _BIN, round(LONG / _BIN))
         self.last = -np.inf
 
     def append(self, times: Array, values: Array) -> None:
@@ -88,30 +111,20 @@ class History:
             times, values = times[back[-1] + 1 :], values[back[-1] + 1 :]
         if not len(times):
             return
-        before = np.concatenate([[self.last if np.isfinite(self.last) else times[0]], times[:-1]])
-        gaps = np.flatnonzero(times - before > _GAP)
-        times = np.insert(times, gaps, (before[gaps] + times[gaps]) / 2)
-        columns = np.insert(values.astype(float), gaps, np.nan, axis=0).T
+        times, columns = broken(times, values, self.last if np.isfinite(self.last) else times[0])
         self.last = float(times[-1])
         self._rows.append(times, columns)
-        times = np.concatenate([self._open[0], times])
-        columns = np.concatenate([self._open[1], columns], axis=1)
-        number = np.floor(times / _BIN)
-        whole = int(np.searchsorted(number, number[-1]))
-        self._open = times[whole:], columns[:, whole:]
-        if whole:
-            first = np.flatnonzero(np.diff(number[:whole], prepend=-np.inf))
-            self._bins.append(*_combined(times[:whole], np.stack([columns[:, :whole]] * 3), first))
+        self._bins.append(times, columns)
 
     def span(self, column: int, begin: float, parts: int) -> Span:
         """A column since the time `begin` in s, in about so many `parts`."""
-        rows, bins = self._rows, self._bins
+        rows = self._rows
         oldest = float(rows.times[0]) if len(rows.times) else np.inf
-        early = slice(*np.searchsorted(bins.times, [begin, oldest]))
+        early, before = self._bins.between(column, begin, oldest)
         late = slice(int(np.searchsorted(rows.times, begin)), None)
-        times = np.concatenate([bins.times[early], rows.times[late]])
+        times = np.concatenate([early, rows.times[late]])
         recent = np.broadcast_to(rows.values[column, late], (3, len(rows.times[late])))
-        extremes = np.concatenate([bins.values[:, column, early], recent], axis=1).astype(float)
+        extremes = np.concatenate([before, recent], axis=1).astype(float)
         if len(times) <= parts:
             return Span(times, extremes)
         part = max((times[-1] - begin) / parts, 1e-9)
@@ -119,6 +132,17 @@ class History:
         first = np.flatnonzero(np.diff(np.floor(times / part), prepend=-np.inf))
         times, combined = _combined(times, extremes[:, None], first)
         return Span(times, combined[:, 0])
+
+
+def broken(times: Array, values: Array, last: float) -> tuple[Array, Array]:
+    """Times (T,) in s, `values` (T, n) as columns (n, T), with unknown ones in the middle of gaps.
+
+    `last` is the time before the first.
+    """
+    before = np.concatenate([[last], times[:-1]])
+    gaps = np.flatnonzero(times - before > _GAP)
+    middles = (before[gaps] + times[gaps]) / 2
+    return np.insert(times, gaps, middles), np.insert(values.astype(float), gaps, np.nan, axis=0).T
 
 
 def _combined(times: Array, extremes: Array, first: NDArray[np.intp]) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ from kappaskin.frames import Array
 from kappaskin.pipeline import REPORTED
 from kappaskin_app.features.strip_chart.history import LONG, WHOLE, Span
 from kappaskin_app.guard import guarded
-from kappaskin_app.widgets.chart import Chart, ChartAxis, Series
+from kappaskin_app.widgets.chart import Chart, ChartAxis, ChartLine, Series
 from kappaskin_app.widgets.layout import Flow
 
 MIME = "application/x-kappaskin-quantities"
@@ -26,13 +26,18 @@ _TIP = (
     "{} over time; the band is \N{PLUS-MINUS SIGN} 1 standard deviation. Every frame of the last "
     "minute is shown, before that the least and largest in each tenth of a second, for an hour."
 )
+_RECORDED_TIP = (
+    "{} over the whole recording; the band is ± 1 standard deviation. Lines mark "
+    "the present time and the events. Click to go to another time; the wheel zooms, a double click "
+    "shows all."
+)
 _SPAN_TIP = "Time that is shown."
 
 
 def _principal(form: Array) -> Array:
     """Principal curvatures (T, 2) of curvature forms (T, 2, 2), the larger first."""
-    mean = (form[:, 0, 0] + form[:, 1, 1]) / 2
-    off = np.hypot((form[:, 0, 0] - form[:, 1, 1]) / 2, form[:, 0, 1])
+    xx, xy, _, yy = form.reshape(len(form), 4).T
+    mean, off = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
     return np.stack([mean + off, mean - off], axis=-1)
 
 
@@ -91,19 +96,21 @@ class StripChart(QWidget):
     """Charts of the selected quantities, and check boxes that select them.
 
     `toggled` asks for a quantity to be shown or hidden, `added` for those dragged here, `spanned`
-    for another time in s.
+    for another span in s, `sought` for another time in s in a recording.
     """
 
     toggled = Signal(str)
     added = Signal(list)
     spanned = Signal(float)
+    sought = Signal(float)
 
     def __init__(self) -> None:
         super().__init__()
         self.setAcceptDrops(True)
         self.charts: dict[str, Chart] = {}
         self.boxes: dict[str, QCheckBox] = {}
-        self._seconds = WHOLE
+        self._shown: tuple[object, ...] = ()
+        self._length, self._unit = 0.0, 1.0
         top, above = QWidget(), Flow()
         top.setLayout(above)
         for name, quantity in QUANTITIES.items():
@@ -128,44 +135,62 @@ class StripChart(QWidget):
         self.hint.show_series((), _NONE)
         self._around.addWidget(self.hint, 1)
 
-    def show_choice(self, names: Sequence[str], seconds: float) -> None:
-        """Show charts of these quantities over so many s."""
+    def show_choice(self, names: Sequence[str], seconds: float, length: float = 0.0) -> None:
+        """Show charts of these quantities over so many s up to now, or over a recording's length.
+
+        That is in s too; without one the chart is live.
+        """
         names = [name for name in QUANTITIES if name in names]
         for name, box in self.boxes.items():
             box.setChecked(name in names)
         self.span.setCurrentIndex(self.span.findData(seconds))
-        if names == list(self.charts) and seconds == self._seconds:
+        self.span.setVisible(not length)
+        if self._shown == (names, seconds, length):
             return
-        self._seconds = seconds
+        self._shown, self._length = (names, seconds, length), length
+        begin, end = (0.0, length) if length else (-seconds, 0.0)
+        unit, self._unit = ("min", 60.0) if end - begin >= _MINUTES else ("s", 1.0)
+        when = "Time in the recording" if length else "Time from now"
         for name in [name for name in self.charts if name not in names]:
             self.charts.pop(name).deleteLater()
         self.charts = {name: self.charts.get(name) or self._chart(name) for name in names}
-        unit, limit = ("min", seconds / 60) if seconds >= _MINUTES else ("s", seconds)
         for name, chart in self.charts.items():
             self._around.removeWidget(chart)
             self._around.addWidget(chart, 1)
-            title = "Time from now" if name == names[-1] else ""
-            of = QUANTITIES[name]
-            axis = ChartAxis(title, unit, limits=(-limit, 0.0))
-            chart.show_axes(ChartAxis(of.label, of.unit), axis, _TIP.format(of.label))
+            of, tip = QUANTITIES[name], _RECORDED_TIP if length else _TIP
+            title, limits = (
+                when if name == names[-1] else "",
+                (begin / self._unit, end / self._unit),
+            )
+            axis = ChartAxis(title, unit, limits=limits)
+            chart.show_axes(ChartAxis(of.label, of.unit), axis, tip.format(of.label))
         self.hint.setVisible(not names)
 
     def _chart(self, name: str) -> Chart:
         of = QUANTITIES[name]
-        return Chart(ChartAxis(of.label, of.unit), ChartAxis(""), _TIP.format(of.label))
+        chart = Chart(ChartAxis(of.label, of.unit), ChartAxis(""), "")
+        chart.clicked_at.connect(guarded(self._seek))
+        return chart
 
-    def show_span(self, name: str, span: Span, sd: Span | None, now: float) -> None:
-        """Draw a quantity and its standard deviation, in SI units, up to the time `now` in s."""
-        scale, chart = QUANTITIES[name].scale, self.charts[name]
-        each = 60.0 if self._seconds >= _MINUTES else 1.0
+    def _seek(self, at: float) -> None:
+        if self._length:
+            self.sought.emit(min(max(at * self._unit, 0.0), self._length))
+
+    def show_span(
+        self, name: str, span: Span, sd: Span | None, zero: float, marks: Mapping[float, str]
+    ) -> None:
+        """Draw a quantity and its standard deviation, in SI units.
+
+        The times are from `zero` in s on; `marks` are times in s with the colours of lines there.
+        """
+        scale, chart, each = QUANTITIES[name].scale, self.charts[name], self._unit
         times, values = span.outline
-        curve = Series("", (times - now) / each, scale * values)
-        if sd is None:
-            chart.show_series([curve], _EMPTY)
-            return
-        ago, mean = (span.times - now) / each, scale * span.mean
-        band = Series("", ago, mean, line="", band=scale * sd.mean)
-        chart.show_series([curve, band], _EMPTY)
+        shown = [Series("", (times - zero) / each, scale * values)]
+        if sd is not None:
+            ago, mean = (span.times - zero) / each, scale * span.mean
+            shown.append(Series("", ago, mean, line="", band=scale * sd.mean))
+        lines = [ChartLine((at - zero) / each, ink, upright=True) for at, ink in marks.items()]
+        chart.show_series(shown, _EMPTY, lines)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         if event.mimeData().hasFormat(MIME):

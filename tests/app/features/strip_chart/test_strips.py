@@ -6,7 +6,7 @@ from PySide6.QtCore import QEvent, QMimeData, QPointF, Qt
 from PySide6.QtGui import QDropEvent, QMouseEvent
 from PySide6.QtWidgets import QApplication
 
-from kappaskin_app.features.strip_chart.history import History
+from kappaskin_app.features.strip_chart.history import History, Span
 from kappaskin_app.features.strip_chart.panel import MIME, QUANTITIES, RADIUS, StripChart
 
 LEFT = Qt.MouseButton.LeftButton
@@ -66,13 +66,31 @@ def test_a_curve_is_in_the_unit_of_the_screen_up_to_now_with_its_error_band(pane
     history = History(2)
     history.append(times, np.stack([0.1 + 0.01 * times, np.full(len(times), 0.002)], axis=1))
     spans = [history.span(column, 0.0, 600) for column in (0, 1)]
-    panel.show_span("force", *spans, 20.0)
+    panel.show_span("force", *spans, 20.0, {})
     curve, band = panel.charts["force"].series
     assert curve.x[0] == pytest.approx(-20, abs=0.05)
     assert curve.y[-1] == pytest.approx(300, abs=0.5)
     np.testing.assert_allclose(band.band, 2.0, rtol=1e-4)
-    panel.show_span("force", spans[0], None, 20.0)
+    panel.show_span("force", spans[0], None, 20.0, {})
     assert len(panel.charts["force"].series) == 1
+
+
+def test_a_click_on_the_chart_of_a_recording_goes_there(panel, qtbot, until) -> None:
+    sought: list[float] = []
+    panel.sought.connect(sought.append)
+    panel.show_choice(("force",), 60.0, 600.0)
+    times = np.linspace(0, 600, 500)
+    panel.show_span("force", Span(times, np.ones((3, 500))), None, 0.0, {300.0: "accent"})
+    chart = panel.charts["force"]
+    assert (chart.x_axis.label, chart.x_axis.limits) == ("Time in the recording, min", (0.0, 10.0))
+    assert not panel.span.isVisible()
+    until(lambda: chart.place_of(10.0, 0.0).x() > 300)
+    qtbot.mouseClick(chart.canvas, LEFT, pos=chart.place_of(7.5, 500.0).toPoint())
+    assert sought == [pytest.approx(450, abs=2)]
+    panel.show_choice(("force",), 60.0)
+    panel.show_span("force", Span(times - 600, np.ones((3, 500))), None, 0.0, {})
+    qtbot.mouseClick(chart.canvas, LEFT, pos=chart.place_of(-30.0, 500.0).toPoint())
+    assert len(sought) == 1  # live there is no other time to go to
 
 
 def test_every_number_follows_from_what_an_estimate_stores() -> None:
@@ -126,3 +144,19 @@ def test_the_window_draws_force_and_depth_and_a_readout_dragged_down(window, unt
     until(lambda: "position_y" in strips.panel.charts)
     window.actions_by_name["undo"].trigger()
     until(lambda: list(strips.panel.charts) == ["displacement"])
+
+
+@pytest.mark.slow
+def test_a_recording_is_drawn_whole_and_a_click_goes_there(opened, recording, until, qtbot) -> None:
+    window = opened(f"replay:{recording}")
+    window.actions_by_name["dock-strip_chart"].trigger()
+    chart = window.features["strip_chart"].strips.panel.charts["force"]
+    until(lambda: chart.x_axis.title == "" and chart.x_axis.limits[0] == 0)
+    length = window.session.status.replay.length
+    until(lambda: chart.series and len(chart.series[0].x))
+    until(lambda: chart.series[0].x.max() > 0.9 * length)
+    until(lambda: chart.place_of(length, 0.0).x() > 200)
+    window.playback.go(False)
+    place = chart.place_of(length / 2, float(np.nanmax(chart.series[0].y)) / 2)
+    qtbot.mouseClick(chart.canvas, LEFT, pos=place.toPoint())
+    until(lambda: window.session.status.replay.at == pytest.approx(length / 2, rel=0.05))
