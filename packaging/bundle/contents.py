@@ -64,7 +64,7 @@ EXCLUDED = (
     # Of extras: a cluster has its own, ffmpeg is large, and comparing is for who works on this.
     *("dask", "distributed", "imageio_ffmpeg", "skfem"),
     *("hypothesis", "psutil", "pytest", "pydoc_data", "tkinter", "IPython"),
-    *("PySide6.QtDBus", "PySide6.QtNetwork"),
+    *("PySide6.QtDBus", "PySide6.QtNetwork", "PySide6.QtTest", "pyqtgraph.opengl"),
     "PIL.AvifImagePlugin",
     *("vtk", "vtkmodules.all"),  # PyVista names it for type checkers, and it is all of VTK
     *("cffi", "zstandard._cffi", "zstandard.backend_cffi"),  # a second way beside the compiled one

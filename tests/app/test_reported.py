@@ -47,10 +47,10 @@ found["panel"] = "reads twice [1/m]" in facts(7, sensor, status, estimate)
 
 panel, traces = ElementPanel(), Traces()
 values = np.arange(12.0).reshape(2, 6)
-panel.show_history(np.array([-1.0, 0.0]), values, 10.0)
-traces.show_history([3], np.array([-1.0, 0.0]), values[:, :, None], 10.0)
-found["panel's history"] = panel.histories[1].curves[2].values.tolist() == [5.0, 11.0]
-found["traces"] = traces.plots[5].curves[0].values.tolist() == [5.0, 11.0]
+panel.show_history(np.array([-1.0, 0.0]), values)
+traces.show_history([3], np.array([-1.0, 0.0]), values[:, :, None])
+found["panel's history"] = panel.histories[1].series[2].y.tolist() == [5.0, 11.0]
+found["traces"] = traces.plots[5].series[0].y.tolist() == [5.0, 11.0]
 
 tasks = Tasks()
 colouring = Colouring(tasks)

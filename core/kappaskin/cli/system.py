@@ -31,6 +31,7 @@ PACKAGES = (
     "PySide6-Essentials",
     "pyvista",
     "pyvistaqt",
+    "pyqtgraph",
     "vtk",
     "tomlkit",
 )

@@ -11,6 +11,7 @@ from kappaskin.recording.importing import Imported as Imported
 from kappaskin.recording.importing import ImportRequest as ImportRequest
 from kappaskin.recording.importing import ImportTask as ImportTask
 from kappaskin.recording.reading import Recording as Recording
+from kappaskin.recording.reading import contacts_in as contacts_in
 from kappaskin.recording.reading import made_by as made_by
 from kappaskin.recording.recompute import RecordingSummary as RecordingSummary
 from kappaskin.recording.recompute import Verification as Verification

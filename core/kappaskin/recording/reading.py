@@ -9,10 +9,12 @@ from collections import Counter
 from collections.abc import Iterator
 from functools import cached_property
 from io import BytesIO
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 import lz4.frame  # pyright: ignore[reportMissingTypeStubs]
+import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -33,10 +35,12 @@ from mcap.records import (
 
 from kappaskin._files import Budget, open_file
 from kappaskin.errors import Damaged, Refusal
-from kappaskin.frames import Event
+from kappaskin.frames import Array, Event
 from kappaskin.pipeline import REVISION
 from kappaskin.recording.cdr import decode
 from kappaskin.recording.messages import (
+    CONTACT,
+    CONTACTS,
     DEVICE,
     EVENTS,
     LINES,
@@ -56,6 +60,7 @@ _FOOTER = _HEAD.size + 20
 # What work on a record costs, as bytes of a file's budget: each takes some microseconds, and one
 # that is parsed some for each entry.
 _PER_RECORD, _PARSED = 400, 16
+_AT_ONCE = 2000  # contacts
 _FAULTS = (
     McapError,
     ValueError,
@@ -512,3 +517,22 @@ def event_of(message: RecordedMessage, time: float) -> Event:
 def _number(metadata: dict[str, str], name: str, unknown: int) -> int:
     text = metadata.get(name, "")
     return int(text[:_DIGITS]) if text.isascii() and text.isdigit() else unknown
+
+
+def contacts_in(path: Path) -> Iterator[tuple[float, Array, dict[str, Array]]]:
+    """Length of a recording in s, times (T,) in it and the fields (T, ...) of contacts, by name.
+
+    In parts of some thousand contacts, as `CONTACT` has them. A `Refusal` for a file that is no
+    recording.
+    """
+    with Recording(path) as recording:
+        messages = recording.messages_on(CONTACTS)
+        while True:
+            part = list(islice(messages, _AT_ONCE))
+            found = [decode(CONTACT, message.data) for message in part]
+            names = [name for name in (found[0] if found else ()) if name != "header"]
+            fields = {name: np.array([each[name] for each in found]) for name in names}
+            times = [recording.seconds(message.stamp) for message in part]
+            yield recording.seconds(recording.last), np.array(times), fields
+            if len(part) < _AT_ONCE:
+                return

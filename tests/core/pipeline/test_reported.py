@@ -255,10 +255,12 @@ found["foxglove"] = described["description"] == "twice the force"
 ring, slot = Ring.create(), slot_type(made)
 ring.lay_out(1, slot)
 ring.write(estimate)
-got, (_, recent, _) = ring.read(1, slot), ring.recent(1, slot, 0)
+paths = ["curvature", "twice_read"]
+got, (_, recent, _) = ring.read(1, slot), ring.recent(1, slot, 0, paths)
 found["ring"] = np.array_equal(got.twice_read, estimate.twice_read)
 found["ring"] &= getters()["twice"](Reported(got)) == 2 * estimate.contact.force
-found["recent"] = np.array_equal(recent[0], [*got.curvature, *got.twice_read])
+recent = np.concatenate(recent, axis=1)[0]
+found["recent"] = np.array_equal(recent, [*got.curvature, *got.twice_read])
 ring.destroy()
 found["readouts"] = [r.value for r in readouts(got) if r.label == "Twice"] == [
     2 * got.contact.force

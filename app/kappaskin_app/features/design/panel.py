@@ -20,9 +20,9 @@ from kappaskin_app.shell.settings.designed import DesignSettings
 from kappaskin_app.shell.settings.form_fields import Range
 from kappaskin_app.shell.settings.scene import SHAPES
 from kappaskin_app.theme import SEQUENTIAL
+from kappaskin_app.widgets.chart import Chart, ChartAxis, Series
 from kappaskin_app.widgets.layout import row, scrolled
 from kappaskin_app.widgets.parts import ELLIPSIS, button, sentence, text_label
-from kappaskin_app.widgets.plots import Curve, CurvePlot
 from kappaskin_app.widgets.surface_map import SurfaceMap
 from kappaskin_app.widgets.text import length, round_up
 
@@ -38,7 +38,7 @@ _PREDICTED = (
     "simulation. Points are the elements."
 )
 _SIMULATED = "Standard deviation of the estimated displacement in thousands of simulated frames."
-_ALONG = "Standard deviation along x through the middle of the skin, on the scale of the maps."
+_ALONG = "Standard deviation along x through the middle of the skin."
 
 
 class DesignForm(Form):
@@ -121,7 +121,7 @@ class DesignPanel(QWidget):
         self.form = DesignForm()
         self.predicted = SurfaceMap("Predicted", "mm", _PREDICTED)
         self.simulated = SurfaceMap("Simulated", "mm", _SIMULATED)
-        self.along = CurvePlot("Error bar along x", "mm", False, _ALONG)
+        self.along = Chart(ChartAxis("Error bar along x", "mm"), ChartAxis("x", "mm"), _ALONG)
         self.words = text_label()
         self.simulate = button(
             "Check by simulation",
@@ -180,18 +180,16 @@ class DesignPanel(QWidget):
         sides = (1.0, 1.0) if found is None else (float(found.x[-1]), float(found.y[-1]))
         shown = [each.sd for each in (found, check) if each is not None]
         limit = round_up(max((1e3 * float(np.nanmax(sd)) for sd in shown), default=0.0)) or 1.0
-        curves = list[Curve]()
+        curves = list[Series]()
         for number, (view, source, name) in enumerate(
             ((self.predicted, found, "predicted"), (self.simulated, check, "simulated"))
         ):
             sd = None if source is None else 1e3 * source.sd
             view.show_surface(sd, (0.0, limit), SEQUENTIAL, np.full(2, np.nan), sides)
             view.map.show_points(None if sd is None or found is None else found.positions)
-            if sd is not None:
-                curves.append(Curve(name, number, sd[len(sd) // 2]))
-        x = np.empty(0) if found is None else 1e3 * found.x
-        span = (0.0, 1.0) if found is None else (0.0, float(x[-1]))
-        self.along.show_curves(x, curves, span, "mm", "No design yet.")
+            if sd is not None and found is not None:
+                curves.append(Series(name, 1e3 * found.x, sd[len(sd) // 2], number))
+        self.along.show_series(curves, "No design yet.")
 
     def _show_words(self, found: Prospect | None) -> None:
         check = self._prediction.check if self._prediction else None

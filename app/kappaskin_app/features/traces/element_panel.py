@@ -9,11 +9,15 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 from kappaskin.frames import COMPONENTS, Array
 from kappaskin.pipeline import REPORTED, ReportedQuantity
 from kappaskin.sensing import SHOWN_UNITS, SensorLayout
+from kappaskin_app.widgets.chart import Chart, ChartAxis, ChartPoint, Series
 from kappaskin_app.widgets.parts import Label
-from kappaskin_app.widgets.plots import Curve, CurvePlot
 
+SECONDS = 10.0
+"""Length of the history."""
 TRACED = tuple(quantity for quantity in REPORTED if quantity.traced)
+_AGO = ChartAxis("Time", "s", limits=(-SECONDS, 0.0))
 _NONE = "Click an element, on the skin or in a heatmap."
+_FREQUENCY = ChartAxis("Frequency", "Hz")
 _NONE_PLOTTED = "Click an element, then Plot in its panel (Ctrl+Alt+E)."
 _TRACE = "{} over the last 10 s, in every computed frame, up to 500 per second."
 _SPECTRUM = (
@@ -56,10 +60,10 @@ class ElementPanel(QWidget):
         self.button.setEnabled(False)
         self._names, self._scales = list(COMPONENTS), np.ones(len(COMPONENTS))
         self.histories = [
-            CurvePlot(of.traced, of.unit, True, _TRACE.format(f"{of.traced} (xx, yy, xy)"))
+            Chart(ChartAxis(of.traced, of.unit), _AGO, _TRACE.format(f"{of.traced} (xx, yy, xy)"))
             for of in TRACED
         ]
-        self.spectrum = CurvePlot("Amplitude", TRACED[0].unit, False, _SPECTRUM)
+        self.spectrum = Chart(ChartAxis("Amplitude", TRACED[0].unit), _FREQUENCY, _SPECTRUM)
         left = QVBoxLayout()
         for widget in (self.title, self.facts):
             left.addWidget(widget)
@@ -76,8 +80,8 @@ class ElementPanel(QWidget):
         self._names, (self._scales, unit) = layout.kind_names, scales_of(layout)
         for of, plot in zip(TRACED, self.histories, strict=True):
             names = f"{traced_title(of, layout)} ({', '.join(self._names)})"
-            plot.show_title(traced_title(of, layout), unit, _TRACE.format(names))
-        self.spectrum.show_title("Amplitude", unit, _SPECTRUM)
+            plot.show_axes(ChartAxis(traced_title(of, layout), unit), _AGO, _TRACE.format(names))
+        self.spectrum.show_axes(ChartAxis("Amplitude", unit), _FREQUENCY, _SPECTRUM)
 
     def show_facts(self, title: str, facts: str) -> None:
         """Write the title and facts of the element; empty for none."""
@@ -89,29 +93,27 @@ class ElementPanel(QWidget):
     def show_plotted(self, plotted: bool) -> None:
         self.button.setText("Stop plo&tting" if plotted else "Plo&t")
 
-    def show_history(self, times: Array, values: Array, seconds: float) -> None:
+    def show_history(self, times: Array, values: Array) -> None:
         """Draw `values` (T, n k) of k quantities at `times` (T,) in s up to now."""
         count = len(self._names)
         for number, plot in enumerate(self.histories):
-            curves = [
-                Curve(name, n, self._scales[n] * values[:, count * number + n])
-                for n, name in enumerate(self._names)
-            ]
-            plot.show_curves(times, curves, (-seconds, 0.0), "s")
+            plot.show_series(
+                [
+                    Series(name, times, self._scales[n] * values[:, count * number + n], n)
+                    for n, name in enumerate(self._names)
+                ]
+            )
 
     def show_spectrum(self, frequencies: Array, amplitudes: Array) -> None:
         """Draw `amplitudes` (n, F) in SI units at `frequencies` (F,) in Hz, or a note without."""
-        curves = [
-            Curve(name, n, scale * amplitude)
-            for n, (name, scale, amplitude) in enumerate(
-                zip(self._names, self._scales.tolist(), amplitudes, strict=True)
-            )
-        ]
-        if not len(frequencies):
-            self.spectrum.show_curves(frequencies, (), (0.0, 1.0), "Hz", "Not enough readings yet.")
-            return
-        span = (0.0, float(frequencies[-1]))
-        self.spectrum.show_curves(frequencies, curves, span, "Hz")
+        each = zip(self._names, self._scales.tolist(), amplitudes, strict=True)
+        self.spectrum.show_series(
+            [
+                Series(name, frequencies, scale * amplitude, n)
+                for n, (name, scale, amplitude) in enumerate(each)
+            ],
+            "Not enough readings yet.",
+        )
 
 
 class Traces(QWidget):
@@ -123,7 +125,7 @@ class Traces(QWidget):
         super().__init__()
         self._around = QHBoxLayout(self)
         self._around.setContentsMargins(8, 4, 8, 6)
-        self.plots: list[CurvePlot] = []
+        self.plots: list[Chart] = []
         self._scales = np.ones(len(COMPONENTS) * len(TRACED))
         self._show_plots([(f"{of.traced} {name}", of.unit) for of in TRACED for name in COMPONENTS])
 
@@ -133,12 +135,15 @@ class Traces(QWidget):
             plot.deleteLater()
         del self.plots[len(titles) :]
         for plot, (title, unit) in zip(self.plots, titles, strict=False):
-            plot.show_title(title, unit, _TRACE.format(title))
+            plot.show_axes(ChartAxis(title, unit), _AGO, _TRACE.format(title))
         for title, unit in titles[len(self.plots) :]:
-            plot = CurvePlot(title, unit, True, _TRACE.format(title))
+            plot = Chart(ChartAxis(title, unit), _AGO, _TRACE.format(title))
             self._around.addWidget(plot)
-            plot.pointed.connect(self.pointed)
+            plot.pointed.connect(self._point)
             self.plots.append(plot)
+
+    def _point(self, point: ChartPoint | None) -> None:
+        self.pointed.emit(-1 if point is None else point.series.key)
 
     def show_layout(self, layout: SensorLayout) -> None:
         """Have a plot for each quantity that the elements of a layout read."""
@@ -150,16 +155,14 @@ class Traces(QWidget):
         )
         self._scales = np.tile(scales, len(TRACED))
 
-    def show_history(
-        self, elements: Sequence[int], times: Array, values: Array, seconds: float
-    ) -> None:
+    def show_history(self, elements: Sequence[int], times: Array, values: Array) -> None:
         """Draw `values` (T, plots, k) of k `elements` at `times` (T,) in s up to now."""
         for row, plot in enumerate(self.plots):
             curves = [
-                Curve(str(element), n, self._scales[row] * values[:, row, n], element)
+                Series(str(element), times, self._scales[row] * values[:, row, n], n, key=element)
                 for n, element in enumerate(elements)
             ]
-            plot.show_curves(times, curves, (-seconds, 0.0), "s", _NONE_PLOTTED)
+            plot.show_series(curves, _NONE_PLOTTED)
 
     def mark(self, element: int) -> None:
         for plot in self.plots:

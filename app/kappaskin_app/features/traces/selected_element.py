@@ -15,6 +15,7 @@ from kappaskin.live import Status
 from kappaskin.pipeline import REPORTED, Reported, ReportedQuantity
 from kappaskin.sensing import Sensor, SensorLayout
 from kappaskin_app.features.traces.element_panel import (
+    SECONDS,
     TRACED,
     ElementPanel,
     Traces,
@@ -27,8 +28,6 @@ from kappaskin_app.shell.selection import Selection
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
 
-SECONDS = 10.0
-"""Length of the history."""
 _LEAST_PERIOD = 0.002  # s between two stored frames
 _ROUNDING = 1e-6  # of a period: at exactly that rate all frames are stored
 _MOST_BYTES = 24e6  # of the buffer: with many elements fewer frames are stored
@@ -67,6 +66,13 @@ class ReadingBuffer:
 
 
 _READ = tuple(quantity for quantity in REPORTED if quantity.element_head)
+_PATHS = [str(quantity.value) for quantity in TRACED]
+
+
+def _by_kind(values: list[Array], layout: SensorLayout) -> Array:
+    """Values (T, n k, P) of k traced quantities, each in the n kinds of readings of a layout."""
+    each = [v if v.ndim == 3 else layout.by_kind(v) for v in values]
+    return np.concatenate(each, axis=1)
 
 
 def _heads(layout: SensorLayout) -> tuple[str, ...]:
@@ -227,8 +233,10 @@ class SelectedElement(QObject):
         key = status.connections, estimate.generation
         if key != self._key:
             self._key, self._last_number = key, 0
-        times, readings, self._last_number = self._session.engine.recent(status, self._last_number)
-        self._buffer.append(times, readings)
+        engine = self._session.engine
+        times, traced, self._last_number = engine.recent(status, self._last_number, _PATHS)
+        if traced and status.sensor is not None:
+            self._buffer.append(times, _by_kind(traced, status.sensor.layout))
         if self.panel.isVisible() and self.element >= 0:
             self._show_panel(estimate, now)
         if now >= self._next_plots:
@@ -239,7 +247,7 @@ class SelectedElement(QObject):
     def _show_panel(self, estimate: Estimate, now: float) -> None:
         if now >= self._next_plots:
             times, values = self._buffer.of([self.element])
-            self.panel.show_history(times, values[:, :, 0], SECONDS)
+            self.panel.show_history(times, values[:, :, 0])
         if now >= self._next_facts:
             self._next_facts = now + _FACTS_PERIOD
             self._show_facts(estimate)
@@ -277,7 +285,7 @@ class SelectedElement(QObject):
 
     def _show_traces(self, elements: int) -> None:
         traced = [one for one in self._history.settings.traced if one < elements]
-        self.traces.show_history(traced, *self._buffer.of(traced), SECONDS)
+        self.traces.show_history(traced, *self._buffer.of(traced))
 
     # Display.
 

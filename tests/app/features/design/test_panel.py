@@ -111,7 +111,7 @@ def test_a_design_is_predicted_checked_undone_and_saved(
     design.simulate.click()
     assert design.simulate.text() == "Stop the check"
     until(lambda: prediction.check is not None and not prediction.checking, 60)
-    assert [curve.name for curve in design.along.curves] == ["predicted", "simulated"]
+    assert [curve.name for curve in design.along.series] == ["predicted", "simulated"]
     assert "times the prediction" in design.words.text()
 
     window.requests.set("design_place", "clustered")

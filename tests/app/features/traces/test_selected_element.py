@@ -5,14 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import QToolTip
 
 from kappaskin import Status, load_scene
 from kappaskin.health import Health
 from kappaskin.health.findings import Finding
 from kappaskin_app.features.membrane.camera import Projection
-from kappaskin_app.features.traces.selected_element import SECONDS, ReadingBuffer, facts
+from kappaskin_app.features.traces.element_panel import SECONDS, Traces
+from kappaskin_app.features.traces.selected_element import ReadingBuffer, facts
 from kappaskin_app.shell.window import MainWindow
-from kappaskin_app.widgets.plots import Curve, CurvePlot
 
 
 def pixel_of(window: MainWindow, element: int) -> QPoint:
@@ -85,24 +86,30 @@ def centre_estimate():
     return pipeline.sensor, pipeline(Simulator(scene).frame(100, lambda: 1.0))
 
 
-def test_a_curve_is_pointed_at_where_it_is_drawn_and_broken_where_nothing_is(
-    qapp, until, points_at
+def test_a_trace_is_pointed_at_where_it_is_drawn_and_bold_while_it_is_marked(
+    qtbot, until, points_at
 ) -> None:
-    plot, table = CurvePlot("Curvature", "1/m", True, "tip"), []
-    plot.resize(400, 200)
-    plot.show()
-    plot.pointed.connect(table.append)
-    x = np.linspace(-10, 0, 11)
-    low, high = np.full(11, -1.0), np.full(11, 1.0)
-    high[4:7] = np.nan
-    plot.show_curves(x, [Curve("3", 0, low, 3), Curve("9", 1, high, 9)], (-10, 0), "s")
-    colours = {plot.grab().toImage().pixelColor(120, y).name() for y in range(20, 180)}
-    assert len(colours) > 2
-    points_at(plot, QPoint(120, 195 - plot.fontMetrics().height()))
-    until(lambda: table[-1:] == [3])
-    points_at(plot, QPoint(225, 100))
-    until(lambda: table[-1:] == [-1])
-    plot.close()
+    traces, table = Traces(), []
+    qtbot.addWidget(traces)
+    traces.resize(1500, 240)
+    traces.pointed.connect(table.append)
+    times = np.linspace(-10, 0, 11)
+    values = np.ones((11, 6, 2)) * [-1.0, 1.0]
+    values[4:7, 0, 1] = np.nan
+    traces.show_history([3, 9], times, values)
+    traces.show()
+    plot = traces.plots[0]
+    until(lambda: plot.place_of(0.0, 0.0).x() > 100)
+    plain = plot.grab().toImage()
+    points_at(plot.canvas, plot.place_of(-7.5, -1.0).toPoint())
+    assert table[-1:] == [3]
+    traces.mark(3)
+    assert plot.grab().toImage() != plain
+    points_at(plot.canvas, plot.place_of(-5.0, 1.0).toPoint())
+    assert table[-1:] == [-1]
+    traces.mark(-1)
+    assert plot.grab().toImage() == plain
+    until(lambda: not QToolTip.isVisible())
 
 
 @pytest.mark.full
@@ -128,16 +135,16 @@ def test_a_click_on_the_skin_opens_the_panel_which_plots_the_element(
     assert not panel.isVisible()
     qtbot.mouseClick(window.membrane.plotter, left, pos=pixel_of(window, 17))
     until(lambda: panel.isVisible() and "Element 17" in panel.title.text())
-    until(lambda: len(panel.histories[0].curves) == 3 and len(panel.spectrum.curves) == 3)
+    until(lambda: len(panel.histories[0].series) == 3 and len(panel.spectrum.series) == 3)
     until(lambda: "\N{PLUS-MINUS SIGN}" in panel.title.text())  # its error bar
     panel.button.click()
     assert window.history.settings.traced == (17,)
     window.actions_by_name["dock-traces"].trigger()
     until(
-        lambda: [curve.name for curve in window.selected_element.traces.plots[0].curves] == ["17"]
+        lambda: [curve.name for curve in window.selected_element.traces.plots[0].series] == ["17"]
     )
     window.history.stack.undo()
-    until(lambda: not window.selected_element.traces.plots[0].curves)
+    until(lambda: not window.selected_element.traces.plots[0].series)
     window.heatmaps["xx"].chosen.emit(44)
     until(lambda: "Element 44" in panel.title.text())
 
