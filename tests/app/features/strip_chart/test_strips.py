@@ -24,7 +24,7 @@ def panel(qtbot) -> StripChart:
 
 def test_each_selected_number_has_a_chart_in_its_unit(panel) -> None:
     assert list(panel.charts) == ["force", "displacement"]
-    assert panel.charts["force"].y_axis.label == "Force, mN"
+    assert panel.charts["force"].y_axis.label == "Force, N"
     assert [box.text() for box in panel.boxes.values() if box.isChecked()] == ["Force", "Depth"]
     panel.show_choice((), 60.0)
     assert not panel.charts
@@ -69,8 +69,8 @@ def test_a_curve_is_in_the_unit_of_the_screen_up_to_now_with_its_error_band(pane
     panel.show_span("force", *spans, 20.0, {})
     curve, band = panel.charts["force"].series
     assert curve.x[0] == pytest.approx(-20, abs=0.05)
-    assert curve.y[-1] == pytest.approx(300, abs=0.5)
-    np.testing.assert_allclose(band.band, 2.0, rtol=1e-4)
+    assert curve.y[-1] == pytest.approx(0.3, abs=0.5e-3)
+    np.testing.assert_allclose(band.band, 0.002, rtol=1e-4)
     panel.show_span("force", spans[0], None, 20.0, {})
     assert len(panel.charts["force"].series) == 1
 
@@ -85,11 +85,11 @@ def test_a_click_on_the_chart_of_a_recording_goes_there(panel, qtbot, until) -> 
     assert (chart.x_axis.label, chart.x_axis.limits) == ("Time in the recording, min", (0.0, 10.0))
     assert not panel.span.isVisible()
     until(lambda: chart.place_of(10.0, 0.0).x() > 300)
-    qtbot.mouseClick(chart.canvas, LEFT, pos=chart.place_of(7.5, 500.0).toPoint())
+    qtbot.mouseClick(chart.canvas, LEFT, pos=chart.place_of(7.5, 0.5).toPoint())
     assert sought == [pytest.approx(450, abs=2)]
     panel.show_choice(("force",), 60.0)
     panel.show_span("force", Span(times - 600, np.ones((3, 500))), None, 0.0, {})
-    qtbot.mouseClick(chart.canvas, LEFT, pos=chart.place_of(-30.0, 500.0).toPoint())
+    qtbot.mouseClick(chart.canvas, LEFT, pos=chart.place_of(-30.0, 0.5).toPoint())
     assert len(sought) == 1  # live there is no other time to go to
 
 
@@ -108,7 +108,7 @@ def test_the_window_draws_force_and_depth_and_a_readout_dragged_down(window, unt
     strips = window.features["strip_chart"].strips
     until(lambda: all(chart.series for chart in strips.panel.charts.values()))
     until(lambda: len(strips.panel.charts["force"].series[0].x) > 20)
-    force = 1e3 * window.session.estimate.contact.force
+    force = window.session.estimate.contact.force
     drawn = strips.panel.charts["force"].series[0].y
     assert np.nanmedian(drawn) == pytest.approx(force, rel=0.1)
 
