@@ -383,7 +383,7 @@ class Recording:
 
     def seconds(self, stamp: int) -> float:
         """The time of a `stamp`, in s since the recording began."""
-        return (stamp - self.first) * 1e-9
+        return (stamp - self.first) / 1e9
 
     def devices(self) -> Iterator[tuple[float, str]]:
         """The information texts of devices, each with its time in s since the recording began."""
