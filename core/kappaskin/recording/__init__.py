@@ -26,5 +26,6 @@ from kappaskin.recording.replay import Replay as Replay
 from kappaskin.recording.replay import ReplayedSource as ReplayedSource
 from kappaskin.recording.writing import RecordingStatus as RecordingStatus
 from kappaskin.recording.writing import part_of as part_of
+from kappaskin.recording.writing import renamed as renamed
 from kappaskin.recording.writing import repair_command as repair_command
 from kappaskin.recording.writing import unused as unused

@@ -40,7 +40,7 @@ FORMATS: dict[str, type[ExportWriter]] = {
 
 _REPORT = 0.05  # s between two reports
 _EARLY = 1e-6  # share of a period by which a frame may come early: times are rounded
-_SAMPLE = 0.5  # s of writing from which a forecast is made
+_SAMPLE = 0.2  # s of a core for writing what a forecast is made from
 
 
 class Exported(NamedTuple):
@@ -102,14 +102,14 @@ def _steps(
     seconds: float,
     result: "Callable[[_ExportWork], _Result]",
 ) -> Generator[float | _Result]:
-    """Write for so many `seconds`: shares, and the `result`."""
+    """Write for so many `seconds` of the processor: shares, and the `result`."""
     try:
         with Recording(request.recording) as recording:
             info = recording_info(recording, request)
             with closing(FORMATS[request.format](scratch, request, info)) as writer:
                 work, next_report = _ExportWork(recording, request, info, writer), 0.0
                 for message in recording.messages():
-                    if not work.take(message) or time.monotonic() - work.since > seconds:
+                    if not work.take(message) or time.process_time() - work.since > seconds:
                         break
                     if time.monotonic() >= next_report:
                         next_report = time.monotonic() + _REPORT
@@ -144,9 +144,10 @@ class _ExportWork:
         self._last = math.nan  # s, when the last frame that was looked at came
         self._written = self._unsettled = self._shapeless = 0
         self._slope = 0.0
-        self._begun, self.since = time.monotonic(), math.inf
-        """When the first frame was written."""
-        self._first = 0.0  # s since the recording began, when that came
+        self.since = math.inf
+        """The processor's time when the first frame was written."""
+        self._begun = self._wrote = time.monotonic()
+        self._first = 0.0  # s since the recording began, when the first frame came
 
     def take(self, message: RecordedMessage) -> bool:
         """Take one message; whether the next one is needed too."""
@@ -167,7 +168,8 @@ class _ExportWork:
             self._unsettled += 1
         elif self._writer.take(ExportedFrame(at, frame, estimate, pipeline)):
             if not self._written:
-                self.since, self._first = time.monotonic(), at
+                self.since, self._first = time.process_time(), at
+                self._wrote = time.monotonic()
             self._written += 1
             if pipeline.fitted is not None:
                 self._slope = max(self._slope, pipeline.fitted.neglected_slope)
@@ -220,7 +222,7 @@ class _ExportWork:
         series = request.every and covered > 0
         frames = 1 + span // request.every if series else self._written * share
         size = sum(file.stat().st_size for file in scratch.rglob("*") if file.is_file())
-        seconds = self.since - self._begun + share * (time.monotonic() - self.since)
+        seconds = self._wrote - self._begun + share * (time.monotonic() - self._wrote)
         whole = self._head + max(size - self._head, 0) * frames / self._written
         return Forecast(round(frames), round(whole), seconds)
 
