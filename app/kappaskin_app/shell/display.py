@@ -114,7 +114,7 @@ class Display(QObject):
             self.ranges = Ranges(1e3 * max(patch.a, patch.b), self.colouring.shades)
             self.restarted.emit(status)
         state = self._session.badge()
-        self.badge.show_state(state, status.recording.active)
+        self.badge.show_state(state, status.recording)
         self.old = state in _OLD
         self.status_shown.emit(status)
         now = time.monotonic()

@@ -34,6 +34,20 @@ def _with_unit(value: float, units: tuple[tuple[float, float, str], ...]) -> str
     return f"{shown:.{min(digits, _MOST_DIGITS)}f} {unit}"
 
 
+def elapsed(seconds: float) -> str:
+    """A time as m:ss, or h:mm:ss from an hour on."""
+    hours, rest = divmod(int(seconds), 3600)
+    return f"{hours}:{rest // 60:02d}:{rest % 60:02d}" if hours else f"{rest // 60}:{rest % 60:02d}"
+
+
+def file_size(count: int) -> str:
+    """A number of bytes in few digits."""
+    for one, unit in ((1e9, "GB"), (1e6, "MB"), (1e3, "kB")):
+        if count >= one:
+            return f"{count / one:.1f} {unit}"
+    return f"{count} B"
+
+
 def day(time: float) -> str:
     """A time in s since 1970 to the minute."""
     return f"{datetime.fromtimestamp(time):%Y-%m-%d %H:%M}"

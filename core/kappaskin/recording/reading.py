@@ -51,7 +51,7 @@ from kappaskin.recording.messages import (
     Topic,
     unpack_line,
 )
-from kappaskin.recording.writing import FORMAT, PROGRAM
+from kappaskin.recording.writing import FORMAT, PROGRAM, part_of
 
 MAGIC = b"\x89MCAP0\r\n"
 LARGEST = 2**26  # bytes of a record, or of what is in a chunk
@@ -233,9 +233,10 @@ class Recording:
             self._file.seek(0)
             magic = self._file.read(len(MAGIC))
         except OSError as error:
-            raise Refusal(
-                f"{path}: cannot be read ({error.strerror or error}); expected a recording"
-            ) from error
+            why = f"cannot be read ({error.strerror or error}); expected a recording"
+            if part_of(path).exists():
+                why = f"is not complete; end the recording, or use {part_of(path).name}"
+            raise Refusal(f"{path}: {why}") from error
         self.library = ""
         # Where they were lost with the beginning of the file:
         self.format, self.revision = FORMAT, 0
@@ -388,7 +389,7 @@ class Recording:
 
     def seconds(self, stamp: int) -> float:
         """The time of a `stamp`, in s since the recording began."""
-        return (stamp - self.first) * 1e-9
+        return (stamp - self.first) / 1e9
 
     def devices(self) -> Iterator[tuple[float, str]]:
         """The information texts of devices, each with its time in s since the recording began."""

@@ -150,7 +150,7 @@ FLAGS = ["present", "single", "near_rim", "force_is_lower_bound", "shape_follows
 @pytest.fixture
 def made() -> list:
     sensor = load_scene("centre").sensor()
-    return list(columns(SimpleNamespace(sensor=sensor, functions=(5, 4))))  # pyright: ignore
+    return list(columns(SimpleNamespace(sensor=sensor, functions=(5, 4)), "everything"))  # pyright: ignore
 
 
 def test_columns_are_called_as_they_always_were(made) -> None:
@@ -228,7 +228,7 @@ recording, folder, guide = map(Path, sys.argv[1:])
 found = {}
 for suffix in (".csv", ".npz", ".h5"):
     to = folder / f"out{suffix}"
-    list(export_steps(ExportRequest(recording, to), folder))
+    list(export_steps(ExportRequest(recording, to, preset="everything"), folder))
 
 
 def doubled(file, name, half):

@@ -18,6 +18,7 @@ from kappaskin.errors import Refusal
 from kappaskin.live import Status
 from kappaskin_app.features.calibration.controller import WeightController, parsed
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.folders import proposed
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.widgets.parts import (
     ELLIPSIS,
@@ -85,7 +86,9 @@ class WeightsPanel(Panel):
         if found is None:
             return
         name = f"{found.serial_number}-{found.date.astimezone():%Y%m%d}.calibration.toml"
-        path, _ = QFileDialog.getSaveFileName(self, "Save the calibration", name, FILES)
+        path, _ = QFileDialog.getSaveFileName(
+            self, "Save the calibration", str(proposed(name)), FILES
+        )
         if path:
             controller.save(Path(path))
 
