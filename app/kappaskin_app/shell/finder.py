@@ -177,15 +177,39 @@ def _layouts(window: Parts) -> Iterator[FinderEntry]:
 _BEGINS, _FOLLOWS, _SKIPS = 8, 5, 0.2  # points of a letter that begins a word, or has its neighbour
 _WHOLE = 4  # points more where the text begins so
 _FAR = 0.3  # of the best one's points, below which an entry is not listed
-_ELSEWHERE = 0.4  # of the points, for what is found only in the place of an entry
+_ELSEWHERE = 0.4  # of the points, for what is found only in the place of an entry or in a synonym
+_SYNONYMS = {
+    "camera": "zoom rotate view",
+    "chart": "plot graph curve",
+    "compare": "difference a b",
+    "connect": "device usb serial com tty",
+    "connection": "device usb serial com tty port baud",
+    "cost": "plot performance speed",
+    "export": "csv parquet table save data",
+    "film": "video movie animation",
+    "guide": "help manual documentation",
+    "log": "console errors",
+    "noise": "sigma error",
+    "picture": "screenshot snapshot image png",
+    "publish": "stream udp ros foxglove send",
+    "record": "save capture",
+    "tare": "zero reset offset",
+    "text": "font zoom letters",
+    "theme": "dark light colours mode",
+    "traces": "plot graph",
+    "undo": "back revert",
+}
+"""What a word of a title is called elsewhere."""
 
 
 def score(query: str, text: str, place: str = "") -> float:
     """Points of `text`, at `place`, for all words of `query`; 0 where one is not found.
 
-    The words may come in any order, their letters only in theirs.
+    The words may come in any order. Each is a part of the text, or the beginnings of its words.
     """
-    points = [_best(word, text, place) for word in query.lower().split()]
+    names = [_SYNONYMS.get(word, "") for word in text.lower().replace(":", " ").split()]
+    beside = " ".join([place, *names])
+    points = [_best(word, text, beside) for word in query.lower().split()]
     if not points:
         return 1.0
     return sum(points) - 0.01 * len(text) if min(points) > 0 else 0.0
@@ -197,39 +221,32 @@ def best(points: Mapping[str, float]) -> list[str]:
     return sorted((name for name in points if points[name] > least), key=lambda name: -points[name])
 
 
-def _best(word: str, text: str, place: str) -> float:
-    return max(_points(word, text.lower()), _ELSEWHERE * _points(word, place.lower()))
+def _best(word: str, text: str, beside: str) -> float:
+    return max(_points(word, text.lower()), _ELSEWHERE * _points(word, beside.lower()))
 
 
 @lru_cache(maxsize=20_000)
 def _points(word: str, text: str) -> float:
-    """Points of the best way to find the letters of `word` in `text`; 0 where there is none."""
-    letters = iter(text)
-    if not all(letter in letters for letter in word):
-        return 0.0
+    """Points of the best way to find a `word` in `text`; 0 where there is none."""
+    begins = [at == 0 or not text[at - 1].isalnum() for at in range(len(text))]
     # best[j]: of the letters so far, the last of them at j.
-    best = {at: _at(text, at) for at, letter in enumerate(text) if letter == word[0]}
+    best = {at: 1.0 + _BEGINS for at, here in enumerate(text) if here == word[0] and begins[at]}
     for letter in word[1:]:
         best = {
             at: max(
-                _step(text, before, at) + points for before, points in best.items() if before < at
+                points
+                + (1.0 + _FOLLOWS if at == before + 1 else 1.0 + _BEGINS)
+                - _SKIPS * (at - before - 1)
+                for before, points in best.items()
+                if before == at - 1 or (before < at and begins[at])
             )
-            for at in range(min(best) + 1, len(text))
+            for at in range(min(best, default=0) + 1, len(text))
             if text[at] == letter
+            and (at - 1 in best or (begins[at] and any(before < at for before in best)))
         }
-    most = max(best.values(), default=0.0)
-    return max(most, 0.1) + _WHOLE * text.startswith(word)
-
-
-def _at(text: str, at: int) -> float:
-    begins = at == 0 or not text[at - 1].isalnum()
-    return 1.0 + _BEGINS * begins
-
-
-def _step(text: str, before: int, at: int) -> float:
-    """Points of a letter at `at` after one at `before`."""
-    skipped = at - before - 1
-    return max(_at(text, at), 1.0 + _FOLLOWS * (skipped == 0)) - _SKIPS * skipped
+    inside = len(word) + _FOLLOWS * (len(word) - 1) if word in text else 0.0
+    most = max(inside, *(max(points, 0.1) for points in best.values()), 0.0)
+    return most + _WHOLE * text.startswith(word)
 
 
 _LED = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
@@ -316,9 +333,7 @@ class Finder(QDialog):
             "A command, a setting, a scene, a panel, a file\N{HORIZONTAL ELLIPSIS}"
         )
         self.line.setAccessibleName("Search")
-        self.line.setToolTip(
-            "A few letters of a name, in their order: nogau finds Noise: Gaussian."
-        )
+        self.line.setToolTip("Part of a name, or how its words begin: nogau finds Noise: Gaussian.")
         clearable(self.line)
         self.list.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the line keeps it
         self.list.setAccessibleName("Matches")

@@ -1,3 +1,4 @@
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,12 +16,14 @@ WORDS = st.text("abc- ", min_size=1, max_size=12)
 
 
 @given(WORDS, WORDS)
-def test_a_text_is_found_exactly_if_it_has_the_letters_of_each_word_in_order(
+def test_a_text_is_found_exactly_if_each_word_is_part_of_it_or_how_its_words_begin(
     query: str, text: str
 ) -> None:
     def has(word: str) -> bool:
-        at = -1
-        return all((at := text.find(letter, at + 1)) >= 0 for letter in word)
+        begin = "(?<![a-z0-9])"
+        first, *rest = map(re.escape, word)
+        beginnings = begin + first + "".join(f"(?:{one}|.*{begin}{one})" for one in rest)
+        return word in text or re.search(beginnings, text) is not None
 
     assert (score(query, text) > 0) == all(has(word) for word in query.split())
 
@@ -40,6 +43,27 @@ def test_what_begins_a_word_or_stands_together_ranks_first(
     query: str, better: str, worse: str
 ) -> None:
     assert score(query, better) > score(query, worse)
+
+
+@pytest.mark.parametrize(
+    ("query", "found"),
+    [
+        ("screenshot", "Save picture"),
+        ("csv", "Export the recording"),
+        ("baud", "Connection panel"),
+        ("port", "Connection panel"),
+        ("zero", "Tare now"),
+        ("plot", "Strip chart"),
+        ("zoom", "Reset camera"),
+    ],
+)
+def test_what_others_call_it_is_found(query: str, found: str) -> None:
+    assert score(query, found) > 0
+
+
+@pytest.mark.parametrize("text", ["Size of the error bars", "Azure topography", "Noise: Gaussian"])
+def test_letters_scattered_over_a_text_are_no_match(text: str) -> None:
+    assert score("zero", text) == 0
 
 
 def test_a_name_ranks_before_a_place() -> None:
