@@ -73,9 +73,11 @@ class RecordedFrames:
         return self._decoder.accounting()
 
     def begin_with(self, message: RecordedMessage) -> None:
-        """Start in the middle of a recording with the last message about a device or clock."""
+        """Start in the middle of a recording with the last message on a device, clock or truth."""
         if message.topic == m.CLOCKS.name:
             self._map(decode(m.CLOCK, message.data) | {"since": math.nan})
+        elif message.topic == m.TRUTHS.name:
+            self._truth = _truth(decode(m.TRUTH, message.data), self.sensor)
         else:
             self._learn(decode(m.STRING, message.data)["data"])
 

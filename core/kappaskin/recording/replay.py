@@ -199,9 +199,13 @@ class ReplayedSource:
         # From the chunk before, so that no message is begun in its middle.
         chunks = self._recording.chunks
         later = next((n for n, chunk in enumerate(chunks) if chunk.last >= stamp), len(chunks))
-        for topic in (m.DEVICE, m.CLOCKS):
-            if message := self._recording.last_before(topic, stamp):
+        since = 0
+        for topic in (m.DEVICE, m.CLOCKS, m.TRUTHS):
+            message = self._recording.last_before(topic, stamp)
+            if message is not None and message.stamp >= since:
                 self._frames.begin_with(message)
+            if message is not None and topic is m.DEVICE:
+                since = message.stamp  # what is older is of another device
         self._results = _RecordedResults(self._recording, max(later - 1, 0), stamp)
         self._messages: Iterator[RecordedMessage] = self._recording.messages(max(later - 1, 0))
         self._next: RecordedMessage | None = next(self._messages, None)

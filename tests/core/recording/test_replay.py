@@ -359,3 +359,26 @@ def test_contacts_of_what_is_no_recording_are_refused(tmp_path) -> None:
     (tmp_path / "no.mcap").write_bytes(b"nothing")
     with pytest.raises(Refusal, match=r"no\.mcap"):
         next(contacts_in(tmp_path / "no.mcap"))
+
+
+def test_the_truth_of_a_load_that_stays_is_known_wherever_one_goes(
+    tmp_path, written_out, clock
+) -> None:
+    path = tmp_path / "centre.mcap"
+    source = SimulatedSource(load_scene("centre"), clock, clock.sleep)
+    recorder = Recorder(path, clock())
+    source.record(recorder)
+    count = 0
+    while count < 400:
+        count += len(source.read(1.0))
+        if count % 100 == 0:
+            written_out(recorder)
+    recorder.close()
+
+    with closing(ReplayedSource(path, clock, clock.sleep)) as replayed:
+        replayed.seek(0.6, 0.0)
+        (there,) = replayed.read(0.1)
+
+    assert there.device_time > 0.5
+    assert there.truth is not None
+    assert there.truth.contact.tolist() == [0.05, 0.05]
