@@ -29,6 +29,7 @@ from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
 
 _LEAST_PERIOD = 0.002  # s between two stored frames
+_GAP = 0.5  # s without a frame, as where a replay goes elsewhere, that a curve does not cross
 _ROUNDING = 1e-6  # of a period: at exactly that rate all frames are stored
 _MOST_BYTES = 24e6  # of the buffer: with many elements fewer frames are stored
 
@@ -53,9 +54,15 @@ class ReadingBuffer:
         for at, read in zip(times.tolist(), readings, strict=True):
             if (rows, elements) != self._read.shape[1:] or at < self._last:
                 self.clear(elements, rows)  # another sensor, or a restarted one
+            if at - self._last > _GAP and self._last >= 0:
+                self._put((at + self._last) / 2, np.full_like(read, np.nan))
             if at - self._last >= (1 - _ROUNDING) * self._least:
-                self._times[self._next], self._read[self._next] = at, read
-                self._next, self._last = (self._next + 1) % len(self._times), at
+                self._put(at, read)
+                self._last = at
+
+    def _put(self, at: float, read: Array) -> None:
+        self._times[self._next], self._read[self._next] = at, read
+        self._next = (self._next + 1) % len(self._times)
 
     def of(self, elements: list[int]) -> tuple[Array, Array]:
         """Times (T,) in s relative to the newest, and readings (T, rows, k) of k `elements`."""
@@ -170,6 +177,7 @@ class SelectedElement(QObject):
         self._key, self._last_number = (0, 0), 0
         self._next_plots = self._next_facts = self._next_spectrum = 0.0
         session.estimated.connect(guarded(self.receive))
+        session.source_changed.connect(guarded(lambda *_: self._begin_anew()))
         history.changed.connect(guarded(self._show_settings))
         selection.over.connect(guarded(self._point))
         selection.clicked.connect(guarded(self._click))
@@ -224,12 +232,11 @@ class SelectedElement(QObject):
         """Store the readings of new frames, and update the visible plots."""
         status, now = self._session.status, time.monotonic()
         if status.connections != self._connection:
-            self._connection, self.element = status.connections, -1
-            self._buffer.clear(0)  # another sensor may have as many elements and a later clock
+            self._connection = status.connections
             if status.sensor is not None:
                 self.panel.show_layout(status.sensor.layout)
                 self.traces.show_layout(status.sensor.layout)
-            self.panel.show_facts("", "")
+            self._begin_anew()
         key = status.connections, estimate.generation
         if key != self._key:
             self._key, self._last_number = key, 0
@@ -243,6 +250,14 @@ class SelectedElement(QObject):
             self._next_plots = now + _PLOT_PERIOD
             if self.traces.isVisible():
                 self._show_traces(len(estimate.suspect))
+
+    def _begin_anew(self) -> None:
+        """Show nothing of another source: it may have as many elements and a later clock."""
+        self.element = -1
+        self._buffer.clear(0)
+        self.panel.show_facts("", "")
+        for plot in (*self.panel.histories, self.panel.spectrum, *self.traces.plots):
+            plot.show_series(())
 
     def _show_panel(self, estimate: Estimate, now: float) -> None:
         if now >= self._next_plots:

@@ -51,6 +51,26 @@ def test_the_buffer_is_cleared_for_another_clock_or_sensor(other) -> None:
     assert times.tolist() == [0.0]
 
 
+def test_a_curve_does_not_cross_a_gap_as_where_a_replay_goes_elsewhere() -> None:
+    buffer = ReadingBuffer()
+    buffer.append(*read(1.0, 1.1, 5.0, 5.1))
+    times, values = buffer.of([0])
+    np.testing.assert_allclose(times, [-4.1, -4.0, -2.05, -0.1, 0.0])
+    assert np.isnan(values[2]).all()
+    assert np.isfinite(np.delete(values, 2, axis=0)).all()
+
+
+@pytest.mark.slow
+def test_nothing_of_another_source_stays(window: MainWindow, until) -> None:
+    shown = window.features["traces"].selected_element
+    window.docks.reveal("element")
+    shown.select(44)
+    until(lambda: shown.panel.histories[0].series and not shown.panel.histories[0].is_empty)
+    window.session.connect_to("sim:")
+    assert all(plot.is_empty for plot in (*shown.panel.histories, *shown.traces.plots))
+    assert "Click an element" in shown.panel.title.text()
+
+
 @pytest.mark.parametrize(("elements", "kept"), [(4, 500), (1024, 167)])
 def test_500_frames_per_second_are_stored_or_as_many_as_memory_allows(
     elements: int, kept: int
