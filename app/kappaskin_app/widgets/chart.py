@@ -65,6 +65,7 @@ _GLYPHS = {
     **{"t": "\u25bc\u25bd", "p": "\u2b1f\u2b20", "t3": "\u25c4\u25c5", "t2": "\u25ba\u25bb"},
     "x": "\u2715\u2715",
 }
+_RING, _LARGE = "\u25ef", 12.0  # px, beyond which a circle is written as a ring
 _LINES = {"solid": "\u2014", "dashed": "\u254c\u254c", "": ""}
 
 
@@ -173,7 +174,7 @@ class Series:
     filled: bool = True
     band: Array | None = None
     tips: Sequence[str] = ()
-    key: object = None
+    key: Any = None
 
     @property
     def ink(self) -> QColor:
@@ -314,6 +315,7 @@ class Chart(QWidget):
         entries = []
         for each in () if self.is_empty else self.series:
             glyph = _GLYPHS[each.mark][not each.filled] if each.mark else _LINES[each.line]
+            glyph = _RING if each.mark == "o" and each.size > _LARGE else glyph
             name = escape(each.name).replace(" ", "\N{NO-BREAK SPACE}")
             ink = f"<span style='color:{each.ink.name()}'>{glyph}</span>"
             entries += [f"{ink}\N{NO-BREAK SPACE}{name}"] if each.name else []
@@ -375,13 +377,14 @@ class Chart(QWidget):
         self._draw()
 
     def nearest(self, at: QPointF) -> ChartPoint | None:
-        """The point next to a position on the canvas, in px, if one is near."""
-        best: tuple[float, ChartPoint | None] = (_NEAR, None)
-        for each in self.series:
-            away, index = _nearest(*self._places(each.x, each.y), at, bool(each.line))
-            if away < best[0]:
-                best = away, ChartPoint(each, index)
-        return best[1]
+        """The point next to a position on the canvas, in px, if one is near: a mark, or a curve."""
+        found = [
+            (not each.mark, *_nearest(*self._places(each.x, each.y), at, bool(each.line)), each)
+            for each in self.series
+        ]
+        near = [one for one in found if one[1] < _NEAR]
+        _, _, index, each = min(near, key=lambda one: one[:2], default=(True, 0.0, 0, None))
+        return None if each is None else ChartPoint(each, index)
 
     def _point(self, at: QPointF | None, over: QPoint) -> None:
         point = None if at is None else self.nearest(at)
@@ -392,7 +395,7 @@ class Chart(QWidget):
         if self._view is not None:
             self._view.ring(point, self.x_axis, self.y_axis)
         if point is not None:
-            QToolTip.showText(over, plain_tip(self.point_text(point)), self)
+            QToolTip.showText(over, plain_tip(self.point_text(point)), self.canvas)
         if not same:
             self.pointed.emit(point)
 
