@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QSize, Qt, Signal
 
 from kappaskin.studies import Cost
 from kappaskin_app.features.accuracy.measurement import Frontier, setting_text
@@ -17,8 +17,6 @@ _MARKS = ("o", "s", "t1", "d", "t", "p", "t3", "t2")
 _ERROR = ChartAxis("RMS error", log=True, text=length)
 _TIME = ChartAxis("Computing time", log=True, text=duration)
 _TIP = "RMS error and computing time of each measured setting. Click a point to use its setting."
-
-Point = tuple[float, float]
 
 
 class CostPlot(Chart):
@@ -37,8 +35,12 @@ class CostPlot(Chart):
         self.clicked.connect(guarded(self._choose))
         self.pointed.connect(guarded(self._show_hand))
 
+    def minimumSizeHint(self) -> QSize:
+        line = self.fontMetrics().height()
+        return QSize(28 * line, 13 * line)
+
     def show_costs(
-        self, frontier: Frontier, present: Cost | None, live: Point, empty: str = ""
+        self, frontier: Frontier, present: Cost | None, live: tuple[float, float], empty: str = ""
     ) -> None:
         """Draw the costs, a ring at `present` and a cross at `live`, (error in m, time in s).
 
@@ -68,17 +70,22 @@ def _of_costs(frontier: Frontier, present: Cost | None) -> list[Series]:
         own = present is None or cost.setting.elements == present.setting.elements
         found.setdefault((cost.setting.method, own), []).append(cost)
     drawn = []
-    for method in sorted({method for method, _ in found}, key=_number):
-        name = METHOD_SHORT.get(method, method)
-        for own in (True, False):
-            if costs := tuple(found.get((method, own), ())):
-                number = _number(method)
-                mark = _MARKS[number % len(_MARKS)]
-                tips = list(map(cost_text, costs))
-                drawn.append(
-                    Series(name, *_at(*costs), number, "", mark, 8.0, own, tips=tips, key=costs)
-                )
-                name = ""
+    for method, own in sorted(found, key=lambda each: (_number(each[0]), not each[1])):
+        costs, number = tuple(found[method, own]), _number(method)
+        named = own or (method, True) not in found
+        drawn.append(
+            Series(
+                METHOD_SHORT.get(method, method) if named else "",
+                *_at(*costs),
+                colour=number,
+                line="",
+                mark=_MARKS[number % len(_MARKS)],
+                size=8.0,
+                filled=own,
+                tips=list(map(cost_text, costs)),
+                key=costs,
+            )
+        )
     return drawn
 
 
@@ -86,7 +93,7 @@ def _number(method: str) -> int:
     return _METHODS.index(method) if method in _METHODS else len(_METHODS)
 
 
-def _others(frontier: Frontier, present: Cost | None, live: Point) -> list[Series]:
+def _others(frontier: Frontier, present: Cost | None, live: tuple[float, float]) -> list[Series]:
     """What the marks are, the setting in use, and the least error within each time."""
     none, (error, time) = np.empty(0), live
     known = math.isfinite(error) and math.isfinite(time)

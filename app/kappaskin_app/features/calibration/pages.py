@@ -23,9 +23,16 @@ from kappaskin_app.features.calibration.controller import (
     Result,
     parsed_radii,
 )
-from kappaskin_app.features.calibration.plots import CylinderView, Loop, LoopPlot, PassMap
+from kappaskin_app.features.calibration.plots import (
+    LOOP_AXES,
+    LOOP_TIP,
+    CylinderView,
+    PassMap,
+    loop_series,
+)
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import current, follow_look
+from kappaskin_app.widgets.chart import Chart, Series
 from kappaskin_app.widgets.parts import (
     ELLIPSIS,
     Heading,
@@ -247,7 +254,7 @@ class ResultPage(QWidget):
             "(section 5 of the paper), and with hysteresis compensated. The standard error in use "
             "is that of corrected curvature on other cylinders and in another order.",
         )
-        self.map, self.plot, self.channel = PassMap(), LoopPlot(), text_label()
+        self.map, self.plot, self.channel = PassMap(), Chart(*LOOP_AXES, LOOP_TIP), text_label()
         self.worst = text_label(tip="Click a channel to see its readings.", rich=True)
         self.worst.setTextInteractionFlags(
             Qt.TextInteractionFlag.LinksAccessibleByMouse
@@ -338,10 +345,10 @@ class ResultPage(QWidget):
             return
         self.map.show_channel(channel)
         self.channel.setText(self._channel_text(channel))
-        self.plot.show_loop(_loop(self._result, channel))
+        self.plot.show_series(_loop(self._result, channel), "No readings.")
 
 
-def _loop(result: Result, channel: int) -> Loop:
+def _loop(result: Result, channel: int) -> list[Series]:
     """Readings of `channel` at the flat steps and those that bend its component.
 
     Without preconditioning.
@@ -352,7 +359,7 @@ def _loop(result: Result, channel: int) -> Loop:
     counts = np.array([step.way != "first" for step in sweep.steps])
     used = np.flatnonzero(counts & (flat | (applied != 0)))
     steps = [sweep.steps[k] for k in used]
-    return Loop(
+    return loop_series(
         applied[used],
         sweep.readings[used, channel],
         np.array([step.back for step in steps]),
