@@ -67,7 +67,7 @@ _RING, _LARGE = "\u25ef", 12.0  # px, beyond which a circle is written as a ring
 _LINES = {"solid": "\u2014", "dashed": "\u254c\u254c", "": ""}
 
 
-Ticks = list[tuple[float | None, list[float]]]
+Ticks = list[tuple[Any, list[float]]]
 
 
 @dataclass(frozen=True)
@@ -117,12 +117,14 @@ class ChartAxis:
     def ticks(
         self, low: float, high: float, size: float, gap: float, linear: Callable[..., Ticks]
     ) -> Ticks:
-        """Each level's spacing and ticks along `size` px, decades at least `gap` px apart.
+        """Each level's spacing and ticks along `size` px; those of the first are `gap` px apart.
 
-        `linear` gives those of a linear axis, also for the part of a logarithmic one.
+        `linear` gives those of a linear axis, also for a part of a logarithmic one.
         """
         if not self.log:
-            return linear(low, high, size)
+            (step, first), *finer = linear(low, high, size)
+            every = math.ceil(gap * (high - low) / (size * step))
+            return [(step, [v for v in first if not round(v / step) % every]), *finer]
         if high - low < _FEW:
             found = linear(10.0**low, 10.0**high, size)
             return [(step, np.log10([v for v in each if v > 0]).tolist()) for step, each in found]
@@ -198,14 +200,6 @@ class ChartPoint:
     series: Series
     index: int
 
-    @property
-    def x(self) -> float:
-        return float(self.series.x[self.index])
-
-    @property
-    def y(self) -> float:
-        return float(self.series.y[self.index])
-
 
 class Chart(QWidget):
     """Series over two axes; an empty chart says what to do.
@@ -241,11 +235,10 @@ class Chart(QWidget):
         follow_look(self, self._dress)
 
     def sizeHint(self) -> QSize:
-        return QSize(260, 12 * self.fontMetrics().height())
+        return QSize(18, 12) * self.fontMetrics().height()
 
     def minimumSizeHint(self) -> QSize:
-        line = self.fontMetrics().height()
-        return QSize(9 * line, 7 * line)
+        return QSize(9, 10) * self.fontMetrics().height()
 
     def show_axes(self, y: ChartAxis, x: ChartAxis, tip: str) -> None:
         """Show other quantities from now on."""
@@ -409,8 +402,8 @@ class Chart(QWidget):
             return each.tips[index]
         spans = self._view.spans if self._view else (1.0, 1.0)
         x, y = (
-            self.x_axis.value_text(point.x, spans[0]),
-            self.y_axis.value_text(point.y, spans[1]),
+            self.x_axis.value_text(float(each.x[index]), spans[0]),
+            self.y_axis.value_text(float(each.y[index]), spans[1]),
         )
         if each.band is not None:
             band = self.y_axis.value_text(float(each.band[index]), spans[1])
@@ -500,7 +493,7 @@ def _nearest(x: Array, y: Array, at: QPointF, joined: bool) -> tuple[float, int]
         dx, dy = np.diff(x), np.diff(y)
         with np.errstate(invalid="ignore"):
             along = -(x[:-1] * dx + y[:-1] * dy) / np.maximum(dx**2 + dy**2, 1e-12)
-        along = np.clip(along, 0.0, 1.0)
+            along = along.clip(0.0, 1.0)
         between = np.hypot(x[:-1] + along * dx, y[:-1] + along * dy)
         between = np.nan_to_num(between, nan=np.inf, posinf=np.inf)
         nearest = int(np.argmin(between))
@@ -521,7 +514,7 @@ def _axis_class() -> type:
         shown, line = ChartAxis(""), 0
 
         def tickValues(self, low: float, high: float, size: float) -> Ticks:
-            gap = self.line * (5 if self.orientation == "bottom" else 2)
+            gap = self.line * (4 if self.orientation == "bottom" else 1.2)
             return self.shown.ticks(low, high, size, gap, super().tickValues)
 
         def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:

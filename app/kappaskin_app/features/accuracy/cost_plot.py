@@ -36,8 +36,7 @@ class CostPlot(Chart):
         self.pointed.connect(guarded(self._show_hand))
 
     def minimumSizeHint(self) -> QSize:
-        line = self.fontMetrics().height()
-        return QSize(28 * line, 13 * line)
+        return QSize(28, 13) * self.fontMetrics().height()
 
     def show_costs(
         self, frontier: Frontier, present: Cost | None, live: tuple[float, float], empty: str = ""
@@ -57,10 +56,8 @@ class CostPlot(Chart):
             self.chosen.emit(point.series.key[point.index])
 
     def _show_hand(self, point: ChartPoint | None) -> None:
-        hand = point is not None and point.series.key is not None
-        self.canvas.setCursor(
-            Qt.CursorShape.PointingHandCursor if hand else Qt.CursorShape.ArrowCursor
-        )
+        hand, arrow = Qt.CursorShape.PointingHandCursor, Qt.CursorShape.ArrowCursor
+        self.canvas.setCursor(hand if point is not None and point.series.key else arrow)
 
 
 def _of_costs(frontier: Frontier, present: Cost | None) -> list[Series]:

@@ -31,7 +31,7 @@ from kappaskin_app.features.calibration.plots import (
     loop_series,
 )
 from kappaskin_app.guard import guarded
-from kappaskin_app.theme import current, follow_look
+from kappaskin_app.theme import current, follow_look, grown
 from kappaskin_app.widgets.chart import Chart, Series
 from kappaskin_app.widgets.parts import (
     ELLIPSIS,
@@ -45,6 +45,7 @@ from kappaskin_app.widgets.parts import (
     text_label,
 )
 
+_LOOP_HIGH = 230  # px
 EQUATION_8 = (
     "Nominal curvature, as Eq. 8 reads it from the voltage: kappa = 4 V / (V_in GF (t_s + t_g) G). "
 )
@@ -280,6 +281,7 @@ class ResultPage(QWidget):
         self._result: Result | None = None
         self._worst = list[int]()
         follow_look(self, self._show_worst)
+        follow_look(self.plot, lambda: self.plot.setMinimumHeight(grown(_LOOP_HIGH)))
 
     def show_result(self, result: Result) -> None:
         if result is self._result:

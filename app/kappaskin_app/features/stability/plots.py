@@ -95,7 +95,7 @@ class SpectrumPlot(Chart):
         self._number = 0
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName("Singular values")
-        self.clicked.connect(guarded(lambda point: self.chosen.emit(round(point.x))))
+        self.clicked.connect(guarded(lambda at: self.chosen.emit(round(at.series.x[at.index]))))
 
     def show_spectrum(self, spectrum: Spectrum | None, number: int, empty: str) -> None:
         """Draw it with a ring around the mode `number`; without a spectrum, the text `empty`."""
