@@ -423,7 +423,7 @@ class Chart(QWidget):
         for text, act in (
             ("&Show all (double click)", self.fit),
             ("&Copy data", lambda: QGuiApplication.clipboard().setText(self.table("\t"))),
-            (f"Save data as CS&V{ELLIPSIS}", partial(self._save, "csv", lambda: self.table(","))),
+            (f"Save &data as CSV{ELLIPSIS}", partial(self._save, "csv", lambda: self.table(","))),
             (f"Save picture as &PNG{ELLIPSIS}", partial(self._save, "png", self._png)),
             (f"Save picture as S&VG{ELLIPSIS}", partial(self._save, "svg", self._svg)),
         ):
