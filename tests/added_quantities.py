@@ -33,7 +33,7 @@ pipeline.REPORTED = table.REPORTED = (
         lambda r: 2 * r.contact.force,
         sd=lambda r: 2 * r.contact.force_sd,
         labels_shown=("Twice",),
-        shown=("mN", 1e3, 1),
+        shown=("N", 1.0, 4),
         header=HeaderNumber("twice", 14, "Twice the force."),
     ),
     ReportedQuantity(

@@ -232,7 +232,7 @@ def recorded() -> dict[str, Any]:
     exports = {}
     for ending in ("csv", "npz", "h5"):
         file = recording().with_suffix(f".{ending}")
-        ran("export", recording(), "--to", file)
+        ran("export", recording(), "--to", file, "--preset", "everything")
         exports[ending] = columns_of(file)
         file.unlink()
     return {"topics": topics, "info": sorted(told), "exports": exports}

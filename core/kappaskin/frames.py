@@ -233,18 +233,17 @@ class Estimate:
 
     `nominal` (3, P) in 1/m is what this frame brought as Eq. 8 reads it, whatever calibration and
     tare make of it, `curvature` and `residual` (3, P) in 1/m what they do; NaN where a reading is
-    missing; `fresh` (3, P) which
-    readings this frame brought: the others are held from earlier ones; `coefficients`
-    (Ni, Nj) in m; `surface` (ny, nx) in m, NaN off the skin; `noise` is the standard deviation of
-    a reading in 1/m as the residual tells it; `suspect` (P,) numbers in `FAULTS` why an element was
-    left out, 0 if it was not; `converged` is False where an iteration gave up for least squares;
-    `fit_time` in s is what the fit took; `drift` in 1/m, by RMS, is how far all readings have
-    smoothly shifted, 0 where no drift is told; the shape and contacts are without it. `second` is a
-    weaker contact beside `contact`, which are told as two; none is there where its numbers are NaN.
-    `geometry` is that of the skin at the first contact.
-    `true_surface`, `true_contact`, `error_at_load` and `error_rms` (all in m) are NaN unless a
-    simulation made the frame. `ready_time` is when the estimate was done, on the clock of
-    `host_time`; `taken` +- `taken_sd`, in s on it too, when the scan began, as the frame says.
+    missing; `fresh` (3, P) which readings this frame brought: the others are held from earlier
+    ones; `coefficients` (Ni, Nj) in m; `surface` (ny, nx) in m, NaN off the skin and where the
+    setup leaves it out; `noise` is the standard deviation of a reading in 1/m as the residual tells
+    it; `suspect` (P,) numbers in `FAULTS` why an element was left out, 0 if it was not; `converged`
+    is False where an iteration gave up for least squares; `fit_time` in s is what the fit took;
+    `drift` in 1/m, by RMS, is how far all readings have smoothly shifted, 0 where no drift is told;
+    the shape and contacts are without it. `second` is a weaker contact beside `contact`, which are
+    told as two; none is there where its numbers are NaN. `geometry` is that of the skin at the
+    first contact. `true_surface`, `true_contact`, `error_at_load` and `error_rms` (all in m) are
+    NaN unless a simulation made the frame. `ready_time` is when the estimate was done, on the clock
+    of `host_time`; `taken` +- `taken_sd`, in s on it too, when the scan began, as the frame says.
     """
 
     generation: int

@@ -17,6 +17,7 @@ import numpy as np
 from PySide6.QtWidgets import QApplication
 
 from kappaskin import Pipeline, Setup, Simulator, Status, load_scene
+from kappaskin._text import with_error
 from kappaskin_app.features.contact.numbers import ELEMENTS, elements_of, facts_of
 from kappaskin_app.features.contact.readouts import Readouts
 from kappaskin_app.features.heatmaps.heatmap import HeatmapGrid
@@ -36,12 +37,12 @@ found, twice = {}, 2 * estimate.curvature
 
 readouts = Readouts()
 readouts.show_estimate(estimate)
-force = 1e3 * estimate.contact.force
-found["header"] = readouts.text("twice").startswith(f"{2 * force:.1f} ")
+force, sd = estimate.contact.force, estimate.contact.force_sd
+found["header"] = readouts.text("twice") == with_error(2 * force, 2 * sd, "N")
 found["lessons"] = "readout-twice" in READOUTS
-found["facts"] = ("Twice", f"{2 * force:.1f}") in [row[:2] for row in facts_of(estimate, "")]
+found["facts"] = ("Twice", f"{2 * force:.4f}") in [row[:2] for row in facts_of(estimate, "")]
 at = ELEMENTS.index("twice xy [1/m]")
-found["elements"] = float(elements_of(estimate, sensor)[7][at]) == round(twice[2, 7], 3)
+found["elements"] = elements_of(estimate, sensor)[7][at] == with_error(twice[2, 7])
 found["panel"] = "reads twice [1/m]" in facts(7, sensor, status, estimate)
 
 panel, traces = ElementPanel(), Traces()

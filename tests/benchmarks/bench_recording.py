@@ -1,13 +1,22 @@
 """What recording costs of a core, and how fast a recording is read, verified and repaired."""
 
 import time
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from kappaskin import Pipeline, Setup, load_scene
-from kappaskin.recording import Recorder, Recording, RecordingStatus
-from kappaskin.sources import SimulatedSource
+from kappaskin.recording import (
+    Exported,
+    ExportRequest,
+    ExportTask,
+    Recorder,
+    Recording,
+    RecordingStatus,
+)
+from kappaskin.sources import SimulatedSource, VirtualClock
 from kappaskin.sources.wire import encode_samples
 
 RATE = 1000.0  # frames/s
@@ -66,3 +75,38 @@ def test_recording_takes_little_of_a_core(figure, ratio, tmp_path) -> None:
     figure(f"reading it: {FRAMES / RATE / reading:.0f} times as fast as it was recorded")
     assert count == written.messages
     assert np.isfinite(reading)
+
+
+@pytest.fixture(scope="module")
+def long(tmp_path_factory):
+    """A recording of 12 s of the simulation at 1,000 frames/s."""
+    path, clock, scene = (
+        tmp_path_factory.mktemp("long") / "a.mcap",
+        VirtualClock(),
+        load_scene("circle"),
+    )
+    quick = replace(scene.transduction.converter, conversion_time=1e-6)  # or a scan takes 1.5 ms
+    chain = replace(scene.transduction, converter=quick)
+    source = SimulatedSource(replace(scene, rate=RATE, transduction=chain), clock, clock.sleep)
+    with closing(Recorder(path, clock())) as recorder:
+        source.record(recorder)
+        recorder.set_up(Pipeline(source.sensor, Setup()))
+        while clock() < 12.0:
+            source.read(0.1)
+            recorder.wait()
+    return path
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_an_export_of_12_s_is_small_by_default(suffix: str, long, figure, tmp_path) -> None:
+    began = time.monotonic()
+    with ExportTask(ExportRequest(long, tmp_path / f"a{suffix}")) as task:
+        *_, done = task.wait()
+    size = (tmp_path / f"a{suffix}").stat().st_size
+    figure(
+        f"export of 12 s at {RATE:.0f} frames/s as {suffix}: {size / 1e6:.2f} MB, "
+        f"in {time.monotonic() - began:.1f} s"
+    )
+    assert isinstance(done, Exported)
+    assert done.written == pytest.approx(12 * RATE, rel=0.01)
+    assert size < 2e6

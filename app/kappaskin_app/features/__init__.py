@@ -30,6 +30,7 @@ from kappaskin_app.features.recording import RecordingFeature
 from kappaskin_app.features.scene import SceneFeature
 from kappaskin_app.features.sensor import SensorFeature
 from kappaskin_app.features.stability import StabilityFeature
+from kappaskin_app.features.strip_chart import StripChartFeature
 from kappaskin_app.features.traces import TracesFeature
 from kappaskin_app.shell.window import Feature, MainWindow
 
@@ -53,6 +54,7 @@ FEATURES: tuple[Callable[[], Feature], ...] = (
     LogFeature,
     CompareFeature,
     DesignFeature,
+    StripChartFeature,
     TracesFeature,
     GuideFeature,
     PresenterFeature,

@@ -2,20 +2,21 @@
 
 import math
 
-from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QAction, QColor, QFontInfo, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtCore import QPointF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QFontInfo, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QToolBar, QWidget
 
 from kappaskin.live import Status
-from kappaskin.recording import Replay
+from kappaskin.recording import RecordingStatus, Replay
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
 from kappaskin_app.theme import Theme, current
-from kappaskin_app.widgets.parts import Label, sentence
+from kappaskin_app.widgets.parts import Label, plain_tip, sentence
+from kappaskin_app.widgets.text import elapsed, file_size
 
 LIVE, SIM, WAITING = "LIVE", "SIM", "WAITING"
 STALE, LOST, OFF = "STALE", "LOST", "OFF"
 _BESIDE = " \N{MIDDLE DOT} "  # between a source and its condition
-_GAP, _SATURATED, _PAUSED, _RECORDING = "gap", "saturated", "paused", "recording"
+_GAP, _SATURATED, _PAUSED = "gap", "saturated", "paused"
 REPLAY = "REPLAY"
 GAP = f"{REPLAY}{_BESIDE}{_GAP}"
 
@@ -31,11 +32,10 @@ _TIPS = {
     _SATURATED: "Elements are beyond the range of their electronics: the skin may be bent more "
     "than shown.",
     _PAUSED: "Paused; Ctrl+P continues.",
-    _RECORDING: "The readings are being recorded.",
 }
 
 _WIDTH, _HEIGHT, _LARGE = 8.6, 2.5, 1.54  # of the size of letters elsewhere
-_ROUND = 6  # px: radius of its corners
+_ROUND, _DOT = 6, 4  # px: radius of its corners, and of the dot of a recording
 _MORE = "Click, or F4: event log."
 
 
@@ -55,24 +55,32 @@ def origin(state: str) -> str:
 
 
 class Badge(Label):
-    """Shows one of the states in its colour; `clicked` requests the event log."""
+    """Shows a state in its colour, and a red dot while recording; `clicked` requests the log."""
 
     clicked = Signal()
 
     def __init__(self) -> None:
         super().__init__()
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Preferred)
-        self.state, self._recording = "", False
+        self.state, self.recorded = "", RecordingStatus()
 
-    def show_state(self, state: str, recording: bool = False) -> None:
-        """Show a state; below it its condition, else whether it is `recording`."""
-        if (state, recording) != (self.state, self._recording):
-            self.state, self._recording = state, recording
-            also = [_RECORDING] if recording else []
-            parts = [*state.split(_BESIDE), *also]
-            self.setText("\n".join(parts[:2]))
-            self.setAccessibleName(", ".join(parts))
-            self.setToolTip("\n".join([*(_TIPS[part] for part in parts), _MORE]))
+    def show_state(self, state: str, recorded: RecordingStatus) -> None:
+        """Show a state; below it its condition, else how long is being `recorded`."""
+        if (state, recorded) == (self.state, self.recorded):
+            return
+        self.state, self.recorded = state, recorded
+        parts, tips = state.split(_BESIDE), [_TIPS[part] for part in state.split(_BESIDE)]
+        also = list[str]()
+        if recorded.active:
+            lost = f"{recorded.lost:,} lost"
+            also = [f"REC {lost if recorded.lost else elapsed(recorded.seconds)}"]
+            tips.append(
+                f"Recording to {recorded.path}: {file_size(recorded.size)}, {lost} by a slow disk. "
+                "Ctrl+R stops."
+            )
+        self.setText("\n".join([*parts, *also][:2]))
+        self.setAccessibleName(", ".join([*parts, *["recording"] * recorded.active]))
+        self.setToolTip(plain_tip("\n".join([*tips, _MORE])))
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         self.clicked.emit()
@@ -99,6 +107,9 @@ class Badge(Label):
         painter.setFont(font)
         painter.setPen(QColor("white"))
         painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self.text())
+        if self.recorded.active:
+            painter.setBrush(QColor(current().bad))
+            painter.drawEllipse(QPointF(2.5 * _DOT, 2.5 * _DOT), _DOT, _DOT)
 
 
 def colour_of(state: str, theme: Theme) -> str:
@@ -170,16 +181,8 @@ class Header(QToolBar):
         self.setObjectName("header")
         self.setMovable(False)
         self.toggleViewAction().setEnabled(False)
-        self._first: QAction | None = None
         self.addWidget(badge)
 
     def add(self, widget: QWidget) -> None:
         """Show a widget after all others."""
-        shown = self.addWidget(widget)
-        self._first = self._first or shown
-
-    def add_mark(self, widget: QWidget) -> QAction:
-        """Show a widget right after the badge; the action shows and hides it."""
-        if self._first is None:
-            return self.addWidget(widget)
-        return self.insertWidget(self._first, widget)
+        self.addWidget(widget)

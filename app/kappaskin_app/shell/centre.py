@@ -64,6 +64,7 @@ class ActionBanner(QWidget):
         """Show `words` with a tooltip and these actions, for so many seconds; 0: until closed."""
         for button in self.buttons:
             self._flow.removeWidget(button)
+            button.hide()  # at once, or its key would be that of two buttons
             button.deleteLater()
         self.words.setText(printable(words, keep="\n"))
         self.words.setToolTip(plain_tip(tip))

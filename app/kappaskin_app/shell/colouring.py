@@ -88,19 +88,22 @@ SHADES = shades_of(skin_colours())  # of a curvature sensor
 
 
 _CLEARLY = 1.5  # times as far out as in, or in as out, before the colours change sides
+_SIGMAS = 5.0  # standard deviations that a range has at least: noise alone stays pale
+_MOST = {"1/m": 1e3, "1/m^2": 1e6}  # widest ranges: no object has a radius below 1 mm
 _PATIENCE = 2.0  # s that the values must stay small before the range narrows
 
 
 class SteadyRange:
-    """A range that follows the largest value, and narrows only after a delay."""
+    """A range from `least` to `most` that follows the largest value, and narrows after a delay."""
 
-    def __init__(self, least: float) -> None:
+    def __init__(self, least: float, most: float = math.inf) -> None:
         self.least = self.limit = least
+        self.most = most
         self._small_since = math.inf
 
     def follow(self, largest: float, now: float) -> float:
         """The limit to use for values up to `largest` at time `now` in s."""
-        wanted = max(self.least, round_up(largest))
+        wanted = min(max(self.least, round_up(largest)), self.most)
         if wanted >= self.limit:
             self.limit, self._small_since = wanted, math.inf
         elif self._small_since == math.inf:
@@ -120,7 +123,10 @@ class Ranges:
         """
         self._shades = shades
         self._steady = {
-            name: SteadyRange(shade.least * (side if shade.unit_shown == "mm" else 1.0))
+            name: SteadyRange(
+                shade.least * (side if shade.unit_shown == "mm" else 1.0),
+                side if shade.unit_shown == "mm" else _MOST.get(shade.unit, math.inf),
+            )
             for name, shade in shades.items()
         }
         self._pulled = False
@@ -140,12 +146,14 @@ class Ranges:
         """The largest displacement in mm that was shown of late, as a round number."""
         return self._steady["displacement"].limit
 
-    def limit(self, name: str, values: Array, settings: Settings, now: float) -> float:
+    def limit(
+        self, name: str, values: Array, settings: Settings, now: float, noise: float = 0.0
+    ) -> float:
         """The limit on the screen's scale for `values` of the quantity `name`, NaN or not.
 
-        They count from what they are at rest.
+        They count from what they are at rest. It is five times their `noise` at least.
         """
-        largest = float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
+        largest = float(np.max(np.abs(values), where=np.isfinite(values), initial=_SIGMAS * noise))
         self._steady[name].follow(largest, now)
         alike, group = [name], self._shades[name].group
         if settings.one_range and group:
@@ -233,6 +241,15 @@ class Colouring:
         if found is None:
             return np.full(len(estimate.suspect), np.nan)
         return self.shades[name].scale * found.of_elements(name, estimate)
+
+    def noise(self, name: str, estimate: Estimate) -> float:
+        """The standard deviation of a value, as far as the estimate has it; 0 where it has none."""
+        unit, sd = self.shades[name].unit, math.nan
+        if unit == "1/m" and estimate.curvature.ndim == 2:
+            sd = estimate.noise
+        elif name == "displacement" and estimate.contact.single and not estimate.contact.near_rim:
+            sd = 1e3 * estimate.contact.displacement_sd
+        return sd if math.isfinite(sd) else 0.0
 
     def at_rest(self, name: str, estimate: Estimate) -> float:
         """The value of a quantity of a skin at rest."""

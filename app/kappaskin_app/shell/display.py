@@ -29,6 +29,7 @@ from kappaskin_app.widgets.tint import Tint
 _OLD = (LOST, OFF, STALE, WAITING, GAP)  # the values shown are not the present ones
 _HINT, _NO_LOAD_HINT = "Drag the red arrow to move the load; F1: shortcuts", "F1: shortcuts"
 _NUMBERS = 0.2  # s between two updates of numbers
+_SLOW = 0.95  # times real time: a slower simulation is marked
 
 Kinds = NDArray[np.uint8]
 
@@ -113,7 +114,7 @@ class Display(QObject):
             self.ranges = Ranges(1e3 * max(patch.a, patch.b), self.colouring.shades)
             self.restarted.emit(status)
         state = self._session.badge()
-        self.badge.show_state(state, status.recording.active)
+        self.badge.show_state(state, status.recording)
         self.old = state in _OLD
         self.status_shown.emit(status)
         now = time.monotonic()
@@ -141,6 +142,8 @@ class Display(QObject):
             slope = self._slope(self._session.status.slope, time.monotonic())
             method = self._session.engine.requested.setup.method
             texts.append(warnings(estimate, int(crossed.sum()), method, slope))
+        if (pace := self._session.status.pace) < _SLOW:
+            texts.append(f"simulated at {pace:.1f} x real time: this computer is not fast enough")
         self.notice.show_warning("; ".join(filter(None, texts)))
 
     def estimate_shown(self) -> Estimate | None:
@@ -160,7 +163,8 @@ class Display(QObject):
             values = self.colouring.of_elements(name, estimate)
         elif name == "displacement":
             values = 1e3 * estimate.surface
-        limit = self.ranges.limit(name, values - at_rest, self.settings, now)
+        noise = self.colouring.noise(name, estimate)
+        limit = self.ranges.limit(name, values - at_rest, self.settings, now, noise)
         pulled = name == "displacement" and self.ranges.pulled(values)
         return shade.tint(limit, at_rest, pulled)
 

@@ -1,4 +1,4 @@
-"""The user's folder of recordings: its files, and names of new ones."""
+"""The folder of the user's files: recordings in it, and names of new files."""
 
 import shlex
 from contextlib import suppress
@@ -15,7 +15,7 @@ _PART = ".part"
 
 
 def recordings_folder() -> Path:
-    """The default folder of this user's recordings: here, without a home directory."""
+    """The folder of this user's recordings and other files: here, without a home directory."""
     try:
         documents = platformdirs.user_documents_path()
     except RuntimeError:
@@ -23,9 +23,17 @@ def recordings_folder() -> Path:
     return documents / "Kappaskin"
 
 
-def proposed(folder: Path, now: datetime) -> Path:
-    """The unused path of a recording that begins `now`."""
-    return unused(folder / f"kappaskin-{now:%Y%m%d-%H%M%S}.mcap")
+def proposed(name: str) -> Path:
+    """The unused path of a new file `name` in the user's folder, which is made if it can be."""
+    folder = recordings_folder()
+    with suppress(OSError):  # reported when the file is written
+        folder.mkdir(parents=True, exist_ok=True)
+    return unused(folder / name)
+
+
+def dated(now: datetime, suffix: str) -> Path:
+    """The proposed path of a new file that is named by the time `now`."""
+    return proposed(f"kappaskin-{now:%Y%m%d-%H%M%S}{suffix}")
 
 
 def newest(folder: Path) -> list[Path]:

@@ -12,6 +12,7 @@ from kappaskin._text import printable
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.folders import proposed
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.work_dialog import with_ending
@@ -117,7 +118,7 @@ class Opening(QObject):
     def save_scene(self, name: str, write: Callable[[Path], object]) -> None:
         """Ask for a file, `name` by default, and `write` a scene there."""
         window = self.menu.parentWidget()
-        file, _ = QFileDialog.getSaveFileName(window, "Save the scene", name, SCENES)
+        file, _ = QFileDialog.getSaveFileName(window, "Save the scene", str(proposed(name)), SCENES)
         if file:
             try:
                 path = with_ending(file, ".toml")

@@ -14,6 +14,7 @@ from kappaskin._files import write_whole
 from kappaskin._text import printable
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
+from kappaskin_app.shell.folders import proposed
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.work_dialog import has_suffix, with_ending
 
@@ -126,7 +127,9 @@ def _write(painter: QPainter, view: QWidget, caption: str) -> None:
 def chosen_file(parent: QWidget, title: str, flat: bool) -> Path | None:
     """The file selected for a picture, if any; a `Refusal` as of `with_ending`."""
     kinds = "Picture (*.png);;Drawing (*.svg)" if flat else "Picture (*.png)"
-    name, kind = QFileDialog.getSaveFileName(parent, f"Export {title}", "", kinds)
+    name, kind = QFileDialog.getSaveFileName(
+        parent, f"Export {title}", str(proposed(f"{title}.png")), kinds
+    )
     if not name:
         return None
     return Path(name) if has_suffix(Path(name)) else with_ending(name, kind[-5:-1])

@@ -157,7 +157,8 @@ class Session(QObject):
     `preparing` whether it is still computed. `publish_refused` reports why nothing is published
     (empty when it is). `source_changing` precedes another source or a disconnection,
     `source_changed` brings the new one. `base` is the setup of a recording, for what no setting
-    determines. `pause_requested` requests that a scene or recording be paused or continued.
+    determines. `pause_requested` requests that a scene or recording be paused or continued,
+    `time_requested` another time in s in a recording.
     `trusted` are the scenes, as absolute paths, that may name files outside their folders.
     """
 
@@ -166,6 +167,7 @@ class Session(QObject):
     source_changing = Signal()
     source_changed = Signal(str)
     pause_requested = Signal()
+    time_requested = Signal(float)
     playing = Signal(Scene)
     publish_refused = Signal(str)
     estimated = Signal(Estimate)

@@ -137,9 +137,12 @@ class WorkDialog(QDialog):
         """End the task, and show `words`."""
         self.task.stop()
         self.words.setText(printable(words, keep="\n"))
-        high = self.heightForWidth(self.width())
-        self.resize(self.width(), max(self.height(), high))  # or the fields would be pressed flat
         self._allow()
+        self._grow()
+
+    def _grow(self) -> None:
+        """Make room for all words, or the fields would be pressed flat."""
+        self.resize(self.width(), max(self.height(), self.heightForWidth(self.width())))
 
     def done(self, result: int) -> None:
         if self.busy:

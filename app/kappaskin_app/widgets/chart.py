@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QBuffer, QEvent, QObject, QPoint, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QColor,
@@ -205,11 +206,12 @@ class Chart(QWidget):
     """Series over two axes; an empty chart says what to do.
 
     The wheel zooms, dragging pans, a double click shows all. `pointed` emits the `ChartPoint` next
-    to the mouse, or None; `clicked` the one that is clicked.
+    to the mouse, or None; `clicked` the one that is clicked, `clicked_at` the x of any click.
     """
 
     pointed = Signal(object)
     clicked = Signal(object)
+    clicked_at = Signal(float)
 
     def __init__(self, y: ChartAxis, x: ChartAxis, tip: str) -> None:
         super().__init__()
@@ -238,7 +240,7 @@ class Chart(QWidget):
         return QSize(18, 12) * self.fontMetrics().height()
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(9, 10) * self.fontMetrics().height()
+        return QSize(9, 7) * self.fontMetrics().height()
 
     def show_axes(self, y: ChartAxis, x: ChartAxis, tip: str) -> None:
         """Show other quantities from now on."""
@@ -357,9 +359,12 @@ class Chart(QWidget):
         return False
 
     def _click(self, began: QPointF, at: QPointF) -> None:
-        still = (at - began).manhattanLength() < QApplication.startDragDistance()
-        if still and (point := self.nearest(at)):
+        if (at - began).manhattanLength() >= QApplication.startDragDistance():
+            return
+        if point := self.nearest(at):
             self.clicked.emit(point)
+        if self._view is not None:
+            self.clicked_at.emit(self._view.value_at(at.x()))
 
     def _hold(self) -> None:
         """Leave the ranges as the user has set them."""
@@ -502,6 +507,20 @@ def _nearest(x: Array, y: Array, at: QPointF, joined: bool) -> tuple[float, int]
     return float(away[index]), index
 
 
+def _enclosed(x: Array, low: Array, high: Array) -> tuple[Array, Array, NDArray[np.int32]]:
+    """The outline (2 n,) around what lies between `low` and `high` (n,), broken at unknown points.
+
+    And whether each point of it is joined to the next.
+    """
+    known = np.flatnonzero(np.isfinite(x + low + high))
+    runs = np.split(known, np.flatnonzero(np.diff(known) > 1) + 1)
+    around = np.concatenate([np.concatenate([x[run], x[run][::-1]]) for run in runs])
+    edge = np.concatenate([np.concatenate([low[run], high[run][::-1]]) for run in runs])
+    joined = np.ones(len(around), np.int32)
+    joined[2 * np.cumsum([len(run) for run in runs if len(run)], dtype=np.intp) - 1] = 0
+    return around, edge, joined
+
+
 @cache
 def _axis_class() -> type:
     """The class of the axes; pyqtgraph, which takes 0.3 s to load, is loaded with the first."""
@@ -604,10 +623,8 @@ class _View:
             ink = each.ink
             ink.setAlpha(_BAND)
             at, low, high = x.shown(each.x), y.shown(each.y - band), y.shown(each.y + band)
-            good = np.isfinite(at + low + high)
-            at, edge = at[good], np.concatenate([low[good], high[good][::-1]])
-            around = np.concatenate([at, at[::-1]])
-            item.setData(around, edge, pen=None, fillLevel="enclosed", brush=ink)
+            around, edge, joined = _enclosed(at, low, high)
+            item.setData(around, edge, connect=joined, pen=None, fillLevel="enclosed", brush=ink)
             item.setZValue(-1)
         drawn = self._pooled(self._lines, len(lines), self._pg.InfiniteLine)
         for item, line in zip(drawn, lines, strict=False):
@@ -653,6 +670,12 @@ class _View:
         """How much is shown along each axis."""
         (left, right), (low, high) = self._box.viewRange()
         return right - left, high - low
+
+    def value_at(self, x: float) -> float:
+        """The position along the x axis that is seen x px from the left of the view."""
+        (left, _), _ = self._box.viewRange()
+        area = self._box.sceneBoundingRect()
+        return left + (x - area.left()) / area.width() * self.spans[0]
 
     def places(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Where values are seen on the canvas, in px."""

@@ -65,7 +65,7 @@ class Line(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
-        painter.setPen(self.palette().windowText().color())
+        painter.setPen(self.palette().color(self.foregroundRole()))
         text = painter.fontMetrics().elidedText(
             self.shown, Qt.TextElideMode.ElideRight, self.width()
         )

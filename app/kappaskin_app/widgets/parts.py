@@ -1,8 +1,7 @@
-"""Small widgets and texts: labels, headings, buttons, numbers with errors."""
+"""Small widgets and texts: labels, headings, buttons."""
 
 from html import escape
 
-import numpy as np
 from PySide6.QtCore import QEvent
 from PySide6.QtGui import QKeyEvent, Qt
 from PySide6.QtWidgets import (
@@ -17,22 +16,6 @@ from PySide6.QtWidgets import (
 from kappaskin._text import printable
 
 ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
-
-
-def number(value: float, how: str) -> str:
-    if not np.isfinite(value):
-        return "\N{EN DASH}"
-    rounded = round(value, int(how[-2])) + 0.0  # no minus before a zero
-    return f"{rounded:{how}}".replace("-", "\N{MINUS SIGN}")
-
-
-def with_error(value: float, sd: float, digits: int, unit: str = "", sign: str = "") -> str:
-    """A number with its error bar, as far as that is known; a dash for what is not known."""
-    text = number(value, f"{sign}.{digits}f")
-    if not np.isfinite(value):
-        return text
-    bar = f" \N{PLUS-MINUS SIGN} {sd:.{digits}f}" if np.isfinite(sd) else ""
-    return f"{text}{bar} {unit}".rstrip()
 
 
 def capital(text: str) -> str:

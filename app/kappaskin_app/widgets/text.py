@@ -4,10 +4,12 @@ import math
 import re
 from datetime import datetime
 
-NONE = "\N{EN DASH}"
+from kappaskin._text import NONE
+
 COMMAND = re.compile("`([^`]+)`")
 """A command in a message."""
-_LENGTHS = ((1e-6, 1e-3, "mm"), (1e-9, 1e-6, "\N{MICRO SIGN}m"), (0.0, 1e-9, "nm"))
+_LENGTHS = ((0.0, 1e-3, "mm"),)
+_MOST_DIGITS = 7  # after the point: a tenth of a nanometre in mm
 _TIMES = ((120.0, 60.0, "min"), (1.0, 1.0, "s"), (1e-3, 1e-3, "ms"), (0.0, 1e-6, "\N{MICRO SIGN}s"))
 
 
@@ -29,7 +31,21 @@ def _with_unit(value: float, units: tuple[tuple[float, float, str], ...]) -> str
     scale, unit = next((scale, unit) for least, scale, unit in units if value >= least * 0.999999)
     shown = value / scale
     digits = max(0, 1 - math.floor(math.log10(shown))) if shown > 0 else 0
-    return f"{shown:.{digits}f} {unit}"
+    return f"{shown:.{min(digits, _MOST_DIGITS)}f} {unit}"
+
+
+def elapsed(seconds: float) -> str:
+    """A time as m:ss, or h:mm:ss from an hour on."""
+    hours, rest = divmod(int(seconds), 3600)
+    return f"{hours}:{rest // 60:02d}:{rest % 60:02d}" if hours else f"{rest // 60}:{rest % 60:02d}"
+
+
+def file_size(count: int) -> str:
+    """A number of bytes in few digits."""
+    for one, unit in ((1e9, "GB"), (1e6, "MB"), (1e3, "kB")):
+        if count >= one:
+            return f"{count / one:.1f} {unit}"
+    return f"{count} B"
 
 
 def day(time: float) -> str:

@@ -16,6 +16,7 @@ import numpy as np
 
 from kappaskin._files import open_file, write_whole
 from kappaskin._state import Stateful
+from kappaskin._text import with_error
 from kappaskin._toml import table
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
@@ -136,8 +137,7 @@ class KnownWeights:
         )
         if self.rim_stiffness:
             stiff = f"its edge gives: {self.rim_stiffness:.3g} N/m^2"
-        share = 100 * self.rigidity_sd / self.rigidity
-        head = f"rigidity {self.rigidity:.4g} N m +- {share:.2g} %; {stiff}"
+        head = f"rigidity {with_error(self.rigidity, self.rigidity_sd, 'N m')}; {stiff}"
         each = zip(self.weights, self.told, self.left_out, strict=True)
         return [
             head,

@@ -6,6 +6,7 @@ neither is known, it must exceed the offsets of the elements: a smaller one is t
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
@@ -276,13 +277,9 @@ def _check_unloaded(sensor: Sensor, seeker: LoadDetector, found: _Found, rest: R
             f"{rest.tare.date:%Y-%m-%d %H:%M}: undo that tare first"
         )
     raise Refusal(
-        f"the skin is loaded: {_force(load.force)} at ({x:.0f}, {y:.0f}) mm; this contact explains "
+        f"the skin is loaded: {load.force:.3g} N at ({x:.0f}, {y:.0f}) mm; this contact explains "
         f"{100 * load.share:.0f} % of the signal; {then}"
     )
-
-
-def _force(force: float) -> str:
-    return f"{force:.3g} N" if abs(force) >= 1 else f"{1e3 * force:.3g} mN"
 
 
 @dataclass(frozen=True)
@@ -302,35 +299,38 @@ class Drift:
 
 
 class DriftMonitor:
-    """Averages the readings of a tared skin, and gives their drift while nothing presses."""
+    """Averages the readings of a tared skin, and gives their drift while nothing presses.
 
-    def __init__(self, seeker: LoadDetector) -> None:
-        self._seeker = seeker
+    `surface` is the map from coefficients (Ni, Nj) to displacements (ny, nx) in m.
+    """
+
+    def __init__(self, seeker: LoadDetector, surface: Callable[[Array], Array]) -> None:
+        self._seeker, self._surface = seeker, surface
         self._drift = Drift()
         self._next: Drift | None = None
         self._loaded, self._checked, self._frames = False, -math.inf, 0
         self._begin(math.nan, np.empty(0), np.empty(0), math.nan)
 
-    def _begin(self, time: float, curvature: Array, surface: Array, noise: float) -> None:
+    def _begin(self, time: float, curvature: Array, shape: Array, noise: float) -> None:
         self._begun = self._time = time
-        self._mean, self._surface = curvature.copy(), np.nan_to_num(surface)
+        self._mean, self._shape = curvature.copy(), np.nan_to_num(shape)
         self._noise, self._variance = noise, noise**2
         self._frames = 1
 
-    def follow(self, device_time: float, curvature: Array, surface: Array, noise: float) -> None:
-        """Take the readings (3, P) in 1/m of a frame, their `noise`, and the surface (ny, nx)."""
+    def follow(self, device_time: float, curvature: Array, shape: Array, noise: float) -> None:
+        """Take the readings (3, P) in 1/m of a frame, their `noise`, and coefficients (Ni, Nj)."""
         elapsed = device_time - self._time
         if -OVERTAKEN <= elapsed < _EVERY or not math.isfinite(noise):  # too soon, or overtaken
             return
         if not (self._frames and 0 <= elapsed < _TAU):
             # A first frame, one after a gap, or a clock that went back.
-            self._begin(device_time, curvature, surface, noise)
+            self._begin(device_time, curvature, shape, noise)
             return
         self._time, self._noise, self._frames = device_time, noise, self._frames + 1
         a = max(elapsed / _TAU, 1 / self._frames)
         np.copyto(self._mean, curvature, where=np.isnan(self._mean))
         self._mean += a * np.nan_to_num(curvature - self._mean)
-        self._surface += a * (np.nan_to_num(surface) - self._surface)
+        self._shape += a * (np.nan_to_num(shape) - self._shape)
         self._variance = (1 - a) ** 2 * self._variance + (a * noise) ** 2
 
     def current(self) -> Drift:
@@ -349,6 +349,6 @@ class DriftMonitor:
             return self._drift
         self._drift = self._next or self._drift
         square = float(np.nanmean(weighted**2)) - self._variance
-        farthest = float(np.abs(self._surface).max())
+        farthest = float(np.nanmax(np.abs(self._surface(self._shape))))
         self._next = Drift(math.sqrt(max(square, 0.0)), farthest, self._time)
         return self._drift

@@ -128,7 +128,9 @@ class UsedTare:
         from kappaskin.pipeline import usual_setup
 
         if status.connections != self.connections and status.sensor is not None:
-            self.connections, self._usual = status.connections, usual_setup(status.sensor)
+            asked = self._engine.requested.setup.quantities
+            self.connections = status.connections
+            self._usual = replace(usual_setup(status.sensor), quantities=asked)
             if not status.sensor.simulated:
                 self._engine.set_up(self._usual)
         usual, used = self._usual, status.setup

@@ -47,11 +47,11 @@ def publish(
 ) -> int:
     """Publish contact, shape and error bars of every estimate, until stopped (Ctrl+C).
 
-    Prints a line a second: frames/s, how many of them are computed and the time that each takes,
-    those skipped since they came faster than that, messages sent and dropped, and the 99th
-    percentile of the time from the arrival of a frame until it was sent. The messages are explained
-    in `publishing/messages.md` among the resources. Exit code 1 if there was nothing to send, or if
-    the connection was lost in the end.
+    Prints a line a second: frames/s, how many of them are computed, what of them (not the surface,
+    which is not published) and the time that each takes, those skipped since they came faster than
+    that, messages sent and dropped, and the 99th percentile of the time from the arrival of a frame
+    until it was sent. The messages are explained in `publishing/messages.md` among the resources.
+    Exit code 1 if there was nothing to send, or if the connection was lost in the end.
 
     Example: `kappaskin publish /dev/ttyACM0 --udp 192.168.1.20:9870 --foxglove`
 
@@ -75,6 +75,7 @@ def publish(
         Let the scene name files outside its folder.
     """
     from kappaskin.live import LOST, Engine
+    from kappaskin.pipeline import Setup
     from kappaskin.publish import targets_of
     from kappaskin.scenes import load_scene
     from kappaskin.sources import SimulatedSource
@@ -92,7 +93,7 @@ def publish(
     if source.startswith(SimulatedSource.SCHEME):
         load_scene(source.removeprefix(SimulatedSource.SCHEME), trust)  # or refused here
     stopped = stops()
-    with Engine() as engine:
+    with Engine(Setup(quantities=())) as engine:
         engine.publish(targets, allow_origin or ())
         engine.connect(source, trust)
         status = _watched(engine, time.monotonic() + seconds, stopped)
@@ -149,7 +150,9 @@ def _line(status: "Status") -> str:
     parts = [f"{status.state:9}", f"{status.rate:6.0f} frames/s"]
     if math.isfinite(each := status.computed.each):
         skipped = f", {status.skipped} skipped" if status.skipped else ""
-        parts.append(f"{status.computed.rate:.0f} computed in {1e3 * each:.2f} ms each{skipped}")
+        what = ", ".join(("shape", *status.quantities))
+        rate = f"{status.computed.rate:.0f} computed ({what})"
+        parts.append(f"{rate} in {1e3 * each:.2f} ms each{skipped}")
     parts += map(_words, publishing.targets)
     if math.isfinite(publishing.latency.whole):
         parts.append(f"99 % within {1e3 * publishing.latency.whole:.1f} ms")

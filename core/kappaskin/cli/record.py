@@ -70,6 +70,7 @@ def record(
     """
     from kappaskin.estimation import slope_warning
     from kappaskin.live import LOST, Engine
+    from kappaskin.pipeline import Setup
     from kappaskin.recording import ReplayedSource
 
     check_time(seconds, "record")
@@ -77,7 +78,7 @@ def record(
     if source.startswith(ReplayedSource.SCHEME):
         raise Refusal(f"expected a live source to record, got {source}; copy its file")
     stopped = stops()
-    with Engine() as engine:
+    with Engine(Setup(quantities=())) as engine:
         # Before there is a source, so that nothing of it is missed.
         engine.record(out)
         engine.connect(source, trust)
@@ -305,18 +306,19 @@ def export(
     recording: Path,
     *,
     to: Path,
+    preset: str = "contact",
     begin: Annotated[float, Parameter("--from")] = 0.0,
     until: float = math.inf,
     every: float = 0.0,
     at: float | None = None,
     limit: Limit = "",
 ) -> None:
-    """Export a recording: readings and estimates as a table, or the skin's surface as a mesh.
+    """Export a recording: contact, readings or everything as a table, or the surface as a mesh.
 
-    The suffix selects the format. A .csv, .npz or .h5 has a row for each frame: counts, readings,
-    coefficients, contact and geometry with their error bars, recomputed from the recorded bytes
-    with the recorded settings. A .vtp or .stl is the skin in space at one moment, a .pvd a
-    series of .vtp files. Every file states units, settings, calibration, tare and device.
+    The suffix selects the format. A .parquet, .csv, .npz or .h5 has a row for each frame,
+    recomputed from the recorded bytes with the recorded settings; the preset selects its columns.
+    A .vtp or .stl is the skin in space at one moment, a .pvd a series of .vtp files. Every file
+    states units, settings, calibration, tare and device.
 
     Example: `kappaskin export press.mcap --to press.csv --from 2 --until 4`
 
@@ -326,6 +328,10 @@ def export(
         The recording to read.
     to
         The file to write; refused where it exists already.
+    preset
+        The columns of a table: contact (time, contact, force and depth with their standard
+        deviations, 12 columns), readings (counts and readings) or everything; the first two with
+        7 digits.
     begin
         Start, in seconds since the recording began.
     until
@@ -339,7 +345,9 @@ def export(
 
     allow(limit)
     try:
-        with ExportTask(ExportRequest(recording, to, begin, until, every, at)) as exporting:
+        with ExportTask(
+            ExportRequest(recording, to, begin, until, every, at, preset=preset)
+        ) as exporting:
             done = result_of(exporting.wait(), Exported)
     except KeyboardInterrupt:
         raise Refusal("stopped before the end; nothing was written") from None

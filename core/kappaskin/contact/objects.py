@@ -35,7 +35,9 @@ _INEXACT_BENT = 0.08
 _QUIET = 1e-4  # of the largest reading: no skin is quieter
 _SEEN = 2.6  # standard deviations: a width below is only an upper bound, or noise passes for one
 _LEAST, _DEEPEST = 1e-12, 10.0  # of a side: displacements beyond show no shape of an object
-_SURE = 0.4  # probability below which no kind is named
+_SURE = 0.4  # probability below which a kind is not the result
+_CERTAIN = 0.9  # probability below which a result is not named in words
+_VAST = 1.0  # m: a radius beyond is flat to a skin, and as a bound says nothing
 _LEVEL = 0.01  # probability that noise leaves as much of the readings unexplained
 _ODDS = math.log(9)  # that it touches at two ends, over an oval anywhere: a probability of 0.9
 
@@ -80,21 +82,36 @@ class ContactObject:
         """Kinds and their probabilities, the most likely first."""
         return sorted(self.probability.items(), key=lambda item: -item[1])
 
+    @property
+    def likeliest(self) -> str:
+        """The most likely kind, however unsure; empty without a contact."""
+        return self.ranked[0][0] if self.probability else ""
+
+    @property
+    def sure(self) -> bool:
+        """Whether the kind is known: likely enough, and no size of it is a mere bound.
+
+        A thin cylinder reads as an edge, and counts for it.
+        """
+        if not self.kind:
+            return False
+        alike = {self.kind, "cylinder"} if self.kind == "edge" else {self.kind}
+        likely = sum(self.probability[kind] for kind in alike) >= _CERTAIN
+        bounded = self.radius_95[0] > 0 and self.radius_95[1] < math.inf
+        sized = {"plane": True, "edge": self.length > self.length_95}
+        return likely and sized.get(self.kind, bounded)
+
     def describe(self) -> str:
-        """One line in millimetres and degrees, with the second guess."""
+        """One line in millimetres and degrees: the kind only where it is `sure`."""
         if not self.probability:
             return "no contact"
-        (likeliest, first), (second, chance) = self.ranked[:2]
-        if not self.fits:
-            return f"undetermined: no object fits, {likeliest} is nearest"
-        if not self.kind and first >= _SURE:
-            return f"undetermined: {likeliest}, or another contact that reads the same"
-        if not self.kind:
-            odds = f"{100 * first:.0f} % to {100 * chance:.0f} %"
-            return f"{likeliest} or {second}: undetermined ({odds})"
+        if not self.sure:
+            return f"shape unknown{self._bounds()}"
+        second, chance = self.ranked[1]
         parts = [self.kind]
         if self.kind in ("cylinder", "sphere"):
-            parts.append(self._radius())
+            low, high = map(_millimetres, self.radius_95)
+            parts.append(f"radius {_millimetres(self.radius)} mm ({low} to {high})")
         if self.kind in ("cylinder", "edge"):
             long = f"{1e3 * self.length:.0f} mm long, " if math.isfinite(self.length) else ""
             parts.append(f"{long}axis {math.degrees(self.axis):.0f} deg")
@@ -103,28 +120,34 @@ class ContactObject:
 
     def _alike(self) -> list[str]:
         """What else would read the same."""
-        (low, high), flattest = (1e3 * np.array(two) for two in (self.face_95, self.radius_95))
+        low, high = self.face_95
         if self.kind == "plane" or not high < math.inf:
             return []
         if low:
-            return [f"or a flat face {_digits(1e3 * self.face)} mm wide"]
-        thin = [f"or a cylinder of radius below {_digits(flattest[1])} mm"]
+            return [f"or a flat face {_millimetres(self.face)} mm wide"]
+        thin = [f"or a cylinder of radius below {_millimetres(self.radius_95[1])} mm"]
         other = "any tip" if self.kind == "sphere" else "any two ends"
-        return thin * (self.kind == "edge") + [f"or {other} less than {_digits(high)} mm wide"]
+        return thin * (self.kind == "edge") + [f"or {other} less than {_millimetres(high)} mm wide"]
 
-    def _radius(self) -> str:
-        low, high = (1e3 * radius for radius in self.radius_95)
-        if low == math.inf:
-            return "flat or hollow"
-        if high == math.inf:
-            return f"radius above {_digits(low)} mm" if low else "radius unknown"
-        if not low:
-            return f"radius below {_digits(high)} mm"
-        return f"radius {_digits(1e3 * self.radius)} mm ({_digits(low)} to {_digits(high)})"
+    def _bounds(self) -> str:
+        """What is known in spite of an unknown shape."""
+        low, high = self.radius_95
+        if not self.fits:
+            return ": no object fits"
+        if low >= _VAST:
+            return " (flat, or nearly so)"
+        if self.likeliest == "plane" or not (low > 0 or high < _VAST):
+            return ""
+        far = f"over {_millimetres(low)}" if low else f"under {_millimetres(high)}"
+        if low and high < _VAST:
+            far = f"{_millimetres(low)} to {_millimetres(high)}"
+        what = "ball" if self.likeliest == "sphere" else "cylinder"
+        return f" (a {what} would be {far} mm in radius)"
 
 
-def _digits(value: float) -> str:
+def _millimetres(length: float) -> str:
     """Three digits, and whatever more a number from 1000 on has before the point."""
+    value = 1e3 * length
     return f"{value:.3g}" if value < 999.5 else f"{value:.0f}"
 
 

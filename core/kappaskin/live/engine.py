@@ -290,21 +290,18 @@ class Engine:
             return None
         return self._ring.read(status.generation, status.slot, sequence)
 
-    def recent(self, status: Status, after: int) -> tuple[Array, Array, int]:
-        """Device times (T,) in s and `traced` quantities (T, n k, P) of estimates since `after`.
+    def recent(
+        self, status: Status, after: int, paths: Sequence[str]
+    ) -> tuple[Array, list[Array], int]:
+        """Device times (T,) in s and fields (T, ...) of the estimates since `after`.
 
-        The n kinds of readings of each of k quantities, such as `curvature`. `after` is the
-        number that the last call returned, 0 at first; at most the last 64 estimates.
+        The fields are those at `paths`, such as "contact.force", as far as an estimate stores them;
+        none before the first. `after` is the number that the last call returned, 0 at first; at
+        most the last 64 estimates.
         """
         if status.slot is None:
-            return np.empty(0), np.empty((0, 3, 0)), 0
-        times, values, last = self._ring.recent(status.generation, status.slot, after)
-        if values.ndim == 2 and status.sensor is not None:
-            layout = status.sensor.layout
-            count = values.shape[1] // layout.channels
-            each = layout.by_kind(values.reshape(len(values), count, layout.channels))
-            values = each.reshape(len(values), count * len(layout.kinds), len(layout))
-        return times, values, last
+            return np.empty(0), [], 0
+        return self._ring.recent(status.generation, status.slot, after, paths)
 
     def compared(self, status: Status) -> Estimate | None:
         """The newest estimate with the setup that is compared with."""

@@ -33,7 +33,7 @@ from kappaskin.live.ring import Ring
 from kappaskin.live.status import LOST, STREAMING, WAITING, Status
 from kappaskin.live.tare_taking import TareCapture
 from kappaskin.live.timing import ArrivalTimes, ComputingTimes, RateLimit
-from kappaskin.pipeline import Pipeline
+from kappaskin.pipeline import QUANTITIES, Pipeline, Setup
 from kappaskin.publish import Publishing
 from kappaskin.recording import ReplayedSource
 from kappaskin.scenes import Playback, Scene
@@ -43,6 +43,7 @@ from kappaskin.sources import SimulatedSource, Source, open_source
 _READ = 0.02  # s a read may wait, and so a command
 _REPORT = 0.1  # s between two statuses
 _AGAIN = 0.5  # s between two tries to open a port
+_AT_CONTACT = "contact", "geometry"  # published and recorded of each frame; the surface is neither
 
 
 class EngineLoop:
@@ -274,6 +275,7 @@ class EngineLoop:
             pipeline.pass_over(frame)
             self._compared.pass_over(frame)
             self._arrivals.used(frame)
+        pipeline.wanted = self._wanted(pipeline.setup)
         began = time.monotonic()
         for frame in frames[late:]:
             begun = time.monotonic()
@@ -294,6 +296,11 @@ class EngineLoop:
             kept = time.monotonic() - published
             self._computing.add(estimated - begun, published - estimated, kept)
         self._rate_limit.spend(len(frames) - late, time.monotonic() - began)
+
+    def _wanted(self, setup: Setup) -> frozenset[str]:
+        """The quantities that the setup names, and those that receivers, files and scans need."""
+        used = self._publishing.active or self._recorder.active or self._tracking is not None
+        return frozenset((*setup.quantities, *(_AT_CONTACT if used else ())))
 
     def _follow(self, source: Source) -> None:
         """Update the status of the source and of the device on it."""
@@ -362,9 +369,11 @@ class EngineLoop:
                 drift=watch.current() if watch else None,
                 rate=self._arrivals.rate(now),
                 computed=self._computing.means(),
+                quantities=tuple(n for n in QUANTITIES if pipeline and n in pipeline.wanted),
                 reader_gap=self._arrivals.gap(now),
                 last_frame=self._arrivals.last,
                 playing=source.playing if isinstance(source, SimulatedSource) else Playback(),
+                pace=source.pace if isinstance(source, SimulatedSource) else 1.0,
                 health=self._health.health(pipeline, self._place),
                 replay=source.replay if isinstance(source, ReplayedSource) else None,
                 slope=fit.neglected_slope if fit else 0.0,

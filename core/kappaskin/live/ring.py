@@ -10,11 +10,12 @@ import os
 import pickle
 import secrets
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from functools import reduce
 from multiprocessing import resource_tracker
 from multiprocessing.shared_memory import SharedMemory
-from operator import attrgetter
+from operator import attrgetter, getitem
 from pathlib import Path
 from typing import Any, cast
 
@@ -24,7 +25,7 @@ from numpy.typing import NDArray
 from kappaskin._files import hold, left_behind
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Estimate
-from kappaskin.pipeline import REPORTED, Pipeline, axes_of, stored
+from kappaskin.pipeline import Pipeline, axes_of, stored
 
 _SIZE = 96 * 2**20  # pages that are never written cost no memory
 _STATUS_SIZE = 8 * 2**20  # the calibration of a large skin is most of it
@@ -58,7 +59,6 @@ def _fields(
     ]
 
 
-_TRACED = [of.value for of in REPORTED if of.traced]
 _RECORDS: list[tuple[int, Any]] = [
     (n, field.type) for n, field in enumerate(fields(Estimate)) if is_dataclass(field.type)
 ]
@@ -264,27 +264,26 @@ class Ring:
         return _estimate(record) if record is not None else None
 
     def recent(
-        self, generation: int, slot: np.dtype[np.void], after: int
-    ) -> tuple[Array, Array, int]:
-        """Reader: times (T,) in s and what is `traced` of all after the one numbered `after`.
+        self, generation: int, slot: np.dtype[np.void], after: int, paths: Sequence[str]
+    ) -> tuple[Array, list[Array], int]:
+        """Reader: times (T,) in s and fields (T, ...) of all after the one numbered `after`.
 
-        It is (T, 3 k, P), for each of the k quantities its components, or (T, k R) of other
-        readings. As many of `generation` as are still there, and the number of the last, counted
-        from 1.
+        The fields are those at `paths` of `stored()`; none without `generation`. As many of it as
+        are still there, and the number of the last, counted from 1.
         """
         written = int(self._header[self._WRITTEN])
         if not self._mapped(generation, slot):
-            return np.empty(0), np.empty((0, 3, 0)), written
+            return np.empty(0), [], written
         tickets = np.arange(max(after, written - len(self._slots)), written) + 1
         here = (tickets - 1) % len(self._slots)
         closed = self._slots["closed"][here]
         times = self._slots["device_time"][here]
-        values = np.concatenate([self._slots[name][here] for name in _TRACED], axis=1)
+        values = [reduce(getitem, path.split("."), self._slots)[here] for path in paths]
         # The tickets in the order opposite to the writer's, as above.
         whole = (closed == tickets) & (self._slots["opened"][here] == tickets)
         if self._header[self._GENERATION] != generation:
             whole[:] = False
-        return times[whole], values[whole], written
+        return times[whole], [value[whole] for value in values], written
 
     def _mapped(self, generation: int, slot: np.dtype[np.void]) -> bool:
         """Reader: whether the slots are those of `generation`, as they are laid out."""

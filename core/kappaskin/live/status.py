@@ -34,16 +34,17 @@ class Status:
     one in use, `refusal` says why it is not the one requested last, `computing` whether another is
     being prepared. `region` is scanned unless `region_refusal` says why not. `connections` counts
     the devices connected so far, `skipped` the frames that arrived faster than they could be
-    computed, `computed` how long the others take. `rate` in frames/s; `reader_gap` in s is the 99th
-    percentile of the time between two arrivals; `last_frame` and `reported` in s on the monotonic
-    clock. `playing` maps device time to the time of a simulated scene. `events` are the last of
-    `event_count`. `temperature` of the device in degrees Celsius, NaN if it sends none. `tare` is
-    the state of tares, `drift` the drift since the tare of the `setup`, None without one. `health`
-    lists faulty channels, `publishing` the state of each target, `recording` that of the file being
-    written, `replay` the position in a recording (None for any other source), `compared` the state
-    of the second pipeline (None without one). `slope` is the largest of the newest shape, if the
-    method neglects it though it matters (`Fit.neglected_slope`), else 0. `requested` is the number
-    of the newest request that the engine has received.
+    computed, `computed` how long the others take, `quantities` those of `QUANTITIES` that they
+    have. `rate` in frames/s; `reader_gap` in s is the 99th percentile of the time between two
+    arrivals; `last_frame` and `reported` in s on the monotonic clock. `playing` maps device time to
+    the time of a simulated scene, which goes on by `pace` seconds per second. `events` are the last
+    of `event_count`. `temperature` of the device in degrees Celsius, NaN if it sends none. `tare`
+    is the state of tares, `drift` the drift since the tare of the `setup`, None without one.
+    `health` lists faulty channels, `publishing` the state of each target, `recording` that of the
+    file being written, `replay` the position in a recording (None for any other source), `compared`
+    the state of the second pipeline (None without one). `slope` is the largest of the newest shape,
+    if the method neglects it though it matters (`Fit.neglected_slope`), else 0. `requested` is the
+    number of the newest request that the engine has received.
     """
 
     state: str = OFF
@@ -59,6 +60,7 @@ class Status:
     region_refusal: str = ""
     skipped: int = 0
     computed: ComputedFrames = field(default_factory=ComputedFrames)
+    quantities: tuple[str, ...] = ()
     generation: int = 0
     slot: "np.dtype[np.void] | None" = None
     accounting: Accounting = field(default_factory=Accounting)
@@ -67,6 +69,7 @@ class Status:
     last_frame: float = -math.inf
     reported: float = -math.inf
     playing: Playback = field(default_factory=Playback)
+    pace: float = 1.0
     events: tuple[Event, ...] = ()
     event_count: int = 0
     temperature: float = math.nan
@@ -99,9 +102,11 @@ class Status:
             region_refusal="",
             skipped=0,
             computed=ComputedFrames(),
+            quantities=(),
             accounting=Accounting(),
             rate=0.0,
             last_frame=-math.inf,
+            pace=1.0,
             temperature=math.nan,
             drift=None,
             health=Health(),

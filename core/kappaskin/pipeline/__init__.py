@@ -28,6 +28,7 @@ from kappaskin.pipeline.reported import readouts as readouts
 from kappaskin.pipeline.reported import readouts_of as readouts_of
 from kappaskin.pipeline.reported import skin_colours as skin_colours
 from kappaskin.pipeline.reported import stored as stored
+from kappaskin.pipeline.setup import QUANTITIES as QUANTITIES
 from kappaskin.pipeline.setup import SETUP as SETUP
 from kappaskin.pipeline.setup import Setup as Setup
 from kappaskin.pipeline.setup import setup_from_text as setup_from_text

@@ -16,6 +16,7 @@ from kappaskin.bases import Basis, ValueMap, basis_for
 from kappaskin.calibration import Calibration, Corrector, DriftMonitor, Rest, Tare
 from kappaskin.contact import (
     NO_CONTACT,
+    NO_GEOMETRY,
     LoadDetector,
     LowerBound,
     contacts_of,
@@ -24,7 +25,7 @@ from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation import METHODS, Fit, check_method, estimator_for
 from kappaskin.frames import OVERTAKEN, Array, Estimate, Frame, Mask, Truth
 from kappaskin.health import Exclusion, exclude
-from kappaskin.pipeline.setup import Setup
+from kappaskin.pipeline.setup import QUANTITIES, Setup
 from kappaskin.sensing import Sensor
 
 REVISION = 4
@@ -108,14 +109,16 @@ class Pipeline:
         clock: Callable[[], float] = time.monotonic,
         budget: Budget | None = None,
     ) -> None:
+        _check_quantities(setup.quantities)
         _check_size(sensor, setup, budget)
+        self.wanted = frozenset(setup.quantities)
+        """Those of `QUANTITIES` that are computed from the next frame on."""
         self.sensor, self.setup, self.generation, self._clock = sensor, setup, generation, clock
         self.past = _Past(
             self._corrector(setup.calibration), FrameAssembly(sensor.channels, setup.hold)
         )
         self._zero = self._shift(setup.tare)
         edge = setup.edge or sensor.edge
-        self.drift = None if setup.tare is None else DriftMonitor(LoadDetector(sensor, edge))
         across = 1 if sensor.layout.patch.strip else setup.Nj
         self.basis = basis_for(sensor.layout.patch, edge, setup.Ni, across)
         layout, rim_sd = sensor.layout, setup.rim_sd
@@ -131,6 +134,9 @@ class Pipeline:
         on_skin = sensor.layout.patch.contains(points).reshape(setup.ny, setup.nx)
         self._skin = ... if on_skin.all() else on_skin
         self._surface = self.basis.on_grid(self._x, self._y)
+        self.drift = None
+        if setup.tare is not None:
+            self.drift = DriftMonitor(LoadDetector(sensor, edge), self._surface)
         known = setup.calibration and setup.calibration.weights
         plate = known.plate(sensor.plate) if known else sensor.plate
         self._contacts = contacts_of(plate, sensor.layout, self.basis, edge, sensor.sigma)
@@ -246,17 +252,20 @@ class Pipeline:
         found = self._fitted(frame, out(scanned), out(curvature))
         fit_time = time.perf_counter() - began
         fit = self.fitted = self._with_given_noise(found)
-        surface, noise = self._surface(fit.coefficients), float(fit.noise)
+        noise, wanted = float(fit.noise), self.wanted
         if self.drift is not None:
-            self.drift.follow(frame.device_time, curvature, surface, noise)
-        contact, second, drift = NO_CONTACT, NO_CONTACT, 0.0
-        if math.isfinite(noise):
+            self.drift.follow(frame.device_time, curvature, fit.coefficients, noise)
+        contact, second, drift, geometry = NO_CONTACT, NO_CONTACT, 0.0, NO_GEOMETRY
+        if "contact" in wanted and math.isfinite(noise):
             # By the residuals: a given noise lacks the error of too few functions.
             left = found if math.isfinite(float(found.noise)) else fit
             contact, second = map(self._bounded, self._contacts(fit.readings, left))
-        if math.isfinite(noise) and (drifted := self._contacts.drift) is not None:
-            fit, drift = self._with_given_noise(drifted.fit), drifted.size
-            self.fitted, surface, noise = fit, self._surface(fit.coefficients), float(fit.noise)
+            if (drifted := self._contacts.drift) is not None:
+                fit, drift = self._with_given_noise(drifted.fit), drifted.size
+                self.fitted, noise = fit, float(fit.noise)
+        if "geometry" in wanted:
+            geometry = self._contacts.geometry(fit, contact)
+        surface = self._surface(fit.coefficients) if "surface" in wanted else self._unknown
         return Estimate(
             self.generation,
             frame.sequence,
@@ -278,7 +287,7 @@ class Pipeline:
             drift,
             contact,
             second,
-            self._contacts.geometry(fit, contact),
+            geometry,
             *self._compared(surface, fit.coefficients, frame.truth),
         )
 
@@ -403,6 +412,15 @@ def pipeline_for(
                 "fewer"
             )
     raise Refusal(refusal)
+
+
+def _check_quantities(quantities: tuple[str, ...]) -> None:
+    unknown = [name for name in quantities if name not in QUANTITIES]
+    if unknown or ("geometry" in quantities and "contact" not in quantities):
+        raise Refusal(
+            f"expected quantities among {', '.join(QUANTITIES)}, and the contact where the "
+            f"geometry is that of, got {', '.join(map(str, quantities))}"
+        )
 
 
 def _check_size(sensor: Sensor, setup: Setup, budget: Budget | None) -> None:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
+from kappaskin._text import NO_FORCE
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Fit
 from kappaskin.frames import COMPONENTS, Array, Estimate
@@ -233,8 +234,9 @@ class ReportedQuantity:
     `quick` gets all that is published of it as a list, in less time than `value` and `sd`.
 
     On the screen its numbers are called as in `labels_shown`, and each is `shown` in a unit, as so
-    many times the value, with so many digits; without labels it is no readout. `header` says how
-    it stands in the window's header too. `colours` are what the skin may be coloured by of it.
+    many times the value, with so many digits where its error is unknown; without labels it is no
+    readout. `at_rim` is shown where a contact is too near a held edge to determine it. `header`
+    says how it stands in the window's header too. `colours` are what the skin may be coloured by.
 
     What has `COMPONENTS` at every element may be a column `element_head` of the element panel.
     `traced` is the title of what is drawn of it over time: then it is a field of the estimate with
@@ -262,6 +264,7 @@ class ReportedQuantity:
     quick: Getter | None = None
     interleaved: bool = False
     labels_shown: tuple[str, ...] = ()
+    at_rim: str = ""
     shown: tuple[str, float, int] = ("", 1.0, 3)
     header: HeaderNumber | None = None
     element_head: str = ""
@@ -851,6 +854,7 @@ _CONTACT = (
         sd="contact.position_sd",
         half_width="contact.position_95",
         labels_shown=("Contact x", "Contact y"),
+        at_rim="edge: unreliable",
         shown=("mm", 1e3, 2),
         keys=(
             ("x_m", "position of the contact along the skin"),
@@ -868,7 +872,8 @@ _CONTACT = (
         half_width="contact.force_95",
         keys=(("force_N", "of the contact, above zero where it presses"),),
         labels_shown=("Force",),
-        shown=("mN", 1e3, 1),
+        at_rim=NO_FORCE,
+        shown=("N", 1.0, 4),
         header=HeaderNumber(
             "force",
             16,
@@ -898,6 +903,7 @@ _CONTACT = (
         columns=("", "_sd"),
         keys=(("displacement_m", f"{_OF_SKIN}, above zero inward"),),
         labels_shown=("Depth",),
+        at_rim="edge: no depth",
         shown=("mm", 1e3, 3),
         header=HeaderNumber(
             "depth", 15, "Displacement at the contact, with its error bar; positive is inward."
@@ -920,6 +926,7 @@ _CONTACT = (
         symbol="r",
         keys=(("load_radius_m", f"{_OF_LOAD}; null where the skin does not tell it"),),
         labels_shown=("Load radius",),
+        at_rim="edge: no radius",
         shown=("mm", 1e3, 2),
     ),
     ReportedQuantity(
@@ -1180,7 +1187,11 @@ def colours_of(layout: SensorLayout) -> dict[str, SkinColour]:
 
 
 class Readout(NamedTuple):
-    """A number on the screen: in a `unit`, with so many `digits`; NaN where one is not known."""
+    """A number on the screen: in a `unit`, NaN if unknown.
+
+    It has so many `digits` where its error is unknown. The `words` stand instead of a number that
+    is not determined.
+    """
 
     label: str
     value: float
@@ -1188,6 +1199,7 @@ class Readout(NamedTuple):
     half_width: float
     unit: str
     digits: int
+    words: str = ""
 
     def less(self, other: "Readout") -> tuple[float, float]:
         """The difference to another number, and its error as if theirs had nothing in common."""
@@ -1219,6 +1231,11 @@ def readouts_of(quantity: ReportedQuantity, reported: Reported) -> list[Readout]
     ]
     found: list[Readout] = []
     for part, label in enumerate(quantity.labels_shown):
+        if quantity.at_rim and reported.contact.near_rim:
+            found.append(
+                Readout(label, math.nan, math.nan, math.nan, unit, digits, quantity.at_rim)
+            )
+            continue
         value, sd, half_width = (scale * float(each[part % len(each)]) for each in numbers)
         found.append(Readout(label, value, sd, half_width, unit, digits))
     return found

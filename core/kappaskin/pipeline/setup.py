@@ -13,6 +13,9 @@ from kappaskin.errors import Refusal
 from kappaskin.estimation import METHODS, Estimator
 from kappaskin.sensing import Sensor
 
+QUANTITIES = "surface", "contact", "geometry"
+"""What a pipeline computes of a shape, each with its error bars; the geometry is at the contact."""
+
 
 @dataclass(frozen=True)
 class Setup:
@@ -22,7 +25,8 @@ class Setup:
     one of `METHODS`. A channel that a frame leaves out keeps its last reading until that is
     `hold` s old. Readings are relative to the zero of the `tare` and corrected by the
     `calibration`, both of which must be the sensor's own. A rim that gives is expected to move by
-    `rim_sd` in m.
+    `rim_sd` in m. Besides the shape those of `QUANTITIES` are computed that are named; the others
+    are NaN, and no contact. What somebody publishes or records is computed too.
     """
 
     Ni: int = 8
@@ -35,6 +39,7 @@ class Setup:
     calibration: Calibration | None = None
     tare: Tare | None = None
     rim_sd: float = Estimator.RIM_SD
+    quantities: tuple[str, ...] = QUANTITIES
 
 
 _COUNT = Within(1, 4096, whole=True)
@@ -96,7 +101,10 @@ SETUP = Part(
     },
     (Setup,),
 )
-"""All keys of a setup; in text, a calibration and a tare are the names of their files."""
+"""The keys of a setup in text, where a calibration and a tare are the names of their files.
+
+What is computed again of a recording does not depend on what was computed at the time.
+"""
 
 _LONGEST = 2**16  # characters of a setup
 
@@ -128,7 +136,8 @@ def setup_from_text(text: str, file: Callable[[str], bytes]) -> Setup:
             raise Refusal(f"expected at most {_LONGEST} characters, got {len(text)}")
         table = json_table(text)
         calibration, tare = (SETUP.value(table, name) for name in ("calibration", "tare"))
-        setup = SETUP.make(table, Setup, complete=True, calibration=None, tare=None)
+        given = {"calibration": None, "tare": None, "quantities": QUANTITIES}
+        setup = SETUP.make(table, Setup, complete=True, **given)
         table.done()
     except Refusal as refusal:
         raise Refusal(f"expected a setup as it was recorded: {refusal}") from refusal

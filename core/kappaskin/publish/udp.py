@@ -8,7 +8,7 @@ import time
 from contextlib import suppress
 from typing import Any, cast
 
-from kappaskin._text import printable
+from kappaskin._text import NO_FORCE, printable, with_error
 from kappaskin.errors import Refusal
 from kappaskin.publish.message import LARGEST, VERSION, EstimateMessage, SourceState
 from kappaskin.publish.publishing import Receiver, Target, reason
@@ -222,11 +222,15 @@ def _understood(data: bytes) -> JsonMessage | None:
     return message if known else None
 
 
-def _figure(message: JsonMessage, key: str, scale: float, how: str) -> str:
+def _number(message: JsonMessage, key: str) -> float:
+    """A number of a message; NaN where it has none."""
     value = message.get(key)
-    if not isinstance(value, int | float) or not abs(value) < _ENDLESS:
-        return "?"
-    return f"{scale * value:{how}}"
+    return value if isinstance(value, int | float) and abs(value) < _ENDLESS else math.nan
+
+
+def _figure(message: JsonMessage, key: str, scale: float, how: str) -> str:
+    value = _number(message, key)
+    return "?" if math.isnan(value) else f"{scale * value:{how}}"
 
 
 def _words(message: JsonMessage) -> str:
@@ -235,10 +239,9 @@ def _words(message: JsonMessage) -> str:
     if not message.get("present"):
         return f"{head}  none  {tail}"
 
-    def bar(key: str, unit: str, scale: float, how: str) -> str:
-        sd_key = f"{key}_sd_{unit}"
-        value, sd = (_figure(message, k, scale, how) for k in (f"{key}_{unit}", sd_key))
-        return f"{value} +- {sd}"
+    def bar(key: str, unit: str, scale: float, shown: str) -> str:
+        value, sd = (scale * _number(message, f"{key}{of}_{unit}") for of in ("", "_sd"))
+        return with_error(value, sd, shown)
 
     doubt = "" if message.get("single") else "  not a single load"
     second = message.get("second")
@@ -246,11 +249,12 @@ def _words(message: JsonMessage) -> str:
         also = cast("JsonMessage", second)
         x, y = (_figure(also, key, 1e3, ".2f") for key in ("x_m", "y_m"))
         doubt = f"  second x {x} mm  y {y} mm  force {_figure(also, 'force_N', 1, '.4f')} N"
-    rim = "  near the rim" if message.get("near_rim") else ""
+    rim = message.get("near_rim")
+    force = NO_FORCE if rim else f"force {bar('force', 'N', 1, 'N')}"
     least = "  force is a lower bound" if message.get("force_is_lower_bound") else ""
     return (
-        f"{head}  x {bar('x', 'm', 1e3, '.2f')} mm  y {bar('y', 'm', 1e3, '.2f')} mm  "
-        f"force {bar('force', 'N', 1, '.4f')} N  moved {bar('displacement', 'm', 1e3, '.3f')} mm  "
-        f"curvature {bar('curvature_1', 'per_m', 1, '.2f')}, "
-        f"{bar('curvature_2', 'per_m', 1, '.2f')} 1/m{doubt}{rim}{least}  {tail}"
+        f"{head}  x {bar('x', 'm', 1e3, 'mm')}  y {bar('y', 'm', 1e3, 'mm')}  "
+        f"{force}  moved {bar('displacement', 'm', 1e3, 'mm')}  "
+        f"curvature {bar('curvature_1', 'per_m', 1, '1/m')}, "
+        f"{bar('curvature_2', 'per_m', 1, '1/m')}{doubt}{least}  {tail}"
     )

@@ -9,10 +9,12 @@ from collections import Counter
 from collections.abc import Iterator
 from functools import cached_property
 from io import BytesIO
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 import lz4.frame  # pyright: ignore[reportMissingTypeStubs]
+import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -33,10 +35,12 @@ from mcap.records import (
 
 from kappaskin._files import Budget, open_file
 from kappaskin.errors import Damaged, Refusal
-from kappaskin.frames import Event
+from kappaskin.frames import Array, Event
 from kappaskin.pipeline import REVISION
 from kappaskin.recording.cdr import decode
 from kappaskin.recording.messages import (
+    CONTACT,
+    CONTACTS,
     DEVICE,
     EVENTS,
     LINES,
@@ -47,7 +51,7 @@ from kappaskin.recording.messages import (
     Topic,
     unpack_line,
 )
-from kappaskin.recording.writing import FORMAT, PROGRAM
+from kappaskin.recording.writing import FORMAT, PROGRAM, part_of
 
 MAGIC = b"\x89MCAP0\r\n"
 LARGEST = 2**26  # bytes of a record, or of what is in a chunk
@@ -56,6 +60,7 @@ _FOOTER = _HEAD.size + 20
 # What work on a record costs, as bytes of a file's budget: each takes some microseconds, and one
 # that is parsed some for each entry.
 _PER_RECORD, _PARSED = 400, 16
+_AT_ONCE = 2000  # contacts
 _FAULTS = (
     McapError,
     ValueError,
@@ -228,9 +233,10 @@ class Recording:
             self._file.seek(0)
             magic = self._file.read(len(MAGIC))
         except OSError as error:
-            raise Refusal(
-                f"{path}: cannot be read ({error.strerror or error}); expected a recording"
-            ) from error
+            why = f"cannot be read ({error.strerror or error}); expected a recording"
+            if part_of(path).exists():
+                why = f"is not complete; end the recording, or use {part_of(path).name}"
+            raise Refusal(f"{path}: {why}") from error
         self.library = ""
         # Where they were lost with the beginning of the file:
         self.format, self.revision = FORMAT, 0
@@ -383,7 +389,7 @@ class Recording:
 
     def seconds(self, stamp: int) -> float:
         """The time of a `stamp`, in s since the recording began."""
-        return (stamp - self.first) * 1e-9
+        return (stamp - self.first) / 1e9
 
     def devices(self) -> Iterator[tuple[float, str]]:
         """The information texts of devices, each with its time in s since the recording began."""
@@ -512,3 +518,22 @@ def event_of(message: RecordedMessage, time: float) -> Event:
 def _number(metadata: dict[str, str], name: str, unknown: int) -> int:
     text = metadata.get(name, "")
     return int(text[:_DIGITS]) if text.isascii() and text.isdigit() else unknown
+
+
+def contacts_in(path: Path) -> Iterator[tuple[float, Array, dict[str, Array]]]:
+    """Length of a recording in s, times (T,) in it and the fields (T, ...) of contacts, by name.
+
+    In parts of some thousand contacts, as `CONTACT` has them. A `Refusal` for a file that is no
+    recording.
+    """
+    with Recording(path) as recording:
+        messages = recording.messages_on(CONTACTS)
+        while True:
+            part = list(islice(messages, _AT_ONCE))
+            found = [decode(CONTACT, message.data) for message in part]
+            names = [name for name in (found[0] if found else ()) if name != "header"]
+            fields = {name: np.array([each[name] for each in found]) for name in names}
+            times = [recording.seconds(message.stamp) for message in part]
+            yield recording.seconds(recording.last), np.array(times), fields
+            if len(part) < _AT_ONCE:
+                return

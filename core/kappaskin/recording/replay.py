@@ -368,8 +368,9 @@ class ReplayedSource:
 
 
 def _same_estimator(setup: Setup | None, used: Setup) -> bool:
-    """Whether the settings are the same but for the points of the surface."""
-    return setup is not None and replace(setup, nx=used.nx, ny=used.ny) == used
+    """Whether the settings are the same but for the points of the surface, and what is computed."""
+    alike = {name: getattr(used, name) for name in ("nx", "ny", "quantities")}
+    return setup is not None and replace(setup, **alike) == used
 
 
 def recorded_estimate(estimate: Estimate, found: dict[str, Any], pipeline: Pipeline) -> Estimate:

@@ -219,6 +219,25 @@ def part_of(path: Path) -> Path:
     return path.with_name(path.name + ".part")
 
 
+def renamed(path: Path, name: str) -> Path:
+    """The new path of the complete recording `path`, from now on called `name`.
+
+    A `Refusal` where that is not possible.
+    """
+    if not name or Path(name).name != name:
+        raise Refusal(f"expected a name without a folder, got {name!r}; choose another name")
+    new = path.with_name(f"{name.removesuffix(path.suffix)}{path.suffix}")
+    if is_there(new) or is_there(part_of(new)):
+        raise Refusal(f"{new.name}: already exists; choose another name")
+    try:
+        path.rename(new)
+    except OSError as error:
+        raise Refusal(
+            f"{path.name}: cannot be renamed ({error.strerror or error}); it keeps its name"
+        ) from error
+    return new
+
+
 def repair_command(path: Path) -> str:
     """The command that completes the recording to be at `path`."""
     return shlex.join(["kappaskin", "repair", str(part_of(path)), "--out", str(path)])

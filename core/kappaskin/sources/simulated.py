@@ -20,7 +20,8 @@ from kappaskin.sources.information import sensor_from_json, sensor_to_json
 from kappaskin.sources.source import InputRecorder, register_scheme
 from kappaskin.sources.wire import MOST_RUNS, encode_scan, pack_runs
 
-_BACKLOG = 0.25  # s behind its own clock after which frames are skipped, and counted as lost
+_BACKLOG = 0.25  # s behind real time after which the simulated time waits for the computing
+_WHILE = 2.0  # s over which the pace is taken
 _DEPTH = 0.02  # m from the middle of the skin down to the force/torque sensor
 _ROUNDING = 1e-3  # of a frame: a clock that was slept to may stand a rounding error before it
 
@@ -41,6 +42,7 @@ class VirtualClock:
 class SimulatedSource:
     """Yields the frames of a scene at its rate; scene and scan may change while it plays.
 
+    Where its frames cannot be computed in real time its own time goes slower, and none is lost.
     Another skin, other elements or electronics are another device on the same line: `sensor` is
     then another one.
     """
@@ -61,6 +63,7 @@ class SimulatedSource:
         self._taken = 0.0  # device time of the last frame
         self._accepted = self._lost = 0
         self._recorder: InputRecorder | None = None
+        self._paced, self._pace = (self._start, 0.0), 1.0
         self._listed, self._runs = np.empty(0, np.intp), b""
 
     def _become(self, scene: Scene, due: float, playing: Playback) -> None:
@@ -108,9 +111,12 @@ class SimulatedSource:
         """Give `recorder` from now on what such a device would send; nobody without one."""
         self._recorder = recorder
         if recorder is not None:
-            state = ClockState((0.0, self._start, 0.0, 0.0, 0.0, False), 0, math.nan)
             recorder.connected(self._text)
-            recorder.clock(math.nan, state)
+            self._record_clock(recorder)
+
+    def _record_clock(self, recorder: InputRecorder) -> None:
+        state = ClockState((0.0, self._start, 0.0, 0.0, 0.0, False), 0, math.nan)
+        recorder.clock(math.nan, state)
 
     def _record(self, recorder: InputRecorder, frames: list[Frame]) -> None:
         width = self._simulator.scene.transduction.count_bytes
@@ -170,10 +176,11 @@ class SimulatedSource:
         if due > now:
             self._sleep(min(due - now, timeout))
             now = self._clock()
-        behind = int((now - self._start - self._due()) * self._rate + _ROUNDING) + 1
-        skipped = max(0, behind - max(1, int(_BACKLOG * self._rate)))
-        self._lost += skipped
-        self._n += skipped
+        late = now - self._start - self._due()
+        if late > max(_BACKLOG, 1 / self._rate):
+            self._start += late
+            if self._recorder is not None:
+                self._record_clock(self._recorder)
         frames: list[Frame] = []
         while (now - self._start - self._due()) * self._rate + _ROUNDING >= 0:
             frames.append(self._next())
@@ -183,6 +190,17 @@ class SimulatedSource:
         self._accepted += len(arrived)
         self._lost += len(frames) - len(arrived)
         return arrived
+
+    @property
+    def pace(self) -> float:
+        """Simulated seconds per second of the last two or more: below 1 where it is slower."""
+        now = self._clock()
+        then, time = self._paced
+        if now - then >= _WHILE:
+            until = min(now - self._start, self._due())
+            self._pace = max(until - time, 0.0) / (now - then)
+            self._paced = now, until
+        return self._pace
 
     @property
     def patient(self) -> bool:

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QApplication
 from kappaskin import Status, load_scene
 from kappaskin.health import Health
 from kappaskin.health.findings import Finding
-from kappaskin.recording import Replay
+from kappaskin.recording import RecordingStatus, Replay
 from kappaskin_app.shell.badge import Badge, colour_of, origin, state_of
 from kappaskin_app.theme import LIGHT
 
@@ -70,10 +70,11 @@ def test_a_rail_wins_over_a_pause() -> None:
 
 def test_the_badge_says_recording_below_what_nothing_graver_is_true_of(qapp: QApplication) -> None:
     badge = Badge()
-    badge.show_state("LIVE", recording=True)
-    assert badge.text() == "LIVE\nrecording"
-    badge.show_state("SIM \N{MIDDLE DOT} paused", recording=True)
+    recorded = RecordingStatus("x.mcap", True, 11.0)
+    badge.show_state("LIVE", recorded)
+    assert badge.text() == "LIVE\nREC 0:11"
+    badge.show_state("SIM \N{MIDDLE DOT} paused", recorded)
     assert badge.text() == "SIM\npaused"
     assert badge.accessibleName() == "SIM, paused, recording"
-    badge.show_state("SIM")
+    badge.show_state("SIM", RecordingStatus())
     assert badge.text() == "SIM"

@@ -1,10 +1,14 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin_app.shell.colouring import Ranges, SteadyRange
+from kappaskin import Pipeline, Setup, Simulator, load_scene
+from kappaskin_app.shell.background import Tasks
+from kappaskin_app.shell.colouring import Colouring, Ranges, SteadyRange
+from kappaskin_app.shell.settings import Settings
 from kappaskin_app.widgets.text import round_up
 
 
@@ -33,6 +37,33 @@ def test_a_peak_between_keeps_the_range() -> None:
     steady.follow(9.0, now=1.5)
     assert steady.follow(2.0, now=2.5) == 10.0
     assert not math.isnan(steady.limit)
+
+
+def test_noise_alone_stays_within_a_fifth_of_the_range() -> None:
+    ranges, settings = Ranges(side=100.0), Settings()
+    noise = np.full(100, 0.4)
+    assert ranges.limit("xx", noise, settings, 0.0) == 0.5
+    assert ranges.limit("xx", noise, settings, 0.1, noise=0.231) >= 5 * 0.231
+    assert ranges.limit("displacement", 0.01 * noise, settings, 0.0, noise=0.05) >= 0.25
+
+
+def test_no_range_is_wider_than_a_skin_or_an_object_can_be() -> None:
+    ranges, settings = Ranges(side=100.0), Settings()
+    wild = np.array([0.0, 1e12])
+    limits = [ranges.limit(name, wild, settings, 0.0) for name in ("displacement", "xx", "mean")]
+    assert limits == [100.0, 1e3, 1e3]
+
+
+def test_the_noise_of_a_colour_is_that_of_the_estimate() -> None:
+    scene = load_scene("centre")
+    estimate = Pipeline(scene.sensor(), Setup())(Simulator(scene).frame(0, lambda: 0.0))
+    colouring = Colouring(Tasks())
+    assert colouring.noise("xx", estimate) == estimate.noise > 0
+    depth = 1e3 * estimate.contact.displacement_sd
+    assert colouring.noise("displacement", estimate) == depth > 0
+    for doubt in ({"single": False}, {"near_rim": True}):
+        doubtful = replace(estimate, contact=replace(estimate.contact, **doubt))
+        assert colouring.noise("displacement", doubtful) == 0
 
 
 def test_a_skin_at_rest_keeps_its_side() -> None:

@@ -24,7 +24,7 @@ from kappaskin_app.shell.window_file import WindowState, clamped, from_text, to_
 
 BELOW = (
     *("cost", "stability", "scene", "health", "compare", "design"),
-    *("element", "traces", "numbers", "log", "guide"),
+    *("element", "strip_chart", "traces", "numbers", "log", "guide"),
 )
 DOCKS = ("lesson", "settings", "curvature", *BELOW)
 SHARES = st.integers(50, 600).map(lambda share: share / 1000)

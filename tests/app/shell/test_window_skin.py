@@ -9,6 +9,7 @@ from PySide6.QtCore import QPoint, Qt
 from kappaskin import Disk, Patch
 from kappaskin.bases import edges_of
 from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.theme import current
 
 
 def _shown(window: MainWindow) -> bool:
@@ -40,6 +41,19 @@ def test_a_load_dragged_on_the_skin_is_where_the_mouse_let_go(
     assert (end - start - QPoint(72, 24)).manhattanLength() <= 12
     window.history.stack.undo()
     assert window.history.settings.x == 0.05
+
+
+def test_the_mark_of_a_contact_near_the_rim_is_grey(window: MainWindow, until) -> None:
+    mark = window.membrane._contacts[0]  # noqa: SLF001
+
+    def near(x: float) -> bool:
+        window.history.change("Place", -1, load_case="point", x=x, y=0.05, force=0.05)
+        until(lambda: _shown(window))
+        until(lambda: mark.prop.color == (current().faint if x < 0.01 else "#1fd17a"))
+        return window.session.estimate.contact.near_rim
+
+    assert [near(x) for x in (0.05, 0.004, 0.05)] == [False, True, False]
+    until(lambda: " N" in window.readouts.text("force"))
 
 
 def test_letters_typed_over_the_skin_do_not_reach_vtk(window: MainWindow, qtbot) -> None:
@@ -85,7 +99,19 @@ def test_a_load_too_near_the_rim_is_warned_of_and_no_more_further_inside(
     assert "near rim" in window.readouts.text("contact")
     assert notice.toolTip()
     window.history.change("Load", -1, x=0.05)
-    until(lambda: not notice.warning and "Drag the red arrow" in notice.text())
+    until(lambda: "near the rim" not in notice.text())
+
+
+def test_a_simulation_slower_than_real_time_is_marked(window: MainWindow) -> None:
+    session, notice = window.session, window.display.notice
+    session.status = replace(session.status, pace=0.64)
+    window.display.show_numbers_soon()
+    session.reported.emit(session.status)
+    assert "imulated at 0.6 x real time" in notice.text()
+    session.status = replace(session.status, pace=0.97)
+    window.display.show_numbers_soon()
+    session.reported.emit(session.status)
+    assert "real time" not in notice.text()
 
 
 def test_a_load_over_the_rim_is_explained_where_it_is_placed(window: MainWindow, until) -> None:

@@ -14,7 +14,7 @@ from kappaskin_app.shell.window import MainWindow
 @pytest.mark.full
 def test_the_simulation_is_shown_as_a_simulation(window: MainWindow, until) -> None:
     until(lambda: window.display.badge.state == "SIM")
-    units = {"contact": " mm", "rms": " mm", "age": " ms", "force": " mN"}
+    units = {"contact": " mm", "rms": " mm", "age": " ms", "force": " N"}
     until(lambda: all(window.readouts.text(name).endswith(unit) for name, unit in units.items()))
 
 

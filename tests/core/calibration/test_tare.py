@@ -235,7 +235,7 @@ def test_a_load_is_told_from_elements_that_are_off_by_as_much(load):
     scene = spoilt(SCENE.touched_by(load), replace(OFF, offset_sd=0.3))
 
     with pytest.raises(
-        Refusal, match=r"loaded: .* mN at \(\d+, \d+\) mm; this contact explains \d+ % of"
+        Refusal, match=r"loaded: .* N at \(\d+, \d+\) mm; this contact explains \d+ % of"
     ):
         taken(scene)
 
@@ -421,7 +421,8 @@ def test_drift_is_what_the_readings_wandered_by():
 
 
 def test_frames_that_others_overtook_do_not_keep_the_drift_from_being_told():
-    watch, off = DriftMonitor(SEEKER), np.random.default_rng(0).normal(0, 0.5, (3, 100))
+    watch = DriftMonitor(SEEKER, np.zeros_like)
+    off = np.random.default_rng(0).normal(0, 0.5, (3, 100))
     for n in range(300):
         late = 0.05 if n % 50 == 49 else 0.0
         watch.follow(0.02 * n - late, off, np.zeros((9, 9)), 0.2)

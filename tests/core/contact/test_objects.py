@@ -264,7 +264,9 @@ def test_a_ball_too_small_to_tell_has_an_upper_bound_only():
     for one in bounds:
         assert math.isnan(one.radius)
         assert 0.02 < one.radius_95[1] < 0.2
-        assert "radius below" in one.describe()
+        assert re.fullmatch(
+            r"shape unknown \(a ball would be under \d+(\.\d+)? mm in radius\)", one.describe()
+        )
 
 
 def test_noise_alone_is_no_object_in_2000_frames():
@@ -288,7 +290,7 @@ def test_what_fits_no_single_object_is_not_named():
 
     for one in PAPER.finds(K.reshape(3, -1), 5):
         assert one.kind == ""
-        assert "undetermined" in one.describe()
+        assert one.describe() == "shape unknown: no object fits"
 
 
 def same(ours, theirs):
@@ -473,7 +475,7 @@ def test_a_shape_that_no_object_explains_is_not_named(sheet):
 
     for one in sheet.skin.finds(sheet.curvature(plane), 5):
         assert one.kind == ""
-        assert one.describe().startswith("undetermined: no object fits")
+        assert one.describe() == "shape unknown: no object fits"
 
 
 @pytest.mark.cases("0.06")
@@ -505,24 +507,34 @@ def test_one_line_describes_it():
     text = r"{}, radius [\d.]+ mm \([\d.]+ to [\d.]+\){}, or a flat face [\d.]+ mm wide; .*"
     narrow = {"face": math.nan, "face_95": (0.0, 0.004), "radius_95": (0.0, 0.03)}
     ends = "or any two ends less than 4 mm wide; second guess"
+    sharp = {"edge": 0.7, "cylinder": 0.25, "sphere": 0.05, "plane": 0.0}
+    even = {"sphere": 0.8, "cylinder": 0.2}
+    span = r"[\d.]+ to [\d.]+ mm in radius"
     edge = r"edge, \d+ mm long, axis \d+ deg, or a cylinder of radius below 30 mm, "
     for found, pattern in (
         (rod, text.format("cylinder", r", \d+ mm long, axis \d+ deg")),
         (ball, text.format("sphere", "")),
-        (replace(ball, kind=""), "undetermined: sphere, or another contact that reads the same"),
-        (replace(ball, kind="", fits=False), "undetermined: no object fits, sphere is nearest"),
-        (replace(rod, kind="edge", **narrow), edge + ends + r" \w+ \d+ %"),
-        (replace(rod, **narrow), r"cylinder, radius below 30 mm, .*, " + ends + r" \w+ \d+ %"),
-        (replace(ball, **narrow), r"sphere, .*, or any tip less than 4 mm wide; second guess .*"),
+        (replace(ball, kind=""), rf"shape unknown \(a ball would be {span}\)"),
+        (replace(ball, probability=even), rf"shape unknown \(a ball would be {span}\)"),
+        (replace(ball, kind="", fits=False), "shape unknown: no object fits"),
+        (replace(rod, kind="edge", probability=sharp, **narrow), edge + ends + r" \w+ \d+ %"),
+        (replace(rod, **narrow), r"shape unknown \(a cylinder would be under 30 mm in radius\)"),
+        (replace(ball, **narrow), r"shape unknown \(a ball would be under 30 mm in radius\)"),
         (
             replace(ball, radius_95=(0.05, math.inf)),
-            r"sphere, radius above 50 mm, or a flat face .*",
+            r"shape unknown \(a ball would be over 50 mm in radius\)",
         ),
-        (replace(ball, radius_95=(0.0, 2.756)), r"sphere, radius below 2756 mm, or a flat face .*"),
-        (replace(ball, radius_95=(0.0, math.inf)), r"sphere, radius unknown, or a flat face .*"),
+        (replace(ball, radius_95=(0.0, 2.756)), "shape unknown"),
+        (replace(ball, radius_95=(0.0, math.inf)), "shape unknown"),
+        (replace(rod, radius_95=(math.inf, math.inf)), r"shape unknown \(flat, or nearly so\)"),
         (
-            replace(rod, radius_95=(math.inf, math.inf)),
-            r"cylinder, flat or hollow, \d+ mm .*",
+            replace(
+                rod,
+                kind="edge",
+                probability=sharp,
+                **{**narrow, "length": 0.001, "length_95": 0.002},
+            ),
+            r"shape unknown \(a cylinder would be under 30 mm in radius\)",
         ),
     ):
         assert re.fullmatch(pattern, found.describe())

@@ -66,4 +66,4 @@ def test_no_object_is_told_from_a_skin_that_is_moved_by_nothing_or_kilometres(k)
 
     assert found.kind == ""
     assert set(found.probability.values()) == {0.25}
-    assert found.describe().startswith("plane or cylinder: undetermined")
+    assert found.describe() == "shape unknown"

@@ -1,6 +1,7 @@
 """Publishing from the live process: off until asked, through its death, and by the commands."""
 
 import json
+import math
 import os
 import re
 import select
@@ -13,6 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from importlib.resources import as_file, files
 
+import numpy as np
 import psutil
 import pytest
 from websockets.exceptions import InvalidStatus, WebSocketException
@@ -98,6 +100,21 @@ def test_nothing_is_sent_before_it_is_asked_for_nor_after(engine, receiver, port
     with pytest.raises(TimeoutError):
         receiver.recv(9999)
     assert engine.status().publishing.targets == ()
+
+
+def test_what_is_published_is_computed_and_no_surface(receiver, port) -> None:
+    with Engine(Setup(4, 4, quantities=())) as engine:
+        engine.connect("sim:centre")
+        until(lambda: math.isfinite(engine.status().computed.each))
+        assert engine.status().quantities == ()
+        assert not engine.latest(engine.status()).contact.present
+
+        engine.publish([f"udp://127.0.0.1:{port}"])
+
+        told = heard(receiver, "contact", present=True)
+        assert told["force_N"] == pytest.approx(0.2, abs=0.1)
+        until(lambda: engine.status().quantities == ("contact", "geometry"))
+        assert np.isnan(engine.latest(engine.status()).surface).all()
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="priorities as Linux has them")
@@ -222,13 +239,15 @@ def test_publish_sends_what_listen_tells(start) -> None:
     listening = start("listen", "--udp", port)
     until(lambda: taken(port))
     publishing, lines = start("publish", "sim:centre", "--udp", f"127.0.0.1:{port}"), list[str]()
-    until(lambda: lines.append(publishing.stdout.readline()) or " computed in " in lines[-1])
+    until(lambda: lines.append(publishing.stdout.readline()) or " computed (" in lines[-1])
     publishing.terminate()
     said, warned = publishing.communicate(timeout=30)
     assert re.search(r"^kappaskin: slopes reach 0.1\d?: up to 0.\d % too flat;", warned)
     said = "".join(lines) + said
     assert publishing.returncode == 0
-    computed = r"streaming +\d+ frames/s +\d+ computed in \d+\.\d\d ms each"
+    computed = (
+        r"streaming +\d+ frames/s +\d+ computed \(shape, contact, geometry\) in \d+\.\d\d ms each"
+    )
     assert re.search(computed + r".* +udp://127.0.0.1:\d+: \d+ sent, \d+ dropped", said)
     assert "99 % within" in said
     listening.terminate()

@@ -26,6 +26,7 @@ def pipeline_of(setup: Setup | None = None) -> Pipeline:
 
 
 PIPELINE = pipeline_of()
+PATHS = ["curvature", "contact.force"]
 SLOT = slot_type(PIPELINE)
 
 
@@ -123,19 +124,23 @@ def test_readings_since_the_last_look_are_all_there_once_and_in_order(ring, writ
     def write(times: range) -> None:
         for t in times:
             read = np.full(estimate.curvature.shape, float(t))
-            writer.write(replace(estimate, device_time=float(t), curvature=read))
+            contact = replace(estimate.contact, force=10.0 * t)
+            got = replace(estimate, device_time=float(t), curvature=read, contact=contact)
+            writer.write(got)
 
     write(range(5))
-    times, curvature, last = ring.recent(1, SLOT, 0)
+    times, (curvature, force), last = ring.recent(1, SLOT, 0, PATHS)
     np.testing.assert_array_equal(times, np.arange(5))
     np.testing.assert_array_equal(curvature[:, 1, 7], np.arange(5))
+    np.testing.assert_array_equal(force, 10 * np.arange(5))
     write(range(5, 7))
-    times, curvature, last = ring.recent(1, SLOT, last)
+    times, (curvature, force), last = ring.recent(1, SLOT, last, PATHS)
     assert (times.tolist(), curvature.shape) == ([5, 6], (2, *estimate.curvature.shape))
-    assert not len(ring.recent(1, SLOT, last)[0])
+    assert not len(ring.recent(1, SLOT, last, PATHS)[0])
     write(range(7, 200))
-    np.testing.assert_array_equal(ring.recent(1, SLOT, last)[0], np.arange(136, 200))  # the last 64
-    assert not len(ring.recent(2, SLOT, 0)[0])  # of another generation
+    the_last_64 = ring.recent(1, SLOT, last, PATHS)[0]
+    np.testing.assert_array_equal(the_last_64, np.arange(136, 200))
+    assert not len(ring.recent(2, SLOT, 0, PATHS)[0])  # of another generation
 
 
 def test_readings_that_are_being_written_are_not_read(ring, writer) -> None:
@@ -144,7 +149,7 @@ def test_readings_that_are_being_written_are_not_read(ring, writer) -> None:
         writer.write(estimate_of())
     slots = writer._slots  # noqa: SLF001
     slots["opened"][1] += 64  # the writer came round and began anew
-    assert len(ring.recent(1, SLOT, 0)[0]) == 2
+    assert len(ring.recent(1, SLOT, 0, PATHS)[0]) == 2
 
 
 def test_an_estimate_read_stays_as_it_was_while_others_are_written(ring, writer) -> None:

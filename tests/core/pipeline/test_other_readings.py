@@ -153,7 +153,7 @@ def test_fields_have_the_shape_of_a_frame_and_pass_through_the_ring(kind):
         ring.lay_out(1, slot)
         ring.write(estimate)
         read = ring.read(1, slot)
-        times, values, last = ring.recent(1, slot, 0)
+        times, (values,), last = ring.recent(1, slot, 0, ["curvature"])
     finally:
         ring.destroy()
     for name in ("nominal", "curvature", "residual", "fresh", "coefficients"):

@@ -12,6 +12,7 @@ from kappaskin import (
     Pipeline,
     PointLoad,
     RankDeficient,
+    Refusal,
     Scene,
     Setup,
     Simulator,
@@ -320,3 +321,33 @@ def test_no_contact_is_found_on_a_skin_of_unknown_material_at_rest():
     scene = unknown(replace(load_scene("off-centre").touched_by(), effects=()))
 
     assert not pipeline_of(scene)(frame_of(scene)).contact.present
+
+
+# Only what a setup names
+
+
+def test_what_a_setup_leaves_out_is_unknown_and_the_rest_is_the_same() -> None:
+    scene = load_scene("circle")
+    frame, whole = frame_of(scene, n=123), pipeline_of(scene)(frame_of(scene, n=123))
+    shape = Pipeline(scene.sensor(), replace(SETUP, quantities=()))(frame)
+    contact = Pipeline(scene.sensor(), replace(SETUP, quantities=("contact",)))(frame)
+    surface = Pipeline(scene.sensor(), replace(SETUP, quantities=("surface",)))(frame)
+
+    assert whole.contact.present
+    assert np.isfinite(whole.geometry.frame).all()
+    for part in (shape, contact, surface):
+        assert np.array_equal(part.coefficients, whole.coefficients)
+        assert np.isnan(part.geometry.frame).all()
+    assert not shape.contact.present
+    assert not surface.contact.present
+    assert contact.contact.force == whole.contact.force
+    assert np.isnan(shape.surface).all()
+    assert np.isnan(contact.surface).all()
+    assert math.isnan(contact.error_rms)
+    assert np.array_equal(surface.surface, whole.surface)
+
+
+@pytest.mark.parametrize("quantities", [("force",), ("geometry",), ("surface", "geometry")])
+def test_quantities_that_cannot_be_computed_are_refused(quantities) -> None:
+    with pytest.raises(Refusal, match="expected quantities among surface, contact, geometry, and"):
+        Pipeline(QUIET.sensor(), replace(SETUP, quantities=quantities))

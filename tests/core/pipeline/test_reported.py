@@ -150,7 +150,7 @@ FLAGS = ["present", "single", "near_rim", "force_is_lower_bound", "shape_follows
 @pytest.fixture
 def made() -> list:
     sensor = load_scene("centre").sensor()
-    return list(columns(SimpleNamespace(sensor=sensor, functions=(5, 4))))  # pyright: ignore
+    return list(columns(SimpleNamespace(sensor=sensor, functions=(5, 4)), "everything"))  # pyright: ignore
 
 
 def test_columns_are_called_as_they_always_were(made) -> None:
@@ -228,7 +228,7 @@ recording, folder, guide = map(Path, sys.argv[1:])
 found = {}
 for suffix in (".csv", ".npz", ".h5"):
     to = folder / f"out{suffix}"
-    list(export_steps(ExportRequest(recording, to), folder))
+    list(export_steps(ExportRequest(recording, to, preset="everything"), folder))
 
 
 def doubled(file, name, half):
@@ -255,13 +255,15 @@ found["foxglove"] = described["description"] == "twice the force"
 ring, slot = Ring.create(), slot_type(made)
 ring.lay_out(1, slot)
 ring.write(estimate)
-got, (_, recent, _) = ring.read(1, slot), ring.recent(1, slot, 0)
+paths = ["curvature", "twice_read"]
+got, (_, recent, _) = ring.read(1, slot), ring.recent(1, slot, 0, paths)
 found["ring"] = np.array_equal(got.twice_read, estimate.twice_read)
 found["ring"] &= getters()["twice"](Reported(got)) == 2 * estimate.contact.force
-found["recent"] = np.array_equal(recent[0], [*got.curvature, *got.twice_read])
+recent = np.concatenate(recent, axis=1)[0]
+found["recent"] = np.array_equal(recent, [*got.curvature, *got.twice_read])
 ring.destroy()
 found["readouts"] = [r.value for r in readouts(got) if r.label == "Twice"] == [
-    2e3 * got.contact.force
+    2 * got.contact.force
 ]
 found["colours"] = skin_colours()["twice_xy"].unit == "1/m"
 sys.path.insert(0, str(guide.parent))
@@ -292,6 +294,22 @@ def test_quantities_added_to_the_table_are_in_every_file_message_and_slot(
     assert len(found) == 11
 
 
+def test_a_contact_near_the_rim_has_words_for_its_force_on_the_screen(messages_of) -> None:
+    (made,) = messages_of(load_scene("off-centre"))
+    contact = made.estimate.contact
+    inside, rim = (
+        {each.label: each for each in readouts(dataclasses.replace(made.estimate, contact=of))}
+        for of in (contact, dataclasses.replace(contact, near_rim=True))
+    )
+    assert (inside["Force"].value, inside["Force"].words) == (contact.force, "")
+    assert math.isnan(rim["Force"].value)
+    assert math.isnan(rim["Force"].half_width)
+    assert rim["Force"].words == "edge: no force"
+    assert rim["Depth"].words == "edge: no depth"
+    assert rim["Contact x"].words == rim["Contact y"].words == "edge: unreliable"
+    assert rim["Noise of a reading"].value == inside["Noise of a reading"].value
+
+
 def test_readouts_are_the_estimate_in_units_of_the_screen(messages_of) -> None:
     (made,) = messages_of(load_scene("off-centre"))
     touch, geometry = made.estimate.contact, made.estimate.geometry
@@ -299,7 +317,7 @@ def test_readouts_are_the_estimate_in_units_of_the_screen(messages_of) -> None:
     assert list(found)[:4] == ["Contact x", "Contact y", "Force", "Depth"]
     assert found["Contact y"].value == 1e3 * touch.position[1]
     assert found["Contact y"].half_width == 1e3 * touch.position_95[1]
-    assert (found["Force"].value, found["Force"].unit) == (1e3 * touch.force, "mN")
+    assert (found["Force"].value, found["Force"].unit) == (touch.force, "N")
     assert found["Depth"].sd == 1e3 * touch.displacement_sd
     assert found["Smaller \N{GREEK SMALL LETTER KAPPA}"].sd == geometry.principal_sd[1]
     assert math.isnan(found["Noise of a reading"].sd)

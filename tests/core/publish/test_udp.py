@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Refusal, load_scene
+from kappaskin._text import with_error
 from kappaskin.publish import Publishing, SourceState, UdpListener, targets_of
 from kappaskin.publish import udp as transport
 from kappaskin.publish.message import EstimateMessage
@@ -302,12 +303,19 @@ def numbered(number: object, **more: object) -> bytes:
 
 def test_a_contact_is_told_with_its_error_bars_and_age(listener, message: EstimateMessage) -> None:
     said, touch = send(listener, message.contact, message.shape), message.estimate.contact
-    assert f"x {1e3 * touch.position[0]:.2f} +- {1e3 * touch.position_sd[0]:.2f} mm" in said
-    assert f"force {touch.force:.4f} +- {touch.force_sd:.4f} N" in said
+    assert f"x {with_error(1e3 * touch.position[0], 1e3 * touch.position_sd[0], 'mm')}  " in said
+    assert f"force {with_error(touch.force, touch.force_sd, 'N')}  " in said
     assert touch.force_is_lower_bound
     assert "force is a lower bound" in said
     assert "age" in said
     assert listener.summary == "1 contacts received, 0 lost"
+
+
+def test_the_force_of_a_contact_near_the_rim_is_not_told(listener, message) -> None:
+    rim = json.loads(message.contact) | {"near_rim": True}
+    said = send(listener, json.dumps(rim).encode())
+    assert "edge: no force" in said
+    assert " N" not in said
 
 
 def test_losses_are_told_by_gaps(listener) -> None:

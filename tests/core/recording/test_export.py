@@ -39,6 +39,7 @@ from kappaskin.recording import (
     Exported,
     ExportRequest,
     ExportTask,
+    ForecastTask,
     Recorder,
     Recording,
     Verification,
@@ -96,9 +97,10 @@ def recorded(
 
 
 def export(recording: Path, to: Path, **asked) -> Exported:
-    """Export in this process, which is sooner; into a folder that is made for it."""
+    """Export everything in this process, which is sooner; into a folder that is made for it."""
     to.parent.mkdir(exist_ok=True)
-    *shares, done = export_steps(ExportRequest(recording, to, **asked), to.parent)
+    request = ExportRequest(recording, to, **({"preset": "everything"} | asked))
+    *shares, done = export_steps(request, to.parent)
     assert isinstance(done, Exported)
     assert shares == sorted(shares)
     return done
@@ -484,8 +486,9 @@ def test_a_file_that_appears_meanwhile_stays_as_it_is(taps, tmp_path) -> None:
 @pytest.mark.parametrize(
     ("name", "asked", "why"),
     [
-        ("out.txt", {}, r"ends in one of \.csv"),
-        ("out", {}, r"ends in one of \.csv"),
+        ("out.txt", {}, r"ends in one of \.parquet, \.csv"),
+        ("out", {}, r"ends in one of \.parquet, \.csv"),
+        ("out.csv", {"preset": "all"}, "one of contact, readings, everything; got 'all'"),
         ("out.csv", {"at": 0.1}, "a row for each frame"),
         ("out.vtp", {}, "give it"),
         ("out.vtp", {"every": 0.1}, "to a .pvd"),
@@ -584,7 +587,8 @@ def test_a_full_disk_is_told_of(taps, tmp_path) -> None:
         "    try: list(export_steps(ExportRequest(recording, to, at=at), to.parent))\n"
         "    except Refusal as refusal: print(refusal)\n"
     )
-    places = [tmp_path / f"out{suffix}" for suffix in (".csv", ".npz", ".h5", ".vtp", ".stl")]
+    suffixes = (".csv", ".npz", ".h5", ".vtp", ".stl", ".parquet")
+    places = [tmp_path / f"out{suffix}" for suffix in suffixes]
     command = [sys.executable, "-c", script, *map(str, [taps[0], *places])]
     # What coverage measures would find no room either.
     env = {name: value for name, value in os.environ.items() if not name.startswith("COVERAGE")}
@@ -596,10 +600,120 @@ def test_a_full_disk_is_told_of(taps, tmp_path) -> None:
     assert (found.returncode, found.stderr) == (0, "")
 
 
-def test_without_h5py_the_line_that_installs_it_is_told(taps, tmp_path, monkeypatch) -> None:
-    monkeypatch.setitem(sys.modules, "h5py", None)
-    with pytest.raises(Refusal, match=r"pip install 'kappaskin\[hdf5\]'"):
-        export(taps[0], tmp_path / "out.h5")
+@pytest.mark.parametrize(
+    ("suffix", "module", "extra"), [(".h5", "h5py", "hdf5"), (".parquet", "pyarrow", "parquet")]
+)
+def test_without_its_package_the_line_that_installs_it_is_told(
+    suffix: str, module: str, extra: str, taps, tmp_path, monkeypatch
+) -> None:
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(Refusal, match=rf"needs {module}: pip install 'kappaskin\[{extra}\]'"):
+        export(taps[0], tmp_path / f"out{suffix}")
+
+
+# Presets, and what is known before.
+
+
+CONTACT = [
+    *("time [s]", "present", "single", "near_rim", "position_x [m]", "position_y [m]"),
+    *("position_sd_x [m]", "position_sd_y [m]", "force [N]", "force_sd [N]"),
+    *("displacement [m]", "displacement_sd [m]"),
+]
+
+
+def test_by_default_a_table_has_contact_and_force_in_12_columns(taps, tmp_path) -> None:
+    recording, told = taps
+    export_steps_done = [*export_steps(ExportRequest(recording, tmp_path / "a.csv"), tmp_path)]
+    assert export_steps_done[-1].written == len(told)
+    lines = (tmp_path / "a.csv").read_text().splitlines()
+    head, *rows = csv.reader(line for line in lines if not line.startswith("#"))
+    assert head == CONTACT
+    found = np.array(rows, float)
+    force = np.array([one.estimate.contact.force for one in told])
+    assert np.isfinite(force).any()
+    np.testing.assert_array_equal(found[:, 8].astype("<f4"), force.astype("<f4"))
+    np.testing.assert_allclose(found[:, 8], force, rtol=2**-24)
+    np.testing.assert_array_equal(found[:, 1], [one.estimate.contact.present for one in told])
+    times = np.array([one.frame.host_time for one in told]) - 1000.0
+    np.testing.assert_allclose(found[:, 0], times, atol=1e-9)
+
+
+@pytest.mark.parametrize("preset", ["contact", "readings", "everything"])
+def test_parquet_has_the_columns_numbers_and_metadata_of_a_csv(preset: str, taps, tmp_path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    export(taps[0], tmp_path / "a.csv", preset=preset)
+    export(taps[0], tmp_path / "b" / "a.parquet", preset=preset)
+    table = parquet.read_table(tmp_path / "b" / "a.parquet")
+    lines = (tmp_path / "a.csv").read_text().splitlines()
+    head, *rows = csv.reader(line for line in lines if not line.startswith("#"))
+    assert table.column_names == head
+    assert "counts_xx_0" in head or preset == "contact"
+    assert table.num_rows == len(taps[1])
+    found = np.array([column.to_numpy().astype(float) for column in table.columns]).T
+    single = [str(kind) == "float" for kind in table.schema.types]
+    read = np.array(rows, float)
+    read[:, single] = read[:, single].astype("<f4")
+    np.testing.assert_array_equal(found, read)
+    said = {name.decode(): value.decode() for name, value in table.schema.metadata.items()}
+    assert json.loads(said["device"]) == about_in(tmp_path / "a.csv")["device"]
+    assert json.loads(said["columns"])["time"] == "arrival time since the recording began"
+
+
+def test_readings_are_counts_and_corrected_readings(taps, tmp_path) -> None:
+    export(taps[0], tmp_path / "a.npz", preset="readings")
+    found = columns_in(tmp_path / "a.npz")
+    assert set(found) == {"time", "sequence", "device_time", "counts", "curvature"}
+    was = np.array([one.estimate.curvature for one in taps[1]])
+    np.testing.assert_array_equal(found["curvature"], was.astype("<f4"))
+    device = [one.estimate.device_time for one in taps[1]]
+    np.testing.assert_array_equal(found["device_time"], device)  # in double precision, as times are
+
+
+@pytest.fixture(scope="module")
+def long(tmp_path_factory) -> Path:
+    """Some 2,400 frames, more than a forecast looks at."""
+    path = tmp_path_factory.mktemp("long") / "long.mcap"
+    recorded(path, seconds=24.0)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("name", "asked"),
+    [
+        ("a.csv", {}),
+        ("a.csv", {"begin": 12.0}),
+        ("a.csv", {"every": 0.05}),
+        ("a.npz", {"preset": "everything"}),
+        ("a.pvd", {"every": 1.0}),
+        ("a.vtp", {"at": 1.0}),
+    ],
+)
+def test_size_and_frames_are_known_before(name: str, asked: dict, long, tmp_path) -> None:
+    request = ExportRequest(long, tmp_path / name, **asked)
+    with ForecastTask(request) as task:
+        *_, forecast = task.wait()
+    assert not list(tmp_path.iterdir())
+    with ExportTask(request) as exporting:
+        *_, done = exporting.wait()
+    files = [file for file in tmp_path.rglob("*") if file.is_file()]
+    size = sum(file.stat().st_size for file in files)
+    assert forecast.frames == pytest.approx(done.written, rel=0.03, abs=1)
+    assert forecast.size == pytest.approx(size, rel=0.25)
+    assert forecast.seconds > 0
+
+
+def test_a_period_of_five_frames_takes_every_fifth(long, tmp_path) -> None:
+    export(long, tmp_path / "a.npz", every=0.05, preset="contact")
+    times = columns_in(tmp_path / "a.npz")["time"]
+    np.testing.assert_allclose(np.diff(times), 0.05, atol=1e-6)
+
+
+def test_a_forecast_of_what_cannot_be_written_is_refused(taps, tmp_path) -> None:
+    with (
+        pytest.raises(Refusal, match="cannot be written"),
+        ForecastTask(ExportRequest(taps[0], tmp_path / "no" / "a.csv")) as task,
+    ):
+        deque(task.wait(), 0)
 
 
 # The command.

@@ -247,7 +247,8 @@ def _imported(folder: Path, file: Path, kind: str = "text", topic: str = "") -> 
 
 
 def _exported(folder: Path) -> dict[str, Any]:
-    *_, _ = export_steps(ExportRequest(folder / "out.mcap", folder / "out.npz"), folder)
+    request = ExportRequest(folder / "out.mcap", folder / "out.npz", preset="everything")
+    *_, _ = export_steps(request, folder)
     with np.load(folder / "out.npz") as found:
         return dict(found)
 

@@ -119,7 +119,7 @@ def test_a_replay_shows_what_was_recorded(recorded):
 
 
 def exported(path, to):
-    *_, done = export_steps(ExportRequest(path, to), to.parent)
+    *_, done = export_steps(ExportRequest(path, to, preset="everything"), to.parent)
     assert isinstance(done, Exported)
     return to
 

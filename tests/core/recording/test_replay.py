@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kappaskin import Event, Frame, Refusal, SensorLayout, load_scene
-from kappaskin.recording import Recorder, Recording, ReplayedSource
+from kappaskin.recording import Recorder, Recording, ReplayedSource, contacts_in
 from kappaskin.recording import messages as m
 from kappaskin.sources import SimulatedSource, sensor_to_json
 from kappaskin.sources.wire import encode_information, encode_samples
@@ -337,3 +337,25 @@ def test_bytes_of_no_device_are_no_replay(tmp_path) -> None:
     with pytest.raises(Refusal, match="recording"):
         ReplayedSource(tmp_path / "none.mcap")
     assert m.LINES.name == "/kappaskin/line"
+
+
+def test_the_contacts_of_a_recording_come_in_parts_with_their_times(recording) -> None:
+    with Recording(recording) as read:
+        length, count = read.seconds(read.last), sum(1 for _ in read.messages_on(m.CONTACTS))
+    parts = list(contacts_in(recording))
+
+    times = np.concatenate([times for _, times, _ in parts])
+    assert {length for length, _, _ in parts} == {length}
+    assert len(times) == count > 100
+    assert (np.diff(times) >= 0).all()
+    assert times[-1] <= length
+    fields = parts[0][2]
+    assert fields["position"].shape == (len(parts[0][1]), 2)
+    assert fields["present"].any()
+    assert np.nanmedian(fields["force"]) > 0.1
+
+
+def test_contacts_of_what_is_no_recording_are_refused(tmp_path) -> None:
+    (tmp_path / "no.mcap").write_bytes(b"nothing")
+    with pytest.raises(Refusal, match=r"no\.mcap"):
+        next(contacts_in(tmp_path / "no.mcap"))

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from kappaskin._text import with_error
 from kappaskin.calibration import Procedure
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS
@@ -39,7 +40,6 @@ from kappaskin_app.widgets.parts import (
     Label,
     button,
     in_a_row,
-    number,
     seconds_box,
     sentence,
     text_label,
@@ -213,7 +213,8 @@ class CylinderStepPage(QWidget):
         parts = zip(taken.mean.reshape(3, -1), taken.noise.reshape(3, -1), strict=True)
         for row, (mean, noise) in enumerate(parts):
             values = (_median(mean), float(taken.step.curvature[row]))
-            texts = [number(value, "+.1f") for value in values] + [number(_median(noise), ".2f")]
+            texts = [with_error(value, digits=1, sign="+") for value in values]
+            texts.append(with_error(_median(noise), digits=2))
             for cell, text in zip(self.cells[row], texts, strict=True):
                 cell.setText(text)
 
@@ -338,7 +339,7 @@ class ResultPage(QWidget):
             return f"{name} fails: {why}"
         return (
             f"{name}: gain {fit.gain[channel]:.3f}, offset "
-            f"{number(float(fit.offset[channel]), '+.2f')} 1/m, error "
+            f"{with_error(float(fit.offset[channel]), unit='1/m', digits=2, sign='+')}, error "
             f"{report.error[channel]:.2f} 1/m"
         )
 

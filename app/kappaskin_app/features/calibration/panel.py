@@ -18,6 +18,7 @@ from kappaskin_app.features.calibration.pages import (
 )
 from kappaskin_app.features.calibration.weights import FILES
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.folders import proposed, recordings_folder
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.shell.settings import Settings, calibration_text
 from kappaskin_app.widgets.parts import (
@@ -50,7 +51,9 @@ class InUsePanel(Panel):
 
     def connect_to(self, controller: CalibrationController) -> None:
         def load() -> None:
-            path, _ = QFileDialog.getOpenFileName(self, "Load a calibration", "", FILES)
+            path, _ = QFileDialog.getOpenFileName(
+                self, "Load a calibration", str(recordings_folder()), FILES
+            )
             if path:
                 controller.load(Path(path))
 
@@ -180,7 +183,9 @@ class CalibratePanel(Panel):
             return
         found = self._controller.result.report.calibration
         name = f"{found.serial_number}-{found.date.astimezone():%Y%m%d}.calibration.toml"
-        path, _ = QFileDialog.getSaveFileName(self, "Save the calibration", name, FILES)
+        path, _ = QFileDialog.getSaveFileName(
+            self, "Save the calibration", str(proposed(name)), FILES
+        )
         if path:
             self._controller.save(Path(path))
 

@@ -12,11 +12,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from kappaskin._text import with_error
 from kappaskin.calibration import GRAVITY, WEIGHT_ADVICE, KnownWeights, Weighing
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
 from kappaskin_app.features.calibration.controller import WeightController, parsed
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.folders import proposed
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.widgets.parts import (
     ELLIPSIS,
@@ -24,7 +26,6 @@ from kappaskin_app.widgets.parts import (
     Label,
     button,
     in_a_row,
-    number,
     seconds_box,
     sentence,
     text_label,
@@ -85,7 +86,9 @@ class WeightsPanel(Panel):
         if found is None:
             return
         name = f"{found.serial_number}-{found.date.astimezone():%Y%m%d}.calibration.toml"
-        path, _ = QFileDialog.getSaveFileName(self, "Save the calibration", name, FILES)
+        path, _ = QFileDialog.getSaveFileName(
+            self, "Save the calibration", str(proposed(name)), FILES
+        )
         if path:
             controller.save(Path(path))
 
@@ -179,7 +182,7 @@ class _StepPage(QWidget):
         places = (1e3 * contact.position for contact in weighing.contacts)
         self.places.setText(
             "\n".join(
-                f"{mass:g} g at ({number(x, '.1f')}, {number(y, '.1f')}) mm"
+                f"{mass:g} g at ({x:.1f}, {y:.1f}) mm"
                 for mass, (x, y) in zip(weighing.masses, places, strict=False)
             )
         )
@@ -217,14 +220,14 @@ class _ResultPage(QWidget):
         self._shown = known
         self.verdict.setText("Passed" if known.passed else "Failed")
         head, *_, why = known.lines()
-        self.found.setText(sentence(head.replace("+-", "\N{PLUS-MINUS SIGN}")))
+        self.found.setText(sentence(head))
         self.why.setText(sentence(why.partition(": ")[2]))
         rows = [("<i>weight</i>", "<i>told</i>", "<i>by the others</i>")]
         rows += [
             (
-                f"{number(1e3 * laid / GRAVITY, '.4g')} g",
-                f"{number(1e3 * told / GRAVITY, '.4g')} g",
-                f"{number(100 * left, '+.1f')} %",
+                f"{1e3 * laid / GRAVITY:.4g} g",
+                f"{1e3 * told / GRAVITY:.4g} g",
+                with_error(100 * left, unit="%", digits=1, sign="+"),
             )
             for laid, told, left in zip(known.weights, known.told, known.left_out, strict=True)
         ]

@@ -5,6 +5,7 @@ import math
 import numpy as np
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
+from kappaskin._text import with_error
 from kappaskin.bases import edges_of
 from kappaskin.live import PipelineStatus, Status
 from kappaskin.sensing import Sensor
@@ -16,9 +17,10 @@ from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
 from kappaskin_app.theme import DIVERGING, SEQUENTIAL, follow_look, grown
 from kappaskin_app.widgets.layout import scrolled
-from kappaskin_app.widgets.parts import button, sentence, with_error
+from kappaskin_app.widgets.parts import button, sentence
 from kappaskin_app.widgets.surface_map import SurfaceMap
 from kappaskin_app.widgets.table import Table
+from kappaskin_app.widgets.text import length
 
 _SETTINGS = (
     "other_x",
@@ -29,10 +31,10 @@ _SETTINGS = (
     "other_tared",
 )
 _COLUMNS = ("", "A", "B", "B \N{MINUS SIGN} A")
-_TABLE_WIDTH = 432  # px
-_MICROMETRES, _MILLIMETRES = 1e6, 1e3
+_TABLE_WIDTH = 560  # px
+_MILLIMETRES = 1e3
 _SURFACE = "Displacement of the skin, on a common scale of A and B; the cross is the contact."
-_DIFFERENCE = "B minus A in \N{MICRO SIGN}m, on its own scale."
+_DIFFERENCE = "B minus A, on its own scale."
 _TABLE = (
     "Position, force and depth of the contact, and the principal curvatures of the skin there, "
     "each with its standard deviation. That of the difference assumes that A and B are "
@@ -76,9 +78,9 @@ class ComparePanel(QWidget):
         self.maps = {
             "a": SurfaceMap("A, in use", "mm", _SURFACE),
             "b": SurfaceMap("B", "mm", _SURFACE),
-            "difference": SurfaceMap("B \N{MINUS SIGN} A", "\N{MICRO SIGN}m", _DIFFERENCE),
+            "difference": SurfaceMap("B \N{MINUS SIGN} A", "mm", _DIFFERENCE),
         }
-        self._scale, self._difference = SteadyRange(0.01), SteadyRange(0.1)
+        self._scale, self._difference = SteadyRange(0.01), SteadyRange(1e-4)
         self._status = Status()
         around = QHBoxLayout(self)
         around.setContentsMargins(8, 4, 8, 6)
@@ -136,7 +138,7 @@ class ComparePanel(QWidget):
             )
         difference = pair.difference
         if difference is not None:
-            difference = _MICROMETRES * difference
+            difference = _MILLIMETRES * difference
             limit = self._difference.follow(_largest(difference), now)
             self.maps["difference"].show_surface(
                 difference, (-limit, limit), DIVERGING, np.full(2, np.nan), self._sides
@@ -152,9 +154,8 @@ class ComparePanel(QWidget):
                 method = METHOD_SHORT.get(setup.method, setup.method)
                 self.maps[name].words.show_text(f"{setup.Ni} x {setup.Nj}, {method}")
         if (difference := pair.difference) is not None:
-            micrometres = _MICROMETRES * difference[np.isfinite(difference)]
-            rms = math.sqrt(float(np.mean(micrometres**2)))
-            self.maps["difference"].words.show_text(f"RMS {rms:.3g} \N{MICRO SIGN}m")
+            rms = math.sqrt(float(np.nanmean(difference**2)))
+            self.maps["difference"].words.show_text(f"RMS {length(rms)}")
 
     def _show_figures(self, pair: Pair) -> None:
         figures = pair.figures()
@@ -162,8 +163,8 @@ class ComparePanel(QWidget):
         for row, (a, b) in enumerate(figures):
             texts = (
                 f"{a.label}, {a.unit}",
-                *(with_error(each.value, each.sd, each.digits) for each in (a, b)),
-                with_error(*b.less(a), a.digits, sign="+"),
+                *(e.words or with_error(e.value, e.sd, digits=e.digits) for e in (a, b)),
+                with_error(*b.less(a), digits=a.digits, sign="+"),
             )
             for column, text in enumerate(texts):
                 self.table.write(row, column, text)

@@ -5,13 +5,13 @@ from pathlib import Path
 from PySide6.QtWidgets import QFileDialog
 
 from kappaskin.live import ResumeInfo
-from kappaskin.recording import Imported, ImportRequest, ImportTask, is_foreign, unused
+from kappaskin.recording import Imported, ImportRequest, ImportTask, is_foreign
 from kappaskin.sources import described_source, is_description, load_description, parts_of
 from kappaskin_app.features.connection.panel import ConnectionPanel, PortSearch
 from kappaskin_app.features.connection.wizard import NewSensorDialog
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import BackgroundTask
-from kappaskin_app.shell.folders import recordings_folder
+from kappaskin_app.shell.folders import proposed, recordings_folder
 from kappaskin_app.shell.opening import Kind
 from kappaskin_app.shell.pages import LIVE
 from kappaskin_app.shell.parts import FILE, SOURCE
@@ -86,7 +86,9 @@ class ConnectionFeature:
         self._session.request_source(self.connection.source())
 
     def _open(self) -> None:
-        file, _ = QFileDialog.getOpenFileName(self._shell, "Open a sensor description", "", _FILES)
+        file, _ = QFileDialog.getOpenFileName(
+            self._shell, "Open a sensor description", str(recordings_folder()), _FILES
+        )
         if file:
             self._shell.opening.open(Path(file))
 
@@ -125,7 +127,7 @@ class ConnectionFeature:
         self._shell.opening.note(file)
         self._freed = ""
         if (lines := Path(port)).is_file() or is_foreign(lines):
-            self._imported = unused(recordings_folder() / f"{lines.stem}.mcap")
+            self._imported = proposed(f"{lines.stem}.mcap")
             request = ImportRequest(lines, self._imported, file, topic)
             self._importing.begin(lambda: ImportTask(request))
             return

@@ -52,7 +52,7 @@ from kappaskin.sources import (
 from kappaskin_app.features.connection.panel import PortSearch
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import Tasks
-from kappaskin_app.shell.folders import recordings_folder
+from kappaskin_app.shell.folders import proposed
 from kappaskin_app.theme import DIVERGING
 from kappaskin_app.widgets.parts import ELLIPSIS, Label, button, in_a_row, sentence
 from kappaskin_app.widgets.surface_map import SurfaceMap
@@ -581,10 +581,9 @@ class NewSensorDialog(QDialog):
         if self.lines is None:
             return
         name = "".join(c if c.isalnum() or c in " -_" else "-" for c in self._sensor().title)
-        proposed = recordings_folder() / f"{name}.toml"
-        proposed.parent.mkdir(parents=True, exist_ok=True)
+        proposal, kind = str(proposed(f"{name}.toml")), "Sensor description (*.toml)"
         chosen, _ = QFileDialog.getSaveFileName(
-            self, "Save the description of the sensor", str(proposed), "Sensor description (*.toml)"
+            self, "Save the description of the sensor", proposal, kind
         )
         if not chosen:
             return

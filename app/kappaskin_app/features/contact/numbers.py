@@ -9,6 +9,7 @@ from collections.abc import Collection, Sequence
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
+from kappaskin._text import rounded
 from kappaskin.estimation import FAULTS
 from kappaskin.frames import Estimate
 from kappaskin.pipeline import REPORTED, Reported, readouts
@@ -29,12 +30,9 @@ Rows = list[tuple[str, ...]]
 def facts_of(estimate: Estimate, object_: str) -> Rows:
     """Rows of the contact, the `object_` in words, and the accuracy of the shape."""
     rows = [
-        (
-            each.label,
-            _text(each.value, each.digits),
-            _text(each.half_width, each.digits),
-            each.unit,
-        )
+        (each.label, *rounded(each.value, each.half_width, each.digits), each.unit)
+        if not each.words
+        else (each.label, each.words, "", "")
         for each in readouts(estimate)
     ]
     return [*rows, ("Object", object_ or "unknown", "", "")]
@@ -63,8 +61,12 @@ def elements_of(estimate: Estimate, sensor: Sensor) -> Rows:
     return [
         (
             str(number),
-            *(_text(value, 1) for value in place),
-            *(_text(value, digits) for values, digits in read for value in values[:, number]),
+            *(rounded(value, math.nan, 1)[0] for value in place),
+            *(
+                rounded(value, math.nan, digits)[0]
+                for values, digits in read
+                for value in values[:, number]
+            ),
             FAULTS[estimate.suspect[number]],
         )
         for number, place in enumerate(places)
@@ -77,12 +79,7 @@ def csv_of(*tables: tuple[Sequence[str], Rows]) -> str:
     for number, (head, rows) in enumerate(tables):
         text.write("\n" if number else "")
         csv.writer(text, lineterminator="\n").writerows([head, *rows])
-    return text.getvalue()
-
-
-def _text(value: float, digits: int) -> str:
-    """A number with an ASCII minus for programs; empty where there is none."""
-    return f"{value + 0.0:.{digits}f}" if math.isfinite(value) else ""
+    return text.getvalue().translate({0x2212: "-", 0x2013: ""})  # for programs
 
 
 _MARGIN = 14  # px, margins of a column's head

@@ -3,17 +3,17 @@
 import math
 
 import numpy as np
-from PySide6.QtGui import QFont, QFontInfo, QResizeEvent
+from PySide6.QtGui import QFont, QFontInfo, QPalette, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
+from kappaskin._text import rounded, with_error
 from kappaskin.frames import Contact, Estimate
-from kappaskin.pipeline import REPORTED, Readout, Reported, readouts_of
+from kappaskin.pipeline import REPORTED, Reported, readouts_of
 from kappaskin_app.theme import FAINT, follow_look
 from kappaskin_app.widgets.line import Line
-from kappaskin_app.widgets.parts import Label, with_error
+from kappaskin_app.widgets.parts import Label
 from kappaskin_app.widgets.text import NONE
 
-_COARSE_SD = 0.02  # mm: smaller error bars need one more digit
 _NEGLIGIBLE_SD = 0.05  # ms: a smaller error bar is omitted
 
 
@@ -46,16 +46,6 @@ _DIGITS = 1.14  # average width of a character in digits, with the space between
 _SMALL = 0.85  # size of a name's letters, of those of its number
 
 
-def _with_error(found: Readout, sign: str) -> str:
-    """A number with its error bar."""
-    _, value, sd, _, unit, digits = found
-    if unit == "mN" and abs(value) >= 1e3:
-        return with_error(1e-3 * value, 1e-3 * sd, 3, "N", sign)
-    if unit == "mm" and sd >= _COARSE_SD:
-        digits -= 1
-    return with_error(value, sd, digits, unit, sign)
-
-
 def _short(count: int) -> str:
     """A count in few digits, so that three fit in a readout."""
     if count < 10_000:
@@ -68,24 +58,26 @@ def _contact(contact: Contact, second: Contact) -> str:
         return "none"
     x, y = contact.position * 1e3
     if second.present:
-        other_x, other_y = second.position * 1e3
-        return f"({x:.1f}, {y:.1f}), ({other_x:.1f}, {other_y:.1f}) mm"
+        return f"{_place(contact)[0]}, {_place(second)[0]} mm"
     if contact.near_rim:
         return f"\N{ALMOST EQUAL TO} ({x:.0f}, {y:.0f}) mm, near rim"
     if not contact.single:
         return f"\N{ALMOST EQUAL TO} ({x:.0f}, {y:.0f}) mm, distributed"
-    sd = float(np.max(contact.position_sd)) * 1e3
-    return f"({x:.1f}, {y:.1f}) \N{PLUS-MINUS SIGN} {sd:.2f} mm"
+    place, bar = _place(contact)
+    return f"{place} {bar}"
 
 
-def _forces(contact: Contact, second: Contact) -> str:
+def _place(contact: Contact) -> tuple[str, str]:
+    """The position in mm, and the larger of its error bars with the unit."""
+    sd = 1e3 * float(np.max(contact.position_sd))
+    (x, bar), (y, _) = (rounded(1e3 * value, sd, 1) for value in contact.position.tolist())
+    return f"({x}, {y})", f"mm {bar}" if bar == "exact" else f"\N{PLUS-MINUS SIGN} {bar} mm"
+
+
+def _forces(*contacts: Contact) -> str:
     """The forces of two contacts, without error bars, for which there is no room."""
-    forces = 1e3 * contact.force, 1e3 * second.force
-    if not math.isfinite(forces[0]):
-        return NONE
-    if abs(forces[0]) >= 1e3:
-        return "{:.2f}, {:.2f} N".format(*(1e-3 * force for force in forces))
-    return "{:.0f}, {:.0f} mN".format(*forces)
+    texts = ["edge" if of.near_rim else rounded(of.force, of.force_sd)[0] for of in contacts]
+    return NONE if NONE in texts else f"{', '.join(texts)} N"
 
 
 def _age(age: float, sd: float) -> str:
@@ -94,7 +86,7 @@ def _age(age: float, sd: float) -> str:
         return NONE
     if not math.isfinite(sd):
         return f"\N{GREATER-THAN OR EQUAL TO} {age:.0f} ms"
-    return f"{age:.0f} ms" if sd < _NEGLIGIBLE_SD else with_error(age, sd, int(sd < 1), "ms")
+    return f"{age:.0f} ms" if sd < _NEGLIGIBLE_SD else with_error(age, sd, "ms")
 
 
 class Readouts(QWidget):
@@ -193,14 +185,18 @@ class Readouts(QWidget):
                 self._write(key, NONE)
             return
         self._write("contact", _contact(estimate.contact, estimate.second))
+        role = FAINT if estimate.contact.near_rim else QPalette.ColorRole.WindowText
+        self._numbers["contact"].setForegroundRole(role)
         reported = Reported(estimate)
         for quantity, header in _NUMBERS:
             (found,) = readouts_of(quantity, reported)
-            least = header.key == "force" and estimate.contact.force_is_lower_bound
-            words = _with_error(found, "+" if header.signed else "")
+            sign = "+" if header.signed else ""
+            words = with_error(found.value, found.sd, found.unit, found.digits, sign)
             if header.key == "force" and estimate.second.present:
                 words = _forces(estimate.contact, estimate.second)
-            self._write(header.key, f"\N{GREATER-THAN OR EQUAL TO} {words}" if least else words)
+            if header.key == "force" and estimate.contact.force_is_lower_bound:
+                words = f"\N{GREATER-THAN OR EQUAL TO} {words}"
+            self._write(header.key, found.words or words)
 
     def _write(self, key: str, text: str) -> None:
         self._numbers[key].show_text(text)

@@ -1,7 +1,11 @@
 """Object recognition: description of the object in contact, computed in the background."""
 
+import time
+from dataclasses import replace
+
 from PySide6.QtCore import QObject, Signal
 
+from kappaskin._text import with_error
 from kappaskin.bases import basis_for
 from kappaskin.contact import (
     NO_OBJECT,
@@ -18,24 +22,55 @@ from kappaskin.mechanics import Plate
 from kappaskin.pipeline import Setup
 from kappaskin.sensing import Sensor
 from kappaskin_app.shell.background import BackgroundTask, Tasks
-from kappaskin_app.widgets.parts import with_error
+from kappaskin_app.widgets.parts import capital
 
-_UNKNOWN = (
-    "unknown object, nearest {}: press it straight at one place; it may bear at several or on its "
-    "rim"
-)
+_UNFIT = "; press it straight at one place: it may bear at several or on its rim"
+_AT_EDGE = "shape unknown (contact at the edge)"
 _AS_ONE = "as one object: "  # of two contacts
 _DRIFTING = "no object is named while readings drift: tare at rest"
 _PREPARING = "computing the model readings of objects on this skin\N{HORIZONTAL ELLIPSIS}"
 
 
 def curvature_text(estimate: Estimate) -> str:
-    """Text of the principal curvatures of the skin at the contact; empty without one."""
-    if not estimate.contact.present:
+    """Text of the principal curvatures of the skin at a contact; empty near the rim."""
+    if not estimate.contact.present or estimate.contact.near_rim:
         return ""
     found = zip(estimate.geometry.principal, estimate.geometry.principal_sd, strict=True)
-    one, other = (with_error(value, sd, 1 + (sd < 0.05), sign="+") for value, sd in found)
-    return f"principal curvatures {one} and {other} 1/m"
+    one, other = (with_error(value, sd, "1/m", sign="+") for value, sd in found)
+    return f"principal curvatures {one} and {other}"
+
+
+def object_text(found: ContactObject, estimate: Estimate) -> str:
+    """Text of the object that was found in an estimate."""
+    as_one = _AS_ONE if estimate.second.present else ""
+    return f"{as_one}{found.describe()}{'' if found.fits else _UNFIT}"
+
+
+_SETTLED, _KEPT = 0.9, 2.0  # s that a kind must be sure to be named, and may be unsure while named
+_OF_NOW = ("position", "position_95", "force", "force_95")  # fields that are never of an older one
+
+
+class SteadyObject:
+    """The object as it is named: its kind is sure for a while first, and is kept for a while."""
+
+    def __init__(self) -> None:
+        self._kind, self._since = "", 0.0
+        self._named, self._until = NO_OBJECT, 0.0
+
+    def __call__(self, found: ContactObject, now: float) -> ContactObject:
+        """What is named of an object `found` at `now` in s; without a sure kind it has none."""
+        kind = found.kind if found.sure else ""
+        if kind != self._kind:
+            self._kind, self._since = kind, now
+        if not found.probability:
+            self._named = NO_OBJECT
+        elif kind and (kind == self._named.kind or now - self._since >= _SETTLED):
+            self._named, self._until = found, now + _KEPT
+        elif now >= self._until:
+            self._named = NO_OBJECT
+        if not self._named.kind:
+            return replace(found, kind="")
+        return replace(self._named, **{name: getattr(found, name) for name in _OF_NOW})
 
 
 class ObjectRecognition(QObject):
@@ -55,6 +90,7 @@ class ObjectRecognition(QObject):
         self._recognition = BackgroundTask(tasks, "", self._finish)
         self._key: tuple[int, Plate, str, str, tuple[int, int]] | None = None
         self._finder: ObjectFinder | ImprintObjects | str = ""
+        self._steady = SteadyObject()
 
     def start(self, status: Status, estimate: Estimate | None) -> None:
         """Recognise the object of an estimate, once the readings of objects are computed."""
@@ -75,10 +111,12 @@ class ObjectRecognition(QObject):
         self._finder = str(finder) if isinstance(finder, Exception) else finder
 
     def _finish(self, recognised: tuple[str, str, ContactObject, Estimate]) -> None:
-        what, curvatures, *found = recognised
+        what, curvatures, found, estimate = recognised
+        found = self._steady(found, time.monotonic())
+        what = what or object_text(found, estimate)
         more = "".join(what.partition("; ")[1:])  # the second guess, or a cause
-        self.described.emit(what + curvatures, curvatures, more)
-        self.found.emit(*found)
+        self.described.emit(f"{capital(what)}{curvatures}", curvatures, more)
+        self.found.emit(found, estimate)
 
 
 def _skin(sensor: Sensor, setup: Setup) -> tuple[Plate, str, str, tuple[int, int]]:
@@ -101,13 +139,13 @@ def _recognise(
 ) -> tuple[str, str, ContactObject, Estimate]:
     if isinstance(finder, str):
         found, what = NO_OBJECT, finder
+    elif estimate.contact.near_rim:
+        found, what = NO_OBJECT, _AT_EDGE
     elif estimate.drift:  # which is in the readings still
         found, what = NO_OBJECT, _DRIFTING
     else:
         whole = as_one(estimate.contact, estimate.second)
         found = finder(estimate.curvature, estimate.noise, whole)
-        what = found.describe() if found.fits else _UNKNOWN.format(found.ranked[0][0])
-        if estimate.second.present:
-            what = _AS_ONE + what
+        what = ""
     curvatures = curvature_text(estimate)
-    return what, f"; {curvatures}" if what and curvatures else curvatures, found, estimate
+    return what, f"; {curvatures}" if curvatures else "", found, estimate

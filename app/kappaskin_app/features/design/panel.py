@@ -24,7 +24,7 @@ from kappaskin_app.widgets.chart import Chart, ChartAxis, Series
 from kappaskin_app.widgets.layout import row, scrolled
 from kappaskin_app.widgets.parts import ELLIPSIS, button, sentence, text_label
 from kappaskin_app.widgets.surface_map import SurfaceMap
-from kappaskin_app.widgets.text import round_up
+from kappaskin_app.widgets.text import length, round_up
 
 _NAMES = tuple(field for field in DesignSettings.__dataclass_fields__)
 _LENGTHS = tuple(f"design_{side}" for side in ("side_x", "side_y", "base_radius", "rim_radius"))
@@ -32,7 +32,6 @@ _NOISE = ("design_noise", "design_height_noise", "design_slope_noise")
 _STEPS = 200  # of a slider
 _FACTOR = 4  # steps of a logarithmic slider, to the next number of two digits
 _WIDE = 50  # ratio of the ends of a range, beyond which its slider is logarithmic
-_MICRO = 1e6
 _PREDICTED = (
     "Standard deviation of the displacement due to noise, from the covariance "
     "s\N{SUPERSCRIPT TWO} (M'M)\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT ONE} of the fit, without a "
@@ -120,11 +119,9 @@ class DesignPanel(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.form = DesignForm()
-        self.predicted = SurfaceMap("Predicted", "\N{MICRO SIGN}m", _PREDICTED)
-        self.simulated = SurfaceMap("Simulated", "\N{MICRO SIGN}m", _SIMULATED)
-        self.along = Chart(
-            ChartAxis("Error bar along x", "\N{MICRO SIGN}m"), ChartAxis("x", "mm"), _ALONG
-        )
+        self.predicted = SurfaceMap("Predicted", "mm", _PREDICTED)
+        self.simulated = SurfaceMap("Simulated", "mm", _SIMULATED)
+        self.along = Chart(ChartAxis("Error bar along x", "mm"), ChartAxis("x", "mm"), _ALONG)
         self.words = text_label()
         self.simulate = button(
             "Check by simulation",
@@ -182,12 +179,12 @@ class DesignPanel(QWidget):
         check = self._prediction.check if self._prediction else None
         sides = (1.0, 1.0) if found is None else (float(found.x[-1]), float(found.y[-1]))
         shown = [each.sd for each in (found, check) if each is not None]
-        limit = round_up(max((_MICRO * float(np.nanmax(sd)) for sd in shown), default=0.0)) or 1.0
+        limit = round_up(max((1e3 * float(np.nanmax(sd)) for sd in shown), default=0.0)) or 1.0
         curves = list[Series]()
         for number, (view, source, name) in enumerate(
             ((self.predicted, found, "predicted"), (self.simulated, check, "simulated"))
         ):
-            sd = None if source is None else _MICRO * source.sd
+            sd = None if source is None else 1e3 * source.sd
             view.show_surface(sd, (0.0, limit), SEQUENTIAL, np.full(2, np.nan), sides)
             view.map.show_points(None if sd is None or found is None else found.positions)
             if sd is not None and found is not None:
@@ -196,7 +193,7 @@ class DesignPanel(QWidget):
 
     def _show_words(self, found: Prospect | None) -> None:
         check = self._prediction.check if self._prediction else None
-        self.predicted.words.show_text("" if found is None else f"RMS {_micrometres(found.rms)}")
+        self.predicted.words.show_text("" if found is None else f"RMS {length(found.rms)}")
         frames = "Not simulated yet" if check is None else f"{check.frames} frames"
         self.simulated.words.show_text(frames)
         if found is None:
@@ -207,16 +204,12 @@ class DesignPanel(QWidget):
         rate = f", {found.rate:.0f} frames/s" if math.isfinite(found.rate) else ""
         words = [
             f"{len(found.positions)} elements{rate}. Due to noise: "
-            f"{_micrometres(found.rms)} RMS over the skin, {_micrometres(found.worst)} at worst."
+            f"{length(found.rms)} RMS over the skin, {length(found.worst)} at worst."
         ]
         if check is not None:
             ratio = check.rms_sd / found.rms
             words.append(
                 f"Simulated: {ratio:.3f} times the prediction. With the error of the basis under a "
-                f"point load in the middle: {_micrometres(check.rms)} RMS."
+                f"point load in the middle: {length(check.rms)} RMS."
             )
         self.words.setText("\n".join(words))
-
-
-def _micrometres(metres: float) -> str:
-    return f"{_MICRO * metres:.3g}\N{NO-BREAK SPACE}\N{MICRO SIGN}m"

@@ -1,9 +1,9 @@
 """Export: recordings as tables, pictures, films, figures, scripts."""
 
-import time
+from datetime import datetime
 from functools import partial
-from pathlib import Path
 
+from PySide6.QtCore import QRect, QTimer
 from PySide6.QtGui import QGuiApplication
 
 from kappaskin._files import write_whole
@@ -15,12 +15,14 @@ from kappaskin_app.features.export.figures import TITLES, FigureWindow
 from kappaskin_app.features.export.scripting import script_of
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell import parts as menus
+from kappaskin_app.shell.folders import dated
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.window import MainWindow
 
 _PYTHON = "Copy a Python script with the present source, scene and setup; it prints the contact"
 
-_WINDOW = "Save the whole window as a PNG in the folder the program was started in"
+_SETTLED = 1500  # ms from the start: the window is drawn
+_WINDOW = "Save the whole window as a PNG in the folder Kappaskin of your documents"
 _FIGURE = "Compute this figure of the paper, and show it in a window"
 _INITIAL = "Compute section 6.2 of the paper, and show it in a window"
 
@@ -40,6 +42,12 @@ class ExportFeature:
         self._register(shell)
         self.exports.notified.connect(guarded(shell.notify))
         shell.closing.connect(guarded(self.exports.close))
+        QTimer.singleShot(_SETTLED, shell, guarded(self._settle))
+
+    def _settle(self) -> None:
+        """Give hidden widgets their sizes, for which the first picture would wait."""
+        if self._shell.isVisible():
+            self._shell.grab(QRect(0, 0, 1, 1))
 
     def _register(self, shell: MainWindow) -> None:
         """Register pictures of all views and docks."""
@@ -56,8 +64,7 @@ class ExportFeature:
         self.exports.offer(self._shell.actions_by_name, self._shell.display.views)
 
     def _save_picture(self) -> None:
-        path = Path(time.strftime("kappaskin-%Y%m%d-%H%M%S.png")).resolve()
-        self.exports.save(self._shell.grab().toImage(), path)
+        self.exports.save(self._shell.grab().toImage(), dated(datetime.now(), ".png"))
 
     def _copy_python(self) -> None:
         """Copy a script to the clipboard, and write the files it reads into a folder."""

@@ -45,9 +45,9 @@ def estimates(seconds):
 if __name__ == "__main__":  # the engine is a separate process that imports this file
     for e in estimates(seconds=5.0):
         x, y = 1e3 * e.contact.position
-        force, deepest = 1e3 * e.contact.force, 1e3 * abs(e.surface).max()
+        force, deepest = e.contact.force, 1e3 * abs(e.surface).max()
         print(
-            f"{e.device_time:9.3f} s  contact {x:6.2f}, {y:6.2f} mm  force {force:7.1f} mN  "
+            f"{e.device_time:9.3f} s  contact {x:6.2f}, {y:6.2f} mm  force {force:7.4f} N  "
             f"deepest {deepest:6.3f} mm  noise {$noise:.3f} $unit"
         )
 ''')

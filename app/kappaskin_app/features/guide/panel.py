@@ -137,6 +137,9 @@ class _Text(QTextBrowser):
         self.setAccessibleName("The page of the guide")
         self.setOpenExternalLinks(True)
         self.setLineWrapMode(QTextBrowser.LineWrapMode.FixedPixelWidth)
+        self.document().setDocumentMargin(_MARGIN)
+        # Else the bar is hidden and shown again with each page, and the page laid out twice more.
+        self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOn)
         follow_look(self, self._dress_anew)
 
     def loadResource(self, kind: int, name: QUrl) -> object:
@@ -160,13 +163,11 @@ class _Text(QTextBrowser):
         at = self.verticalScrollBar().value()
         self._fit()
         self.reload()  # links have the colour of the palette with which they were read
-        self.dress()
         self.verticalScrollBar().setValue(at)
 
     def dress(self) -> None:
         """Format code, headings and tables."""
         document, theme = self.document(), current()
-        document.setDocumentMargin(_MARGIN)
         all_of_it = QTextCursor(document)
         all_of_it.beginEditBlock()  # laid out once, at its end
         for frame in document.rootFrame().childFrames():
@@ -186,7 +187,9 @@ class _Text(QTextBrowser):
 
     def _fit(self) -> None:
         widest = _WIDEST * self.fontMetrics().horizontalAdvance("M")
-        self.setLineWrapColumnOrWidth(min(self.viewport().width(), widest))
+        wide = min(self.viewport().width(), widest)
+        if wide != self.lineWrapColumnOrWidth():  # else Qt lays the page out once more
+            self.setLineWrapColumnOrWidth(wide)
 
 
 def _blocks(document: QTextDocument) -> list[QTextBlock]:

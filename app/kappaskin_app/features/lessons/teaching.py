@@ -19,6 +19,7 @@ from kappaskin_app.features.lessons.lesson_file import READY, read_lesson
 from kappaskin_app.features.lessons.progress import Progress
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.display import Display
+from kappaskin_app.shell.folders import recordings_folder
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.pictures import caption_now, chosen_file, save_view
 from kappaskin_app.shell.session import Session
@@ -89,7 +90,9 @@ class Teaching(QObject):
 
     def open(self) -> None:
         """Ask for a file, and start the lesson in it."""
-        file, _ = QFileDialog.getOpenFileName(self._window, "Open a lesson", "", _FILES)
+        file, _ = QFileDialog.getOpenFileName(
+            self._window, "Open a lesson", str(recordings_folder()), _FILES
+        )
         if file:
             self.open_file(Path(file))
 

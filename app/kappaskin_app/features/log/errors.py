@@ -22,7 +22,7 @@ from kappaskin_app.features.log.events import EventLog
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions
 from kappaskin_app.shell.background import BackgroundThread, Tasks
-from kappaskin_app.shell.folders import recordings_folder
+from kappaskin_app.shell.folders import proposed
 from kappaskin_app.shell.log_files import CRASHES, LOG, log_folder
 from kappaskin_app.shell.recovery import settings_text
 from kappaskin_app.shell.work_dialog import (
@@ -136,7 +136,7 @@ class ReportDialog(WorkDialog):
     def ask(self) -> None:
         if not self.busy:
             now = datetime.now()
-            self.to.setText(str(recordings_folder() / f"kappaskin-report-{now:%Y%m%d-%H%M%S}.zip"))
+            self.to.setText(str(proposed(f"kappaskin-report-{now:%Y%m%d-%H%M%S}.zip")))
         super().ask()
 
     def _choose_file(self) -> None:

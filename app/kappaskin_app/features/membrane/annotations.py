@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
+from kappaskin._text import with_error
 from kappaskin.frames import Array, Indices
 from kappaskin.skin import Distances
 from kappaskin_app.shell.drawn_skin import MM, Direction, DrawnSkin
 from kappaskin_app.theme import WANTED, current, follow_look, grown
-from kappaskin_app.widgets.parts import number
 
 UNLIT = {"lighting": False, "pickable": False, "reset_camera": False, "render": False}
 """Arguments of `add_mesh`: no lighting, no rendering, no change of the camera."""
@@ -158,7 +158,7 @@ def distances_text(found: Distances) -> str:
     """Text of the distances."""
     return (
         f"straight {1e3 * found.straight:.2f} mm, along the skin {1e3 * found.along:.2f} mm, "
-        f"height {number(1e3 * found.higher, '+.2f')} mm"
+        f"height {with_error(1e3 * found.higher, unit='mm', digits=2, sign='+')}"
     )
 
 

@@ -29,6 +29,7 @@ from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, curre
 _LETTERS = 14  # px, of the caption
 _LIFT = 0.006  # of the skin's size above the surface, which would hide half of a line
 _POINT, _POINTS = 5, 80  # px of an element, and of many in a row: or they would hide the skin
+_CONTACT = "#1fd17a"  # the mark of a contact
 _PIN = 0.3  # of the skin's size, length of the mark of a contact
 _STRIDE = 8  # surface lines between two lines of the true surface's wireframe
 
@@ -89,9 +90,10 @@ class MembraneView(QWidget):
     def _make_actors(self) -> None:
         plotter = self.plotter
         self.surface = Surface(plotter)
-        self._wire: Any = pv.PolyData()
+        self._wire: Any = pv.PolyData(np.zeros((2, 3)), lines=[2, 0, 1])
         self._elements: Any = pv.PolyData(np.zeros((1, 3)))
-        self._wire_actor: Any = None
+        self._wire_actor = plotter.add_mesh(self._wire, line_width=pixels(plotter, 1), **UNLIT)
+        self._wire_actor.visibility = False
         self._elements_actor = plotter.add_mesh(
             self._elements, style="points", point_size=pixels(plotter, _POINT), **UNLIT
         )
@@ -105,7 +107,7 @@ class MembraneView(QWidget):
         )
         pin = needle.append_polydata(pv.Sphere(radius=0.018))
         self._contacts = [
-            plotter.add_mesh(pin, color="#1fd17a", ambient=0.6, reset_camera=False, render=False)
+            plotter.add_mesh(pin, color=_CONTACT, ambient=0.6, reset_camera=False, render=False)
             for _ in range(2)
         ]
         self.sides = Sides(plotter)
@@ -137,41 +139,29 @@ class MembraneView(QWidget):
         self.skin = self.drag.skin = self.pointer.skin = self.camera_control.skin = skin
         self.surface.show_skin(skin, sensor.layout)
         self.lift = _LIFT * skin.size
-        self._wire = self._wireframe(skin)
-        self._show_wire()
+        self._place_wire(skin)
         self._positions = sensor.layout.positions
         self.show_marked(np.empty(0, np.intp), -1)
         self.point(-1)
         self._place_elements(sensor.layout.positions[sensor.layout.alive])
         for ball in self._contacts:
             ball.scale = skin.size
-        self._arrays = self._changing()
+        # VTK arrays that change; looking them up takes longer than filling them.
+        self._arrays = {"wire": self._wire.points, "elements": self._elements.points}
         self.sides.show_skin(skin)
         self.show_box(self._box.shares)
         if another:
             self.camera_control.place()
-        self._apply_theme()
 
-    def _show_wire(self) -> None:
-        if self._wire_actor is not None:
-            self.plotter.remove_actor(self._wire_actor, render=False)
-        self._wire_actor = self.plotter.add_mesh(
-            self._wire, line_width=pixels(self.plotter, 1), **UNLIT
-        )
-        self._wire_actor.prop.color = self._ink
-
-    def _changing(self) -> dict[str, Any]:
-        """VTK arrays that change; looking them up takes longer than filling them."""
-        return {"wire": self._wire.points, "elements": self._elements.points}
-
-    def _wireframe(self, skin: DrawnSkin) -> pv.PolyData:
-        """Every few lines of the grid, with their own points."""
+    def _place_wire(self, skin: DrawnSkin) -> None:
+        """Draw every few lines of the grid, with their own points."""
         lines = skin.lines(_STRIDE)
         self._wire_points = np.concatenate(lines)
         ends = np.cumsum([len(line) for line in lines])
         cells = [np.r_[len(x), np.arange(e - len(x), e)] for x, e in zip(lines, ends, strict=True)]
-        points = skin.points(self._wire_points, np.full(len(self._wire_points), self.lift))
-        return pv.PolyData(points, lines=np.concatenate(cells))
+        lift = np.full(len(self._wire_points), self.lift)
+        self._wire.points = skin.points(self._wire_points, lift)
+        self._wire.lines = np.concatenate(cells)
 
     def _place_elements(self, positions: Array) -> None:
         self._elements_at_rest = self.skin.at_rest(positions)
@@ -245,6 +235,7 @@ class MembraneView(QWidget):
         self._follow_pointed()
         for ball, contact in zip(self._contacts, (estimate.contact, estimate.second), strict=True):
             put_upright(ball, skin, contact.position)
+            ball.prop.color = current().faint if contact.near_rim else _CONTACT
         if self._box.shares != WHOLE:
             self._box.cut(self.plotter.actors.values())  # some may be new
         known = math.isfinite(estimate.taken)
@@ -300,8 +291,7 @@ class MembraneView(QWidget):
         self.surface.show_colours(colours)
         self._ink = ink
         self._elements_actor.prop.color = ink
-        if self._wire_actor:
-            self._wire_actor.prop.color = ink
+        self._wire_actor.prop.color = ink
 
     def show_lost(self, lost: bool) -> None:
         """Grey the skin while the connection is lost."""

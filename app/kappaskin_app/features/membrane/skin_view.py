@@ -107,7 +107,8 @@ class SkinView(QObject):
         if not self.membrane.ready:
             return  # the last drawing is due; the next tick has a newer estimate
         estimate, settings, now = shown.estimate, self._settings, shown.now
-        self._display.ranges.limit("displacement", 1e3 * estimate.surface, settings, now)
+        noise = self._display.colouring.noise("displacement", estimate)
+        self._display.ranges.limit("displacement", 1e3 * estimate.surface, settings, now, noise)
         self._shown = shown
         self._colour(shown)
         self._show_loads(estimate)

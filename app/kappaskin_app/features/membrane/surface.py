@@ -101,26 +101,26 @@ class Surface:
 
     def show_skin(self, skin: DrawnSkin, layout: SensorLayout) -> None:
         """Draw another skin, at rest."""
-        self.mesh = pv.PolyData(skin.points(), faces=skin.faces().ravel())
-        self.mesh.point_data["value"] = np.zeros(skin.on.size)
-        self.mesh.point_data.active_normals = skin.shading()
-        self.mesh.active_texture_coordinates = skin.shares
+        mesh = pv.PolyData(skin.points(), faces=skin.faces().ravel())
+        mesh.point_data["value"] = np.zeros(skin.on.size)
+        mesh.point_data.active_normals = skin.shading()
+        mesh.active_texture_coordinates = skin.shares
+        self.mesh.shallow_copy(mesh)
         self._cells.set_layout(layout)
-        if self.actor is not None:
-            self._plotter.remove_actor(self.actor, render=False)
-        self.actor = self._plotter.add_mesh(
-            self.mesh,
-            scalars="value",
-            cmap=self._colours,
-            show_scalar_bar=False,
-            smooth_shading=False,
-            reset_camera=False,
-            render=False,
-            specular=0.0,
-            ambient=0.6,
-            diffuse=0.42,
-        )
-        self.actor.prop.interpolation = "Gouraud"
+        if self.actor is None:
+            self.actor = self._plotter.add_mesh(
+                self.mesh,
+                scalars="value",
+                cmap=self._colours,
+                show_scalar_bar=False,
+                smooth_shading=False,
+                reset_camera=False,
+                render=False,
+                specular=0.0,
+                ambient=0.6,
+                diffuse=0.42,
+            )
+            self.actor.prop.interpolation = "Gouraud"
         # VTK arrays: looking them up takes longer than filling them.
         data = self.mesh.point_data
         self._arrays = {

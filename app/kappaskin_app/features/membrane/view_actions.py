@@ -95,7 +95,7 @@ class ViewActions:
             tip = form_field(f"show_{name}").tip
             add(name, _MENU, f"Show or hide {words}", toggle, key, tip)
         camera = self._view_from("Reset camera", "left")
-        add("camera", _MENU, "Reset &camera", camera, "Ctrl+R", _CAMERA)
+        add("camera", _MENU, "Reset &camera", camera, "Ctrl+Shift+R", _CAMERA)
         for key, name, look, tip in _DIRECTIONS:
             words = f"View {DIRECTIONS[look].words}"
             add(name, _MENU, words, self._view_from(words, look), key, tip)

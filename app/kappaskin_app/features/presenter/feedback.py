@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kappaskin.contact import ContactObject
+from kappaskin.contact import NO_OBJECT, ContactObject
 from kappaskin.frames import Contact, Estimate
 
 _95 = 1.96  # standard deviations that a 95 % interval reaches
@@ -25,6 +25,7 @@ class Recognised:
 class RadiusEstimate:
     """Radius `value` in m of the object `what`, or of the "skin", with its 95 % `interval`.
 
+    The object is empty where its kind is not known.
     The interval begins at zero where only an upper bound is known, and ends at infinity where the
     object may be flat; the value may then be NaN.
     """
@@ -36,7 +37,10 @@ class RadiusEstimate:
 
 @dataclass(frozen=True)
 class Feedback:
-    """Feedback in SI units, each number with its 95 % half-width; NaN where unknown."""
+    """Feedback in SI units, each number with its 95 % half-width; NaN where unknown.
+
+    The force of a contact `near_rim` is not determined, and it has no `radius`.
+    """
 
     force: float
     force_95: float
@@ -71,7 +75,9 @@ def feedback_of(estimate: Estimate, recognised: Recognised | None = None) -> Fee
     elif not contact.single:
         force_95 = place_95 = math.nan
     displacement, displacement_95 = contact.displacement, contact.displacement_95
-    if not contact.single:
+    if contact.near_rim:
+        force = force_95 = math.nan
+    if not contact.single or contact.near_rim:
         displacement, displacement_95 = float(np.nanmax(np.abs(estimate.surface))), math.nan
     x, y = (float(value) for value in place)
     kind, length = (recognised.what.kind, recognised.what.length) if recognised else ("", math.nan)
@@ -83,10 +89,11 @@ def feedback_of(estimate: Estimate, recognised: Recognised | None = None) -> Fee
 
 
 def _radius_estimate(estimate: Estimate, recognised: Recognised | None) -> RadiusEstimate | None:
-    """Radius of a round object; of the skin at the contact without an object; None of others."""
-    if recognised and (what := recognised.what).kind in _ROUND:
+    """Radius of a round object; of the skin at the contact without one; None of an edge."""
+    what = recognised.what if recognised else NO_OBJECT
+    if what.kind in _ROUND or (not what.kind and what.likeliest in _ROUND and what.fits):
         return RadiusEstimate(what.kind, what.radius, what.radius_95)
-    if recognised and recognised.what.kind:
+    if what.kind or estimate.contact.near_rim:
         return None
     geometry = estimate.geometry
     sharper = int(np.argmax(np.abs(geometry.principal)))

@@ -222,13 +222,14 @@ class NumberIndicator(Indicator):
 
     def __init__(self, name: str) -> None:
         super().__init__()
-        self.name, self.value, self.note = name, NONE, ""
+        self.name, self.value, self.note, self.faint = name, NONE, "", False
 
-    def show_figure(self, value: str, note: str = "", name: str = "") -> None:
-        name = name or self.name
-        if (name, value, note) != (self.name, self.value, self.note):
-            self.name, self.value, self.note = name, value, note
-            self.setAccessibleName(f"{name}: {value} {note}".strip())
+    def show_figure(self, value: str, note: str = "", name: str = "", faint: bool = False) -> None:
+        """Show a value, in grey if `faint`."""
+        now = name or self.name, value, note, faint
+        if now != (self.name, self.value, self.note, self.faint):
+            self.name, self.value, self.note, self.faint = now
+            self.setAccessibleName(f"{self.name}: {value} {note}".strip())
             self.update()
 
     def show_unit(self, unit: float) -> None:
@@ -241,7 +242,7 @@ class NumberIndicator(Indicator):
         wide, base = float(self.width()), self.height() - QFontMetricsF(large).descent()
         value = self.line(self.value, large, 0.0, base, wide)
         name = self.line(self.name, caption, 0.0, CAPTION * self.unit * 1.3, wide)
-        shown = [replace(name, faint=True), value]
+        shown = [replace(name, faint=True), replace(value, faint=self.faint)]
         at = width_of(value.font, self.value) + _GAP * self.unit
         if self.note and at < wide:
             shown.append(self.line(self.note, self.letters(SECONDARY), at, base, wide - at))
@@ -250,7 +251,8 @@ class NumberIndicator(Indicator):
 
 HEIGHT = 104.0  # units
 _BAR = 46.0  # units that the bar is high
-_LEAST = 0.2  # N, shortest scale
+_LEAST, _LARGEST = 0.2, 100.0  # N, shortest and longest scale: no load on a skin is larger
+_SIGMAS = 2.55  # half-widths of the 95 % interval that are five standard deviations
 _LEAST_BAND = 3.0  # px, so that a small error bar stays visible
 
 
@@ -259,7 +261,7 @@ class ForceBar(Indicator):
 
     def __init__(self) -> None:
         super().__init__()
-        self._range = SteadyRange(_LEAST)
+        self._range = SteadyRange(_LEAST, _LARGEST)
         self.force = self.force_95 = math.nan
 
     def show_unit(self, unit: float) -> None:
@@ -269,7 +271,8 @@ class ForceBar(Indicator):
     def show_force(self, force: float, force_95: float, now: float) -> None:
         """Show a force in N with its 95 % half-width, at `now` in s; NaN for none."""
         self.force, self.force_95 = abs(force), force_95
-        self._range.follow(self.force + (force_95 if math.isfinite(force_95) else 0.0), now)
+        off = force_95 if math.isfinite(force_95) else 0.0
+        self._range.follow(max(self.force + min(off, self.force), _SIGMAS * off), now)
         self.update()
 
     @property
@@ -332,7 +335,7 @@ class RadiusView(Indicator):
 
     def __init__(self) -> None:
         super().__init__()
-        self._range = SteadyRange(_LEAST_RADIUS)
+        self._range = SteadyRange(_LEAST_RADIUS, _MOST)
         self.radius: RadiusEstimate | None = None
         self.edge = False
         self.setMinimumHeight(60)
@@ -342,7 +345,7 @@ class RadiusView(Indicator):
         self.radius, self.edge = radius, edge
         if radius is not None:
             known = [r for r in (radius.value, *radius.interval) if 0 < r < math.inf]
-            self._range.follow(min(max(known, default=_LEAST_RADIUS), _MOST), now)
+            self._range.follow(max(known, default=_LEAST_RADIUS), now)
         self.update()
 
     @property

@@ -211,7 +211,7 @@ class Pad(Indicator):
     def _draw_feedback(self, painter: QPainter, feedback: Feedback) -> None:
         """Draw a dot at the estimated contact."""
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(series(3))
+        painter.setBrush(QColor(current().faint) if feedback.near_rim else series(3))
         r = 7 * self.unit + 2
         painter.drawEllipse(self.to_pixel(*feedback.position), r, r)
 

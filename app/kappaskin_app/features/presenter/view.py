@@ -6,6 +6,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
+from kappaskin._text import NO_FORCE, rounded
 from kappaskin_app.features.presenter.feedback import Feedback, RadiusEstimate
 from kappaskin_app.features.presenter.indicators import (
     Banner,
@@ -16,13 +17,13 @@ from kappaskin_app.features.presenter.indicators import (
     StatusStrip,
 )
 from kappaskin_app.features.presenter.pad import OperatorControls
-from kappaskin_app.widgets.parts import number
 from kappaskin_app.widgets.text import NONE
 
 _HEIGHT, _WIDTH = 1080.0, 1920.0  # px of the screen for which a unit is one px
 _SKIN, _FIGURES = 51, 49  # shares of the width
 _EDGE = 26.0  # units around the numbers
 _RADIUS = "Radius of the object"
+_FLAT = 1e3  # mm: a bound beyond says nothing of an object
 _OBJECTS = {"sphere": "ball", "cylinder": "pipe", "plane": "flat face", "skin": "skin at contact"}
 
 
@@ -38,7 +39,9 @@ class PresenterView(QWidget):
         super().__init__()
         self.strip, self.controls, self.banner = StatusStrip(), OperatorControls(), Banner()
         self.force, self.bar = NumberIndicator("Force"), ForceBar()
-        self.displacement, self.place = map(NumberIndicator, ("Displacement", "Contact at x, y"))
+        self.displacement, self.place = map(
+            NumberIndicator, ("Displacement", "Contact at x, y in mm")
+        )
         self.radius, self.radius_view = NumberIndicator(_RADIUS), RadiusView()
         self.indicators: list[Indicator] = [
             *(self.strip, self.banner, self.force, self.bar),
@@ -118,17 +121,18 @@ class PresenterView(QWidget):
             self.radius.show_figure(NONE, name=_RADIUS)
             return
         least = "\N{GREATER-THAN OR EQUAL TO} " if feedback.force_is_lower_bound else ""
-        force = f"{least}{number(feedback.force, '.3f')} N"
-        self.force.show_figure(
-            force if math.isfinite(feedback.force) else "unknown", _off(feedback.force_95, 3, "N")
-        )
-        off = _off(1e3 * feedback.displacement_95, 2, "mm") or "largest on the skin"
-        self.displacement.show_figure(f"{number(1e3 * feedback.displacement, '.2f')} mm", off)
-        x, y = (number(1e3 * value, ".1f") for value in feedback.position)
-        off = _off(1e3 * feedback.position_95, 1, "mm")
-        self.place.show_figure(
-            f"{x}, {y} mm", "near the rim: unreliable" if feedback.near_rim else off
-        )
+        force, off = _figure("N", feedback.force_95, feedback.force)
+        if math.isfinite(feedback.force):
+            self.force.show_figure(least + force, off)
+        else:
+            self.force.show_figure(NONE, NO_FORCE if feedback.near_rim else "unknown")
+        depth, off = _figure("mm", 1e3 * feedback.displacement_95, 1e3 * feedback.displacement)
+        self.displacement.show_figure(depth, off or "largest on the skin")
+        x, y = (1e3 * value for value in feedback.position)
+        place, off = _figure("mm", 1e3 * feedback.position_95, x, y)
+        if feedback.near_rim:
+            place, off = f"\N{ALMOST EQUAL TO} {x:.0f}, {y:.0f}", "near the rim: unreliable"
+        self.place.show_figure(place.removesuffix(" mm"), off, faint=feedback.near_rim)
         self.radius.show_figure(*radius_in_words(feedback, recorded))
 
     def show_graphics(self, feedback: Feedback | None, now: float) -> None:
@@ -149,31 +153,31 @@ class PresenterView(QWidget):
 def radius_in_words(feedback: Feedback, recorded: bool = False) -> tuple[str, str, str]:
     """Value, note and name of the radius."""
     if feedback.kind == "edge":
-        return "edge", f"{number(1e3 * feedback.length, '.0f')} mm long", "Object"
+        return "edge", f"{1e3 * feedback.length:.0f} mm long", "Object"
     if feedback.radius is None:
-        return _OBJECTS.get(feedback.kind, feedback.kind), "", "Object"
-    what = feedback.radius.what
-    return *_radius(feedback.radius, recorded), f"Radius of the {_OBJECTS.get(what, what)}"
+        return _OBJECTS.get(feedback.kind, NONE), "" if feedback.kind else "unknown", "Object"
+    what = _OBJECTS.get(feedback.radius.what, "object")
+    return *_radius(feedback.radius, recorded), f"Radius of the {what}"
 
 
 def _radius(estimate: RadiusEstimate, recorded: bool) -> tuple[str, str]:
-    low, high = (_digits(1e3 * radius) for radius in estimate.interval)
-    if estimate.interval[0] == math.inf:
+    """Value and note: the value only where both ends of its interval are known."""
+    low, high = (1e3 * radius for radius in estimate.interval)
+    if low == math.inf:
         return "flat", ""
-    if estimate.interval[1] == math.inf:
-        return (f"> {low} mm", "") if estimate.interval[0] > 0 else (NONE, "unknown")
-    if not estimate.interval[0] > 0:
-        return f"< {high} mm", "pressed too lightly" if recorded else "press harder"
-    return f"{_digits(1e3 * estimate.value)} mm", f"{low} to {high} mm"
+    if low > 0 and high < math.inf:
+        half = (high - low) / 2
+        value, low, high = (rounded(r, half)[0] for r in (1e3 * estimate.value, low, high))
+        return (f"{value} mm", f"{low} to {high} mm") if low != high else (f"{value} mm", "exact")
+    if low > 0:
+        return NONE, f"unknown, over {low:.3g} mm"
+    hint = "pressed too lightly" if recorded else "press harder"
+    return NONE, f"unknown, under {high:.3g} mm: {hint}" if high < _FLAT else "unknown"
 
 
-def _digits(value: float) -> str:
-    """A length in mm with three digits."""
-    if not math.isfinite(value):
-        return "flat"
-    digits = max(0, 2 - math.floor(math.log10(value))) if value > 0 else 1
-    return f"{value:.{min(digits, 2)}f}"
-
-
-def _off(half: float, digits: int, unit: str) -> str:
-    return f"\N{PLUS-MINUS SIGN} {half:.{digits}f} {unit}" if math.isfinite(half) else ""
+def _figure(unit: str, half: float, *values: float) -> tuple[str, str]:
+    """The values with their unit, and the half-width of their interval."""
+    found = [rounded(value, half, 3 if unit == "N" else 1) for value in values]
+    bar = found[0][1]
+    text = f"{', '.join(text for text, _ in found)} {unit}"
+    return text, f"\N{PLUS-MINUS SIGN} {bar} {unit}" if bar not in ("", "exact") else bar

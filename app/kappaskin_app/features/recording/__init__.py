@@ -6,7 +6,7 @@ from pathlib import Path
 from kappaskin.live import ResumeInfo
 from kappaskin_app.features.recording.panel import RecordingPanel
 from kappaskin_app.features.recording.playback import PlaybackControl
-from kappaskin_app.features.recording.recorder import RecordingControl, RecordingMark
+from kappaskin_app.features.recording.recorder import RecordingControl
 from kappaskin_app.features.recording.transport import Transport
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.folders import newest, recordings_folder
@@ -24,11 +24,9 @@ class RecordingFeature:
     def install(self, shell: MainWindow) -> None:
         self._shell, session = shell, shell.session
         self.recording = shell.panels.add(LIVE, RecordingPanel())
-        self.transport, self.mark = Transport(), RecordingMark()
-        self.recorder = RecordingControl(session.engine, shell.tasks, shell)
+        self.transport, banner = Transport(), shell.display.centre.banner
+        self.recorder = RecordingControl(session.engine, shell.tasks, banner, shell)
         self.playback = PlaybackControl(shell.history, session, self.transport, shell.tasks, shell)
-        self._shown = shell.display.header.add_mark(self.mark)
-        self._shown.setVisible(False)
         shell.display.centre.add_below(self.transport)
         self.recorder.add_actions(shell.actions_by_name)
         self.playback.add_actions(shell.actions_by_name)
@@ -44,9 +42,8 @@ class RecordingFeature:
         session.reported.connect(guarded(recorder.follow))
         self._handover = SettingsHandover(shell.history, session.engine)
         session.reported.connect(guarded(self._handover.follow))
-        recorder.changed.connect(guarded(self._show_mark))
         recorder.notified.connect(guarded(shell.notify))
-        self.mark.clicked.connect(guarded(recorder.dismiss))
+        recorder.play_wanted.connect(guarded(self.playback.open_file))
         recorder.repairs.saved.connect(guarded(self.playback.open_file))
         session.may_close.append(recorder.may_close)
 
@@ -67,12 +64,6 @@ class RecordingFeature:
             "Play a recording; a file can also be dropped on the window.",
             playback.open,
         )
-
-    def _show_mark(self) -> None:
-        """Show the mark while recording, or after it ended by itself."""
-        written, ended = self.recorder.written, self.recorder.ended
-        self._shown.setVisible(written.active or bool(ended))
-        self.mark.show_written(written, ended)
 
     def _add_recent(self, source: str) -> None:
         self._shell.opening.note(Path(source.removeprefix(RECORDED)))

@@ -6,13 +6,14 @@ from PySide6.QtWidgets import QWidget
 
 from kappaskin._text import printable
 from kappaskin_app.features.recording.playback import PlaybackControl
-from kappaskin_app.features.recording.recorder import RecordingControl, duration_of, size_of
+from kappaskin_app.features.recording.recorder import RecordingControl
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.panel import Panel
 from kappaskin_app.widgets.line import Line
 from kappaskin_app.widgets.parts import ELLIPSIS, button, in_a_row, plain_tip, sentence
+from kappaskin_app.widgets.text import elapsed, file_size
 
-_RECORD = "Start or stop recording to a file (Ctrl+Shift+R)."
+_RECORD = "Start or stop recording to a file in the folder Kappaskin (Ctrl+R)."
 _NOTE = "Add a note to the event log and the recording (Ctrl+Shift+N)."
 _OPEN = "Play a recording (Ctrl+Shift+O); or drop one on the window."
 _REPAIR = "Save the readable part of the damaged recording to a new file, and play it."
@@ -29,7 +30,7 @@ class RecordingPanel(Panel):
 
     def __init__(self) -> None:
         super().__init__("Recording")
-        self.record = button(f"Record{ELLIPSIS}", "record-button", _RECORD)
+        self.record = button("Record", "record-button", _RECORD)
         self.note = button(f"Note{ELLIPSIS}", "note-button", _NOTE)
         self.open = button(f"Open{ELLIPSIS}", "open-button", _OPEN)
         self.what, self.estimates = Line(), Line()
@@ -67,11 +68,11 @@ class RecordingPanel(Panel):
         if recorder is None or playback is None:
             return
         written = recorder.written
-        self.record.setText("Stop" if recorder.recording else f"Record{ELLIPSIS}")
+        self.record.setText("Stop" if recorder.recording else "Record")
         self.record.setEnabled(not recorder.why_not)
         self.record.setToolTip(plain_tip(recorder.why_not or _RECORD))
-        how = f"{duration_of(written.seconds)}, {size_of(written.size)}"
-        self.what.show_text(f"{how}: {Path(written.path).name}" if written.messages else "")
+        how = f"{elapsed(written.seconds)}, {file_size(written.size)}"
+        self.what.show_text(f"{how}: {Path(written.path).stem}" if written.messages else "")
         self.what.setToolTip(plain_tip(written.path))
         self.what.setVisible(bool(written.messages))
         self.estimates.show_text(printable(playback.made_by))

@@ -95,6 +95,7 @@ class PlaybackControl(QObject):
     def _wire(self) -> None:
         transport, session = self._transport, self._session
         transport.sought.connect(guarded(self.seek))
+        session.time_requested.connect(guarded(self.seek))
         transport.course.sliderReleased.connect(guarded(self._release_handle))
         transport.step_wanted.connect(guarded(self.step))
         transport.jump_wanted.connect(guarded(self.jump))

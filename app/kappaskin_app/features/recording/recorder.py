@@ -1,27 +1,23 @@
-"""Recording: start, notes, stop, repair."""
+"""Recording: start, notes, stop, rename, repair."""
 
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFont, QMouseEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import (
-    QFileDialog,
-    QInputDialog,
-    QLineEdit,
-    QMessageBox,
-    QSizePolicy,
-    QWidget,
-)
+from PySide6.QtCore import QObject, Qt, QUrl, Signal
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QFileDialog, QInputDialog, QLineEdit, QMessageBox, QWidget
 
+from kappaskin.errors import Refusal
 from kappaskin.live import LONGEST_NOTE, Engine, ResumeInfo, Status
-from kappaskin.recording import RecordingStatus, Repaired, RepairTask, part_of
+from kappaskin.recording import RecordingStatus, Repaired, RepairTask, part_of, renamed
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions
 from kappaskin_app.shell.background import Tasks
+from kappaskin_app.shell.centre import ActionBanner, BannerAction
 from kappaskin_app.shell.folders import (
     RECORDINGS,
-    proposed,
+    dated,
     recordings_folder,
     repaired,
     repairing,
@@ -33,88 +29,8 @@ from kappaskin_app.shell.work_dialog import (
     path_in,
     with_suffix,
 )
-from kappaskin_app.theme import current
-from kappaskin_app.widgets.lettering import LEFT
-from kappaskin_app.widgets.parts import plain_tip
-
-_WIDTH, _TEXT = 92, 22  # px: of all, and to where the words begin
-_HOUR = 3600.0  # s, from which there is room for the time alone
-_UNITS = ((1e9, "GB"), (1e6, "MB"), (1e3, "kB"))
-
-
-def size_of(count: int) -> str:
-    """A number of bytes in few digits."""
-    for one, unit in _UNITS:
-        if count >= one:
-            return f"{count / one:.1f} {unit}"
-    return f"{count} B"
-
-
-def duration_of(seconds: float) -> str:
-    """A time as m:ss, or h:mm:ss from an hour on."""
-    whole = int(seconds)
-    hours, rest = divmod(whole, 3600)
-    below = f"{rest // 60:02d}:{rest % 60:02d}" if hours else f"{rest // 60}:{rest % 60:02d}"
-    return f"{hours}:{below}" if hours else below
-
-
-class RecordingMark(QWidget):
-    """The mark of a recording; after one that ended by itself, until `clicked`."""
-
-    clicked = Signal()
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Preferred)
-        self.head, self.below, self._bad = "", "", False
-
-    def sizeHint(self) -> QSize:
-        return QSize(_WIDTH, 2 * self.fontMetrics().height())
-
-    minimumSizeHint = sizeHint
-
-    def show_written(self, written: RecordingStatus, trouble: str) -> None:
-        """Show the recording, or the error that ended it."""
-        if written.active:
-            head, size = duration_of(written.seconds), size_of(written.size)
-            head = head if written.seconds >= _HOUR else f"REC {head}"
-            self._show(head, f"{written.lost} lost" if written.lost else size, written.lost > 0)
-            self.setToolTip(
-                plain_tip(
-                    f"Recording to {written.path}: {size}, {written.lost} messages lost.\n"
-                    "Messages are lost when the disk is too slow."
-                )
-            )
-        else:
-            self._show("REC ended", "with an error", True)
-            self.setToolTip(plain_tip(f"{trouble}\n\nClick to remove this mark."))
-        self.setAccessibleName(f"{self.head}, {self.below}")
-
-    def _show(self, head: str, below: str, bad: bool) -> None:
-        if (head, below, bad) != (self.head, self.below, self._bad):
-            self.head, self.below, self._bad = head, below, bad
-            self.update()
-
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        self.clicked.emit()
-        super().mouseReleaseEvent(event)
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter, theme = QPainter(self), current()
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        line = float(self.fontMetrics().height())
-        top = (self.height() - 2 * line) / 2
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(theme.alert))
-        painter.drawEllipse(QPointF(12, top + line / 2), 5, 5)
-        bold = painter.font()
-        bold.setWeight(QFont.Weight.DemiBold)
-        painter.setFont(bold)
-        painter.setPen(QColor(theme.alert))
-        painter.drawText(QRectF(_TEXT, top, self.width() - _TEXT, line), LEFT, self.head)
-        painter.setFont(self.font())
-        painter.setPen(QColor(theme.alert if self._bad else theme.text))
-        painter.drawText(QRectF(_TEXT, top + line, self.width() - _TEXT, line), LEFT, self.below)
+from kappaskin_app.widgets.parts import ELLIPSIS, sentence
+from kappaskin_app.widgets.text import elapsed, file_size
 
 
 class RepairDialog(WorkDialog):
@@ -163,25 +79,37 @@ class RepairDialog(WorkDialog):
 
 
 _MENU = "&Recording"
-_RECORD, _STOP = "&Record\N{HORIZONTAL ELLIPSIS}", "&Stop recording"
+_RECORD, _STOP = "&Record", "&Stop recording"
+_ELSEWHERE = "Record to a file of another name or in another folder."
+
+
+def _question(window: QWidget, title: str, words: str) -> QInputDialog:
+    """A dialog for a line of text."""
+    dialog = QInputDialog(window)
+    dialog.setWindowTitle(title)
+    dialog.setLabelText(words)
+    dialog.setMinimumWidth(420)
+    dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+    return dialog
 
 
 class RecordingControl(QObject):
     """Controls the engine's recorder; `notified` brings messages, `changed` reports its state.
 
-    `message` is the present message about recordings, an alarm where it is `alarming`; `damaged`
-    is a recording that can be repaired.
+    The `banner` shows what may be done with a recording that ended; `play_wanted` brings the path
+    of one to play. `message` is the present message about recordings, an alarm where it is
+    `alarming`; `damaged` is a recording that can be repaired.
     """
 
     notified = Signal(str)
     changed = Signal()
+    play_wanted = Signal(Path)
 
-    def __init__(self, engine: Engine, tasks: Tasks, window: QWidget) -> None:
+    def __init__(self, engine: Engine, tasks: Tasks, banner: ActionBanner, window: QWidget) -> None:
         super().__init__(window)
-        self._engine, self._window = engine, window
+        self._engine, self._banner, self._window = engine, banner, window
         self._replays = False
-        self.written, self.ended = RecordingStatus(), ""
-        """The state of the recording, and the error that ended it."""
+        self.written = RecordingStatus()
         self.message, self.alarming = "", False
         self.damaged: Path | None = None
         self.repairs = RepairDialog(tasks, window)
@@ -202,49 +130,41 @@ class RecordingControl(QObject):
     def add_actions(self, actions: Actions) -> None:
         """Register the actions."""
         self._actions = actions
-        tip = "Start or stop recording to a file; it continues when the source changes"
-        actions.add("record", _MENU, _RECORD, self.toggle, "Ctrl+Shift+R", tip)
+        tip = f"Start or stop recording to a file in {recordings_folder()}"
+        actions.add("record", _MENU, _RECORD, self.toggle, "Ctrl+R", tip)
         tip = "Add a note to the event log and the recording"
         actions.add("note", _MENU, "&Note\N{HORIZONTAL ELLIPSIS}", self.note, "Ctrl+Shift+N", tip)
 
     # Requests of the user.
 
     def toggle(self) -> None:
-        """Ask for a file and record to it, or stop."""
+        """Record to a file named by the time, or stop."""
         if self.recording:
             self._engine.record(None)
         elif self.why_not:
             self.notified.emit(self.why_not)
-        elif (path := self._ask_path()) is not None:
-            self.begin(path)
+        else:
+            self.begin(dated(datetime.now(), ".mcap"))
 
-    def _ask_path(self) -> Path | None:
-        """Ask for the file to record to; None if cancelled."""
-        path = proposed(recordings_folder(), datetime.now())
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            self.notified.emit(f"{path.parent}: cannot be made ({error.strerror}); choose another")
-            path = Path(path.name)
+    def _record_elsewhere(self) -> None:
+        """Ask for a file, and record to it."""
         option = QFileDialog.Option.DontConfirmOverwrite  # the engine refuses existing files
+        proposal = str(dated(datetime.now(), ".mcap"))
         chosen, _ = QFileDialog.getSaveFileName(
-            self._window, "Record to", str(path), RECORDINGS, "", option
+            self._window, "Record to", proposal, RECORDINGS, "", option
         )
-        return with_suffix(chosen, ".mcap") if chosen else None
+        if chosen:
+            self.begin(with_suffix(chosen, ".mcap"))
 
     def begin(self, path: Path) -> None:
         """Record to `path`."""
-        self.dismiss()
+        self._banner.hide()
         self._set_message("")
         self._engine.record(path)
 
     def note(self) -> None:
         """Ask for a note, and add it to the events."""
-        dialog = QInputDialog(self._window)
-        dialog.setWindowTitle("Note")
-        dialog.setLabelText("Note for the event log and the recording:")
-        dialog.setMinimumWidth(420)
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog = _question(self._window, "Note", "Note for the event log and the recording:")
         dialog.textValueSelected.connect(guarded(self.write_down))
         dialog.open()
         for line in dialog.findChildren(QLineEdit):  # made only now
@@ -286,11 +206,40 @@ class RecordingControl(QObject):
         if closes:
             self._window.close()
 
-    def dismiss(self) -> None:
-        """Remove the mark of a recording that ended by itself."""
-        if self.ended:
-            self.ended = ""
-            self.changed.emit()
+    # What may be done with a recording that has ended.
+
+    def _offer(self, path: Path, words: str) -> None:
+        """Offer to play, rename or find the complete recording at `path`."""
+        offered = (
+            ("&Play", f"Play {path.name}.", partial(self.play_wanted.emit, path)),
+            (f"Rena&me{ELLIPSIS}", f"Rename {path.name}.", partial(self._ask_name, path, words)),
+            ("Sho&w in folder", f"Open {path.parent}.", partial(self._show_folder, path)),
+        )
+        self._banner.show_actions(words, str(path), [BannerAction(*each) for each in offered])
+
+    def _ask_name(self, path: Path, words: str) -> None:
+        def renames(accepted: int) -> None:
+            name = dialog.textValue().strip()
+            self._offer(path, words) if not accepted else self._rename(path, name, words)
+
+        dialog = _question(self._window, "Rename", f"New name of {path.name}:")
+        dialog.setTextValue(path.stem)
+        dialog.finished.connect(guarded(renames))
+        dialog.open()
+
+    def _rename(self, path: Path, name: str, words: str) -> None:
+        if name in (path.name, path.stem):
+            self._offer(path, words)
+            return
+        try:
+            path = renamed(path, name)
+            self._offer(path, f"Renamed to {path.name}:")
+        except Refusal as refusal:
+            self._offer(path, sentence(str(refusal)))
+
+    def _show_folder(self, path: Path) -> None:
+        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(path.parent))):
+            self.notified.emit(f"No program opens folders; the recording is {path}")
 
     def offer_repair(self) -> None:
         """Report unfinished recordings, and how to repair them."""
@@ -324,17 +273,26 @@ class RecordingControl(QObject):
                 self.changed.emit()
             return
         if now.trouble and now.trouble != was.trouble:
-            self.ended = now.trouble if was.active else ""
             part = part_of(Path(now.path))
             self._set_message(now.trouble, damaged=part if part.exists() else None)
             self.notified.emit(now.trouble)
+            self._offer_way_out(now, part)
         elif was.active and not now.active:
-            self.notified.emit(
-                f"Recorded {now.path}: {duration_of(now.seconds)}, {size_of(now.size)}"
-            )
-        if now.active:
-            self.ended = ""
+            words = f"Recorded {elapsed(now.seconds)}, {file_size(now.size)}:"
+            self._offer(Path(now.path), words)
         self.changed.emit()
+
+    def _offer_way_out(self, now: RecordingStatus, part: Path) -> None:
+        """Show an error in the banner, with what can be done about it."""
+        if Path(now.path).exists() and now.messages:  # complete up to a full disk
+            self._offer(Path(now.path), sentence(now.trouble))
+            return
+        repair = BannerAction(
+            f"Re&pair{ELLIPSIS}", f"Complete {part.name}.", partial(self.repairs.ask_of, part)
+        )
+        elsewhere = BannerAction(f"Record else&where{ELLIPSIS}", _ELSEWHERE, self._record_elsewhere)
+        offered = [repair] if part.exists() and now.messages else [elsewhere]
+        self._banner.show_actions(sentence(now.trouble), now.path, offered)
 
     def _show_actions(self) -> None:
         if self._actions is not None:

@@ -15,6 +15,7 @@ from kappaskin_app.features.scene.panel import ScenePanel
 from kappaskin_app.features.scene.plan import EffectPlanner
 from kappaskin_app.features.scene.timeline import Timeline
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.folders import recordings_folder
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.opening import SCENES, Opening
 from kappaskin_app.shell.session import Session
@@ -68,7 +69,9 @@ class SceneControl(QObject):
 
     def open(self) -> None:
         """Open a file dialog, and simulate the selected scene."""
-        file, _ = QFileDialog.getOpenFileName(self._window, "Open a scene", "", SCENES)
+        file, _ = QFileDialog.getOpenFileName(
+            self._window, "Open a scene", str(recordings_folder()), SCENES
+        )
         if file:
             self.play(Path(file))
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
+from kappaskin._text import with_error
 from kappaskin.calibration import Calibration
 from kappaskin.estimation import amplitude_spectrum
 from kappaskin.frames import COMPONENTS, Array, Estimate
@@ -26,7 +27,6 @@ from kappaskin_app.shell.history import History
 from kappaskin_app.shell.selection import Selection
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.widgets.parts import with_error
 
 _LEAST_PERIOD = 0.002  # s between two stored frames
 _ROUNDING = 1e-6  # of a period: at exactly that rate all frames are stored
@@ -66,6 +66,13 @@ class ReadingBuffer:
 
 
 _READ = tuple(quantity for quantity in REPORTED if quantity.element_head)
+_PATHS = [str(quantity.value) for quantity in TRACED]
+
+
+def _by_kind(values: list[Array], layout: SensorLayout) -> Array:
+    """Values (T, n k, P) of k traced quantities, each in the n kinds of readings of a layout."""
+    each = [v if v.ndim == 3 else layout.by_kind(v) for v in values]
+    return np.concatenate(each, axis=1)
 
 
 def _heads(layout: SensorLayout) -> tuple[str, ...]:
@@ -92,7 +99,7 @@ def facts(element: int, sensor: Sensor, status: Status, estimate: Estimate) -> s
 def title(element: int, sensor: Sensor, displacement: float, sd: float) -> str:
     """Number and position of an element, and the `displacement` of the skin there in mm."""
     x, y = 1e3 * sensor.layout.positions[element]
-    inward = with_error(displacement, sd, 3, "mm")
+    inward = with_error(displacement, sd, "mm")
     return f"<b>Element {element}</b> at ({x:.1f}, {y:.1f}) mm; displacement {inward}"
 
 
@@ -117,7 +124,7 @@ def _read(quantity: ReportedQuantity, reported: Reported, channel: int, scale: f
     found = [of(reported) for suffix, _, of in quantity.forms if suffix != "_95"]
     each = np.broadcast_arrays(*found, math.nan)[:2]
     value, sd = (scale * float(one.flat[channel]) for one in each)
-    return with_error(value, sd, quantity.shown[2], sign="+")
+    return with_error(value, sd, digits=quantity.shown[2], sign="+")
 
 
 def _calibration_cells(calibration: Calibration | None, channel: int) -> tuple[str, str]:
@@ -125,8 +132,8 @@ def _calibration_cells(calibration: Calibration | None, channel: int) -> tuple[s
         return "1 (nominal)", "0 (nominal)"
     c = calibration
     return (
-        with_error(c.gain[channel], c.gain_sd[channel], 3),
-        with_error(c.offset[channel], c.offset_sd[channel], 2, sign="+"),
+        with_error(c.gain[channel], c.gain_sd[channel]),
+        with_error(c.offset[channel], c.offset_sd[channel], sign="+"),
     )
 
 
@@ -226,8 +233,10 @@ class SelectedElement(QObject):
         key = status.connections, estimate.generation
         if key != self._key:
             self._key, self._last_number = key, 0
-        times, readings, self._last_number = self._session.engine.recent(status, self._last_number)
-        self._buffer.append(times, readings)
+        engine = self._session.engine
+        times, traced, self._last_number = engine.recent(status, self._last_number, _PATHS)
+        if traced and status.sensor is not None:
+            self._buffer.append(times, _by_kind(traced, status.sensor.layout))
         if self.panel.isVisible() and self.element >= 0:
             self._show_panel(estimate, now)
         if now >= self._next_plots:

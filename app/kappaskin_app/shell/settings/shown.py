@@ -236,4 +236,6 @@ class View(ColourRanges):
         ),
     )
     traced: tuple[int, ...] = ()  # elements whose last seconds are drawn
+    strips: tuple[str, ...] = ("force", "displacement")  # quantities drawn over time
+    strip_seconds: float = 60.0
     ranges: Mapping[str, float] = field(default_factory=dict)  # of readings but xx, yy and xy

@@ -1,5 +1,8 @@
 """Export of recordings: tables of frames, and meshes of the skin."""
 
+from kappaskin.recording.export.request import PRESETS as PRESETS
 from kappaskin.recording.export.request import ExportRequest as ExportRequest
 from kappaskin.recording.export.writing import Exported as Exported
 from kappaskin.recording.export.writing import ExportTask as ExportTask
+from kappaskin.recording.export.writing import Forecast as Forecast
+from kappaskin.recording.export.writing import ForecastTask as ForecastTask

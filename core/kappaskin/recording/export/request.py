@@ -19,11 +19,37 @@ from kappaskin.recording.writing import PROGRAM
 from kappaskin.sensing import Sensor, SensorLayout
 from kappaskin.sources import sensor_from_json
 
-TABLES = (".csv", ".npz", ".h5")
+TABLES = (".parquet", ".csv", ".npz", ".h5")
 """Suffixes of files with a row for each frame."""
 
 SURFACES = (".vtp", ".stl", ".pvd")
 """Suffixes of files of the skin's surface."""
+
+
+class ExportPreset(NamedTuple):
+    """The `columns` of a table, by their names; without any all of them.
+
+    A selection has its numbers, but for times, in single precision: 7 digits.
+    """
+
+    title: str
+    columns: tuple[str, ...] = ()
+
+
+PRESETS = {
+    "contact": ExportPreset(
+        "Contact and force",
+        (
+            *("time", "present", "single", "near_rim", "position", "position_sd"),
+            *("force", "force_sd", "displacement", "displacement_sd"),
+        ),
+    ),
+    "readings": ExportPreset(
+        "Readings", ("time", "sequence", "device_time", "counts", "curvature", "reading")
+    ),
+    "everything": ExportPreset("Everything"),
+}
+"""What a table may have of each frame; the first is the default."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +58,8 @@ class ExportRequest:
 
     Times are in s since the recording began: from `begin` until `end`, one frame each `every` s, or
     all where that is 0; or the first frame from `at` on alone. Frames are worked out with the
-    settings that were recorded, or with `setup`. A `Refusal` where that makes no file.
+    settings that were recorded, or with `setup`. A table has the columns of the `preset`, one of
+    `PRESETS`. A `Refusal` where that makes no file.
     """
 
     recording: Path
@@ -42,8 +69,11 @@ class ExportRequest:
     every: float = 0.0
     at: float | None = None
     setup: Setup | None = None
+    preset: str = "contact"
 
     def __post_init__(self) -> None:
+        if self.preset not in PRESETS:
+            raise Refusal(f"expected a preset, one of {', '.join(PRESETS)}; got {self.preset!r}")
         self._check_times()
         self._check_format()
         self._check_place()

@@ -1,4 +1,4 @@
-"""Exported tables, a row for each frame: CSV, HDF5 and NPZ."""
+"""Exported tables, a row for each frame: Parquet, CSV, HDF5 and NPZ."""
 
 import importlib
 import io
@@ -18,7 +18,12 @@ from numpy.typing import NDArray
 from kappaskin._text import json_cells
 from kappaskin.errors import lacking
 from kappaskin.pipeline import REPORTED, Axes, Getter, axes_of
-from kappaskin.recording.export.request import ExportedFrame, ExportRequest, RecordingInfo
+from kappaskin.recording.export.request import (
+    PRESETS,
+    ExportedFrame,
+    ExportRequest,
+    RecordingInfo,
+)
 from kappaskin.sensing import Sensor, SensorLayout
 
 
@@ -53,7 +58,14 @@ class Column(NamedTuple):
         return found.reshape(self.shape)
 
 
-def columns(info: RecordingInfo) -> tuple[Column, ...]:
+def columns(info: RecordingInfo, preset: str) -> tuple[Column, ...]:
+    """Those of a preset, the frame's before those of its estimate."""
+    found, names = _all_columns(info), PRESETS[preset].columns
+    single = [c._replace(kind="<f4") if c.kind == "<f8" and c.unit != "s" else c for c in found]
+    return tuple(c for c in single if c.name in names) if names else found
+
+
+def _all_columns(info: RecordingInfo) -> tuple[Column, ...]:
     """All of them, for P elements and Ni x Nj functions: of the frame, then of its estimate."""
     layout = info.sensor.layout
     lengths = axes_of(layout, info.functions, (0, 0))
@@ -115,16 +127,18 @@ def _value(getter: Getter) -> Callable[[ExportedFrame], Any]:
 
 Block = dict[str, NDArray[Any]]
 
-_BLOCK = 2**22  # bytes of rows that are written at once, about
-
 
 class TableWriter(ABC):
     """Writer of a table; a format defines how rows (n, ...) are written."""
 
+    block = 2**22
+    """Bytes of rows that are written at once, about."""
+
     def __init__(self, scratch: Path, request: ExportRequest, info: RecordingInfo) -> None:
-        self.path, self.info, self.columns = scratch / request.to.name, info, columns(info)
+        self.path, self.info = scratch / request.to.name, info
+        self.columns = columns(info, request.preset)
         sizes = (np.dtype(c.kind).itemsize * int(np.prod(c.shape)) for c in self.columns)
-        self.rows_at_once = max(_BLOCK // sum(sizes), 1)
+        self.rows_at_once = max(self.block // sum(sizes), 1)
         self._rows: list[list[NDArray[Any]]] = []
         self.begin(scratch)
 
@@ -174,9 +188,7 @@ class CsvTable(TableWriter):
 
     def write(self, block: Block) -> None:
         flat = [values.reshape(len(values), -1) for values in block.values()]
-        parts = [
-            cast("list[list[float]]", (v + 0 if v.dtype == bool else v).tolist()) for v in flat
-        ]
+        parts = [_numbers(values) for values in flat]
         for n in range(len(flat[0])):
             row: list[float] = []
             for part in parts:
@@ -186,6 +198,49 @@ class CsvTable(TableWriter):
 
     def end(self) -> None:
         self._file.flush()
+
+    def close(self) -> None:
+        self._file.close()
+
+
+def _numbers(values: "NDArray[Any]") -> list[list[float]]:
+    """Values (n, k) as numbers: 0 or 1 for booleans, 9 digits in single precision."""
+    rows = cast("list[list[float]]", (values + 0 if values.dtype == bool else values).tolist())
+    single = values.dtype == np.float32
+    return [[float(f"{x:.9g}") for x in row] for row in rows] if single else rows
+
+
+class ParquetTable(TableWriter):
+    """Parquet: a column for each number, called as in a CSV; the metadata are those of the file."""
+
+    block = 2**25  # each group of rows describes all columns anew
+
+    def begin(self, scratch: Path) -> None:
+        try:
+            self._arrow: Any = importlib.import_module("pyarrow")
+            parquet: Any = importlib.import_module("pyarrow.parquet")
+        except ImportError as error:
+            raise lacking("parquet", "a .parquet file, unlike a .csv,", error) from error
+        facts = self.info.facts | {"columns": {c.name: c.text for c in self.columns}}
+        metadata = {name: v if isinstance(v, str) else json.dumps(v) for name, v in facts.items()}
+        kinds = [
+            (head, self._arrow.from_numpy_dtype(np.dtype(column.kind)))
+            for column in self.columns
+            for head in column.heads()
+        ]
+        self._schema = self._arrow.schema(kinds)
+        self._file = self.path.open("xb")
+        self._table = parquet.ParquetWriter(
+            self._file, self._schema, compression="zstd", store_schema=False
+        )
+        self._table.add_key_value_metadata(metadata)
+
+    def write(self, block: Block) -> None:
+        flat = [each for values in block.values() for each in values.reshape(len(values), -1).T]
+        self._table.write_table(self._arrow.table(flat, schema=self._schema))
+
+    def end(self) -> None:
+        self._table.close()
 
     def close(self) -> None:
         self._file.close()

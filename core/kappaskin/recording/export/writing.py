@@ -3,10 +3,10 @@
 import math
 import shutil
 import time
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import closing
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from kappaskin.errors import Refusal
 from kappaskin.estimation import slope_warning
@@ -21,13 +21,14 @@ from kappaskin.recording.export.request import (
     recording_info,
 )
 from kappaskin.recording.export.surfaces import StlSurfaces, VtpSurfaces
-from kappaskin.recording.export.tables import CsvTable, Hdf5Table, NpzTable
+from kappaskin.recording.export.tables import CsvTable, Hdf5Table, NpzTable, ParquetTable
 from kappaskin.recording.reading import RecordedMessage, Recording
 from kappaskin.recording.recompute import Recomputation
 from kappaskin.sensing import Sensor
 from kappaskin.sources import sensor_to_json
 
 FORMATS: dict[str, type[ExportWriter]] = {
+    ".parquet": ParquetTable,
     ".csv": CsvTable,
     ".npz": NpzTable,
     ".h5": Hdf5Table,
@@ -38,6 +39,8 @@ FORMATS: dict[str, type[ExportWriter]] = {
 """Writers by suffix: a new format is one more class."""
 
 _REPORT = 0.05  # s between two reports
+_EARLY = 1e-6  # share of a period by which a frame may come early: times are rounded
+_SAMPLE = 0.2  # s of a core for writing what a forecast is made from
 
 
 class Exported(NamedTuple):
@@ -69,14 +72,51 @@ class Exported(NamedTuple):
         return "; ".join(parts)
 
 
+class Forecast(NamedTuple):
+    """How many `frames` an export will have, its `size` in bytes and `seconds` it takes, about."""
+
+    frames: int
+    size: int
+    seconds: float
+
+
+_Result = TypeVar("_Result")
+
+
 def export_steps(request: ExportRequest, scratch: Path) -> Generator[float | Exported]:
     """Write all requested files into the folder `scratch`.
 
     Now and then the share that is done, and what came of it at the end.
     """
+    return _steps(request, scratch, math.inf, _ExportWork.done)
+
+
+def forecast_steps(request: ExportRequest, scratch: Path) -> Generator[float | Forecast]:
+    """The forecast of an export, from what is written of it in a moment into `scratch`."""
+    return _steps(request, scratch, _SAMPLE, lambda work: work.forecast(scratch))
+
+
+def _steps(
+    request: ExportRequest,
+    scratch: Path,
+    seconds: float,
+    result: "Callable[[_ExportWork], _Result]",
+) -> Generator[float | _Result]:
+    """Write for so many `seconds` of the processor: shares, and the `result`."""
     try:
         with Recording(request.recording) as recording:
-            yield from _exported(recording, request, scratch)
+            info = recording_info(recording, request)
+            with closing(FORMATS[request.format](scratch, request, info)) as writer:
+                work, next_report = _ExportWork(recording, request, info, writer), 0.0
+                for message in recording.messages():
+                    if not work.take(message) or time.process_time() - work.since > seconds:
+                        break
+                    if time.monotonic() >= next_report:
+                        next_report = time.monotonic() + _REPORT
+                        yield work.share(message)
+                work.check()
+                writer.finish()
+            yield result(work)
     except OSError as error:
         raise Refusal(
             f"{request.to}: cannot be written ({error.strerror or error}); choose another place"
@@ -84,23 +124,6 @@ def export_steps(request: ExportRequest, scratch: Path) -> Generator[float | Exp
     except GeneratorExit:  # nobody waits for it any more
         shutil.rmtree(scratch, ignore_errors=True)
         raise
-
-
-def _exported(
-    recording: Recording, request: ExportRequest, scratch: Path
-) -> Generator[float | Exported]:
-    info = recording_info(recording, request)
-    with closing(FORMATS[request.format](scratch, request, info)) as writer:
-        work, next_report = _ExportWork(recording, request, info, writer), 0.0
-        for message in recording.messages():
-            if not work.take(message):
-                break
-            if time.monotonic() >= next_report:
-                next_report = time.monotonic() + _REPORT
-                yield work.share(message)
-        work.check()
-        writer.finish()
-    yield work.done()
 
 
 class _ExportWork:
@@ -116,10 +139,15 @@ class _ExportWork:
         self._recording, self._request, self._writer = recording, request, writer
         self._recomputation = Recomputation(recording, request.setup)
         self._device, self._sensor = sensor_to_json(info.sensor), info.sensor
+        self._head = len(info.json())  # bytes that a file has once, about
         self._due = request.first  # s since the recording began
         self._last = math.nan  # s, when the last frame that was looked at came
         self._written = self._unsettled = self._shapeless = 0
         self._slope = 0.0
+        self.since = math.inf
+        """The processor's time when the first frame was written."""
+        self._begun = self._wrote = time.monotonic()
+        self._first = 0.0  # s since the recording began, when the first frame came
 
     def take(self, message: RecordedMessage) -> bool:
         """Take one message; whether the next one is needed too."""
@@ -139,12 +167,16 @@ class _ExportWork:
         if estimate is None or pipeline is None:
             self._unsettled += 1
         elif self._writer.take(ExportedFrame(at, frame, estimate, pipeline)):
+            if not self._written:
+                self.since, self._first = time.process_time(), at
+                self._wrote = time.monotonic()
             self._written += 1
             if pipeline.fitted is not None:
                 self._slope = max(self._slope, pipeline.fitted.neglected_slope)
             first, every = self._request.first, self._request.every
             if every:
-                self._due = first + every * (math.floor((at - first) / every) + 1)
+                passed = math.floor((at - first) / every + _EARLY)
+                self._due = first + every * (passed + 1 - _EARLY)
         else:
             self._shapeless += 1
 
@@ -181,6 +213,19 @@ class _ExportWork:
         until = min(end, self._recording.seconds(self._recording.last))
         return min(max(at / until, 0.0), 1.0) if until > 0 else 0.0
 
+    def forecast(self, scratch: Path) -> Forecast:
+        """The forecast from what was written into `scratch`."""
+        request, recording = self._request, self._recording
+        span = min(request.end, recording.seconds(recording.last)) - self._first
+        covered = self._last - self._first
+        share = span / covered if request.at is None and covered > 0 else 1.0
+        series = request.every and covered > 0
+        frames = 1 + span // request.every if series else self._written * share
+        size = sum(file.stat().st_size for file in scratch.rglob("*") if file.is_file())
+        seconds = self._wrote - self._begun + share * (time.monotonic() - self._wrote)
+        whole = self._head + max(size - self._head, 0) * frames / self._written
+        return Forecast(round(frames), round(whole), seconds)
+
     def done(self) -> Exported:
         whole = self._recording.whole
         return Exported(self._written, self._unsettled, self._shapeless, whole, self._slope)
@@ -194,3 +239,10 @@ class ExportTask(ScratchTask[Exported]):
         super().__init__(
             "kappaskin-export", request.to, request.files, Exported, export_steps, request
         )
+
+
+class ForecastTask(ScratchTask[Forecast]):
+    """Writes a part of the requested files, and removes it again."""
+
+    def __init__(self, request: ExportRequest) -> None:
+        super().__init__("kappaskin-forecast", request.to, (), Forecast, forecast_steps, request)

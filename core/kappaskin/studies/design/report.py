@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from kappaskin._files import write_whole
-from kappaskin._text import cell, printable
+from kappaskin._text import cell, printable, with_error
 from kappaskin.studies.design.measures import MEASURES, StudyMeasure
 from kappaskin.studies.design.results import (
     Mean,
@@ -49,11 +49,7 @@ def mean_text(mean: Mean, measure: StudyMeasure) -> str:
     value, half = measure.scale * mean.mean, measure.scale * mean.half
     if math.isnan(half):
         return f"{value:.4g} ± ?"
-    # What rounding has left of an interval of nothing is none.
-    if half <= 1e-9 * abs(value):
-        return f"{value:.4g}"
-    digits = max(1 - math.floor(math.log10(half)), 0)
-    return f"{value:.{digits}f} ± {half:.{digits}f}"
+    return with_error(value, half)
 
 
 def header_of(study: Study) -> list[str]:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kappaskin._text import with_error
 from kappaskin.frames import Array
 from kappaskin.scenes import load_scene
 from kappaskin.studies.accuracy import root_mean_square
@@ -114,7 +115,7 @@ class _FingertipRun:
     @property
     def found(self) -> str:
         """The deflection in the middle with its 95 % limits."""
-        return f"{1e3 * self.fitted[90]:.2f} ± {1.96e3 * self.sd[90]:.2f} mm"
+        return with_error(1e3 * self.fitted[90], 1.96e3 * self.sd[90], "mm")
 
     @property
     def rms(self) -> float:

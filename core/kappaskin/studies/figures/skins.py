@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kappaskin._text import with_error
 from kappaskin.frames import Array
 from kappaskin.mechanics import PointLoad
 from kappaskin.scenes import TABLE_1_NOISE
@@ -289,6 +290,6 @@ def _write_values(figure: style.Figure, found: _PatchRun) -> None:
     for n, colour in enumerate(_COLOURS):
         limit = 1.96 * found.principal_sd[n]
         angle = np.degrees(np.arctan(vectors[1, n] / vectors[0, n]))
-        text = f"κ{'₁₂'[n]} = {values[n]:.1f} ± {limit:.1f} 1/m at {angle:.0f}° from x"
+        text = f"κ{'₁₂'[n]} = {with_error(values[n], limit, '1/m')} at {angle:.0f}° from x"
         style.write(figure, 106, 12 - 5 * n, text, color=colour)
     style.write(figure, 106, 2, "positive: convex seen from outside; ± 1.96 sd", color=style.FAINT)

@@ -25,7 +25,7 @@ def test_nothing_is_cheapest_where_nothing_was_measured() -> None:
         (2.5e-3, "2.5 mm"),
         (0.12, "120 mm"),
         (9.96e-7, "0.0010 mm"),
-        (4e-7, "0.40 \N{MICRO SIGN}m"),
+        (4e-7, "0.00040 mm"),
         (math.nan, "\N{EN DASH}"),
         (math.inf, "\N{EN DASH}"),
     ],

@@ -2,10 +2,13 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from kappaskin import Pipeline, Setup, Simulator, load_scene
+from kappaskin_app.features.contact.numbers import FACTS, csv_of, facts_of
 from kappaskin_app.features.contact.readouts import FIELDS, Readouts
+from kappaskin_app.theme import FAINT
 
 
 @pytest.fixture
@@ -59,6 +62,53 @@ def test_a_force_that_leaves_out_a_stretch_is_shown_as_a_lower_bound(readouts: R
     assert readouts.text("force") == f"\N{GREATER-THAN OR EQUAL TO} {plain}"
 
 
+def _centre():
+    scene = load_scene("centre")
+    return Pipeline(scene.sensor(), Setup())(Simulator(scene).frame(0, lambda: 0.0))
+
+
+def test_a_contact_near_the_rim_has_a_grey_place_and_no_numbers(readouts: Readouts) -> None:
+    estimate = _centre()
+    rim = replace(estimate, contact=replace(estimate.contact, near_rim=True))
+    number, _ = readouts.parts["contact"]
+
+    readouts.show_estimate(estimate)
+    plain = number.grab().toImage()
+    readouts.show_estimate(rim)
+
+    assert readouts.text("contact").endswith("near rim")
+    assert readouts.text("force") == "edge: no force"
+    assert readouts.text("depth") == "edge: no depth"
+    assert number.foregroundRole() == FAINT
+    assert number.grab().toImage() != plain
+    readouts.show_estimate(estimate)
+    assert number.foregroundRole() != FAINT
+    assert " N" in readouts.text("force")
+
+
+def test_of_two_contacts_the_one_near_the_rim_has_no_force(readouts: Readouts) -> None:
+    estimate = _centre()
+    second = replace(estimate.contact, near_rim=True, force=1482.331)
+
+    readouts.show_estimate(replace(estimate, second=second))
+
+    assert readouts.text("force").endswith(", edge N")
+
+
+def test_the_error_bar_has_two_digits_and_without_noise_the_place_is_exact(readouts) -> None:
+    estimate = _centre()
+    at = replace(estimate.contact, position=np.array([0.05, 0.0302]))
+
+    def shown(sd: float) -> str:
+        contact = replace(at, position_sd=np.full(2, sd))
+        readouts.show_estimate(replace(estimate, contact=contact))
+        return readouts.text("contact")
+
+    assert shown(1.37e-4) == "(50.00, 30.20) \N{PLUS-MINUS SIGN} 0.14 mm"
+    assert shown(1.7e-6) == "(50.0000, 30.2000) \N{PLUS-MINUS SIGN} 0.0017 mm"
+    assert shown(0.0) == "(50.0, 30.2) mm exact"
+
+
 def test_an_unknown_force_is_a_dash_and_never_nan(readouts: Readouts) -> None:
     scene = load_scene("centre")
     scene = replace(scene, plate=replace(scene.plate, unknown_material=True))
@@ -71,3 +121,15 @@ def test_an_unknown_force_is_a_dash_and_never_nan(readouts: Readouts) -> None:
     assert "mm" in readouts.text("contact")
     readouts.show_estimate(replace(estimate, second=estimate.contact))
     assert readouts.text("force") == "\N{EN DASH}"
+
+
+def test_the_table_near_the_rim_has_words_and_its_copy_numbers_that_programs_read() -> None:
+    estimate = _centre()
+    rim = replace(estimate, contact=replace(estimate.contact, near_rim=True))
+    facts = {row[0]: row[1:] for row in facts_of(rim, "")}
+    assert facts["Force"] == ("edge: no force", "", "")
+    assert facts["Contact x"] == ("edge: unreliable", "", "")
+    assert facts["Larger \N{GREEK SMALL LETTER KAPPA}"][0].startswith("\N{MINUS SIGN}")
+    copied = csv_of((FACTS, facts_of(rim, "")))
+    assert "\N{MINUS SIGN}" not in copied
+    assert "-" in copied

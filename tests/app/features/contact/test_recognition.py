@@ -1,5 +1,6 @@
 """Object recognition: its text in the status bar."""
 
+import re
 import threading
 import time
 from dataclasses import replace
@@ -16,10 +17,10 @@ from kappaskin import (
     Simulator,
     load_scene,
 )
-from kappaskin.contact import ImprintObjects
+from kappaskin.contact import NO_OBJECT, ImprintObjects
 from kappaskin.sensing import DigitalReadings
 from kappaskin_app.features.contact import recognition
-from kappaskin_app.features.contact.recognition import curvature_text
+from kappaskin_app.features.contact.recognition import SteadyObject, curvature_text, object_text
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.simulation import scene_of
 from kappaskin_app.widgets.line import Line
@@ -49,7 +50,7 @@ def test_the_window_describes_the_object_in_contact(window, until):
     assert len(window.session.scene.loads) == 2
 
     # Its ends are two contacts, which the blade makes if it is one object.
-    said = "as one object: edge, 20 mm long, axis "
+    said = "As one object: edge, 20 mm long, axis "
     until(lambda: window.display.status_bar.object.text().startswith(said))
     assert "principal curvatures" in window.display.status_bar.object.text()
 
@@ -63,12 +64,13 @@ def test_what_fits_no_object_is_said_with_its_cause_and_what_to_do():
     estimate = _estimate(*corners)
     finder = ObjectFinder(scene.sensor().plate, scene.sensor().layout)
 
-    words, _, found, _ = recognition._recognise(finder, estimate)  # noqa: SLF001
+    _, _, found, _ = recognition._recognise(finder, estimate)  # noqa: SLF001
+    words = object_text(found, estimate)
 
     assert not found.fits
     assert not found.kind
-    assert "unknown object, nearest " in words
-    assert "press it straight at one place; it may bear at several or on its rim" in words
+    assert "shape unknown: no object fits" in words
+    assert "press it straight at one place: it may bear at several or on its rim" in words
 
 
 def test_simulated_point_loads_are_those_of_the_plate_that_objects_are_recognised_on():
@@ -77,12 +79,12 @@ def test_simulated_point_loads_are_those_of_the_plate_that_objects_are_recognise
     for x, y in places:
         scene = scene_of(Settings(load_case="point", x=x, y=y, force=0.4))
         estimate = Pipeline(scene.sensor(), Setup())(Simulator(scene).frame(0, time.monotonic))
-        words, *_ = recognition._recognise(  # noqa: SLF001
+        _, _, found, _ = recognition._recognise(  # noqa: SLF001
             ObjectFinder(scene.plate, scene.layout), estimate
         )
-        described.add(words.partition(",")[0])
+        described.add(re.sub(r"[\d.]+", "r", object_text(found, estimate)))
 
-    assert described == {"sphere"}
+    assert described == {"shape unknown (a ball would be under r mm in radius)"}
 
 
 def test_an_object_is_told_by_the_shape_from_readings_of_several_units():
@@ -93,6 +95,72 @@ def test_an_object_is_told_by_the_shape_from_readings_of_several_units():
     )
     args = sensor.plate, "hinged", "least-squares", (6, 6)
     assert isinstance(recognition._finder(sensor, *args), ImprintObjects)  # noqa: SLF001
+
+
+def test_no_object_and_no_curvature_is_named_near_the_rim():
+    estimate = _estimate(PointLoad(0.05, 0.05, 0.15))
+    rim = replace(estimate, contact=replace(estimate.contact, near_rim=True))
+
+    words, curvatures, found, _ = recognition._recognise(None, rim)  # noqa: SLF001
+
+    assert words == "shape unknown (contact at the edge)"
+    assert (curvatures, found.probability) == ("", {})
+
+
+def _ball(radius=0.04, **changes):
+    ball = replace(
+        NO_OBJECT,
+        kind="sphere",
+        probability={"sphere": 0.99, "edge": 0.01},
+        radius=radius,
+        radius_95=(0.9 * radius, 1.1 * radius),
+    )
+    return replace(ball, **changes)
+
+
+UNSURE = _ball(radius_95=(0.0, 0.08))
+EDGE = _ball(kind="edge", probability={"edge": 0.95, "cylinder": 0.0}, length=0.02, length_95=1e-3)
+
+
+def test_a_name_comes_after_a_second_of_being_sure():
+    steady = SteadyObject()
+    named = [steady(_ball(), t).kind for t in (0.0, 0.5, 1.0)]
+    assert named == ["", "", "sphere"]
+
+
+def test_a_name_stays_through_a_moment_of_doubt_and_goes_after_two_seconds():
+    steady = SteadyObject()
+    for t in (0.0, 1.0):
+        steady(_ball(), t)
+    seen = [steady(what, t).kind for what, t in ((UNSURE, 1.5), (_ball(), 2.0), (UNSURE, 3.9))]
+    assert seen == ["sphere"] * 3
+    assert steady(UNSURE, 4.1).kind == ""
+    assert steady(_ball(), 4.2).kind == ""  # it has to be sure anew
+
+
+def test_a_name_in_doubt_has_the_force_of_now_and_the_radius_of_when_it_was_sure():
+    steady = SteadyObject()
+    for t in (0.0, 1.0):
+        steady(_ball(0.04), t)
+    kept = steady(replace(UNSURE, force=2.0), 1.5)
+    assert (kept.radius, kept.force) == (0.04, 2.0)
+
+
+def test_two_kinds_that_alternate_do_not_change_the_name():
+    steady = SteadyObject()
+    for t in (0.0, 1.0):
+        steady(_ball(), t)
+    seen = {steady((EDGE, _ball())[n % 2], 1.0 + 0.5 * n).kind for n in range(20)}
+    assert EDGE.sure
+    assert seen == {"sphere"}
+
+
+def test_a_lost_contact_takes_the_name_at_once():
+    steady = SteadyObject()
+    for t in (0.0, 1.0):
+        steady(_ball(), t)
+    assert steady(NO_OBJECT, 1.1).describe() == "no contact"
+    assert steady(_ball(), 1.2).kind == ""
 
 
 def test_the_line_does_without_what_is_spare_where_room_is_short(qapp):

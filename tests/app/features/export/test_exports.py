@@ -1,5 +1,6 @@
 """What leaves the window as a file is what was seen, and says what it is."""
 
+import re
 import sys
 from pathlib import Path
 from xml.etree import ElementTree
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QStandardItemModel
 from PySide6.QtWidgets import QFileDialog
 
 from kappaskin import Refusal
@@ -16,6 +18,8 @@ from kappaskin_app.features.export.exports import ExportDialog
 from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.pictures import save_view
 from kappaskin_app.shell.window import MainWindow
+
+CTRL = Qt.KeyboardModifier.ControlModifier
 
 
 @pytest.fixture
@@ -70,10 +74,10 @@ def test_a_png_that_cannot_be_written_is_told(window, until, named, tmp_path) ->
 def test_the_picture_is_whole_where_the_window_closes_at_once(
     window, tmp_path, monkeypatch, colours_of
 ):
-    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_DOCUMENTS_DIR", str(tmp_path))
     window.actions_by_name["picture"].trigger()
     window.close()
-    (path,) = tmp_path.iterdir()
+    (path,) = (tmp_path / "Kappaskin").iterdir()
     with Image.open(path) as image:
         assert colours_of(np.asarray(image.convert("RGB"))) > 100
 
@@ -157,47 +161,123 @@ def test_a_film_ends_whole_with_the_window(window, until, named, tmp_path) -> No
     assert [path.name for path in tmp_path.iterdir()] == ["out.mp4"]
 
 
-@pytest.mark.full
-def test_a_recording_is_exported_from_the_dialog(window, until, recording) -> None:
-    window.actions_by_name["export"].trigger()
-    dialog = window.exports.dialog
-    assert not dialog.export_button.isEnabled()
-    dialog.recording.setText(str(recording))
-    dialog.to.setText(str(recording.with_name("out.npz")))
-    assert dialog.every.isEnabled()
-    assert not dialog.at.isEnabled()
-    dialog.export_button.click()
-    assert not dialog.to.isEnabled()
-    until(lambda: dialog.to.isEnabled(), 30.0)
-    assert dialog.words.text().startswith("Written: ")
-    with np.load(recording.with_name("out.npz")) as found:
-        assert found["curvature"].shape[1] == 3
-    assert sorted(path.name for path in recording.parent.iterdir()) == ["out.npz", "rec.mcap"]
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where dialogs open: a folder of nobody's own."""
+    monkeypatch.setenv("XDG_DOCUMENTS_DIR", str(tmp_path / "documents"))
+    (tmp_path / "documents" / "Kappaskin").mkdir(parents=True)
+    return tmp_path / "documents" / "Kappaskin"
 
 
 @pytest.mark.full
-def test_enter_exports_and_leaves_the_questions_for_files_alone(
-    window, until, recording, qtbot
+def test_contact_and_force_of_the_last_recording_are_exported_with_two_keys(
+    window, until, recording, folder, qtbot
 ) -> None:
+    last = recording.rename(folder / "last.mcap")
+    qtbot.keyClick(window, Qt.Key.Key_E, CTRL | Qt.KeyboardModifier.ShiftModifier)
+    dialog = window.exports.dialog
+    assert dialog.recording.text() == str(last)
+    assert dialog.to.text() == str(folder / "last.csv")
+    assert dialog.preset.currentText() == "Contact and force"
+    until(lambda: dialog.expected.text().startswith("About "))
+    told = re.fullmatch(r"About ([\d.]+) kB for (\d+) frames, in .+ m?s", dialog.expected.text())
+    assert told, dialog.expected.text()
+    qtbot.keyClick(dialog.to, Qt.Key.Key_Return)
+    assert not dialog.to.isEnabled()
+    until(lambda: dialog.to.isEnabled())
+    assert dialog.words.text().startswith(f"Written: {folder / 'last.csv'}")
+    head, *rows = (
+        line for line in (folder / "last.csv").read_text().splitlines() if line[0] != "#"
+    )
+    assert head.count(",") == 11
+    assert len(rows) == pytest.approx(int(told[2]), rel=0.2)
+    size = (folder / "last.csv").stat().st_size
+    assert size == pytest.approx(1e3 * float(told[1]), rel=0.2)
+    assert dialog.expected.text() == "Already exists; choose another name."
+    assert not dialog.export_button.isEnabled()
+    assert sorted(path.name for path in folder.iterdir()) == ["last.csv", "last.mcap"]
+
+
+@pytest.mark.full
+def test_presets_and_formats_are_selected_by_keyboard(
+    window, until, recording, folder, qtbot
+) -> None:
+    last = recording.rename(folder / "last.mcap")
+    window.actions_by_name["export"].trigger()
+    dialog = window.exports.dialog
+    qtbot.keyClick(dialog.preset, Qt.Key.Key_Down)
+    assert dialog.preset.currentText() == "Readings"
+    qtbot.keyClick(dialog.format, Qt.Key.Key_Down)
+    assert dialog.format.currentData() == ".parquet"
+    assert dialog.to.text() == str(last.with_suffix(".parquet"))
+    qtbot.mouseClick(dialog.export_button, Qt.MouseButton.LeftButton)
+    until(lambda: dialog.to.isEnabled())
+    table = pytest.importorskip("pyarrow.parquet").read_table(last.with_suffix(".parquet"))
+    assert table.column_names[:3] == ["time [s]", "sequence", "device_time [s]"]
+    assert "counts_xx_0" in table.column_names
+    assert "force [N]" not in table.column_names
+
+
+@pytest.mark.full
+def test_a_wrong_suffix_is_refused_while_it_is_typed(window, recording, qtbot) -> None:
     window.actions_by_name["export"].trigger()
     dialog = window.exports.dialog
     dialog.recording.setText(str(recording))
-    dialog.to.setText(str(recording.with_name("out.doc")))
-    was = dialog.every.height()
+    dialog.to.setText("")
+    high = dialog.every.height()
+    for letter in str(recording.with_name("out.xls")):
+        qtbot.keyClicks(dialog.to, letter)
+        assert not dialog.export_button.isEnabled()
+    assert "ends in one of .parquet, .csv, .npz" in dialog.expected.text()
     qtbot.keyClick(dialog.to, Qt.Key.Key_Return)
-    assert ".csv, .npz, .h5" in dialog.words.text()
+    assert not dialog.busy
     qtbot.wait(50)
-    assert dialog.every.height() == was  # no field is pressed flat by what is said
-    dialog.to.setText(str(recording.with_name("out.npz")))
-    qtbot.keyClick(dialog.to, Qt.Key.Key_Return)
-    assert not dialog.choose_file.isEnabled()
-    dialog.cancel_button.click()
-    assert dialog.choose_file.isEnabled()
-    assert not dialog.bar.isVisible()  # no share of what is not there
-    dialog.bar.show()  # as it stands when one is written
-    dialog.to.setText(str(recording.with_name("out.doc")))
-    qtbot.keyClick(dialog.to, Qt.Key.Key_Return)
-    assert not dialog.bar.isVisible()
+    assert dialog.every.height() == high  # no field is pressed flat by what is said
+    for _ in "xls":
+        qtbot.keyClick(dialog.to, Qt.Key.Key_Backspace)
+    qtbot.keyClicks(dialog.to, "vtp")
+    assert dialog.export_button.isEnabled()
+    assert dialog.format.currentData() == ".vtp"
+    assert not dialog.preset.isEnabled()  # a surface has no columns
+
+
+def test_a_format_that_is_not_installed_says_what_installs_it(qapp, qtbot, monkeypatch) -> None:
+    monkeypatch.setattr("kappaskin_app.features.export.exports.find_spec", lambda _: None)
+    dialog = ExportDialog(Tasks(qapp))
+    qtbot.addWidget(dialog)
+    model = dialog.format.model()
+    assert isinstance(model, QStandardItemModel)
+    told = {dialog.format.itemText(n): model.item(n).isEnabled() for n in range(model.rowCount())}
+    off = [text for text, enabled in told.items() if not enabled]
+    assert off == [
+        "Table in Parquet (.parquet): pip install 'kappaskin[parquet]'",
+        "Table in HDF5 (.h5): pip install 'kappaskin[hdf5]'",
+    ]
+    assert dialog.format.currentData() == ".csv"
+
+
+@pytest.mark.full
+def test_what_is_still_recorded_says_what_to_do(window, until, folder, qtbot) -> None:
+    window.recorder.begin(folder / "now.mcap")
+    until(lambda: window.recorder.written.messages > 0)
+    window.actions_by_name["export"].trigger()
+    dialog = window.exports.dialog
+    dialog.recording.setText(str(folder / "now.mcap"))
+    dialog.to.setText(str(folder / "out.csv"))
+    until(lambda: "end the recording" in dialog.expected.text())
+
+
+@pytest.mark.full
+def test_dialogs_open_in_the_folder_with_a_name_filled_in(window, folder, monkeypatch) -> None:
+    asked: list[str] = []
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *a: asked.append(a[2]) or ("", ""))
+    for action in ("picture-of-the window", "film", "save-scene"):
+        window.actions_by_name[action].trigger()
+    assert {Path(name).parent for name in asked} == {folder}
+    names = [Path(name).name for name in asked]
+    assert names[0] == "the window.png"
+    assert re.fullmatch(r"kappaskin-\d{8}-\d{6}\.mp4", names[1])
+    assert names[2].endswith(".toml")
 
 
 @pytest.mark.full
@@ -233,13 +313,13 @@ def test_a_name_without_an_ending_gets_that_of_the_format_chosen(
 ) -> None:
     dialog, asked, names = ExportDialog(Tasks(qapp)), list[str](), list[str]()
     qtbot.addWidget(dialog)
-    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *a: asked.append(a[-1]) or ("", ""))
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *a: asked.append(a[3]) or ("", ""))
     dialog.choose_file.click()
     for kind in asked[0].split(";;"):
         named(tmp_path / "force 0.5 N", kind)
         dialog.choose_file.click()
         names.append(Path(dialog.to.text()).name)
-    endings = [".csv", ".npz", ".h5", ".vtp", ".pvd", ".stl"]
+    endings = [".csv", ".parquet", ".npz", ".h5", ".vtp", ".pvd", ".stl"]
     assert names == [f"force 0.5 N{ending}" for ending in endings]
     named(tmp_path / "out.npz", "CSV (*.csv)")
     dialog.choose_file.click()
@@ -247,10 +327,11 @@ def test_a_name_without_an_ending_gets_that_of_the_format_chosen(
 
 
 @pytest.mark.full
-def test_what_is_refused_is_said_in_the_dialog(window, tmp_path) -> None:
+def test_what_is_refused_is_said_in_the_dialog(window, until, tmp_path) -> None:
+    window.actions_by_name["export"].trigger()
     dialog = window.exports.dialog
     dialog.recording.setText(str(tmp_path / "none.mcap"))
-    dialog.to.setText(str(tmp_path / "out.txt"))
+    dialog.to.setText(str(tmp_path / "out.csv"))
     dialog.export_button.click()
-    assert "ends in one of" in dialog.words.text()
+    until(lambda: "expected a recording" in dialog.words.text())
     assert dialog.export_button.isEnabled()

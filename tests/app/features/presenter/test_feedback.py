@@ -114,12 +114,14 @@ def test_a_small_contact_is_told_with_all_its_error_bars() -> None:
     ("interval", "radius", "words"),
     [
         ((0.038, 0.042), 0.04, ("40.0 mm", "38.0 to 42.0 mm")),
-        ((0.0, 0.0265), math.nan, ("< 26.5 mm", "press harder")),
-        ((0.12, math.inf), math.inf, ("> 120 mm", "")),
+        ((0.0, 0.0265), math.nan, ("\N{EN DASH}", "unknown, under 26.5 mm: press harder")),
+        ((0.12, math.inf), math.inf, ("\N{EN DASH}", "unknown, over 120 mm")),
         ((0.0, math.inf), math.nan, ("\N{EN DASH}", "unknown")),
         ((math.inf, math.inf), math.inf, ("flat", "")),
+        ((0.0, 3.8), math.nan, ("\N{EN DASH}", "unknown")),
+        ((0.01425, 0.01429), 0.01427, ("14.270 mm", "14.250 to 14.290 mm")),
         ((0.0081, 0.0093), 0.00866, ("8.66 mm", "8.10 to 9.30 mm")),
-        ((1.1, 1.4), 1.234, ("1234 mm", "1100 to 1400 mm")),
+        ((1.1, 1.4), 1.234, ("1230 mm", "1100 to 1400 mm")),
     ],
 )
 def test_a_radius_is_written_as_far_as_it_is_known(interval, radius, words) -> None:
@@ -131,13 +133,38 @@ def test_a_radius_is_written_as_far_as_it_is_known(interval, radius, words) -> N
 def test_a_recording_has_no_hint_to_press_harder() -> None:
     feedback = replace(feedback_of(_estimate(0.3)), kind="sphere")
     light = replace(feedback, radius=RadiusEstimate("sphere", math.nan, (0.0, 0.0265)))
-    assert radius_in_words(light)[1] == "press harder"
-    assert radius_in_words(light, recorded=True)[:2] == ("< 26.5 mm", "pressed too lightly")
+    assert radius_in_words(light)[1] == "unknown, under 26.5 mm: press harder"
+    assert radius_in_words(light, recorded=True)[1] == "unknown, under 26.5 mm: pressed too lightly"
 
 
 def test_an_edge_has_a_length_and_no_radius() -> None:
     feedback = replace(feedback_of(_estimate(0.3)), kind="edge", length=0.04, radius=None)
     assert radius_in_words(feedback) == ("edge", "40 mm long", "Object")
+
+
+def test_a_contact_near_the_rim_has_no_force_and_no_radius() -> None:
+    estimate = _estimate()
+    recognised = _recognised(estimate)
+    rim = replace(estimate, contact=replace(estimate.contact, near_rim=True))
+
+    feedback = feedback_of(rim)
+
+    assert math.isnan(feedback.force)
+    assert math.isnan(feedback.force_95)
+    assert feedback.radius is None
+    assert feedback.displacement == pytest.approx(np.nanmax(np.abs(estimate.surface)))
+    assert math.isnan(feedback_of(rim, recognised).force)
+
+
+def test_an_object_of_a_doubtful_kind_has_a_radius_without_a_name() -> None:
+    estimate = _estimate(0.55)
+    recognised = _recognised(estimate)
+    doubtful = replace(recognised, what=replace(recognised.what, kind=""))
+
+    feedback = feedback_of(estimate, doubtful)
+
+    assert feedback.radius.value == recognised.what.radius
+    assert radius_in_words(feedback)[2] == "Radius of the object"
 
 
 def test_feedback_of_an_unknown_force_has_the_rest() -> None:

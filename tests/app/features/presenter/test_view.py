@@ -4,6 +4,7 @@ import math
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 from PySide6.QtGui import QFontMetricsF
@@ -177,7 +178,35 @@ def test_a_force_that_leaves_out_a_stretch_is_a_lower_bound(qtbot) -> None:
 
     view.show_feedback(LONGEST)
 
-    assert view.force.value == "\N{GREATER-THAN OR EQUAL TO} \N{MINUS SIGN}12.345 N"
+    assert view.force.value == "\N{GREATER-THAN OR EQUAL TO} \N{MINUS SIGN}12.35 N"
+
+
+def test_a_contact_near_the_rim_has_a_grey_place_and_no_force(qtbot) -> None:
+    view = view_of((1280, 720), qtbot)
+    view.show_feedback(LONGEST)
+    view.show_graphics(LONGEST, 0.0)
+    before = {words.text: view.place.ink(words) for words in view.place.words()}
+    rim = replace(LONGEST, near_rim=True, force=math.nan, force_95=math.nan, radius=None, kind="")
+
+    view.show_feedback(rim)
+    view.show_graphics(rim, 0.1)
+
+    assert (view.force.value, view.force.note) == ("\N{EN DASH}", "edge: no force")
+    assert math.isnan(view.bar.share)
+    assert view.place.note == "near the rim: unreliable"
+    (place,) = (w for w in view.place.words() if w.text == view.place.value)
+    assert view.place.ink(place) == THEMES["light"].faint
+    assert THEMES["light"].faint not in {before["123.40, 123.40"]}
+    assert view.radius.value == "\N{EN DASH}"
+
+
+def test_the_bar_is_as_long_as_five_standard_deviations_and_as_no_load_at_most(qtbot) -> None:
+    view = view_of((1280, 720), qtbot)
+    view.bar.show_force(0.1, 0.2, 0.0)
+    assert view.bar.at(0.5) < view.bar.scale.width()  # 5 sd of 0.1 N, with two to a half-width
+    view.bar.show_force(1153.772, 1482.331, 1.0)
+    assert view.bar.at(100.0) == view.bar.scale.width()
+    assert view.bar.at(50.0) == pytest.approx(view.bar.scale.width() / 2)
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])

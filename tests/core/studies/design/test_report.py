@@ -139,9 +139,9 @@ def test_workers_and_a_scheduler_are_one_or_the_other(run):
         (12.3456e-3, 0.123e-3, "12.35 ± 0.12"),
         (1.0e-3, 2.0e-3, "1.0 ± 2.0"),
         (123.456e-3, 34.5e-3, "123 ± 34"),
-        (1e-3, 1e-16, "1"),
+        (1e-3, 1e-16, "1.000 exact"),
         (1e-3, float("nan"), "1 ± ?"),
-        (0.0, 0.0, "0"),
+        (0.0, 0.0, "0.000 exact"),
     ],
 )
 def test_a_mean_has_the_digits_that_are_known(mean, half, told):
