@@ -18,13 +18,11 @@ from PySide6.QtCore import QBuffer, QEvent, QObject, QPoint, QPointF, QRectF, QS
 from PySide6.QtGui import (
     QColor,
     QContextMenuEvent,
-    QFont,
-    QFontMetrics,
+    QFocusEvent,
     QGuiApplication,
     QHelpEvent,
     QMouseEvent,
     QPainter,
-    QPaintEvent,
     QPalette,
     QShowEvent,
 )
@@ -44,12 +42,12 @@ from kappaskin._files import write_whole
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin_app.guard import guarded
-from kappaskin_app.theme import current, follow_look, series
-from kappaskin_app.widgets.parts import ELLIPSIS, Label, plain_tip
+from kappaskin_app.theme import FAINT, current, follow_look, series
+from kappaskin_app.widgets.parts import ELLIPSIS, plain_tip, text_label
 from kappaskin_app.widgets.text import in_digits, round_up
 
 _NEAR = 12.0  # px from the mouse, within which a point is shown
-_ROOM = 0.04  # of the data's extent, on either side of marks and on a logarithmic axis
+_ROOM = 0.06  # of the data's extent, on either side of marks and on a logarithmic axis
 _HEAD = 1.02  # times the largest value, that an upright axis reaches
 _LEAST_DECADES = 0.3  # between the ends of a logarithmic axis and its values
 _BAND = 60  # of 255, how opaque a band is
@@ -66,10 +64,11 @@ _GLYPHS = {
     **{"t": "\u25bc\u25bd", "p": "\u2b1f\u2b20", "t3": "\u25c4\u25c5", "t2": "\u25ba\u25bb"},
     "x": "\u2715\u2715",
 }
+_RING, _LARGE = "\u25ef", 12.0  # px, beyond which a circle is written as a ring
 _LINES = {"solid": "\u2014", "dashed": "\u254c\u254c", "": ""}
 
 
-Ticks = list[tuple[float | None, list[float]]]
+Ticks = list[tuple[Any, list[float]]]
 
 
 @dataclass(frozen=True)
@@ -104,7 +103,7 @@ class ChartAxis:
 
     def ends(self, values: Array, marked: bool, upright: bool) -> tuple[float, float]:
         """Both ends along the axis, around all `values` (n,); zero is on a linear `upright` one."""
-        at = self.shown(np.asarray(self.limits, float) if self.limits else values)
+        at = self.shown(np.asarray(self.limits or values))
         at = at[np.isfinite(at)]
         low, high = (float(at.min()), float(at.max())) if len(at) else (0.0, 1.0)
         if self.limits:
@@ -112,19 +111,21 @@ class ChartAxis:
         if upright and not self.log:
             low, high = -round_up(-_HEAD * low), round_up(_HEAD * high)
             return (low, high) if low < high else (-1.0, 1.0)
-        room = _ROOM * (high - low) if marked or self.log else 0.0
-        room = max(room, _LEAST_DECADES * (1 - (high - low))) if self.log else room
+        room = _ROOM * (high - low) * (marked or self.log)
+        room = max(room, _LEAST_DECADES * (1 - (high - low)) * self.log)
         return (low - room, high + room) if high + room > low - room else (low - 0.5, low + 0.5)
 
     def ticks(
         self, low: float, high: float, size: float, gap: float, linear: Callable[..., Ticks]
     ) -> Ticks:
-        """Each level's spacing and ticks along `size` px, decades at least `gap` px apart.
+        """Each level's spacing and ticks along `size` px; those of the first are `gap` px apart.
 
-        `linear` gives those of a linear axis, also for the part of a logarithmic one.
+        `linear` gives those of a linear axis, also for a part of a logarithmic one.
         """
         if not self.log:
-            return linear(low, high, size)
+            (step, first), *finer = linear(low, high, size)
+            every = math.ceil(gap * (high - low) / (size * step))
+            return [(step, [v for v in first if not round(v / step) % every]), *finer]
         if high - low < _FEW:
             found = linear(10.0**low, 10.0**high, size)
             return [(step, np.log10([v for v in each if v > 0]).tolist()) for step, each in found]
@@ -133,10 +134,10 @@ class ChartAxis:
         parts = [p + math.log10(m) for p in range(math.floor(low), math.ceil(high)) for m in (2, 5)]
         return [(1.0, list(map(float, whole))), (None, [p for p in parts if low < p < high])]
 
-    def tick_texts(self, values: Sequence[float], spacing: float | None) -> list[str]:
-        """What is written at ticks, `spacing` apart."""
+    def tick_texts(self, values: Sequence[float], spacing: float) -> list[str]:
+        """What is written at ticks, on a linear axis `spacing` apart."""
         if not self.log:
-            return [in_digits(value, 100 * (spacing or 1.0)) for value in values]
+            return [in_digits(value, 100 * spacing) for value in values]
         powers = [float(f"{10.0**value:.6g}") for value in values]
         if self.text is None:
             return list(map(_power, powers))
@@ -145,13 +146,11 @@ class ChartAxis:
 
 
 def _power(value: float) -> str:
-    """A value in three digits; a power of ten where it would have many zeros."""
-    text = f"{value:.3g}"
-    if "e" not in text and not 0 < abs(value) < 1e-3:
-        return text.replace("-", "\N{MINUS SIGN}")
-    digits, _, power = f"{value:.2e}".partition("e")
-    ten = "10" + str(int(power)).translate(_POWERS)
-    number = f"{float(digits):g}".replace("-", "\N{MINUS SIGN}")
+    """A value in three digits, with a power of ten instead of an e."""
+    number, _, power = f"{value:.3g}".replace("-", "\N{MINUS SIGN}").partition("e")
+    if not power:
+        return number
+    ten = "10" + str(int(power.replace("\N{MINUS SIGN}", "-"))).translate(_POWERS)
     return ten if number == "1" else f"{number}\N{MIDDLE DOT}{ten}"
 
 
@@ -174,7 +173,7 @@ class Series:
     filled: bool = True
     band: Array | None = None
     tips: Sequence[str] = ()
-    key: object = None
+    key: Any = None
 
     @property
     def ink(self) -> QColor:
@@ -195,7 +194,7 @@ def _role(name: str) -> QColor:
     return QColor(getattr(current(), name))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class ChartPoint:
     """The point `index` of a series."""
 
@@ -216,31 +215,32 @@ class Chart(QWidget):
 
     def __init__(self, y: ChartAxis, x: ChartAxis, tip: str) -> None:
         super().__init__()
-        self.series: tuple[Series, ...] = ()
+        self.x_axis, self.y_axis = x, y
         self._lines: tuple[ChartLine, ...] = ()
-        self._empty, self._key, self._fits = "", None, True
+        self._key: object = None
         self._view: _View | None = None
         self._under: ChartPoint | None = None
+        self._mouse: tuple[QPointF, QPoint] | None = None
         self._pressed: QPointF | None = None
-        self.heading = Label(rich=True, wordWrap=True)  # pyright: ignore[reportCallIssue]
+        self.heading, self.message = text_label(rich=True), text_label()
+        self.message.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.message.setForegroundRole(FAINT)
         self._around = QVBoxLayout(self)
         self._around.setContentsMargins(6, 3, 6, 3)
         self._around.setSpacing(2)
         self._around.addWidget(self.heading)
-        self._around.addStretch(1)
+        self._around.addWidget(self.message, 1)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAutoFillBackground(True)
         self.setBackgroundRole(QPalette.ColorRole.Base)
-        self.x_axis, self.y_axis = x, y
         self.show_axes(y, x, tip)
         follow_look(self, self._dress)
 
     def sizeHint(self) -> QSize:
-        return QSize(260, 150)
+        return QSize(18, 12) * self.fontMetrics().height()
 
     def minimumSizeHint(self) -> QSize:
-        line = self.fontMetrics().height()
-        return QSize(9 * line, 7 * line)
+        return QSize(9, 7) * self.fontMetrics().height()
 
     def show_axes(self, y: ChartAxis, x: ChartAxis, tip: str) -> None:
         """Show other quantities from now on."""
@@ -253,7 +253,8 @@ class Chart(QWidget):
         self, shown: Sequence[Series], empty: str = "", lines: Sequence[ChartLine] = ()
     ) -> None:
         """Draw the series; the text `empty` is shown while they have no points."""
-        self.series, self._lines, self._empty = tuple(shown), tuple(lines), empty
+        self.series, self._lines = tuple(shown), tuple(lines)
+        self.message.setText(empty)
         self._draw()
 
     def mark(self, key: object) -> None:
@@ -264,7 +265,8 @@ class Chart(QWidget):
 
     @property
     def is_empty(self) -> bool:
-        return not any(len(each.x) for each in self.series)
+        """Whether there are no points."""
+        return not any(np.isfinite(each.y).any() for each in self.series)
 
     @property
     def canvas(self) -> QWidget:
@@ -273,12 +275,8 @@ class Chart(QWidget):
 
     def place_of(self, x: float, y: float) -> QPointF:
         """Position of values on the canvas, in px."""
-        return QPointF(*(float(v[0]) for v in self._places(np.array([x]), np.array([y]))))
-
-    def _places(self, x: Array, y: Array) -> tuple[Array, Array]:
-        return (
-            self._view.places(self.x_axis.shown(x), self.y_axis.shown(y)) if self._view else (x, y)
-        )
+        view = self._view
+        return QPointF(*map(float, view.places(np.array(x), np.array(y)))) if view else QPointF()
 
     # Drawing
 
@@ -289,33 +287,31 @@ class Chart(QWidget):
     def _dress(self) -> None:
         """Follow theme, letters and axes."""
         if self._view is not None:
-            self._view.dress(self.font(), self.x_axis, self.y_axis)
+            self._view.dress(self.x_axis, self.y_axis)
         self._draw()
 
     def _draw(self) -> None:
         heading = "&nbsp;&nbsp;&nbsp; ".join([escape(self.y_axis.label), *self._legend()])
         if heading != self.heading.text():
             self.heading.setText(heading)
-        self.update()
-        if not self.isVisible():
-            return
-        if self._view is None and not self.is_empty:
-            self._view = _View(self)
-            self._around.takeAt(1)
-            self._around.addWidget(self._view.widget)
+        self.message.setVisible(self.is_empty)
+        if self.isVisible() and self._view is None and not self.is_empty:
+            self._view = _View(self, self._hold)
+            self._around.addWidget(self._view.widget, 1)
             self.canvas.installEventFilter(self)
-            self._view.moved.connect(self._leave_fit)
-            self._view.dress(self.font(), self.x_axis, self.y_axis)
-        if self._view is not None:
+            self._view.dress(self.x_axis, self.y_axis)
+        if self.isVisible() and self._view is not None:
             self._view.widget.setVisible(not self.is_empty)
-            self._view.draw(self.series, self._lines, self._key, self.x_axis, self.y_axis)
+            self._view.draw(self.series, self._lines, self._key)
             if self._fits:
                 self._view.show_ranges(*self._ranges())
+            self._point()
 
     def _legend(self) -> list[str]:
         entries = []
         for each in () if self.is_empty else self.series:
             glyph = _GLYPHS[each.mark][not each.filled] if each.mark else _LINES[each.line]
+            glyph = _RING if each.mark == "o" and each.size > _LARGE else glyph
             name = escape(each.name).replace(" ", "\N{NO-BREAK SPACE}")
             ink = f"<span style='color:{each.ink.name()}'>{glyph}</span>"
             entries += [f"{ink}\N{NO-BREAK SPACE}{name}"] if each.name else []
@@ -332,48 +328,48 @@ class Chart(QWidget):
             np.concatenate(y or [np.empty(0)]), marked, True
         )
 
-    def paintEvent(self, event: QPaintEvent) -> None:
-        super().paintEvent(event)
-        if self.is_empty:
-            painter, line = QPainter(self), self.fontMetrics().height()
-            painter.setPen(_role("faint"))
-            flags = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
-            painter.drawText(self.rect().adjusted(8, line, -8, -4), flags, self._empty)
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        super().focusInEvent(event)
+        self._dress()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        self._dress()
 
     # Mouse
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         kinds, left = QEvent.Type, Qt.MouseButton.LeftButton
-        if isinstance(event, QHelpEvent) and self._under is not None:
-            return True  # its text is shown, not that of the chart
-        if isinstance(event, QMouseEvent):
-            at = event.position()
-            if event.type() == kinds.MouseMove and not event.buttons():
-                self._point(at, event.globalPosition().toPoint())
-            elif event.type() == kinds.MouseButtonPress and event.button() == left:
-                self._pressed = at
-            elif event.type() == kinds.MouseButtonDblClick and event.button() == left:
-                self._pressed = None
-                self.fit()
-            elif event.type() == kinds.MouseButtonRelease and event.button() == left:
-                self._release(at)
+        if isinstance(event, QHelpEvent):
+            return self._under is not None  # whose text is shown, not that of the chart
+        if isinstance(event, QMouseEvent) and event.type() == kinds.MouseMove:
+            at = event.position(), event.globalPosition().toPoint()
+            self._mouse = None if event.buttons() else at
+            self._point()
         elif event.type() == kinds.Leave:
-            self._point(None, QPoint())
+            self._mouse = None
+            self._point()
+        elif isinstance(event, QMouseEvent) and event.button() == left:
+            if event.type() == kinds.MouseButtonDblClick:
+                self.fit()
+            elif event.type() == kinds.MouseButtonRelease and self._pressed is not None:
+                self._click(self._pressed, event.position())
+            pressed = event.type() == kinds.MouseButtonPress
+            self._pressed = event.position() if pressed else None
         return False
 
-    def _release(self, at: QPointF) -> None:
-        point, began = self.nearest(at), self._pressed
-        moved = math.inf if began is None else (at - began).manhattanLength()
-        if moved >= QApplication.startDragDistance():
+    def _click(self, began: QPointF, at: QPointF) -> None:
+        if (at - began).manhattanLength() >= QApplication.startDragDistance():
             return
-        if point is not None:
+        if point := self.nearest(at):
             self.clicked.emit(point)
         if self._view is not None:
             self.clicked_at.emit(self._view.value_at(at.x()))
 
-    def _leave_fit(self) -> None:
+    def _hold(self) -> None:
+        """Leave the ranges as the user has set them."""
         self._fits = False
-        self._point(None, QPoint())
+        self._point()
 
     def fit(self) -> None:
         """Show all, also of what comes."""
@@ -381,25 +377,27 @@ class Chart(QWidget):
         self._draw()
 
     def nearest(self, at: QPointF) -> ChartPoint | None:
-        """The point next to a position on the canvas, in px, if one is near."""
-        best: tuple[float, ChartPoint | None] = (_NEAR, None)
+        """The point next to a position on the canvas, in px, if one is near: a mark, or a curve."""
+        if (view := self._view) is None:
+            return None
+        best: tuple[tuple[bool, float], ChartPoint | None] = ((True, _NEAR), None)
         for each in self.series:
-            away, index = _nearest(*self._places(each.x, each.y), at, bool(each.line))
-            if away < best[0]:
-                best = away, ChartPoint(each, index)
+            away, index = _nearest(*view.places(each.x, each.y), at, bool(each.line))
+            if away < _NEAR and (not each.mark, away) < best[0]:
+                best = (not each.mark, away), ChartPoint(each, index)
         return best[1]
 
-    def _point(self, at: QPointF | None, over: QPoint) -> None:
-        point = None if at is None else self.nearest(at)
-        same = point == self._under
-        if point is None and self._under is not None:
-            QToolTip.hideText()
-        self._under = point
+    def _point(self) -> None:
+        """Show the point under the mouse."""
+        point = self.nearest(self._mouse[0]) if self._mouse else None
         if self._view is not None:
-            self._view.ring(point, self.x_axis, self.y_axis)
-        if point is not None:
-            QToolTip.showText(over, plain_tip(self.point_text(point)), self)
-        if not same:
+            self._view.ring(point)
+        if point is not None and self._mouse:
+            QToolTip.showText(self._mouse[1], plain_tip(self.point_text(point)), self.canvas)
+        elif self._under is not None:
+            QToolTip.hideText()
+        if point != self._under:
+            self._under = point
             self.pointed.emit(point)
 
     def point_text(self, point: ChartPoint) -> str:
@@ -408,14 +406,14 @@ class Chart(QWidget):
         if index < len(each.tips):
             return each.tips[index]
         spans = self._view.spans if self._view else (1.0, 1.0)
-        x, y = float(each.x[index]), float(each.y[index])
-        text = self.y_axis.value_text(y, spans[1])
+        x, y = (
+            self.x_axis.value_text(float(each.x[index]), spans[0]),
+            self.y_axis.value_text(float(each.y[index]), spans[1]),
+        )
         if each.band is not None:
-            text += (
-                f" \N{PLUS-MINUS SIGN} {self.y_axis.value_text(float(each.band[index]), spans[1])}"
-            )
-        rows = [each.name, f"{self.y_axis.title}: {text}"]
-        rows.append(f"{self.x_axis.title}: {self.x_axis.value_text(x, spans[0])}")
+            band = self.y_axis.value_text(float(each.band[index]), spans[1])
+            y += f" \N{PLUS-MINUS SIGN} {band}"
+        rows = (each.name, f"{self.y_axis.title}: {y}", f"{self.x_axis.title}: {x}")
         return "\n".join(filter(None, rows))
 
     # Menu
@@ -430,7 +428,7 @@ class Chart(QWidget):
         for text, act in (
             ("&Show all (double click)", self.fit),
             ("&Copy data", lambda: QGuiApplication.clipboard().setText(self.table("\t"))),
-            (f"Save data as CS&V{ELLIPSIS}", partial(self._save, "csv", lambda: self.table(","))),
+            (f"Save &data as CSV{ELLIPSIS}", partial(self._save, "csv", lambda: self.table(","))),
             (f"Save picture as &PNG{ELLIPSIS}", partial(self._save, "png", self._png)),
             (f"Save picture as S&VG{ELLIPSIS}", partial(self._save, "svg", self._svg)),
         ):
@@ -475,7 +473,6 @@ class Chart(QWidget):
 
     def _png(self) -> bytes:
         packed = QBuffer()
-        packed.open(QBuffer.OpenModeFlag.WriteOnly)
         self.grab().save(packed, "PNG")  # pyright: ignore[reportArgumentType, reportCallIssue]
         return bytes(packed.data().data())
 
@@ -495,16 +492,15 @@ def _nearest(x: Array, y: Array, at: QPointF, joined: bool) -> tuple[float, int]
     if not len(x):
         return math.inf, 0
     x, y = x - at.x(), y - at.y()
-    away = np.hypot(x, y)
-    away = np.where(np.isfinite(away), away, np.inf)
+    away = np.nan_to_num(np.hypot(x, y), nan=np.inf, posinf=np.inf)
     index = int(np.argmin(away))
     if joined and len(x) > 1:
         dx, dy = np.diff(x), np.diff(y)
         with np.errstate(invalid="ignore"):
             along = -(x[:-1] * dx + y[:-1] * dy) / np.maximum(dx**2 + dy**2, 1e-12)
-        along = np.clip(along, 0.0, 1.0)
+            along = along.clip(0.0, 1.0)
         between = np.hypot(x[:-1] + along * dx, y[:-1] + along * dy)
-        between = np.where(np.isfinite(between), between, np.inf)
+        between = np.nan_to_num(between, nan=np.inf, posinf=np.inf)
         nearest = int(np.argmin(between))
         if between[nearest] < away[index]:
             return float(between[nearest]), nearest + round(float(along[nearest]))
@@ -537,12 +533,10 @@ def _axis_class() -> type:
         shown, line = ChartAxis(""), 0
 
         def tickValues(self, low: float, high: float, size: float) -> Ticks:
-            gap = self.line * (5 if self.orientation == "bottom" else 2)
+            gap = self.line * (4 if self.orientation == "bottom" else 1.2)
             return self.shown.ticks(low, high, size, gap, super().tickValues)
 
-        def tickStrings(
-            self, values: Sequence[float], scale: float, spacing: float | None
-        ) -> list[str]:
+        def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:
             return self.shown.tick_texts(values, spacing)
 
         def boundingRect(self) -> QRectF:
@@ -552,16 +546,11 @@ def _axis_class() -> type:
     return _Axis
 
 
-class _View(QObject):
-    """The axes and curves of a chart.
+class _View:
+    """The axes and curves of a chart; `moved` is called when the user zooms or pans."""
 
-    `moved` is emitted when the user zooms or pans.
-    """
-
-    moved = Signal()
-
-    def __init__(self, chart: QWidget) -> None:
-        super().__init__(chart)
+    def __init__(self, chart: QWidget, moved: Callable[[], None]) -> None:
+        self._chart = chart
         axis_class = _axis_class()
         import pyqtgraph
 
@@ -586,12 +575,9 @@ class _View(QObject):
             # Never narrower again: the curves would shift with each number.
             axis.setStyle(tickLength=0, maxTickLevel=1, autoReduceTextSpace=False)
             axis.enableAutoSIPrefix(False)
-        self._curves: list[Any] = []
-        self._bands: list[Any] = []
-        self._lines: list[Any] = []
+        self._curves, self._bands, self._lines = list[Any](), list[Any](), list[Any]()
         self._ring = self._pooled([], 1)[0]
-        self._ring.setZValue(10)
-        self._box.sigRangeChangedManually.connect(lambda *_: self.moved.emit())
+        self._box.sigRangeChangedManually.connect(guarded(lambda *_: moved()))
 
     def _pooled(self, pool: list[Any], count: int, made: Callable[[], Any] | None = None) -> Any:
         """The first `count` items of a pool, which grows as needed; the others are hidden."""
@@ -603,11 +589,16 @@ class _View(QObject):
             item.setVisible(number < count)
         return pool
 
-    def dress(self, font: QFont, x: ChartAxis, y: ChartAxis) -> None:
-        """Use the letters, the colours of the theme, and the titles and texts of the axes."""
-        pen, line = self._pg.mkPen(_role("line")), QFontMetrics(font).height()
+    def dress(self, x: ChartAxis, y: ChartAxis) -> None:
+        """Use the letters, the colours of the theme, and the titles and texts of the axes.
+
+        The frame is bold where the chart has the keyboard.
+        """
+        self._axes, font, letters = (x, y), self._chart.font(), self._chart.fontMetrics()
+        pen, line = self._pg.mkPen(_role("line")), letters.height()
         self.widget.setBackground(_role("base"))
-        self._box.setBorder(pen)
+        bold = self._pg.mkPen(_role("accent"), width=_BOLD)
+        self._box.setBorder(bold if self._chart.hasFocus() else pen)
         self._grid.setContentsMargins(0, line / 2, line, line / 4)
         for axis, item in ((x, self._bottom), (y, self._left)):
             item.shown, item.line = axis, line
@@ -616,23 +607,16 @@ class _View(QObject):
             item.setPen(pen)
             item.setTickPen(pen)
             item.setTextPen(_role("faint"))
-        self._left.textWidth = QFontMetrics(font).horizontalAdvance(_WIDEST)
+        self._left.textWidth = letters.horizontalAdvance(_WIDEST)
         self._left.setWidth(None)
         self._bottom.setLabel(escape(x.label))
         self._bottom.showLabel(bool(x.title))
 
-    def draw(
-        self,
-        shown: Sequence[Series],
-        lines: Sequence[ChartLine],
-        key: object,
-        x: ChartAxis,
-        y: ChartAxis,
-    ) -> None:
+    def draw(self, shown: Sequence[Series], lines: Sequence[ChartLine], key: object) -> None:
         """Draw the series, boldly what has the `key`, and the lines."""
         for item, each in zip(self._pooled(self._curves, len(shown)), shown, strict=False):
-            bold = key is not None and each.key == key
-            self._draw_series(item, each, x.shown(each.x), y.shown(each.y), bold)
+            self._draw_series(item, each, key is not None and each.key == key)
+        x, y = self._axes
         banded = [(each, each.band) for each in shown if each.band is not None]
         bands = self._pooled(self._bands, len(banded), self._pg.PlotCurveItem)
         for item, (each, band) in zip(bands, banded, strict=False):
@@ -648,9 +632,10 @@ class _View(QObject):
             item.setValue(float((x if line.upright else y).shown(np.array(line.value))))
             item.setPen(self._pg.mkPen(_role(line.colour), style=Qt.PenStyle.DashLine))
 
-    def _draw_series(self, item: Any, each: Series, x: Array, y: Array, bold: bool) -> None:
+    def _draw_series(self, item: Any, each: Series, bold: bool = False) -> None:
         style = Qt.PenStyle.DashLine if each.line == "dashed" else Qt.PenStyle.SolidLine
         pen = self._pg.mkPen(each.ink, width=_BOLD if bold else 1.0, style=style)
+        x, y = self._axes[0].shown(each.x), self._axes[1].shown(each.y)
         if not each.line:
             x, y = (values[np.isfinite(x + y)] for values in (x, y))
         dense = len(x) > _DENSE and bool((np.diff(x) > 0).all())
@@ -668,14 +653,13 @@ class _View(QObject):
         )
         item.setZValue(1 if bold else 0)
 
-    def ring(self, point: ChartPoint | None, x: ChartAxis, y: ChartAxis) -> None:
+    def ring(self, point: ChartPoint | None) -> None:
         """Draw a ring around a point, or none."""
         self._ring.setVisible(point is not None)
         if point is not None:
             each, at = point.series, slice(point.index, point.index + 1)
             ring = Series("", each.x[at], each.y[at], "text", "", "o", each.size + 5, False)
-            self._draw_series(self._ring, ring, x.shown(ring.x), y.shown(ring.y), False)
-            self._ring.setZValue(2)
+            self._draw_series(self._ring, ring)
 
     def show_ranges(self, x: tuple[float, float], y: tuple[float, float]) -> None:
         """Show this much along each axis."""
@@ -694,7 +678,8 @@ class _View(QObject):
         return left + (x - area.left()) / area.width() * self.spans[0]
 
     def places(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """Where positions along both axes are seen in the view, in px."""
+        """Where values are seen on the canvas, in px."""
+        x, y = self._axes[0].shown(x), self._axes[1].shown(y)
         (left, _), (low, _) = self._box.viewRange()
         area, (wide, high) = self._box.sceneBoundingRect(), self.spans
         return (

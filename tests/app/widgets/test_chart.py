@@ -1,6 +1,7 @@
 """Charts: what the mouse does, what is written, and what is saved of them."""
 
 import csv
+import gc
 import io
 import subprocess
 import sys
@@ -147,6 +148,18 @@ def test_a_joined_curve_is_met_between_its_points_and_a_gap_is_not(chart, points
     until(lambda: not QToolTip.isVisible())
 
 
+def test_the_cursor_follows_values_that_move_under_the_mouse(chart, points_at, until) -> None:
+    points_at(chart.canvas, chart.place_of(3.0, 1.0).toPoint())
+    until(lambda: "Force: 1 N" in QToolTip.text())
+
+    chart.show_series([Series("third", X, np.full(11, 1.02)), chart.series[0]])
+
+    until(lambda: QToolTip.text() == "third\nForce: 1.02 N\nTime: 3 s")
+    chart.show_series([chart.series[1]])
+    until(lambda: not QToolTip.isVisible())
+    QApplication.sendEvent(chart.canvas, QEvent(QEvent.Type.Leave))
+
+
 def test_a_click_chooses_a_point_and_a_drag_none(chart, qtbot) -> None:
     clicked = []
     chart.clicked.connect(clicked.append)
@@ -179,6 +192,16 @@ def test_logarithmic_axes_have_round_ticks_with_units_at_any_zoom() -> None:
     assert written(-3.05, -2.6, 400) == ["1 ms", "1.5 ms", "2 ms", "2.5 ms"]
 
 
+def test_ticks_of_a_linear_axis_keep_their_distance() -> None:
+    def linear(*_: float) -> list:
+        return [(2.0, [-4.0, -2.0, 0.0, 2.0, 4.0]), (1.0, [-3.0])]
+
+    axis = ChartAxis("")
+    assert axis.ticks(-5.0, 5.0, 100.0, 20.0, linear) == linear()
+    thinned = [(2.0, [-4.0, 0.0, 4.0]), (1.0, [-3.0])]
+    assert axis.ticks(-5.0, 5.0, 100.0, 21.0, linear) == thinned
+
+
 @pytest.mark.parametrize(
     ("values", "log", "shown"),
     [
@@ -186,9 +209,9 @@ def test_logarithmic_axes_have_round_ticks_with_units_at_any_zoom() -> None:
         ([-0.3, 4.0], False, (-0.5, 5.0)),
         ([0.0, 0.0], False, (-1.0, 1.0)),
         ([np.nan, np.inf], False, (0.0, 1.5)),
-        ([1e-3, 0.0, np.nan, 1e-1], True, (-3.08, -0.92)),
+        ([1e-3, 0.0, np.nan, 1e-1], True, (-3.12, -0.88)),
         ([1e-3], True, (-3.3, -2.7)),
-        ([], True, (-0.04, 1.04)),
+        ([], True, (-0.06, 1.06)),
     ],
 )
 def test_an_upright_axis_has_all_values_with_zero_or_all_positive_ones(values, log, shown) -> None:
@@ -243,11 +266,11 @@ def test_an_empty_chart_says_what_to_do_and_a_full_one_has_a_legend(chart) -> No
 
     assert not chart.canvas.isVisible()
     assert "first" not in chart.heading.text()
+    assert (chart.message.isVisible(), chart.message.text()) == (True, "Press the skin.")
     empty = chart.grab().toImage()
-    chart.show_series([], "")
-    assert empty != chart.grab().toImage()
     chart.show_series([Series("<b>", X, X / 5)])
     assert chart.canvas.isVisible()
+    assert not chart.message.isVisible()
     assert "&lt;b&gt;" in chart.heading.text()
     assert full != empty
 
@@ -387,6 +410,26 @@ def test_a_file_that_cannot_be_written_is_reported(chart, qtbot, chosen, until) 
     until(box.isVisible)
     assert "forces.csv" in box.text()
     box.close()
+
+
+def test_nothing_of_a_deleted_chart_is_left(chart, qapp) -> None:
+    def views() -> int:
+        gc.collect()
+        return sum(type(each).__name__ == "ViewBox" for each in gc.get_objects())
+
+    before = views()
+    assert before >= 1
+    for _ in range(3):
+        other = Chart(chart.y_axis, chart.x_axis, "")
+        other.show_series(chart.series, lines=[ChartLine(1.0)])
+        other.show()
+        qapp.processEvents()
+        other.menu()
+        other.close()
+        other.deleteLater()
+        qapp.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    del other
+    assert views() == before
 
 
 def test_pyqtgraph_is_loaded_by_the_first_chart_with_points_alone() -> None:

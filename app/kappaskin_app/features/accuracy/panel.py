@@ -26,7 +26,6 @@ from kappaskin_app.shell.effects import EffectsTable
 from kappaskin_app.theme import ALERT, FAINT, follow_look, grown, slider_style
 from kappaskin_app.widgets.line import Line
 from kappaskin_app.widgets.parts import ELLIPSIS, Label, button, sentence, text_label
-from kappaskin_app.widgets.plots import LogAxis
 from kappaskin_app.widgets.text import NONE, duration, length
 
 _STEPS = 200  # of the slider
@@ -71,7 +70,7 @@ class CostPanel(QWidget):
         self._lay_out()
         self._measurement: CostMeasurement | None = None
         self._accuracy = math.nan
-        self._axis, self._frontier = LogAxis(1e-5, 1e-4), Frontier()
+        self._ends, self._frontier = (1e-5, 1e-4), Frontier()  # m, of the slider
         self._hint = None
         self.required.valueChanged.connect(guarded(self._slid))
         self.required.sliderReleased.connect(guarded(self._take))
@@ -181,7 +180,8 @@ class CostPanel(QWidget):
             self._measurement.measure()
 
     def _slid(self, step: int) -> None:
-        self._accuracy = self._axis.at(step / _STEPS)
+        least, most = self._ends
+        self._accuracy = least * (most / least) ** (step / _STEPS)
         self._show_required()
         if not self.required.isSliderDown():
             self._take()
@@ -275,9 +275,11 @@ class CostPanel(QWidget):
         if not math.isfinite(self._accuracy) and present is not None:
             self._accuracy = present.rms
         # A little more than the least error, which rounding could put out of reach.
-        self._axis = LogAxis(1.002 * min(errors), 1.01 * max(*errors, 1.01 * min(errors)))
+        least, most = 1.002 * min(errors), 1.01 * max(*errors, 1.01 * min(errors))
+        self._ends = least, most
+        asked = min(max(self._accuracy, least), most) if self._accuracy > 0 else least
         with QSignalBlocker(self.required):
-            self.required.setValue(round(_STEPS * self._axis.share(self._accuracy)))
+            self.required.setValue(round(_STEPS * math.log(asked / least, most / least)))
         self._show_required()
 
     def _show_required(self) -> None:

@@ -24,9 +24,16 @@ from kappaskin_app.features.calibration.controller import (
     Result,
     parsed_radii,
 )
-from kappaskin_app.features.calibration.plots import CylinderView, Loop, LoopPlot, PassMap
+from kappaskin_app.features.calibration.plots import (
+    LOOP_AXES,
+    LOOP_TIP,
+    CylinderView,
+    PassMap,
+    loop_series,
+)
 from kappaskin_app.guard import guarded
-from kappaskin_app.theme import current, follow_look
+from kappaskin_app.theme import current, follow_look, grown
+from kappaskin_app.widgets.chart import Chart, Series
 from kappaskin_app.widgets.parts import (
     ELLIPSIS,
     Heading,
@@ -38,6 +45,7 @@ from kappaskin_app.widgets.parts import (
     text_label,
 )
 
+_LOOP_HIGH = 230  # px
 EQUATION_8 = (
     "Nominal curvature, as Eq. 8 reads it from the voltage: kappa = 4 V / (V_in GF (t_s + t_g) G). "
 )
@@ -248,7 +256,7 @@ class ResultPage(QWidget):
             "(section 5 of the paper), and with hysteresis compensated. The standard error in use "
             "is that of corrected curvature on other cylinders and in another order.",
         )
-        self.map, self.plot, self.channel = PassMap(), LoopPlot(), text_label()
+        self.map, self.plot, self.channel = PassMap(), Chart(*LOOP_AXES, LOOP_TIP), text_label()
         self.worst = text_label(tip="Click a channel to see its readings.", rich=True)
         self.worst.setTextInteractionFlags(
             Qt.TextInteractionFlag.LinksAccessibleByMouse
@@ -274,6 +282,7 @@ class ResultPage(QWidget):
         self._result: Result | None = None
         self._worst = list[int]()
         follow_look(self, self._show_worst)
+        follow_look(self.plot, lambda: self.plot.setMinimumHeight(grown(_LOOP_HIGH)))
 
     def show_result(self, result: Result) -> None:
         if result is self._result:
@@ -339,10 +348,10 @@ class ResultPage(QWidget):
             return
         self.map.show_channel(channel)
         self.channel.setText(self._channel_text(channel))
-        self.plot.show_loop(_loop(self._result, channel))
+        self.plot.show_series(_loop(self._result, channel), "No readings.")
 
 
-def _loop(result: Result, channel: int) -> Loop:
+def _loop(result: Result, channel: int) -> list[Series]:
     """Readings of `channel` at the flat steps and those that bend its component.
 
     Without preconditioning.
@@ -353,7 +362,7 @@ def _loop(result: Result, channel: int) -> Loop:
     counts = np.array([step.way != "first" for step in sweep.steps])
     used = np.flatnonzero(counts & (flat | (applied != 0)))
     steps = [sweep.steps[k] for k in used]
-    return Loop(
+    return loop_series(
         applied[used],
         sweep.readings[used, channel],
         np.array([step.back for step in steps]),

@@ -1,7 +1,6 @@
-"""Drawings of a calibration: skin on its cylinder, hysteresis loop, and map of results."""
+"""Drawings of a calibration: skin on its cylinder, and map of results."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
@@ -23,7 +22,7 @@ from kappaskin.scenes.cylinders import CylinderStep
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Patch
 from kappaskin_app.theme import current
-from kappaskin_app.widgets.plots import paint_empty
+from kappaskin_app.widgets.chart import ChartAxis, Series
 
 _POINTS = 61  # of the skin's cross-section
 _MOST_WRAPPED = math.pi  # rad: the rest of a long skin hangs down straight
@@ -194,135 +193,30 @@ def _paint_arrow(painter: QPainter, skin: QRectF, dx: float, dy: float, colour: 
         painter.drawPolygon(QPolygonF([tip, back + across * 5.5, back - across * 5.5]))
 
 
-_TOP, _RIGHT = 8.0, 10.0
-_HIGH = 158  # px of the plot without its captions
-_NUMBER_GAP = 6.0  # px between two numbers
-_AXES = "reading (y) against applied (x), 1/m"
+LOOP_AXES = ChartAxis("Reading", "1/m"), ChartAxis("Applied", "1/m")
+LOOP_TIP = (
+    "Nominal curvature as Eq. 8 reads it, 4 V / (V_in GF (t_s + t_g) G), over that of the "
+    "cylinder. Dashed: line of the calibration. Filled points: falling radius; open "
+    "points: rising radius. Their difference is hysteresis."
+)
 
 
-@dataclass(frozen=True, eq=False)
-class Loop:
-    """Readings `read` (n,) at curvatures `applied` (n,), both in 1/m, in order of capture.
+def loop_series(
+    applied: Array, read: Array, back: Mask, begins: Mask, gain: float, offset: float
+) -> list[Series]:
+    """Readings `read` (n,) at curvatures `applied` (n,), both in 1/m, and the calibration's line.
 
-    `back` (n,) is true at rising radii; a new cycle begins where `begins` (n,) is true.
+    They are in order of capture. `back` (n,) is true at rising radii; a new cycle begins where
+    `begins` (n,) is true.
     """
-
-    applied: Array
-    read: Array
-    back: Mask
-    begins: Mask
-    gain: float
-    offset: float
-
-
-class LoopPlot(QWidget):
-    """Plot of a `Loop`: filled points at falling radii, open ones at rising radii."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._loop: Loop | None = None
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setToolTip(
-            "Nominal curvature as Eq. 8 reads it, 4 V / (V_in GF (t_s + t_g) G), over that of the "
-            "cylinder. Dashed: line of the calibration. Filled points: falling radius; open "
-            "points: rising radius. Their difference is hysteresis."
-        )
-
-    def sizeHint(self) -> QSize:
-        return QSize(280, _HIGH + 2 * self.fontMetrics().height())
-
-    def minimumSizeHint(self) -> QSize:
-        wide = self.fontMetrics().horizontalAdvance(_AXES) + 4
-        return QSize(max(220, wide), self.sizeHint().height())
-
-    def show_loop(self, loop: Loop) -> None:
-        self._loop = loop
-        self.update()
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        loop, theme = self._loop, current()
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        if loop is None or not np.isfinite(loop.read).any():
-            area = self._area(0.0)
-            painter.fillRect(area, QColor(theme.base))
-            paint_empty(painter, area, "No readings")
-            return
-        most = 1.08 * max(
-            float(np.abs(loop.applied).max()), float(np.nanmax(np.abs(loop.read))), 1e-9
-        )
-        ticks = _ticks(most)
-        widest = max(map(self.fontMetrics().horizontalAdvance, ticks.values()))
-        area = self._area(widest)
-        painter.fillRect(area, QColor(theme.base))
-
-        def at(x: float, y: float) -> QPointF:
-            return QPointF(
-                area.center().x() + x / most * area.width() / 2,
-                area.center().y() - y / most * area.height() / 2,
-            )
-
-        self._paint_axes(painter, area, most, ticks, widest)
-        painter.setClipRect(area.adjusted(-4, -4, 4, 4))
-        if math.isfinite(loop.gain):
-            painter.setPen(QPen(QColor(theme.faint), 1.5, Qt.PenStyle.DashLine))
-            ends = (at(x, loop.offset + loop.gain * x) for x in (-most, most))
-            painter.drawLine(*ends)
-        accent = QColor(theme.accent)
-        painter.setPen(QPen(accent, 1))
-        rounds = np.split(np.arange(len(loop.read)), np.flatnonzero(loop.begins)[1:])
-        points = [at(x, y) for x, y in zip(loop.applied, loop.read, strict=True)]
-        good = np.isfinite(loop.read)
-        for turn in rounds:
-            painter.drawPolyline(QPolygonF([points[k] for k in turn if good[k]]))
-        for k in np.flatnonzero(good):
-            painter.setBrush(QColor(theme.base) if loop.back[k] else accent)
-            painter.drawEllipse(points[k], 2.6, 2.6)
-
-    def _area(self, widest: float) -> QRectF:
-        """Area of the plot, with numbers of `widest` px on its left."""
-        below = 2 * self.fontMetrics().height() + 2
-        return QRectF(self.rect()).adjusted(widest + 6, _TOP, -_RIGHT, -below)
-
-    def _paint_axes(
-        self, painter: QPainter, area: QRectF, most: float, ticks: dict[float, str], widest: float
-    ) -> None:
-        theme, flags = current(), Qt.AlignmentFlag
-        line = painter.fontMetrics().height()
-        painter.setPen(QPen(QColor(theme.line), 1))
-        painter.drawRect(area)
-        step = _round(most) / most / 2
-        # Skip numbers that would overlap.
-        beside = math.ceil((widest + _NUMBER_GAP) / (step * area.width()))
-        above = math.ceil(line / (step * area.height()))
-        for number, (value, words) in enumerate(ticks.items(), -(len(ticks) // 2)):
-            x = area.center().x() + value / most * area.width() / 2
-            y = area.center().y() - value / most * area.height() / 2
-            painter.setPen(QPen(QColor(theme.line), 1))
-            painter.drawLine(QPointF(x, area.top()), QPointF(x, area.bottom()))
-            painter.drawLine(QPointF(area.left(), y), QPointF(area.right(), y))
-            painter.setPen(QColor(theme.faint))
-            if not number % above:
-                box = QRectF(0, y - line / 2, area.left() - 4, line)
-                painter.drawText(box, flags.AlignRight | flags.AlignVCenter, words)
-            if not number % beside:
-                box = QRectF(x - widest, area.bottom() + 1, 2 * widest, line)
-                painter.drawText(box, flags.AlignCenter, words)
-        below = QRectF(0, self.height() - line - 1, self.width(), line)
-        painter.drawText(below, flags.AlignCenter, _AXES)
-
-
-def _ticks(most: float) -> dict[float, str]:
-    """Round values from -`most` to `most`, and their texts."""
-    step = _round(most)
-    values = (np.arange(-math.floor(most / step), math.floor(most / step) + 1) * step).tolist()
-    return {value: f"{value:g}".replace("-", "\N{MINUS SIGN}") for value in values}
-
-
-def _round(most: float) -> float:
-    """Distance of ticks with two to four on each side of zero."""
-    power = 10.0 ** math.floor(math.log10(most / 2))
-    return next(m * power for m in (5.0, 2.0, 1.0) if m * power <= most / 2)
+    cycles = np.flatnonzero(begins)[1:]
+    ends = np.array([-1.0, 1.0]) * np.abs(applied).max()
+    return [
+        Series("falling radius", applied[~back], read[~back], "accent", "", "o", 6.0),
+        Series("rising radius", applied[back], read[back], "accent", "", "o", 6.0, False),
+        Series("calibration", ends, offset + gain * ends, "faint", "dashed"),
+        Series("", np.insert(applied, cycles, np.nan), np.insert(read, cycles, np.nan), "accent"),
+    ]
 
 
 _MAP_HIGH = 91  # px of each map

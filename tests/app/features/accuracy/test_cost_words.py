@@ -7,7 +7,6 @@ import pytest
 from kappaskin.estimation import METHODS
 from kappaskin_app.features.accuracy.measurement import Frontier
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
-from kappaskin_app.widgets.plots import LogAxis
 from kappaskin_app.widgets.text import duration, length
 
 
@@ -47,20 +46,3 @@ def test_a_length_is_said_with_two_digits(value: float, words: str) -> None:
 )
 def test_a_time_is_said_with_two_digits(value: float, words: str) -> None:
     assert duration(value) == words
-
-
-def test_a_logarithmic_axis_has_round_ends_around_all_and_equal_ratios_apart() -> None:
-    axis = LogAxis.around([3e-5, 7e-3, math.nan, 0.0, math.inf])
-    assert (axis.least, axis.most) == pytest.approx((2e-5, 1e-2))
-    steps = [axis.share(value) for value in (1e-4, 1e-3, 1e-2)]
-    assert steps[1] - steps[0] == pytest.approx(steps[2] - steps[1])
-    assert axis.at(axis.share(1e-3)) == pytest.approx(1e-3)
-    assert (axis.share(1e-9), axis.share(1.0), axis.share(math.nan)) == (0.0, 1.0, 0.0)
-    values = [value for value, _ in axis.ticks()]
-    assert values == pytest.approx([2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2])
-
-
-def test_an_axis_of_one_value_or_none_can_still_be_drawn() -> None:
-    for axis in (LogAxis.around([]), LogAxis.around([1e-3]), LogAxis.around([math.nan])):
-        assert 0 < axis.least < axis.most
-        assert len(axis.ticks()) >= 2

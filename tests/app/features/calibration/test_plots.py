@@ -9,8 +9,15 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from kappaskin import Patch, SensorLayout
 from kappaskin.scenes.cylinders import schedule
-from kappaskin_app.features.calibration.plots import CylinderView, Loop, LoopPlot, PassMap
+from kappaskin_app.features.calibration.plots import (
+    LOOP_AXES,
+    LOOP_TIP,
+    CylinderView,
+    PassMap,
+    loop_series,
+)
 from kappaskin_app.theme import letters
+from kappaskin_app.widgets.chart import Chart
 from kappaskin_app.widgets.parts import Heading
 
 
@@ -31,18 +38,28 @@ def inked(view: QWidget) -> np.ndarray:
     return np.array([[image.pixel(x, y) != ground for x in wide] for y in high])
 
 
-def test_numbers_beside_a_loop_are_whole(large: QApplication, qtbot) -> None:
-    plot = LoopPlot()
+def test_a_loop_is_filled_falling_and_open_rising_and_broken_between_cycles() -> None:
+    applied = np.array([0.0, 50.0, 100.0, 50.0, 0.0, 40.0])
+    read, back = applied + np.array([0, 0, 0, 9, 9, 0]), np.array([0, 0, 0, 1, 1, 0], bool)
+
+    falling, rising, line, joined = loop_series(
+        applied, read, back, np.array([1, 0, 0, 0, 0, 1], bool), 2.0, 1.0
+    )
+
+    assert (falling.x.tolist(), falling.filled) == ([0, 50, 100, 40], True)
+    assert (rising.y.tolist(), rising.filled) == ([59, 9], False)
+    assert (line.x.tolist(), line.y.tolist()) == ([-100, 100], [-199, 201])
+    assert np.isnan(joined.x).tolist() == [False] * 5 + [True, False]
+
+
+def test_a_channel_without_readings_says_so(qtbot) -> None:
+    plot = Chart(*LOOP_AXES, LOOP_TIP)
     qtbot.addWidget(plot)
-    applied = np.array([0.0, 50.0, 100.0, 50.0])
-    back, begins = np.array([0, 0, 0, 1], bool), np.array([1, 0, 0, 0], bool)
-
-    plot.show_loop(Loop(applied, applied, back, begins, 1.0, 0.0))
-
-    ink = inked(plot)
-    assert not ink[:, :2].any()
-    assert ink[:, 2:40].any()
-    assert not ink[-2:].any()
+    none, flags = np.full(3, np.nan), np.array([True, False, False])
+    plot.show_series(
+        loop_series(np.arange(3.0), none, flags, flags, np.nan, np.nan), "No readings."
+    )
+    assert plot.is_empty
 
 
 def test_titles_above_passed_channels_are_whole(large: QApplication, qtbot) -> None:

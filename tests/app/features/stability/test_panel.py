@@ -211,8 +211,11 @@ def test_a_shape_is_chosen_by_a_click_the_arrows_or_its_number(
 ) -> None:
     panel = _opened(window, until).stability
     assert window.observability.number == 64
-    place = panel.plot.place_of(10).toPoint()
-    qtbot.mouseClick(panel.plot, Qt.MouseButton.LeftButton, pos=place + QPoint(0, -5))
+    value = float(window.observability.spectrum.values[9])
+    until(lambda: panel.plot.place_of(10.0, value).x() > 50)
+    place = panel.plot.place_of(10.0, value).toPoint()
+    qtbot.mouseClick(panel.plot.canvas, Qt.MouseButton.LeftButton, pos=place + QPoint(0, -5))
+    assert panel.plot.hasFocus()
     assert window.observability.number == 10
     assert panel.number.value() == 10
     qtbot.keyClick(panel.plot, Qt.Key.Key_Right)
