@@ -179,27 +179,36 @@ _WHOLE = 4  # points more where the text begins so
 _FAR = 0.3  # of the best one's points, below which an entry is not listed
 _ELSEWHERE = 0.4  # of the points, for what is found only in the place of an entry or in a synonym
 _SYNONYMS = {
-    "camera": "zoom rotate view",
-    "chart": "plot graph curve",
-    "compare": "difference a b",
-    "connect": "device usb serial com tty",
-    "connection": "device usb serial com tty port baud",
-    "cost": "plot performance speed",
-    "export": "csv parquet table save data",
-    "film": "video movie animation",
-    "guide": "help manual documentation",
-    "log": "console errors",
-    "noise": "sigma error",
-    "picture": "screenshot snapshot image png",
-    "publish": "stream udp ros foxglove send",
-    "record": "save capture",
-    "tare": "zero reset offset",
-    "text": "font zoom letters",
-    "theme": "dark light colours mode",
-    "traces": "plot graph",
-    "undo": "back revert",
+    "baud": "connection",
+    "capture": "record picture",
+    "csv": "export copy",
+    "dark": "theme",
+    "data": "export",
+    "device": "connect connection",
+    "font": "text",
+    "graph": "chart traces cost",
+    "help": "guide lessons",
+    "image": "picture",
+    "manual": "guide lessons",
+    "movie": "film",
+    "offset": "tare",
+    "parquet": "export",
+    "performance": "cost frame",
+    "plot": "chart traces cost",
+    "port": "connect connection",
+    "ros": "publish",
+    "screenshot": "picture",
+    "serial": "connect connection",
+    "stream": "publish",
+    "table": "export numbers",
+    "udp": "publish",
+    "usb": "connect connection",
+    "video": "film",
+    "zero": "tare",
+    "zoom": "camera text",
 }
-"""What a word of a title is called elsewhere."""
+"""What others call what a word of a title means."""
+_TYPED = 3  # letters of such a word that are enough
 
 
 def score(query: str, text: str, place: str = "") -> float:
@@ -207,9 +216,7 @@ def score(query: str, text: str, place: str = "") -> float:
 
     The words may come in any order. Each is a part of the text, or the beginnings of its words.
     """
-    names = [_SYNONYMS.get(word, "") for word in text.lower().replace(":", " ").split()]
-    beside = " ".join([place, *names])
-    points = [_best(word, text, beside) for word in query.lower().split()]
+    points = [_best(word, text.lower(), place.lower()) for word in query.lower().split()]
     if not points:
         return 1.0
     return sum(points) - 0.01 * len(text) if min(points) > 0 else 0.0
@@ -221,8 +228,11 @@ def best(points: Mapping[str, float]) -> list[str]:
     return sorted((name for name in points if points[name] > least), key=lambda name: -points[name])
 
 
-def _best(word: str, text: str, beside: str) -> float:
-    return max(_points(word, text.lower()), _ELSEWHERE * _points(word, beside.lower()))
+def _best(word: str, text: str, place: str) -> float:
+    typed = len(word) >= _TYPED
+    meant = [m for other, m in _SYNONYMS.items() if typed and other.startswith(word)]
+    elsewhere = [_points(m, text) for each in meant for m in each.split() if m in text]
+    return max(_points(word, text), _ELSEWHERE * max(_points(word, place), *elsewhere, 0.0))
 
 
 @lru_cache(maxsize=20_000)
