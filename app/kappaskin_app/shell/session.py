@@ -294,7 +294,8 @@ class Session(QObject):
         """Request the setup of the settings, if it has changed."""
         setup = _setup_of(self._settings, self.status.sensor, self.base or _BASE)
         if self._cylinder is not None:
-            setup = replace(setup, calibration=None, tare=None)
+            # What touches is a cylinder on the whole skin: it has no place, and no force.
+            setup = replace(setup, calibration=None, tare=None, quantities=("surface",))
         if not self.inside and self.base is None:
             setup = replace(setup, hold=max(setup.hold, _turn(region_of(self._settings))))
         requested = self.engine.requested.setup
@@ -321,7 +322,7 @@ class Session(QObject):
     def lay(self, step: CylinderStep | None) -> None:
         """Lay the simulated skin on the cylinder of `step`.
 
-        Until None, readings are nominal and every frame has all of them.
+        Until None, readings are nominal, every frame has all of them, and there is no contact.
         """
         begins_or_ends = (step is None) != (self._cylinder is None)
         self._cylinder = step

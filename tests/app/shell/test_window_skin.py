@@ -8,6 +8,7 @@ from PySide6.QtCore import QPoint, Qt
 
 from kappaskin import Disk, Patch
 from kappaskin.bases import edges_of
+from kappaskin.scenes.cylinders import CylinderStep
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import current
 
@@ -289,3 +290,14 @@ def test_the_whole_skin_is_seen_from_every_side(window: MainWindow, until) -> No
         written = [bool(label.GetVisibility()) for label in window.membrane.sides.labels]
         end_on = {"look-along-x": 1, "look-along-y": 2}.get(name)
         assert written == [number != end_on for number in range(3)], name
+
+
+def test_on_a_calibration_cylinder_there_are_no_contact_numbers(window: MainWindow, until) -> None:
+    session = window.session
+    until(lambda: session.estimate is not None and session.estimate.contact.present)
+    session.lay(CylinderStep(0))
+    until(lambda: session.status.setup.quantities == ("surface",))
+    until(lambda: not session.estimate.contact.present)
+    assert np.isfinite(session.estimate.surface).any()
+    session.lay(None)
+    until(lambda: session.estimate.contact.present)
