@@ -1201,10 +1201,6 @@ class Readout(NamedTuple):
     digits: int
     words: str = ""
 
-    def less(self, other: "Readout") -> tuple[float, float]:
-        """The difference to another number, and its error as if theirs had nothing in common."""
-        return self.value - other.value, math.hypot(self.sd, other.sd)
-
 
 def readouts(estimate: Estimate) -> list[Readout]:
     """What the screen shows of an estimate: first of the contact, then of the fit.

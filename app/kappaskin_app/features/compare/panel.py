@@ -5,9 +5,10 @@ import math
 import numpy as np
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
-from kappaskin._text import with_error
+from kappaskin._text import NONE, rounded, with_error
 from kappaskin.bases import edges_of
 from kappaskin.live import PipelineStatus, Status
+from kappaskin.pipeline import Readout
 from kappaskin.sensing import Sensor
 from kappaskin_app.features.compare.comparison import Pair, SetupComparison
 from kappaskin_app.guard import guarded
@@ -37,9 +38,11 @@ _SURFACE = "Displacement of the skin, on a common scale of A and B; the cross is
 _DIFFERENCE = "B minus A, on its own scale."
 _TABLE = (
     "Position, force and depth of the contact, and the principal curvatures of the skin there, "
-    "each with its standard deviation. That of the difference assumes that A and B are "
-    "independent; they use the same readings, so the true one is usually smaller."
+    "each with its standard deviation. Place and force are the same where the settings do not "
+    "change them: they follow from the readings without the functions. A and B use the same "
+    "readings, so that the errors of a difference do not follow from those of A and B."
 )
+_SAME = "same"
 
 
 class OtherForm(Form):
@@ -164,10 +167,19 @@ class ComparePanel(QWidget):
             texts = (
                 f"{a.label}, {a.unit}",
                 *(e.words or with_error(e.value, e.sd, digits=e.digits) for e in (a, b)),
-                with_error(*b.less(a), digits=a.digits, sign="+"),
+                difference_text(a, b),
             )
             for column, text in enumerate(texts):
                 self.table.write(row, column, text)
+
+
+def difference_text(a: Readout, b: Readout) -> str:
+    """B minus A, in as many digits as the smaller error has; a dash where one is not determined."""
+    if a.words or b.words:
+        return NONE
+    if (a.value, a.sd) == (b.value, b.sd):
+        return _SAME
+    return rounded(b.value - a.value, min(a.sd, b.sd), a.digits, "+")[0]
 
 
 def _largest(values: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> float:

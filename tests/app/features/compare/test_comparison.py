@@ -9,6 +9,7 @@ import pytest
 from kappaskin import Setup
 from kappaskin.pipeline import Readout
 from kappaskin_app.features.compare.comparison import Pair, other_setup
+from kappaskin_app.features.compare.panel import difference_text
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.window import MainWindow
 
@@ -42,7 +43,7 @@ def test_equal_settings_differ_by_nothing(window: MainWindow, pairs: list[Pair],
     until(lambda: pairs[-1].b.coefficients.shape == (8, 8))
     assert not pairs[-1].difference.any()
     table = window.compare.table
-    until(lambda: table.item(0, 3).text().startswith("+0.00"))
+    until(lambda: {table.item(row, 3).text() for row in range(6)} == {"same"})
 
 
 @pytest.mark.full
@@ -50,17 +51,32 @@ def test_every_figure_has_its_error_bar(window: MainWindow, pairs: list[Pair], u
     table = window.compare.table
     until(lambda: table.rowCount() == 6)
     for row in range(6):
-        for column in (1, 2, 3):
+        for column in (1, 2):
             assert "\N{PLUS-MINUS SIGN}" in table.item(row, column).text()
+    # Place and force follow from the readings; depth and curvature from the functions too.
+    changed = [table.item(row, 3).text() != "same" for row in range(6)]
+    assert changed == [False, False, False, True, True, True]
+    assert not any("\N{PLUS-MINUS SIGN}" in table.item(row, 3).text() for row in range(6))
     assert [a.label for a, _ in pairs[-1].figures()] == [
         table.item(row, 0).text().rpartition(",")[0] for row in range(6)
     ]
 
 
-def test_a_difference_has_the_errors_of_both() -> None:
-    a, b = (Readout("x", value, sd, math.nan, "mm", 1) for value, sd in ((1.0, 0.3), (3.0, 0.4)))
-    assert b.less(a) == (2.0, pytest.approx(0.5))
-    assert math.isnan(b.less(a._replace(value=math.nan))[0])
+@pytest.mark.parametrize(
+    ("a", "b", "words"),
+    [
+        ((1.0, 0.3), (1.0, 0.3), "same"),
+        ((1.0, 0.3), (3.04, 0.04), "+2.040"),
+        ((3.0, 0.4), (1.0, 0.3), "\N{MINUS SIGN}2.00"),
+        ((math.nan, 0.3), (3.0, 0.4), "\N{EN DASH}"),
+    ],
+)
+def test_a_difference_has_the_digits_of_the_smaller_error_and_none_of_its_own(
+    a: tuple[float, float], b: tuple[float, float], words: str
+) -> None:
+    one, other = (Readout("x", *each, math.nan, "mm", 1) for each in (a, b))
+    assert difference_text(one, other) == words
+    assert difference_text(one, other._replace(words="edge: no force")) == "\N{EN DASH}"
 
 
 @pytest.mark.full
