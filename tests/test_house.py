@@ -42,7 +42,7 @@ LIMITS = {
     # Objects named in half the time; what a frame costs, in the status; computing what is asked.
     # Simulations that go slower instead of losing frames.
     # A source that streams until the requested one answers; the list of devices.
-    "statements": 42_810,
+    "statements": 42_900,
     # _files: one way to read and write files; _text: text from outside; _plugins: what other
     # packages add. For all rooms and the app.
     "loose modules of core": 11,
