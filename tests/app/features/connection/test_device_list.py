@@ -17,15 +17,22 @@ PORTS = [Port("/dev/ttyACM0", "Fingertip", "Kappa Ltd", "SN-4711"), Port("/dev/t
 LEFT = Qt.MouseButton.LeftButton
 
 
+class RecordedPanel(ConnectionPanel):
+    """A panel that lists what it requests."""
+
+    def __init__(self):
+        super().__init__()
+        self.requests = []
+        self.connect_requested.connect(self.requests.append)
+
+
 @pytest.fixture
 def panel(qtbot):
-    made = ConnectionPanel()
+    made = RecordedPanel()
     qtbot.addWidget(made)
     made.resize(290, 200)
     made.show()
     made.show_ports(PORTS)
-    made.requests = []
-    made.connect_requested.connect(made.requests.append)
     qtbot.waitExposed(made)
     made.activateWindow()
     return made
