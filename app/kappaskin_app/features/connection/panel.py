@@ -118,8 +118,7 @@ class SourceBox(QComboBox):
             return event.type() == QEvent.Type.KeyPress and self._typed(event)
         if isinstance(event, QMouseEvent) and watched is self.line:
             if event.type() == QEvent.Type.MouseButtonPress:
-                # A second click, or one into text that is being typed, places the cursor.
-                self._opens = not (self.line.isModified() or self.line.hasSelectedText())
+                self._opens = not self.line.isModified()  # while typing it places the cursor
                 if self._opens:
                     self.line.selectAll()
             elif event.type() == QEvent.Type.MouseButtonRelease and self._opens:

@@ -87,6 +87,7 @@ def test_escape_closes_the_list_and_changes_nothing(panel, qtbot):
 
 def test_what_is_typed_replaces_the_text_and_return_connects_it_once(panel, qtbot):
     for text in ("/dev/ttyACM1", "COM3", "/dev/ttyACM0"):
+        qtbot.keyClick(opened_by_click(panel, qtbot), Qt.Key.Key_Escape)  # and once more
         opened_by_click(panel, qtbot)
         typed(qtbot, text)
         assert panel.sources.currentText() == text
