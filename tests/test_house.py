@@ -45,7 +45,8 @@ LIMITS = {
     # export; the strip chart.
     # Numbers by their error bars, names of objects that last; recordings with one key, what may be
     # done with them, and exports by purpose.
-    "statements": 43_285,
+    # A source that streams until the requested one answers; the list of devices.
+    "statements": 43_505,
     # _files: one way to read and write files; _text: text from outside; _plugins: what other
     # packages add. For all rooms and the app.
     "loose modules of core": 11,

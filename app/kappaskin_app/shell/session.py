@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
+from PySide6.QtWidgets import QLabel
 
 from kappaskin.calibration import Calibration, Tare
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Region, ScanTradeoff
 from kappaskin.frames import Estimate
-from kappaskin.live import Engine, ResumeInfo, Status
+from kappaskin.live import STREAMING, Engine, ResumeInfo, Status
 from kappaskin.mechanics import Plate, PointLoad
 from kappaskin.pipeline import Setup
 from kappaskin.scenes import Scene
@@ -28,7 +29,13 @@ from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.badge import state_of
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.loads import Cache, compliance_or_refusal
-from kappaskin_app.shell.settings import EstimatorSettings, SceneSettings, Settings, part
+from kappaskin_app.shell.settings import (
+    READY_CASES,
+    EstimatorSettings,
+    SceneSettings,
+    Settings,
+    part,
+)
 from kappaskin_app.shell.settings.form_fields import setup_values
 from kappaskin_app.shell.settings.publishing import PublishSettings
 from kappaskin_app.shell.settings.scene import Scanning, Written
@@ -113,6 +120,7 @@ def _slow(settings: Settings) -> _Slow | None:
 
 RECORDED = "replay:"
 """The prefix of a source that is a recording."""
+_READY = frozenset({"sim:", *(f"sim:{case}" for case in READY_CASES)})  # never refused
 _TICK = 4  # ms between two polls for a new estimate
 _ARRIVES = 0.3  # s after which a request to the engine shows in its status
 _LATE = 1.2  # margin over the time of the scan lists
@@ -156,16 +164,18 @@ class Session(QObject):
     scene, `refused` and `refusal` why it is not that of the settings (empty when it is), and
     `preparing` whether it is still computed. `publish_refused` reports why nothing is published
     (empty when it is). `source_changing` precedes another source or a disconnection,
-    `source_changed` brings the new one. `base` is the setup of a recording, for what no setting
-    determines. `pause_requested` requests that a scene or recording be paused or continued,
-    `time_requested` another time in s in a recording.
-    `trusted` are the scenes, as absolute paths, that may name files outside their folders.
+    `source_changed` brings the new one, `source_refused` why the requested one is not used.
+    `connecting` is that one until it answers, `source` the one in use. `base` is the setup of a
+    recording, for what no setting determines. `pause_requested` requests that a scene or recording
+    be paused or continued, `time_requested` another time in s in a recording. `trusted` are the
+    scenes, as absolute paths, that may name files outside their folders.
     """
 
     refused = Signal(str)
     preparing = Signal(bool)
     source_changing = Signal()
     source_changed = Signal(str)
+    source_refused = Signal(str)
     pause_requested = Signal()
     time_requested = Signal(float)
     playing = Signal(Scene)
@@ -195,9 +205,11 @@ class Session(QObject):
         self.status = Status()
         self._lost_since, self._turned_at = math.inf, 0.0
         self.estimate: Estimate | None = None
-        self.source = ""
+        self.source = self.connecting = ""
         self.source_handlers: list[Callable[[str], bool]] = []
         """Functions that may open a requested source instead, and return whether they do."""
+        self.reasons: list[QLabel] = []
+        """Labels that may show why a source is lost or refused."""
         self.may_close: list[Callable[[], bool]] = []
         """Functions that return whether the window may be closed."""
         self._next_status, self.closed = 0.0, False
@@ -244,20 +256,50 @@ class Session(QObject):
     def connect_to(self, source: str, already: bool = False) -> None:
         """Take frames from `source`, unless the engine does `already`.
 
-        A scene named there becomes the load case or the scene from a file; without a name the
-        last simulation continues.
+        A source that streams is shown until the other one answers. A scene named there becomes the
+        load case or the scene from a file; without a name the last simulation continues.
         """
+        source = source.strip()
+        streams = self.status.state == STREAMING
+        if streams and not already and not source.startswith(RECORDED) and source not in _READY:
+            self.connecting = source
+            self.engine.connect(source, self._trusts(source))
+        else:
+            self._use(source, already)
+
+    def _use(self, source: str, already: bool) -> None:
         self.source_changing.emit()
-        self.source, self.estimate = source.strip(), None
-        self._turned_at = time.monotonic()
-        self.source_changed.emit(self.source)
-        trust = Path(self.source.removeprefix("sim:")).absolute() in self.trusted
+        self.connecting, self.source, self.estimate = "", source, None
+        self._turned_at, self._lost_since = time.monotonic(), math.inf
+        self.source_changed.emit(source)
+        trust = self._trusts(source)
         if not already:
-            self.engine.connect(self.source, trust)
+            self.engine.connect(source, trust)
         if self.inside:
             self._restarts = True
-            self._history.change("Simulated skin", -1, **source_settings(self.source, trust))
+            self._history.change("Simulated skin", -1, **source_settings(source, trust))
             self._play()
+
+    def _trusts(self, source: str) -> bool:
+        return Path(source.removeprefix("sim:")).absolute() in self.trusted
+
+    def _follow_source(self) -> None:
+        """Show the requested source once it answers; report why it is refused."""
+        status = self.status
+        if status.connecting or status.requested < self.engine.requested.changed.get("source", 0):
+            return
+        if self.connecting and status.source == self.connecting:
+            self._use(self.connecting, already=True)
+        elif why := status.source_refusal:
+            self.withdraw()
+            if status.source != self.source:
+                self._use(status.source, already=True)
+            self.source_refused.emit(why)
+
+    def withdraw(self) -> None:
+        """Keep the source in use instead of the one that is being connected."""
+        self.connecting = ""
+        self.engine.withdraw()
 
     def go_on(self, left: ResumeInfo) -> None:
         """Resume what another window left; its settings are already those of the history."""
@@ -276,6 +318,7 @@ class Session(QObject):
         self._play()
 
     def disconnect_from(self) -> None:
+        self.connecting = ""
         self.source_changing.emit()
         self._turned_at = time.monotonic()
         self.engine.disconnect()
@@ -413,6 +456,7 @@ class Session(QObject):
             arrived = self.status.reported > self._seek_time + _ARRIVES
             if arrived or self._seek_target == self.status.playing.at:
                 self._seek_target = None
+            self._follow_source()
             self.reported.emit(self.status)
         estimate = self.engine.latest(self.status)
         if estimate is not None and (estimate.generation, estimate.sequence) != self._shown:
@@ -425,11 +469,19 @@ class Session(QObject):
         return self.status.state == "lost"
 
     def alarm(self) -> str:
-        """For how long the connection is lost, and why; empty while it is not."""
+        """For how long the connection is lost, and why unless this is in sight elsewhere.
+
+        Empty while it is not lost.
+        """
         if not self._lost:
             return ""
-        seconds = max(0.0, time.monotonic() - self._lost_since)
-        return f"LOST {seconds:.0f} s\n{self.status.message}"
+        seconds, why = max(0.0, time.monotonic() - self._lost_since), self.status.message
+        return f"LOST {seconds:.0f} s" + ("" if self.in_sight(why) else f"\n{why}")
+
+    def in_sight(self, text: str) -> bool:
+        """Whether one of the `reasons` shows this text."""
+        seen = (label for label in self.reasons if not label.visibleRegion().isEmpty())
+        return any(text.casefold() in label.text().casefold() for label in seen)
 
     def other_device(self) -> str:
         """The report of another device on this source, for a minute."""

@@ -44,6 +44,8 @@ _SILENT = 2.0  # s without a report, of an engine that reports ten times a secon
 _POLL = 1.0  # s between two polls at most that count as silence: this process may have been stopped
 _DEATHS, _WITHIN = 3, 10.0  # so many in so many s, and the process is not started again
 
+_OF_SOURCE = "source", "trust", "scene", "speed", "looped", "recomputes"  # which it comes with
+
 _AGAIN = "the engine process ended unexpectedly and was started again"
 _DIED = "the engine process ended unexpectedly; connect again to restart it"
 _HANGS = "the engine process has not reported for {:.0f} s; connect again if it does not continue"
@@ -76,6 +78,7 @@ class Engine:
         """For how long in s an engine that streams has not reported, as far as it was polled."""
         self._process: BaseProcess | ResumedProcess | None = None
         self.resumed: ResumeInfo | None = None
+        self._in_use = Requested()  # as it was before the newest source was requested
         process = resume_process(resume_from) if resume_from else None
         if process is None:
             self._requests = RequestSender(Requested().changing(setup=setup or Setup()))
@@ -178,7 +181,8 @@ class Engine:
     def connect(self, source: str, trust: bool = False) -> None:
         """Take frames from `source` instead of the present one; replaces a process that hangs.
 
-        With `trust` a scene may name files outside its folder.
+        A source that streams stays in use until the other one answers; where that cannot be opened,
+        `status` says why. With `trust` a scene may name files outside its folder.
         """
         if self._process is not None and self.silent >= _SILENT:
             self._process.kill()
@@ -188,10 +192,21 @@ class Engine:
             self._deaths = []
             self._requests.disconnect()
             self._requests.change(recording=None)
+        if self._seen.source == self.requested.source:
+            self._in_use = self.requested
         played = {"speed": 1.0, "looped": False, "recomputes": False}
         self._requests.change(source=source, trust=trust, scene=None, **played)
         if dead:
             self._start_again()
+
+    def withdraw(self) -> None:
+        """Request the source in use again, instead of one that is refused or does not answer."""
+        if self._in_use.source == self._seen.source:
+            changed = self.requested.changed
+            unchanged = (n for n in _OF_SOURCE if changed[n] == changed["source"])
+            self._requests.change(**{name: getattr(self._in_use, name) for name in unchanged})
+        else:
+            self._requests.change(source=self._seen.source or None)
 
     def disconnect(self) -> None:
         self._requests.change(source=None, scene=None, speed=1.0, looped=False)

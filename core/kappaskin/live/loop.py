@@ -38,7 +38,7 @@ from kappaskin.publish import Publishing
 from kappaskin.recording import ReplayedSource
 from kappaskin.scenes import Playback, Scene
 from kappaskin.sensing import Sensor
-from kappaskin.sources import SimulatedSource, Source, open_source
+from kappaskin.sources import SimulatedSource, Source, open_source, parts_of
 
 _READ = 0.02  # s a read may wait, and so a command
 _REPORT = 0.1  # s between two statuses
@@ -52,6 +52,7 @@ class EngineLoop:
     def __init__(self, requests: RequestReceiver, ring: Ring, compared: Ring) -> None:
         self._requests, self._ring = requests, ring
         self._source: Source | None = None
+        self._next: Source | None = None  # requested, and has not answered yet
         self._health, self._noise = LiveHealthMonitor(), NoiseCheck()
         self._place = np.full(2, math.nan)  # of the last contact, in m
         self._status: Status = ring.read_status() or Status()
@@ -84,11 +85,14 @@ class EngineLoop:
                 self._read(self._source)
             elif time.monotonic() >= self._again:
                 self._open(self._status.source)
+            if self._next is not None:
+                self._try_next(self._next)
             self._swap()
             if self._main.pipeline is not None and self._source is not None:
                 self._tare.update(self._main.pipeline, self._source)
             if time.monotonic() - self._status.reported >= _REPORT:
                 self._report()
+        self._drop_next()
         self._close()
         self.end_recording()
         self._publishing.close()
@@ -142,26 +146,70 @@ class EngineLoop:
                 return
         self._report()
 
-    def _go_to(self, source: str | None) -> None:
-        """Close the source, and open another one."""
-        self._close()
-        self._status = self._status.without_source()
-        if source is not None:
-            self._open(source)
+    def _go_to(self, name: str | None) -> None:
+        """Open a source; the one in use streams on until the other one answers."""
+        now = self._status
+        returns = now.connecting or now.source_refusal
+        self._drop_next()
+        if returns and name == now.source:
+            return
+        # A port is opened once: the same one with another description must be closed before.
+        if name is None or now.state != STREAMING or _place(name) == _place(now.source):
+            self._close()
+            self._status = self._status.without_source()
+            if name is not None:
+                self._open(name)
+            return
+        try:
+            self._next = open_source(name, self._requests.requested.trust)
+        except Refusal as refusal:
+            self._status = replace(self._status, source_refusal=str(refusal))
+            return
+        self._status = replace(self._status, connecting=name)
+        self._try_next(self._next)
+
+    def _drop_next(self, refusal: str = "") -> None:
+        """Close the source that has not answered, on a `refusal` or without."""
+        if self._next is not None:
+            self._next.close()
+        self._next = None
+        self._status = replace(self._status, connecting="", source_refusal=refusal)
+
+    def _try_next(self, source: Source) -> None:
+        """Use the requested source as soon as it answers, or the one in use is lost."""
+        try:
+            if source.sensor is None:
+                source.read(0.0)
+        except Refusal as refusal:
+            self._drop_next(str(refusal))
+            self._report()
+            return
+        now, trouble = self._status, source.trouble
+        if source.sensor is not None or now.state != STREAMING:
+            self._next = None
+            self._close()
+            self._status = self._status.without_source()
+            self._use(source, now.connecting)
+        elif trouble != now.source_refusal:
+            self._status = replace(now, source_refusal=trouble)
 
     def _open(self, name: str) -> None:
         """Open the source; `status` says why it cannot be, and a port is then retried."""
         self._again = math.inf
         try:
-            self._source = open_source(name, self._requests.requested.trust)
-            self._recorder.connect(self._source)
-            self._recompute()
-            self._status = replace(self._status, state=WAITING, source=name, message="")
+            self._use(open_source(name, self._requests.requested.trust), name)
         except SourceError as error:
             self._again = time.monotonic() + _AGAIN
             self._status = replace(self._status, state=LOST, source=name, message=str(error))
         except Refusal as refusal:
             self._status = replace(self._status, state=LOST, source=name, message=str(refusal))
+
+    def _use(self, source: Source, name: str) -> None:
+        """Take frames from the `source` of this `name`, which is open."""
+        self._source = source
+        self._recorder.connect(source)
+        self._recompute()
+        self._status = replace(self._status, state=WAITING, source=name, message="")
 
     def _recompute(self) -> None:
         """Let a recording show its recorded estimates, or such as are computed again."""
@@ -396,6 +444,11 @@ class EngineLoop:
             requested=self._requests.requested.number,
         )
         self._ring.write_status(self._status)
+
+
+def _place(source: str) -> str:
+    """The port, URL or file of a source, the same for each name of a port."""
+    return os.path.normcase(os.path.realpath(parts_of(source)[1] or source))
 
 
 _SWITCH = 2e-4  # s that one thread may keep the interpreter from another

@@ -30,25 +30,29 @@ class Status:
     """State of the engine.
 
     `state` is off, waiting (open, but the device has not sent its information), streaming or lost;
-    `message` says why, and `ended` whether it is lost because it came to its end. `setup` is the
-    one in use, `refusal` says why it is not the one requested last, `computing` whether another is
-    being prepared. `region` is scanned unless `region_refusal` says why not. `connections` counts
-    the devices connected so far, `skipped` the frames that arrived faster than they could be
-    computed, `computed` how long the others take, `quantities` those of `QUANTITIES` that they
-    have. `rate` in frames/s; `reader_gap` in s is the 99th percentile of the time between two
-    arrivals; `last_frame` and `reported` in s on the monotonic clock. `playing` maps device time to
-    the time of a simulated scene, which goes on by `pace` seconds per second. `events` are the last
-    of `event_count`. `temperature` of the device in degrees Celsius, NaN if it sends none. `tare`
-    is the state of tares, `drift` the drift since the tare of the `setup`, None without one.
-    `health` lists faulty channels, `publishing` the state of each target, `recording` that of the
-    file being written, `replay` the position in a recording (None for any other source), `compared`
-    the state of the second pipeline (None without one). `slope` is the largest of the newest shape,
-    if the method neglects it though it matters (`Fit.neglected_slope`), else 0. `requested` is the
-    number of the newest request that the engine has received.
+    `message` says why, and `ended` whether it is lost because it came to its end. `source` is the
+    one in use, `connecting` the requested one until it answers, `source_refusal` says why it does
+    not or cannot be used. `setup` is the one in use, `refusal` says why it is not the one requested
+    last, `computing` whether another is being prepared. `region` is scanned unless `region_refusal`
+    says why not. `connections` counts the devices connected so far, `skipped` the frames that
+    arrived faster than they could be computed, `computed` how long the others take, `quantities`
+    those of `QUANTITIES` that they have. `rate` in frames/s; `reader_gap` in s is the 99th
+    percentile of the time between two arrivals; `last_frame` and `reported` in s on the monotonic
+    clock. `playing` maps device time to the time of a simulated scene, which goes on by `pace`
+    seconds per second. `events` are the last of `event_count`. `temperature` of the device in
+    degrees Celsius, NaN if it sends none. `tare` is the state of tares, `drift` the drift since the
+    tare of the `setup`, None without one. `health` lists faulty channels, `publishing` the state of
+    each target, `recording` that of the file being written, `replay` the position in a recording
+    (None for any other source), `compared` the state of the second pipeline (None without one).
+    `slope` is the largest of the newest shape, if the method neglects it though it matters
+    (`Fit.neglected_slope`), else 0. `requested` is the number of the newest request that the engine
+    has received.
     """
 
     state: str = OFF
     source: str = ""
+    connecting: str = ""
+    source_refusal: str = ""
     message: str = ""
     ended: bool = False
     refusal: str = ""
@@ -96,6 +100,8 @@ class Status:
             self,
             state=OFF,
             source="",
+            connecting="",
+            source_refusal="",
             message="",
             ended=False,
             sensor=None,

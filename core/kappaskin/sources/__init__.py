@@ -27,6 +27,7 @@ from kappaskin.sources.pseudo_device import PseudoDevice as PseudoDevice
 from kappaskin.sources.pushed import FEED as FEED
 from kappaskin.sources.pushed import Feed as Feed
 from kappaskin.sources.pushed import feed as feed
+from kappaskin.sources.pushed import feeds_found as feeds_found
 from kappaskin.sources.recognition import READS as READS
 from kappaskin.sources.recognition import NewSensor as NewSensor
 from kappaskin.sources.recognition import RawLines as RawLines

@@ -14,6 +14,8 @@ import time as clock
 import weakref
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import cast
 
@@ -34,6 +36,7 @@ from kappaskin.sources.description import (
 from kappaskin.sources.information import sensor_from_json
 from kappaskin.sources.inputs import Input
 from kappaskin.sources.lines import BinaryDecoder
+from kappaskin.sources.ports import Port
 
 FEED = "feed:"
 """Scheme of readings that another program pushes, followed by the name of its feed."""
@@ -395,6 +398,21 @@ def fed_description(name: str) -> Description:
     connection.close()
     sensor = sensor_from_json(text)
     return description_of(sensor.description, sensor.name, sensor.serial_number)
+
+
+def feeds_found() -> list[Port]:
+    """The feeds of this user's programs, each as a port with the sensor that it is of."""
+    found: list[Port] = []
+    for path in sorted(machine_folder("feeds").glob("*.sock")):
+        with suppress(Refusal, OSError):
+            found.append(_as_port(path.stem, path.stat().st_mtime_ns))
+    return found
+
+
+@cache  # each feed is joined once, as one that is joined counts the readings that are not taken
+def _as_port(name: str, _: int) -> Port:
+    sensor = fed_description(name).sensor
+    return Port(f"{FEED}{name}", sensor.name, serial_number=sensor.serial_number)
 
 
 class FedInput(Input):

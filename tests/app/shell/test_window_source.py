@@ -28,6 +28,8 @@ def test_a_port_typed_is_the_port_meant(window: MainWindow, qtbot) -> None:
 
 @pytest.mark.full
 def test_an_absent_port_says_why_and_the_simulation_comes_back(window: MainWindow, until) -> None:
+    window.actions_by_name["disconnect"].trigger()  # or the simulation would stay
+    until(lambda: window.session.status.state == "off")
     window.connection.sources.setCurrentText("/dev/ttyNOWHERE")
     window.connection.connect_button.click()
     until(lambda: window.display.badge.state == "LOST")

@@ -16,7 +16,7 @@ import pytest
 from kappaskin import Refusal, SourceError, feed
 from kappaskin._files import machine_folder
 from kappaskin.recording import Verification
-from kappaskin.sources import load_description, open_source
+from kappaskin.sources import feeds_found, load_description, open_source
 
 pytestmark = pytest.mark.slow
 BOARD = """
@@ -161,6 +161,16 @@ def test_two_feeds_of_one_name_are_refused_and_one_left_behind_is_replaced(board
     with feed("glove", board) as glove, closing(open_source("feed:glove")) as source:
         glove.push(VALUES)
         assert len(taken(source, 1)) == 1
+
+
+def test_feeds_are_found_by_name_with_the_sensor_that_they_are_of(board) -> None:
+    with feed("knee", board), feed("hand", board):
+        sensor = load_description(board).sensor
+        found = {port.port: port for port in feeds_found()}
+        for name in ("feed:hand", "feed:knee"):
+            assert found[name].description == sensor.name
+            assert found[name].serial_number == sensor.serial_number
+    assert not {"feed:hand", "feed:knee"} & {port.port for port in feeds_found()}
 
 
 def test_only_this_user_may_connect(board) -> None:

@@ -38,10 +38,13 @@ class ConnectionFeature:
         self.port_search = PortSearch(self.connection.sources, shell.tasks, shell)
         self.connection.connect_requested.connect(guarded(session.request_source))
         self.connection.disconnect_requested.connect(guarded(session.disconnect_from))
+        self.connection.cancel_requested.connect(guarded(self._cancel))
         self.connection.refresh_requested.connect(guarded(self.port_search.refresh))
         self.port_search.found.connect(guarded(self.connection.show_ports))
         session.source_changed.connect(guarded(self.connection.show_source))
-        add("simulate", SOURCE, "&Simulated skin", session.simulate, "Ctrl+M", _SIMULATE)
+        session.source_refused.connect(guarded(self.connection.show_refusal))
+        session.reasons.append(self.connection.message)
+        add("simulate", SOURCE, "&Simulate a device", session.simulate, "Ctrl+M", _SIMULATE)
         add("connect", SOURCE, "&Connect", self._connect, "Ctrl+Return", _CONNECT)
         add("disconnect", SOURCE, "&Disconnect", session.disconnect_from, "Ctrl+D", _DISCONNECT)
         add("ports", SOURCE, "Re&fresh ports", self.port_search.refresh, "F5", _PORTS)
@@ -84,6 +87,10 @@ class ConnectionFeature:
 
     def _connect(self) -> None:
         self._session.request_source(self.connection.source())
+
+    def _cancel(self) -> None:
+        self._session.withdraw()
+        self.connection.show_source(self._session.source)
 
     def _open(self) -> None:
         file, _ = QFileDialog.getOpenFileName(

@@ -3,13 +3,25 @@
 import math
 import time
 
-from PySide6.QtCore import QObject, QSignalBlocker, Qt, QTimer, Signal
+from PySide6.QtCore import (
+    QEvent,
+    QModelIndex,
+    QObject,
+    QPersistentModelIndex,
+    QSignalBlocker,
+    Qt,
+    QTimer,
+    Signal,
+)
+from PySide6.QtGui import QKeyEvent, QKeySequence, QMouseEvent, QWheelEvent
 from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
     QHBoxLayout,
     QLineEdit,
     QPushButton,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
     QWidget,
 )
 
@@ -17,7 +29,7 @@ from kappaskin._text import printable
 from kappaskin.calibration import Calibration
 from kappaskin.live import Status
 from kappaskin.sensing import Sensor
-from kappaskin.sources import Port, parts_of
+from kappaskin.sources import Port, feeds_found, parts_of
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.form import pass_window_keys
@@ -30,7 +42,7 @@ _PERIOD = 1000  # ms between two searches
 
 
 class PortSearch(QObject):
-    """Searches for serial ports each second while `combo` is visible; emits them as `found`."""
+    """Searches for ports and feeds each second while `combo` is visible; emits them as `found`."""
 
     found = Signal(list)
 
@@ -49,32 +61,120 @@ class PortSearch(QObject):
     def refresh(self) -> None:
         """Search now, unless a search is running."""
         if not self._search.running:
-            self._search.run(Port.found)
+            self._search.run(lambda: [*Port.found(), *feeds_found()])
 
 
-_SIMULATED = ("sim:", "Simulated skin")
+_SIMULATED = ("sim:", "Simulate a device")
 _NO_PORTS = ("sim:", "replay:", "feed:", "sensor:")
 _TIP = (
-    "The simulated skin, a serial port found on this machine, or a port or URL typed here, such as "
-    "/dev/ttyACM0, COM3 or socket://host:port."
+    "Click for the list of devices, or type a port or URL, such as /dev/ttyACM0, COM3 or "
+    "socket://host:port."
 )
-_LONGEST, _TAIL = 56, 18  # characters of a port in the list, and how many of them from its end
+_LONGEST, _TAIL = 64, 18  # characters of a line of the list, and how many of them from its end
 _MARGIN = 16  # px
 _LOSSES_PERIOD = 1.0  # s between two updates of the losses
+_EDITING = Qt.Key.Key_Backspace, Qt.Key.Key_Delete, Qt.Key.Key_Left, Qt.Key.Key_Right
+_BREAK = "\N{LINE SEPARATOR}    "  # at which an item of a list is broken, and an indent
+_DETAILS = Qt.ItemDataRole.UserRole + 1
+
+
+class _Rows(QStyledItemDelegate):
+    """Draws each source with its details in further lines."""
+
+    def initStyleOption(
+        self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
+    ) -> None:
+        super().initStyleOption(option, index)
+        option.text = index.data(_DETAILS) or index.data()  # pyright: ignore[reportAttributeAccessIssue]
+
+
+class SourceBox(QComboBox):
+    """A list that opens on a click, with a line in which typed text replaces the selected text.
+
+    `chosen` is emitted for what is chosen from the list alone: `activated` is for a typed name that
+    is listed, too, once the line loses the focus.
+    """
+
+    chosen = Signal()
+
+    def __init__(self) -> None:
+        # Without looking for duplicates, or Return would choose from the list.
+        super().__init__(
+            editable=True, insertPolicy=self.InsertPolicy.NoInsert, duplicatesEnabled=True
+        )  # pyright: ignore[reportCallIssue]
+        self.line, self._opens, self._listed = QLineEdit(), False, False
+        self.setLineEdit(self.line)
+        # A completer would turn a typed ttyACM1 into a listed ttyACM10.
+        self.setCompleter(None)  # pyright: ignore[reportArgumentType]
+        self.activated.connect(self._choose)
+        self.line.textEdited.connect(self._leave_list)
+        self.setItemDelegate(_Rows(self))
+        self.view().setTextElideMode(Qt.TextElideMode.ElideNone)
+        for watched in (self.line, self.view()):
+            watched.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if isinstance(event, QKeyEvent) and watched is self.view():
+            return event.type() == QEvent.Type.KeyPress and self._typed(event)
+        if isinstance(event, QMouseEvent) and watched is self.line:
+            if event.type() == QEvent.Type.MouseButtonPress:
+                self._opens = not self.line.isModified()  # while typing it places the cursor
+                if self._opens:
+                    self.line.selectAll()
+            elif event.type() == QEvent.Type.MouseButtonRelease and self._opens:
+                self._opens = False
+                self.showPopup()
+                self.line.selectAll()
+                return True
+            return self._opens
+        return super().eventFilter(watched, event)
+
+    def _typed(self, event: QKeyEvent) -> bool:
+        """Type into the line what is typed while the list is open; whether it was text."""
+        edits = event.key() in _EDITING or event.matches(QKeySequence.StandardKey.Paste)
+        if not edits and not (event.text() and event.text().isprintable()):
+            return False
+        self.hidePopup()
+        if not self.line.isModified():
+            self.line.selectAll()  # some window managers have ended the selection
+        QApplication.sendEvent(self.line, event)
+        return True
+
+    def showPopup(self) -> None:
+        self._listed = True
+        super().showPopup()
+
+    def _leave_list(self) -> None:
+        self._listed = False
+
+    def _choose(self) -> None:
+        if self._listed:
+            self._listed = False
+            self.chosen.emit()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in (Qt.Key.Key_Up, Qt.Key.Key_Down):
+            self.showPopup()  # to choose without connecting what lies between
+        else:
+            super().keyPressEvent(event)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        event.ignore()
 
 
 class ConnectionPanel(Panel):
-    """Selection of a source: the simulation, a serial port found, or a typed port or URL."""
+    """Selection of a source: the simulation, a device found, or a typed port or URL."""
 
     purpose = (
-        "The source of readings: the simulated skin, a serial port, any URL that pyserial opens, "
-        "or a recording. A lost connection is reopened automatically, and lost messages are "
-        "counted."
+        "The source of readings: a simulated device, a serial port, any URL that pyserial opens, "
+        "or a recording. It streams until another one answers. A lost connection is reopened "
+        "automatically, and lost messages are counted."
     )
     guide_page = "connect"
 
     connect_requested = Signal(str)
     disconnect_requested = Signal()
+    cancel_requested = Signal()
     refresh_requested = Signal()
     new_requested = Signal()
 
@@ -83,13 +183,14 @@ class ConnectionPanel(Panel):
         self._ports: list[Port] = []
         self._selected: Port | None = None  # the selected port, listed or not
         self._next_losses = 0.0
-        self.sources = QComboBox(editable=True, insertPolicy=QComboBox.InsertPolicy.NoInsert)  # pyright: ignore[reportCallIssue]
+        self._speakers: list[tuple[Port, str]] = []  # ports, and the devices last connected there
+        self._refusal, self._connecting = "", ""
+        self.sources = SourceBox()
         self.sources.setObjectName("source")
         self.sources.setAccessibleName("Source of readings")
         self.sources.setMinimumContentsLength(12)
         self.sources.currentTextChanged.connect(self._note_selection)
-        # Show the beginning, where the port's name is.
-        self.sources.currentIndexChanged.connect(lambda: self._line.setCursorPosition(0))
+        self.sources.chosen.connect(self._request)
         self.refresh_button = QPushButton("Refresh")
         self.refresh_button.setToolTip("Search for serial ports again.")
         self.connect_button = QPushButton("Connect")
@@ -97,19 +198,15 @@ class ConnectionPanel(Panel):
         self.connect_button.setToolTip("Connect the source above (Ctrl+Return).")
         self.disconnect_button = QPushButton("Disconnect")
         self.disconnect_button.setObjectName("disconnect")
-        self.disconnect_button.setToolTip("Close the source (Ctrl+D).")
         self.device, self.losses = Label(wordWrap=True), Label(wordWrap=True)  # pyright: ignore[reportCallIssue]
         self.losses.setToolTip("Messages lost and bytes discarded since the source was connected.")
         self.copy_button = QPushButton("Copy the command")
         self.copy_button.setToolTip("Copy the command in the message above, for a terminal.")
         self.copy_button.clicked.connect(self._copy_command)
-        self.connect_button.clicked.connect(lambda: self.connect_requested.emit(self.source()))
-        self._line = QLineEdit()
+        self.connect_button.clicked.connect(self._request)
+        self._line = self.sources.line
         self._line.returnPressed.connect(self.connect_button.click)
-        self.sources.setLineEdit(self._line)
-        # A completer would turn a typed ttyACM1 into a listed ttyACM10.
-        self.sources.setCompleter(None)  # pyright: ignore[reportArgumentType]
-        self.disconnect_button.clicked.connect(self.disconnect_requested)
+        self.disconnect_button.clicked.connect(self._disconnect)
         self.refresh_button.clicked.connect(self.refresh_requested)
         self.new_button = QPushButton(f"New sensor{ELLIPSIS}")
         self.new_button.setObjectName("new_sensor_button")
@@ -133,12 +230,21 @@ class ConnectionPanel(Panel):
         index = self.sources.findText(text)
         return str(self.sources.itemData(index)) if index >= 0 else text
 
+    def _request(self) -> None:
+        self._refusal = ""
+        self._line.setModified(False)
+        self.connect_requested.emit(self.source())
+
+    def _disconnect(self) -> None:
+        (self.cancel_requested if self._connecting else self.disconnect_requested).emit()
+
     def port(self) -> str:
         """The port or URL that is selected or typed, else the only one found; empty without."""
         chosen = parts_of(self.source())[1] or self.source()
         if not chosen.startswith(_NO_PORTS):
             return chosen
-        return self._ports[0].port if len(self._ports) == 1 else ""
+        ports = [port.port for port in self._ports if not port.port.startswith(_NO_PORTS)]
+        return ports[0] if len(ports) == 1 else ""
 
     def _note_selection(self) -> None:
         """Store the selected port, to recognise its device under another name."""
@@ -146,9 +252,10 @@ class ConnectionPanel(Panel):
         known = (port for port in self._ports if port.port == chosen)
         absent = self._selected if self._selected and self._selected.port == chosen else None
         self._selected = next(known, absent)
-        listed = self._selected and _port_text(self._selected)
-        words = _SIMULATED[1] if chosen == _SIMULATED[0] else listed
-        self.sources.setToolTip(plain_tip(f"{words or chosen}\n\n{_TIP}"))
+        words = "" if chosen == _SIMULATED[0] else chosen
+        if self._selected is not None:
+            words = "\n".join(_lines_on(self._selected, ""))
+        self.sources.setToolTip(plain_tip(f"{words}\n\n{_TIP}" if words else _TIP))
 
     def show_ports(self, ports: list[Port]) -> None:
         """List these and the simulation; the selected device stays selected under a new name."""
@@ -168,36 +275,77 @@ class ConnectionPanel(Panel):
         with QSignalBlocker(self.sources):
             self.sources.clear()
             self.sources.addItem(_SIMULATED[1], _SIMULATED[0])
-            for place, port in enumerate(self._ports, 1):
-                self.sources.addItem(_abbreviated(_port_text(port)), port.port)
-                self.sources.setItemData(
-                    place, plain_tip(_port_text(port)), Qt.ItemDataRole.ToolTipRole
-                )
+            for port in self._ports:
+                self.sources.addItem(printable(port.port), port.port)
+            self._show_details()
+
+    def _show_details(self) -> None:
+        for row, port in enumerate(self._ports, 1):
+            speaks = (text for known, text in self._speakers if known.same_plug(port))
+            lines = _lines_on(port, next(speaks, ""))
+            self.sources.setItemData(row, _BREAK.join(map(_abbreviated, lines)), _DETAILS)
+            tip = plain_tip("\n".join(lines))
+            self.sources.setItemData(row, tip, Qt.ItemDataRole.ToolTipRole)
         # Wider than the panel, or the list would cut off the serial numbers of two of a kind.
         self.sources.view().setMinimumWidth(self.sources.view().sizeHintForColumn(0) + _MARGIN)
 
+    def _note_speaker(self, source: str, sensor: Sensor) -> None:
+        """Store which device speaks at a listed port, to show it in the list."""
+        at = parts_of(source)[1] or source
+        text = f"{sensor.name} ({sensor.serial_number}), {sensor.layout}"
+        for port in self._ports:
+            if port.port == at and (port, text) not in self._speakers:
+                others = [known for known in self._speakers if not known[0].same_plug(port)]
+                self._speakers = [*others, (port, text)]
+                self._show_details()
+
     def show_source(self, source: str) -> None:
+        self._refusal = ""
         index = self.sources.findData(source)
         with QSignalBlocker(self.sources):
-            if index >= 0:
-                self.sources.setCurrentIndex(index)
-            else:
-                self.sources.setCurrentText(source)
+            self.sources.setCurrentIndex(index)
+            if index < 0:
+                self.sources.setEditText(source)
+        self._line.setModified(False)
         self._line.setCursorPosition(0)
         self._note_selection()
+
+    def show_refusal(self, why: str) -> None:
+        """Show why the requested source is not used."""
+        self._refusal = why
 
     def show_status(self, status: Status, simulating: bool) -> None:
         text = ""
         if status.sensor is not None and status.state == "streaming":
             text = _sensor_text(status.sensor, status.setup.calibration) + _recording_text(status)
+            self._note_speaker(status.source, status.sensor)
         elif status.state == "waiting":
             text = "Waiting for the device's description\N{HORIZONTAL ELLIPSIS}"
         if text != self.device.text():
             self.device.setText(text)
         self.device.setVisible(bool(text))
-        self.show_message(status.message)
+        self._connecting = status.connecting
+        self._show_message(status)
         self._show_losses(status)
         self.disconnect_button.setEnabled(status.state != "off")
+        self.disconnect_button.setText("Cancel" if status.connecting else "Disconnect")
+        self.disconnect_button.setToolTip(
+            "Keep the source in use." if status.connecting else "Close the source (Ctrl+D)."
+        )
+
+    def _show_message(self, status: Status) -> None:
+        """Show the progress or the failure of a connection, with what stays connected."""
+        stays = "The simulation" if status.source.startswith("sim:") else status.source
+        if status.connecting:
+            why = status.source_refusal and f"\n{status.source_refusal}"
+            begun = f"Connecting to {status.connecting}{ELLIPSIS} {stays} runs until it answers."
+            self.show_message(f"{begun}{why}", hint=not why)
+        elif self._refusal:
+            self.show_message(f"{self._refusal}\n{stays} stays connected.")
+        elif status.replay is None and not status.source.startswith("replay:"):
+            self.show_message(status.message)
+        else:
+            self.show_message("")  # under Recording
 
     def _show_losses(self, status: Status) -> None:
         """Update the losses at a legible rate; a simulation has none."""
@@ -213,14 +361,18 @@ class ConnectionPanel(Panel):
         self.copy_button.setVisible(bool(COMMAND.search(text)))
 
 
-def _port_text(port: Port) -> str:
-    """Description of a port, and whether this user may open it."""
-    words = printable(port.words)
-    return words if port.opened else f"{words}  (no permission)"
+def _lines_on(port: Port, speaks: str) -> list[str]:
+    """Lines on a port: its name and number, its description and maker, and what speaks there."""
+    number = port.serial_number and f"serial number {port.serial_number}"
+    permission = "" if port.opened else "no permission"
+    maker = "" if port.maker in port.description else port.maker
+    named = ", ".join(filter(None, (port.port, number, permission)))
+    described = ", ".join(filter(None, (port.description, maker)))
+    return [printable(line) for line in (named, described, speaks) if line]
 
 
 def _abbreviated(words: str) -> str:
-    """The `words` shortened in the middle: the end has the serial number."""
+    """The `words` shortened in the middle."""
     if len(words) <= _LONGEST:
         return words
     return f"{words[: _LONGEST - _TAIL - 1]}\N{HORIZONTAL ELLIPSIS}{words[-_TAIL:]}"

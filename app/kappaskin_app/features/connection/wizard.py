@@ -40,6 +40,7 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.recording import FileLines, is_foreign
 from kappaskin.sources import (
+    FEED,
     READS,
     NewSensor,
     Port,
@@ -319,7 +320,7 @@ class NewSensorDialog(QDialog):
 
     def show_ports(self, ports: list[Port]) -> None:
         """List these ports; one that was just plugged in is read, unless another one is."""
-        names = [port.port for port in ports]
+        names = [port.port for port in ports if not port.port.startswith(FEED)]
         known, self._known = self._known, set(names)
         if known is not None and self._known == known:
             return

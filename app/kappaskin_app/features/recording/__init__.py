@@ -15,7 +15,7 @@ from kappaskin_app.shell.pages import LIVE
 from kappaskin_app.shell.recovery import SettingsHandover
 from kappaskin_app.shell.session import RECORDED
 from kappaskin_app.shell.window import MainWindow
-from kappaskin_app.widgets.parts import ELLIPSIS
+from kappaskin_app.widgets.parts import ELLIPSIS, sentence
 
 
 class RecordingFeature:
@@ -50,8 +50,9 @@ class RecordingFeature:
     def _wire_playback(self, shell: MainWindow) -> None:
         session, opening, playback = shell.session, shell.opening, self.playback
         session.source_handlers.append(playback.takes)
+        session.reasons.append(self.recording.message)
         session.pause_requested.connect(guarded(self._pause))
-        playback.notified.connect(guarded(shell.notify))
+        playback.notified.connect(guarded(self._notify))
         playback.opened.connect(session.source_changed)
         playback.opened.connect(guarded(self._add_recent))
         playback.offered.connect(guarded(partial(shell.panels.reveal, self.recording)))
@@ -64,6 +65,13 @@ class RecordingFeature:
             "Play a recording; a file can also be dropped on the window.",
             playback.open,
         )
+
+    def _notify(self, text: str) -> None:
+        """Show a message of the playback in the panel alone, if that is visible, or below."""
+        if self.recording.isVisible() and sentence(text) == self.recording.message.text():
+            self._shell.panels.reveal(self.recording)
+        else:
+            self._shell.notify(text)
 
     def _add_recent(self, source: str) -> None:
         self._shell.opening.note(Path(source.removeprefix(RECORDED)))

@@ -148,6 +148,8 @@ class PlaybackControl(QObject):
         """Open `source` if it is a recording; whether it is."""
         if source.startswith(RECORDED):
             self.open_file(Path(source.removeprefix(RECORDED).strip()))
+        elif self.summary is None:
+            self._set_message("")  # of a recording that was refused
         return source.startswith(RECORDED)
 
     def resume(self, source: str) -> None:

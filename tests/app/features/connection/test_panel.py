@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QLineEdit
+from PySide6.QtWidgets import QLineEdit, QStyleOptionViewItem
 
 from kappaskin import Event, Status, load_scene
 from kappaskin.sources import Port
@@ -38,20 +38,43 @@ def listed(panel):
     return [panel.sources.itemText(place) for place in range(panel.sources.count())]
 
 
+def details(panel, row):
+    """The lines that the list shows of a source."""
+    index = panel.sources.model().index(row, 0)
+    option = QStyleOptionViewItem()
+    panel.sources.itemDelegate().initStyleOption(option, index)
+    return [line.strip() for line in option.text.splitlines()]
+
+
 def test_ports_are_listed_with_maker_and_number_and_whether_they_may_be_opened(panel):
-    simulated, skin, board = listed(panel)
-    assert simulated == "Simulated skin"
-    assert skin.startswith("/dev/ttyACM0  Fingertip")
-    assert "\N{HORIZONTAL ELLIPSIS}" in skin
-    assert skin.endswith("Kappa Ltd  [SN-4711]"[-18:])
-    assert len(skin) <= 56
-    assert board.endswith("(no permission)")
-    whole = panel.sources.itemData(1, Qt.ItemDataRole.ToolTipRole)
-    assert whole == "/dev/ttyACM0  Fingertip of ten by ten elements  Kappa Ltd  [SN-4711]"
+    assert listed(panel) == ["Simulate a device", SKIN.port, BOARD.port]
+    assert details(panel, 0) == ["Simulate a device"]
+    whole = [
+        "/dev/ttyACM0, serial number SN-4711",
+        "Fingertip of ten by ten elements, Kappa Ltd",
+    ]
+    assert details(panel, 1) == whole
+    assert details(panel, 2)[0] == "/dev/ttyUSB0, serial number beef, no permission"
+    assert panel.sources.itemData(1, Qt.ItemDataRole.ToolTipRole) == "\n".join(whole)
     panel.sources.setCurrentIndex(1)
     assert panel.source() == "/dev/ttyACM0"
-    assert whole in panel.sources.toolTip()
-    assert panel.sources.lineEdit().cursorPosition() == 0  # the name is to be search
+    assert whole[0] in panel.sources.toolTip()
+    panel.show_ports([replace(SKIN, description=40 * "long ")])
+    line = details(panel, 1)[1]
+    assert "\N{HORIZONTAL ELLIPSIS}" in line
+    assert len(line) == 64
+
+
+def test_the_list_shows_what_speaks_at_a_port_even_under_another_name(panel):
+    sensor = replace(load_scene("centre").sensor(), name="Thumb", serial_number="T-1")
+    panel.show_status(Status(state="streaming", source=SKIN.port, sensor=sensor), False)
+    assert details(panel, 1)[2] == "Thumb (T-1), 10 x 10 elements"
+    assert len(details(panel, 2)) == 2
+    panel.show_ports([BOARD, replace(SKIN, port="/dev/ttyACM1")])
+    assert details(panel, 2)[2] == "Thumb (T-1), 10 x 10 elements"
+    other = replace(sensor, name="Palm")
+    panel.show_status(Status(state="streaming", source="/dev/ttyACM1", sensor=other), False)
+    assert details(panel, 2)[2] == "Palm (T-1), 10 x 10 elements"
 
 
 def test_the_choice_stays_when_other_ports_come_and_go(panel):

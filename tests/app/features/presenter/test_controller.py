@@ -164,6 +164,8 @@ def test_the_estimate_drives_the_cue_and_not_the_truth(demo, until) -> None:
 @pytest.mark.full
 def test_a_lost_line_says_what_to_do_and_what_is_felt_comes_back(demo, until) -> None:
     view = demo.presenter.view
+    demo.session.disconnect_from()  # or the scene would stay
+    until(lambda: demo.session.status.state == "off")
     demo.session.connect_to("/dev/ttyNOWHERE")
     until(lambda: view.strip.state == LOST)
     assert view.pages.currentWidget() is view.banner

@@ -1,0 +1,207 @@
+"""The list of devices, with the mouse and the keys: choose, type, and what a failure leaves."""
+
+import os
+
+import pytest
+
+pytest.importorskip("pty", reason="no pseudo-terminals on this system")
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtWidgets import QApplication, QLabel
+
+from kappaskin.sources import Port
+from kappaskin.sources.ports import open_port
+from kappaskin_app.features.connection.panel import ConnectionPanel
+
+PORTS = [Port("/dev/ttyACM0", "Fingertip", "Kappa Ltd", "SN-4711"), Port("/dev/ttyACM10")]
+LEFT = Qt.MouseButton.LeftButton
+
+
+class RecordedPanel(ConnectionPanel):
+    """A panel that lists what it requests."""
+
+    def __init__(self):
+        super().__init__()
+        self.requests = []
+        self.connect_requested.connect(self.requests.append)
+
+
+@pytest.fixture
+def panel(qtbot):
+    made = RecordedPanel()
+    qtbot.addWidget(made)
+    made.resize(290, 200)
+    made.show()
+    made.show_ports(PORTS)
+    qtbot.waitExposed(made)
+    made.activateWindow()
+    return made
+
+
+def opened_by_click(panel, qtbot):
+    """The list, opened with the mouse."""
+    qtbot.mouseClick(panel.sources.line, LEFT, pos=QPoint(30, 8))
+    view = panel.sources.view()
+    qtbot.waitUntil(view.isVisible)
+    return view
+
+
+def typed(qtbot, text):
+    """Type a text into whatever has the keyboard."""
+    for letter in text:
+        popup = QApplication.activePopupWidget()
+        qtbot.keyClicks((popup and popup.focusWidget()) or QApplication.focusWidget(), letter)
+
+
+def test_a_click_opens_the_list_and_a_click_there_connects(panel, qtbot):
+    view = opened_by_click(panel, qtbot)
+    assert panel.requests == []
+    where = view.visualRect(view.model().index(1, 0)).center()
+    qtbot.mouseMove(view.viewport(), where)
+    qtbot.wait(300)  # after which a release is no longer that of the click which opened it
+    qtbot.mouseClick(view.viewport(), LEFT, pos=where)
+    assert panel.requests == [PORTS[0].port]
+    assert panel.sources.currentText() == PORTS[0].port
+    assert not view.isVisible()
+
+
+def test_arrows_choose_from_the_list_and_connect_with_return_alone(panel, qtbot):
+    panel.sources.setFocus()
+    qtbot.keyClick(panel.sources, Qt.Key.Key_Down)
+    view = panel.sources.view()
+    qtbot.waitUntil(view.isVisible)
+    for _ in range(2):
+        qtbot.keyClick(view, Qt.Key.Key_Down)
+    assert panel.requests == []
+    qtbot.keyClick(view, Qt.Key.Key_Return)
+    assert panel.requests == [PORTS[1].port]
+
+
+def test_escape_closes_the_list_and_changes_nothing(panel, qtbot):
+    view = opened_by_click(panel, qtbot)
+    qtbot.keyClick(view, Qt.Key.Key_Down)
+    qtbot.keyClick(view, Qt.Key.Key_Escape)
+    qtbot.waitUntil(lambda: not view.isVisible())
+    assert (panel.requests, panel.source()) == ([], "sim:")
+
+
+def test_what_is_typed_replaces_the_text_and_return_connects_it_once(panel, qtbot):
+    for text in ("/dev/ttyACM1", "COM3", "/dev/ttyACM0"):
+        qtbot.keyClick(opened_by_click(panel, qtbot), Qt.Key.Key_Escape)  # and once more
+        opened_by_click(panel, qtbot)
+        typed(qtbot, text)
+        assert panel.sources.currentText() == text
+        assert not panel.sources.view().isVisible()
+        qtbot.keyClick(panel.sources, Qt.Key.Key_Return)
+        assert panel.requests.pop() == text  # not the longer name that is listed
+        assert panel.requests == []
+
+
+def test_a_typed_name_that_is_listed_connects_with_return_alone(panel, qtbot):
+    opened_by_click(panel, qtbot)
+    typed(qtbot, PORTS[0].port)
+    panel.connect_button.setFocus()
+    assert panel.requests == []
+    qtbot.keyClick(panel.sources, Qt.Key.Key_Return)
+    assert panel.requests == [PORTS[0].port]
+
+
+def test_a_click_into_text_that_is_being_typed_places_the_cursor(panel, qtbot):
+    opened_by_click(panel, qtbot)
+    typed(qtbot, "/dev/ttyX")
+    qtbot.mouseClick(panel.sources.line, LEFT, pos=QPoint(4, 8))
+    assert not panel.sources.view().isVisible()
+    typed(qtbot, "Y")
+    assert panel.sources.currentText() == "Y/dev/ttyX"
+
+
+def test_the_wheel_does_not_change_the_source(panel, qtbot):
+    panel.sources.setFocus()
+    at = QPointF(30, 8)
+    turn = QWheelEvent(
+        at,
+        panel.sources.mapToGlobal(at),
+        QPoint(),
+        QPoint(0, -120),
+        Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase,
+        False,
+    )
+    QApplication.sendEvent(panel.sources, turn)
+    assert (panel.requests, panel.source()) == ([], "sim:")
+
+
+def connected(window, qtbot, text):
+    """Type a source over what is in the box, and press Return."""
+    opened_by_click(window.connection, qtbot)
+    typed(qtbot, text)
+    qtbot.keyClick(window.connection.sources, Qt.Key.Key_Return)
+
+
+def places_of(window, text):
+    """Where in the window a text is shown."""
+    shown = [label for label in window.findChildren(QLabel) if label.isVisible()]
+    found = [label for label in shown if text in label.text()]
+    return (
+        len(found)
+        + (text in window.statusBar().currentMessage())
+        + (text in window.membrane.alarm.text)
+    )
+
+
+@pytest.mark.parametrize(
+    ("source", "reason"),
+    [
+        ("/dev/ttyABSENT7", "there is no such port"),
+        ("sim:nowhere", "expected a scene among"),
+        ("feed:nobody", "no program feeds it"),
+        ("replay:/nowhere/x.mcap", "cannot be read"),
+    ],
+)
+def test_a_wrong_path_leaves_the_simulation_and_one_reason(window, qtbot, until, source, reason):
+    connections = window.session.status.connections
+    connected(window, qtbot, source)
+    until(lambda: places_of(window, reason) > 0)
+    before = window.session.estimate.sequence
+    until(lambda: window.session.estimate.sequence > before + 20)
+
+    assert places_of(window, reason) == 1
+    assert (window.session.source, window.session.engine.source) == ("sim:", "sim:")
+    assert window.session.status.connections == connections
+    assert window.display.badge.state == "SIM"
+    assert window.connection.sources.currentText() == source  # to be mended
+
+    window.connection.sources.setFocus()
+    connected(window, qtbot, "sim:circle")
+    until(lambda: window.session.source == "sim:circle")
+    until(lambda: places_of(window, reason) == 0)
+
+
+def test_a_silent_port_waits_beside_the_simulation_until_it_is_cancelled(window, qtbot, until):
+    master, slave = os.openpty()
+    port, panel = os.ttyname(slave), window.connection
+    connected(window, qtbot, port)
+    until(lambda: "The simulation runs until it answers." in panel.message.text())
+    until(lambda: "silent" in panel.message.text())
+    assert places_of(window, "silent") == 1
+    assert (window.session.source, window.display.badge.state) == ("sim:", "SIM")
+
+    assert panel.disconnect_button.text() == "Cancel"
+    qtbot.mouseClick(panel.disconnect_button, LEFT)
+    until(lambda: panel.disconnect_button.text() == "Disconnect")
+    assert not panel.message.isVisible()
+    assert (panel.source(), window.session.engine.source) == ("sim:", "sim:")
+    for end in (master, slave):
+        os.close(end)
+
+
+def test_a_busy_port_is_named_with_who_has_it(window, qtbot, until):
+    master, slave = os.openpty()
+    held = open_port(os.ttyname(slave))
+    connected(window, qtbot, os.ttyname(slave))
+    until(lambda: "busy, opened by" in window.connection.message.text())
+    assert window.display.badge.state == "SIM"
+    held.close()
+    for end in (master, slave):
+        os.close(end)
