@@ -208,10 +208,7 @@ def test_a_table_that_is_dropped_is_described_and_imported(
     rows = (f"{n / 100},{','.join(f'{n * k % 7}' for k in range(1, 13))}" for n in range(300))
     table.write_text("time," + ",".join(f"h{k}" for k in range(12)) + "\n" + "\n".join(rows) + "\n")
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(file), ""))
-    monkeypatch.setattr(
-        "kappaskin_app.features.connection.recordings_folder", lambda: tmp_path / "made"
-    )
-    (tmp_path / "made").mkdir()
+    monkeypatch.setenv("XDG_DOCUMENTS_DIR", str(tmp_path))
     window.opening.open(table)
     dialog = window.new_sensor
     until(lambda: "13 columns" in dialog.fact.text())
@@ -225,7 +222,7 @@ def test_a_table_that_is_dropped_is_described_and_imported(
 
     until(lambda: window.display.badge.state == "REPLAY")
     until(lambda: window.session.status.replay.length == pytest.approx(2.99))
-    assert (tmp_path / "made" / "week.mcap").exists()
+    assert (tmp_path / "Kappaskin" / "week.mcap").exists()
 
 
 def test_a_bag_that_is_dropped_is_described_and_its_topic_imported(
