@@ -56,7 +56,8 @@ class SectionBox(QGroupBox):
         self.grid.setHorizontalSpacing(10)
         self.grid.setContentsMargins(*((8, 6, 8, 8) if section.title else (8, 0, 8, 0)))
         self._fill(section)
-        self._corner = self._buttons(section) if section.title else QWidget()
+        # A label without text has no size; an empty widget would take the clicks of a button below.
+        self._corner = self._buttons(section) if section.title else Label()
         self._corner.setParent(self)
         if not (section.rows or section.sections or section.adding):
             default = Label("Default")

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QCheckBox,
@@ -12,6 +13,7 @@ from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QLineEdit,
     QSpinBox,
+    QToolButton,
     QWidget,
 )
 
@@ -196,3 +198,14 @@ def test_tips_tell_unit_and_range() -> None:
     assert Key("a", "A tip.", mm, 0.0, 0.5).explained == "A tip. From 0 to 500 mm."
     assert Key("a", "A tip.", newton, 2.0).explained == "A tip. At least 2 N."
     assert Key("a", "A tip.").explained == "A tip."
+
+
+def test_nothing_takes_the_clicks_of_the_button_that_adds_a_touch(
+    shown: Callable[[str], SceneForm],
+) -> None:
+    form = shown(TEXTS["centre"])
+    button = next(b for b in form.findChildren(QToolButton) if b.text() == "+ Add touch")
+    box = button.parentWidget()
+    box.resize(button.geometry().right() + 8, box.height())
+    assert box.childAt(button.geometry().center()) is button
+    assert box.childAt(button.geometry().topRight() + QPoint(-4, 4)) is button
