@@ -1,9 +1,9 @@
 """The status bar: messages, warnings, the object in contact, background tasks."""
 
 import numpy as np
-from PySide6.QtCore import QEvent, Signal
+from PySide6.QtCore import QEvent, QSize, Signal
 from PySide6.QtGui import QPalette
-from PySide6.QtWidgets import QHBoxLayout, QStatusBar, QToolButton, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStatusBar, QToolButton, QWidget
 
 from kappaskin.estimation import FAULTS, METHODS, slope_warning
 from kappaskin.frames import Estimate
@@ -109,26 +109,35 @@ class SteadySlope:
         return self._shown
 
 
-class Notice(Label):
+class Notice(Line):
     """Shows a hint, or a warning in the colour of alarms."""
 
     def __init__(self, hint: str) -> None:
         super().__init__(hint)
         self._hint, self.warning = hint, ""
         self.setContentsMargins(4, 0, 12, 0)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         self.setMinimumWidth(self.sizeHint().width())  # else the widgets to its right would move
+
+    def sizeHint(self) -> QSize:
+        # The margins, and 2 px, as the advance is rounded.
+        return QSize(
+            self.fontMetrics().horizontalAdvance(self.text()) + 18, super().sizeHint().height()
+        )
 
     def show_hint(self, hint: str) -> None:
         """Show this hint while there is no warning."""
         if hint != self._hint:
             self._hint = hint
-            self.setText(self.warning or hint)
+            self.show_text(self.warning or hint)
+            self.updateGeometry()
 
     def show_warning(self, text: str) -> None:
         """Show a warning; none when `text` is empty."""
         if text != self.warning:
             self.warning = text
-            self.setText(text or self._hint)
+            self.show_text(text or self._hint)
+            self.updateGeometry()
             self.setToolTip(_TIP if text else "")
             self.setForegroundRole(ALERT if text else QPalette.ColorRole.WindowText)
 

@@ -36,7 +36,7 @@ class Line(QWidget):
             self.update()
 
     def _fits(self, text: str) -> bool:
-        return self.fontMetrics().horizontalAdvance(text) <= self.width()
+        return self.fontMetrics().horizontalAdvance(text) <= self.contentsRect().width()
 
     @property
     def shown(self) -> str:
@@ -67,6 +67,6 @@ class Line(QWidget):
         painter = QPainter(self)
         painter.setPen(self.palette().color(self.foregroundRole()))
         text = painter.fontMetrics().elidedText(
-            self.shown, Qt.TextElideMode.ElideRight, self.width()
+            self.shown, Qt.TextElideMode.ElideRight, self.contentsRect().width()
         )
-        painter.drawText(self.rect(), LEFT, text)
+        painter.drawText(self.contentsRect(), LEFT, text)

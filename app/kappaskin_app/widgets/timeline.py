@@ -46,7 +46,7 @@ class Course(QAbstractSlider):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setFixedHeight(HEIGHT)
-        self.setMinimumWidth(80)
+        self.setMinimumWidth(50)
         self.setAccessibleName(name)
         self.setToolTip(tip)
         self.time, self.last, self.duration = 0.0, 0.0, 1.0
@@ -238,7 +238,10 @@ def glyph_button(name: str) -> QToolButton:
 
 
 class Clock(QWidget):
-    """Draws a line of text, every digit in a place of its own width."""
+    """Draws a line of text, every digit in a place of its own width.
+
+    Where there is no room for all of it, only the text before " of " is drawn.
+    """
 
     def __init__(self, tip: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -263,7 +266,14 @@ class Clock(QWidget):
         self._fit()
 
     def _fit(self) -> None:
-        self.setFixedSize(math.ceil(sum(self._widths(self._longest))), HEIGHT)
+        self.setMinimumSize(self._wide(self._longest.partition(" of ")[0]), HEIGHT)
+        self.setMaximumSize(self._wide(self._longest), HEIGHT)
+
+    def sizeHint(self) -> QSize:
+        return self.maximumSize()
+
+    def _wide(self, text: str) -> int:
+        return math.ceil(sum(self._widths(text)))
 
     def _widths(self, text: str) -> list[float]:
         metrics = QFontMetricsF(self.font())
@@ -273,9 +283,12 @@ class Clock(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setPen(self.palette().windowText().color())
-        widths = self._widths(self.text)
+        text = (
+            self.text if self._wide(self.text) <= self.width() else self.text.partition(" of ")[0]
+        )
+        widths = self._widths(text)
         x = self.width() - sum(widths)
-        for character, width in zip(self.text, widths, strict=True):
+        for character, width in zip(text, widths, strict=True):
             place = QRectF(x - 1, 0, width + 2, self.height())
             painter.drawText(place, Qt.AlignmentFlag.AlignCenter, character)
             x += width

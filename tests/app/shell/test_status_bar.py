@@ -115,3 +115,23 @@ def test_a_message_is_alone_even_where_the_bar_grows_meanwhile(qapp) -> None:
 
     assert hidden
     assert back
+
+
+def test_a_warning_that_lacks_room_is_whole_in_the_tooltip(qapp) -> None:
+    notice = Notice("F1: shortcuts")
+    bar = StatusBar(notice)
+    bar.resize(400, 30)
+    bar.show()
+    words = (
+        "Slopes reach 0.14: up to 1 % too flat; use finite-slope; this computer is not fast enough"
+    )
+    notice.show_warning(words)
+    qapp.processEvents()
+    cut, tip, inside = not notice.whole, notice.tip(), bar.rect().contains(notice.geometry())
+    bar.resize(1200, 30)
+    qapp.processEvents()
+    whole = notice.whole
+    bar.close()
+
+    assert (cut, inside, whole) == (True, True, True)
+    assert tip.startswith(words)

@@ -68,7 +68,7 @@ class MembraneView(QWidget):
         self._fit_timer = QTimer(self, singleShot=True, interval=0)  # pyright: ignore[reportCallIssue]
         self._fit_timer.timeout.connect(guarded(self._fit))
         self._box = Box()
-        self.setMinimumSize(320, 160)
+        self.setMinimumSize(300, 160)
         self.ages: deque[tuple[float, float]] = deque(maxlen=8192)
         """(when, age of its frame in s) of each drawing completed."""
         self.age_sd = float("inf")

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QMenu,
     QScrollArea,
     QSizePolicy,
+    QStyleOptionToolButton,
     QToolButton,
     QVBoxLayout,
     QWidget,
@@ -35,7 +36,6 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.widgets.parts import Label
 
 _BUTTON, _EDGE = 20, 9  # px: size of a small button, margin of the last one
-_NO_ARROW = "QToolButton::menu-indicator { image: none; }"
 
 Request = Callable[[Change], None]
 _ADDING = "Select from a list what to add to the scene."
@@ -56,7 +56,8 @@ class SectionBox(QGroupBox):
         self.grid.setHorizontalSpacing(10)
         self.grid.setContentsMargins(*((8, 6, 8, 8) if section.title else (8, 0, 8, 0)))
         self._fill(section)
-        self._corner = self._buttons(section) if section.title else QWidget()
+        # A label without text has no size; an empty widget would take the clicks of a button below.
+        self._corner = self._buttons(section) if section.title else Label()
         self._corner.setParent(self)
         if not (section.rows or section.sections or section.adding):
             default = Label("Default")
@@ -197,13 +198,17 @@ class SectionBox(QGroupBox):
         return menu
 
 
+class _Arrowless(QToolButton):
+    """A button without the arrow of its menu; a style sheet would keep the ink of another theme."""
+
+    def initStyleOption(self, option: QStyleOptionToolButton) -> None:
+        super().initStyleOption(option)
+        option.features &= ~QStyleOptionToolButton.ToolButtonFeature.HasMenu  # pyright: ignore
+
+
 def _tool(text: str, tip: str, place: Place) -> QToolButton:
-    button = QToolButton()
-    button.setText(text)
-    button.setToolTip(tip)
-    button.setAutoRaise(len(text) == 1)
+    button = _Arrowless(text=text, toolTip=tip, autoRaise=len(text) == 1)  # pyright: ignore[reportCallIssue]
     button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-    button.setStyleSheet(_NO_ARROW)
     if len(text) == 1:
         button.setFixedSize(_BUTTON, _BUTTON)
     button.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)

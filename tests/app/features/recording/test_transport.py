@@ -1,6 +1,7 @@
 """A real row on a (virtual) display: what it shows of a recording, and what it asks for."""
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import pytest
 from PySide6.QtCore import QEvent, QPoint, Qt
@@ -181,3 +182,14 @@ def test_a_note_is_read_as_it_was_written(row: Transport, until) -> None:
     assert shown.toPlainText() == "0:02.000  note: from <b> to <i> & back"
     QToolTip.hideText()
     until(lambda: not QToolTip.isVisible())
+
+
+def test_a_narrow_row_drops_the_duration_and_nothing_overlaps(row: Transport) -> None:
+    row.resize(row.minimumSizeHint().width(), 30)
+    QApplication.processEvents()
+    row.show_time(3.25, True)
+    parts = [row.course, row.clock, row.speed, *row.buttons.values()]
+    places = sorted((part.geometry() for part in parts), key=lambda place: place.left())
+    assert all(one.right() < other.left() for one, other in pairwise(places))
+    assert row.width() <= 382  # beside the panels of a window of 1024 px
+    assert row.clock.width() < row.clock.sizeHint().width()

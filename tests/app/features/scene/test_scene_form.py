@@ -5,13 +5,16 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
+    QApplication,
     QCheckBox,
     QComboBox,
     QDoubleSpinBox,
     QLineEdit,
     QSpinBox,
+    QToolButton,
     QWidget,
 )
 
@@ -20,6 +23,7 @@ from kappaskin.scenes import SCENES
 from kappaskin_app.features.scene import scene_text
 from kappaskin_app.features.scene.scene_form import SceneForm
 from kappaskin_app.features.scene.sections import sections_of
+from kappaskin_app.theme import DARK, LIGHT, apply_look
 
 from .conftest import TEXTS, box_at, said_by
 
@@ -196,3 +200,29 @@ def test_tips_tell_unit_and_range() -> None:
     assert Key("a", "A tip.", mm, 0.0, 0.5).explained == "A tip. From 0 to 500 mm."
     assert Key("a", "A tip.", newton, 2.0).explained == "A tip. At least 2 N."
     assert Key("a", "A tip.").explained == "A tip."
+
+
+def test_nothing_takes_the_clicks_of_the_button_that_adds_a_touch(
+    shown: Callable[[str], SceneForm],
+) -> None:
+    form = shown(TEXTS["centre"])
+    button = next(b for b in form.findChildren(QToolButton) if b.text() == "+ Add touch")
+    box = button.parentWidget()
+    box.resize(button.geometry().right() + 8, box.height())
+    assert box.childAt(button.geometry().center()) is button
+    assert box.childAt(button.geometry().topRight() + QPoint(-4, 4)) is button
+
+
+def test_buttons_have_the_ink_of_the_theme_that_is_switched_to(
+    qapp: QApplication, shown: Callable[[str], SceneForm]
+) -> None:
+    apply_look(DARK)
+    form = shown(TEXTS["centre"])
+    apply_look(LIGHT)
+    qapp.processEvents()
+    buttons = form.findChildren(QToolButton)
+    assert buttons
+    assert {button.palette().buttonText().color().name() for button in buttons} <= {
+        LIGHT.text,
+        LIGHT.disabled,
+    }
