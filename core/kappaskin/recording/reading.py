@@ -234,7 +234,7 @@ class Recording:
             magic = self._file.read(len(MAGIC))
         except OSError as error:
             why = f"cannot be read ({error.strerror or error}); expected a recording"
-            if part_of(path).exists():
+            if isinstance(error, FileNotFoundError) and part_of(path).exists():
                 why = f"is not complete; end the recording, or use {part_of(path).name}"
             raise Refusal(f"{path}: {why}") from error
         self.library = ""

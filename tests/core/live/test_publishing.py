@@ -254,7 +254,7 @@ def test_publish_sends_what_listen_tells(start) -> None:
     told, _ = listening.communicate(timeout=30)
     assert listening.returncode == 0
     assert "status    streaming  Simulated skin" in told
-    assert re.search(r"contact +#\d+ +x 4?5?\d*\.\d+ \+- ", told)
+    assert re.search(r"contact +#\d+ +x [45]\d\.\d+ \u00b1 ", told)
     assert re.search(r"\d+ contacts received, \d+ lost", told.splitlines()[-1])
 
 

@@ -204,7 +204,8 @@ def test_the_saved_tare_is_used_by_a_loop_and_by_publishing(board) -> None:
         with stream("feed:glove") as found:
             tared = np.mean([each.curvature for each in islice(found, 50)], axis=0)
         used = list[Setup]()
-        publishing = UsedTare(SimpleNamespace(set_up=used.append))
+        asked = SimpleNamespace(setup=Setup())
+        publishing = UsedTare(SimpleNamespace(set_up=used.append, requested=asked))
         publishing(Status(connections=1, sensor=sensor))
         publishing(Status(connections=1, sensor=sensor))
         assert main(["tare", "feed:glove", "--undo"]) == 0

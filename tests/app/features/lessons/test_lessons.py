@@ -110,7 +110,7 @@ def test_steps_are_undone_one_by_one_and_back_gives_them_again(window: MainWindo
 
 
 def test_settings_and_source_from_before_come_back_and_a_theme_stays(window: MainWindow) -> None:
-    window.connection.connect_requested.emit("/dev/none")
+    window.session.source = "/dev/none"  # as while a device is connected
     window.history.change("Mine", -1, functions_x=5, noise_seed=7)
     mine = window.history.settings
     take(window, "07-silent-mode")
@@ -119,7 +119,7 @@ def test_settings_and_source_from_before_come_back_and_a_theme_stays(window: Mai
     window.requests.switch_theme()
     window.lesson.leave.click()
     assert window.history.settings == replace(mine, theme="light")
-    assert window.session.source == "/dev/none"
+    assert window.session.connecting == "/dev/none"
     assert window.lesson.list.isVisible()
     assert not window.pointing.rings
 
