@@ -96,6 +96,7 @@ class PlaybackControl(QObject):
         transport, session = self._transport, self._session
         transport.sought.connect(guarded(self.seek))
         session.time_requested.connect(guarded(self.seek))
+        session.source_refused.connect(guarded(self._give_up))
         transport.course.sliderReleased.connect(guarded(self._release_handle))
         transport.step_wanted.connect(guarded(self.step))
         transport.jump_wanted.connect(guarded(self.jump))
@@ -216,6 +217,12 @@ class PlaybackControl(QObject):
         self._send.forget()
         self._set_message("")
         self._history.change("Calibration and tare as before", -1, **self._before)
+
+    def _give_up(self, why: str) -> None:
+        """Keep nothing of a recording that the engine refused."""
+        if self._asked.name and str(self._asked) in why:
+            self._leave()
+            self.notified.emit(f"{self._asked.name} is not played")
 
     # Playing.
 

@@ -302,8 +302,8 @@ def test_the_age_has_its_error_bar(window, until):
         return window.readouts.text("age")
 
     assert reported(0.0124, 0.0) == "12 ms"
-    assert reported(0.0124, 0.00031) == "12.4 ± 0.3 ms"
-    assert reported(0.0124, 0.0014) == "12 ± 1 ms"
+    assert reported(0.0124, 0.00031) == "12.40 ± 0.31 ms"
+    assert reported(0.0124, 0.0014) == "12.4 ± 1.4 ms"
     assert reported(0.0124, np.inf) == "≥ 12 ms"
     assert reported(np.nan, np.inf) == "–"
 

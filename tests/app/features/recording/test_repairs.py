@@ -85,11 +85,16 @@ def test_a_file_of_another_kind_is_not_offered(window: MainWindow, tmp_path: Pat
 
 @pytest.mark.full
 def test_one_without_readings_is_not_offered(window: MainWindow, tmp_path: Path, until) -> None:
-    path, panel = tmp_path / "empty.mcap", window.recording
+    path, panel, settings = tmp_path / "empty.mcap", window.recording, window.history.settings
     with closing(Recorder(path, 0.0)) as recorder:
         recorder.add_event(Event(0.0, "note", "nothing else"))
     window.playback.open_file(path)
-    until(lambda: "expected a recording with bytes of a device" in panel.message.text())
+    reason = window.connection.message
+    until(lambda: "expected a recording with bytes of a device" in reason.text())
+    assert "The simulation stays connected." in reason.text()
+    assert "is not played" in window.statusBar().currentMessage()
+    assert window.playback.summary is None
+    assert window.history.settings == settings
     assert not panel.offer.isVisibleTo(panel)
 
 
