@@ -876,7 +876,7 @@ _CONTACT = (
         shown=("N", 1.0, 4),
         header=HeaderNumber(
             "force",
-            16,
+            20,
             "Force of that point load, with its error bar; \u2265: a lower bound, for the skin may "
             "stretch. Its thickness is not given; 0.25 mm would change the force by more than the "
             "error bar.",
@@ -906,7 +906,7 @@ _CONTACT = (
         at_rim="edge: no depth",
         shown=("mm", 1e3, 3),
         header=HeaderNumber(
-            "depth", 15, "Displacement at the contact, with its error bar; positive is inward."
+            "depth", 17, "Displacement at the contact, with its error bar; positive is inward."
         ),
     ),
     ReportedQuantity(
