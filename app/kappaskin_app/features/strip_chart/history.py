@@ -85,7 +85,7 @@ class Bins:
         return self._rows.times[part], self._rows.values[:, column, part].astype(float)
 
 
-class History:
+class StripHistory:
     """Numbers of frames over time, in so many `columns`.
 
     Of a time before the last one everything begins anew: it is of another recording, or place in

@@ -14,12 +14,12 @@ from kappaskin.contact import ContactObject
 from kappaskin.frames import Array, Estimate
 from kappaskin.live import Status
 from kappaskin.recording import Replay, contacts_in
-from kappaskin_app.features.strip_chart.history import Bins, History, Span, broken
+from kappaskin_app.features.strip_chart.history import Bins, Span, StripHistory, broken
 from kappaskin_app.features.strip_chart.panel import MIME, QUANTITIES, RADIUS, StripChart
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.display import Display
-from kappaskin_app.shell.history import History as Changes
+from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import RECORDED, Session
 from kappaskin_app.shell.settings import Settings
 
@@ -92,11 +92,11 @@ class Dragging(QObject):
 class Strips(QObject):
     """Keeps the numbers of every estimate, and draws those selected in its `panel`."""
 
-    def __init__(self, changes: Changes, session: Session, display: Display, tasks: Tasks) -> None:
+    def __init__(self, history: History, session: Session, display: Display, tasks: Tasks) -> None:
         super().__init__(display)
-        self._changes, self._session, self._display = changes, session, display
+        self._history, self._session = history, session
         self.panel = StripChart()
-        self._frames, self._objects = History(len(_COLUMNS)), History(1)
+        self._frames, self._objects = StripHistory(len(_COLUMNS)), StripHistory(1)
         self._key, self._last_number, self._next = (0, 0), 0, 0.0
         self._recorded, self._length, self._last = _bins(1.0), 0.0, 0.0
         self._reading = BackgroundTask(tasks, "Reading the contacts", self._take_recorded)
@@ -114,21 +114,21 @@ class Strips(QObject):
     # Requests
 
     def _toggle(self, name: str) -> None:
-        shown = self._changes.settings.strips
+        shown = self._history.settings.strips
         if name not in shown:
             self._add([name])
             return
         others = tuple(one for one in shown if one != name)
-        self._changes.change(f"Hide {QUANTITIES[name].label} over time", -1, strips=others)
+        self._history.change(f"Hide {QUANTITIES[name].label} over time", -1, strips=others)
 
     def _add(self, names: list[str]) -> None:
-        shown = self._changes.settings.strips
+        shown = self._history.settings.strips
         if new := [name for name in names if name not in shown]:
             text = f"Show {QUANTITIES[new[0]].label} over time"
-            self._changes.change(text, -1, strips=(*shown, *new))
+            self._history.change(text, -1, strips=(*shown, *new))
 
     def _set_span(self, seconds: float) -> None:
-        self._changes.change("Time of the strip chart", -1, strip_seconds=seconds)
+        self._history.change("Time of the strip chart", -1, strip_seconds=seconds)
 
     def show_settings(self, settings: Settings) -> None:
         self.panel.show_choice(settings.strips, settings.strip_seconds, self._length)
@@ -156,7 +156,7 @@ class Strips(QObject):
         self._length = 0.0
         if self._session.replaying:
             self._reading.compute(contacts_in, Path(source.removeprefix(RECORDED)))
-        self.show_settings(self._changes.settings)
+        self.show_settings(self._history.settings)
 
     def _take_recorded(self, found: tuple[float, Array, dict[str, Array]]) -> None:
         """Store contacts of a recording."""
@@ -164,7 +164,7 @@ class Strips(QObject):
         if not self._length:
             self._length, self._last = max(length, _SHORTEST), 0.0
             self._recorded = _bins(self._length / _PARTS)
-            self.show_settings(self._changes.settings)
+            self.show_settings(self._history.settings)
         if len(times):
             unknown = np.full(len(times), np.nan)
             each = {path: fields.get(path.rpartition(".")[2], unknown) for path in _PATHS}
@@ -188,7 +188,7 @@ class Strips(QObject):
         self._objects.append(np.array([estimate.device_time]), np.array([[radius]]))
 
     def _draw(self) -> None:
-        until, seconds = self._frames.last, self._changes.settings.strip_seconds
+        until, seconds = self._frames.last, self._history.settings.strip_seconds
         if not math.isfinite(until):
             return
         begin = until - seconds

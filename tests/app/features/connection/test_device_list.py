@@ -27,12 +27,8 @@ class RecordedPanel(ConnectionPanel):
 
 
 @pytest.fixture
-def panel(qtbot):
-    made = RecordedPanel()
-    qtbot.addWidget(made)
-    made.resize(290, 200)
-    made.show()
-    made.show_ports(PORTS)
+def panel(qtbot, shown):
+    made = shown(RecordedPanel(), PORTS)
     qtbot.waitExposed(made)
     made.activateWindow()
     return made

@@ -25,13 +25,8 @@ PERMISSION = (
 
 
 @pytest.fixture
-def panel(qtbot):
-    made = ConnectionPanel()
-    qtbot.addWidget(made)
-    made.resize(290, 200)
-    made.show()
-    made.show_ports([SKIN, BOARD])
-    return made
+def panel(shown):
+    return shown(ConnectionPanel(), [SKIN, BOARD])
 
 
 def listed(panel):

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin_app.features.strip_chart.history import LONG, WHOLE, History
+from kappaskin_app.features.strip_chart.history import LONG, WHOLE, StripHistory
 
 
-def filled(times: np.ndarray, *columns: np.ndarray, at_once: int = 10) -> History:
-    history, values = History(len(columns)), np.stack(columns, axis=1)
+def filled(times: np.ndarray, *columns: np.ndarray, at_once: int = 10) -> StripHistory:
+    history, values = StripHistory(len(columns)), np.stack(columns, axis=1)
     for n in range(0, len(times), at_once):
         history.append(times[n : n + at_once], values[n : n + at_once])
     return history
@@ -89,7 +89,7 @@ def test_a_curve_is_broken_where_no_frames_came() -> None:
 
 
 def test_nothing_is_known_at_first_and_of_what_is_unknown() -> None:
-    history = History(2)
+    history = StripHistory(2)
     assert len(history.span(0, 0.0, 10).times) == 0
     history.append(np.empty(0), np.empty((0, 2)))
 

@@ -6,7 +6,7 @@ from PySide6.QtCore import QEvent, QMimeData, QPointF, Qt
 from PySide6.QtGui import QDropEvent, QMouseEvent
 from PySide6.QtWidgets import QApplication
 
-from kappaskin_app.features.strip_chart.history import History, Span
+from kappaskin_app.features.strip_chart.history import Span, StripHistory
 from kappaskin_app.features.strip_chart.panel import MIME, QUANTITIES, RADIUS, StripChart
 
 LEFT = Qt.MouseButton.LeftButton
@@ -63,7 +63,7 @@ def test_what_is_dragged_here_is_shown_and_nothing_else_is_taken(panel) -> None:
 
 def test_a_curve_is_in_the_unit_of_the_screen_up_to_now_with_its_error_band(panel) -> None:
     times = np.arange(0, 20, 0.01)
-    history = History(2)
+    history = StripHistory(2)
     history.append(times, np.stack([0.1 + 0.01 * times, np.full(len(times), 0.002)], axis=1))
     spans = [history.span(column, 0.0, 600) for column in (0, 1)]
     panel.show_span("force", *spans, 20.0, {})
