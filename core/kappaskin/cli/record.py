@@ -64,7 +64,7 @@ def record(
     out
         The file; it must not exist yet.
     seconds
-        How long to record.
+        How long to record, from the first frame computed.
     trust
         Let the scene name files outside its folder.
     """
@@ -128,14 +128,14 @@ def _recorded(
         status, now = engine.status(), time.monotonic()
         slope = max(slope, status.slope)
         written = status.recording
-        recording = recording if written.active else now
+        prepared = status.slot is not None or now - began > _BEGIN
+        recording = recording if written.active and prepared else now
         if not engine.alive or engine.silent > _BEGIN:
             return slope
         if written.trouble and not written.seconds:
             raise Refusal(written.trouble)
         tared(status)
-        over = max(written.seconds, now - recording) >= seconds
-        if stopped or written.trouble or over:
+        if stopped or written.trouble or now - recording >= seconds:
             return slope
         if status.ended and status.accounting.accepted:
             return slope

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import psutil
 import pytest
 
@@ -192,12 +193,16 @@ def test_repair_tells_by_its_exit_code_what_was_lost(recorded, tmp_path, capsys)
 
 
 class StuckEngine:
-    """An engine that records, and reports nothing more."""
+    """An engine that records and computes after `prepared` s, and reports nothing more."""
 
     alive, silent = True, 0.0
 
+    def __init__(self, prepared: float = 0.0) -> None:
+        self._ready = time.monotonic() + prepared
+
     def status(self) -> Status:
-        return Status(recording=RecordingStatus("a.mcap", active=True))
+        slot = np.dtype([]) if time.monotonic() >= self._ready else None
+        return Status(recording=RecordingStatus("a.mcap", active=True), slot=slot)
 
 
 def test_the_seconds_are_over_even_if_the_engine_reports_no_more() -> None:
@@ -205,3 +210,10 @@ def test_the_seconds_are_over_even_if_the_engine_reports_no_more() -> None:
     with ProgressLine() as show_progress:
         _recorded(StuckEngine(), 0.3, [], show_progress)  # type: ignore[arg-type]
     assert 0.3 <= time.monotonic() - began < 5.0
+
+
+def test_the_seconds_begin_once_frames_are_computed() -> None:
+    began = time.monotonic()
+    with ProgressLine() as show_progress:
+        _recorded(StuckEngine(0.5), 0.2, [], show_progress)  # type: ignore[arg-type]
+    assert 0.6 <= time.monotonic() - began < 5.0
