@@ -14,6 +14,7 @@ from kappaskin.sources.description import load_description as load_description
 from kappaskin.sources.description import parts_of as parts_of
 from kappaskin.sources.diagnosis import Diagnosis as Diagnosis
 from kappaskin.sources.diagnosis import WireMonitor as WireMonitor
+from kappaskin.sources.diagnosis import identified_ports as identified_ports
 from kappaskin.sources.information import sensor_from_json as sensor_from_json
 from kappaskin.sources.information import sensor_to_json as sensor_to_json
 from kappaskin.sources.inputs import EndOfInput as EndOfInput

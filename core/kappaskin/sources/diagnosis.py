@@ -1,9 +1,10 @@
-"""Diagnosis of a port, and a monitor of its messages."""
+"""Diagnosis of a port, identification of devices, and a monitor of messages."""
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,11 @@ from kappaskin.frames import Event, Frame
 from kappaskin.sources import information
 from kappaskin.sources.clock import ClockMap
 from kappaskin.sources.commands import DeviceCommands, operation_name
-from kappaskin.sources.decoder import SEQUENCES, Accounting
+from kappaskin.sources.decoder import SEQUENCES, Accounting, Decoder
 from kappaskin.sources.description import Description
 from kappaskin.sources.lines import LineDecoder
-from kappaskin.sources.ports import BaudRateSearch, Port
+from kappaskin.sources.ports import BAUD_RATE, BaudRateSearch, Port, SerialConnection, holders
+from kappaskin.sources.recognition import TEXT_RATES, Recogniser
 from kappaskin.sources.serial_source import SerialSource, connected
 from kappaskin.sources.wire import VERSION, Command, FromDevice, Information, Reply, Samples
 
@@ -26,6 +28,7 @@ _SOON = 0.02  # s that a read may wait
 _SEARCH = 10.0  # s in which every baud rate has been tried
 _LISTEN = 2.0  # s that a known device is read for
 
+_SLOW = 10.0  # lines/s below which their rate is shown with a decimal
 _SHOWN = 0.1  # s between two samples that are shown: nobody reads 500 lines a second
 _SILENCE = 3.0  # s of silence, after which the usual causes are named
 _RATE_DWELL = 0.8  # s of unreadable bytes, after which another baud rate is tried
@@ -114,6 +117,110 @@ def _frame_rate(frames: list[Frame]) -> tuple[float, float]:
         return math.nan, math.inf
     span = frames[-1].device_time - frames[0].device_time
     return (len(frames) - 1) / span if span > 0 else math.nan, frames[-1].taken_sd
+
+
+def identified_ports(
+    urls: Sequence[str], stopped: Callable[[], bool] = lambda: False
+) -> Iterator[tuple[str, str]]:
+    """Each port with what it sends, in words, after 10 s at most; before, that it is read.
+
+    All are read at once until `stopped()`; the words are then empty for the rest. Nothing is sent,
+    and a port that another program has open is not opened. Opening one raises DTR and RTS, at which
+    some boards restart.
+    """
+    reading: list[_Identification] = []
+    try:
+        for url in urls:
+            if stopped():
+                break
+            if by := ", ".join(holders(url)):
+                yield url, f"in use by {by}"
+                continue
+            try:
+                reading.append(_Identification(url))
+            except SourceError as error:
+                yield url, str(error).removeprefix(f"{url}: ")
+            else:
+                yield url, "listening\N{HORIZONTAL ELLIPSIS}"
+        while reading and not stopped():
+            time.sleep(_SOON)
+            for each in list(reading):
+                if text := each.found():
+                    each.close()
+                    reading.remove(each)
+                    yield each.url, text
+        for each in reading:
+            yield each.url, ""
+    finally:
+        for each in reading:
+            each.close()
+
+
+class _Identification:
+    """A port that is read, at one baud rate after the other, until it is known what it sends."""
+
+    def __init__(self, url: str) -> None:
+        self.url, self._connection = url, SerialConnection(url)
+        self._rates, self._began = cycle(TEXT_RATES), time.monotonic()
+        self._heard = self._garbled = False
+        self._tune(BAUD_RATE)
+
+    def _tune(self, rate: int) -> None:
+        if rate != self._connection.baud_rate:
+            self._connection.set_baud_rate(rate)
+        self._decoder, self._recogniser, self._tuned_at = Decoder(), Recogniser(), time.monotonic()
+
+    def found(self) -> str:
+        """What it sends, from the bytes up to now; empty as long as that is not known."""
+        connection, now, lost = self._connection, time.monotonic(), self._connection.lost
+        for arrived, data in connection.take(0.0):
+            self._heard = True
+            self._recogniser.feed(arrived, data)
+            for message in self._decoder.feed(data):
+                if isinstance(message, Information):
+                    return _information_text(message.text)
+        if lost:
+            return str(connection.refusal or "unplugged").removeprefix(f"{self.url}: ")
+        counts = self._decoder.accounting()
+        if counts.other_version is not None:
+            return f"Kappaskin device of wire version {counts.other_version}, expected {VERSION}"
+        late = now - self._began > (_SEARCH if self._heard else _SILENCE)
+        if counts.good:
+            return "Kappaskin device, without a description" if late else ""
+        if late:
+            return self._unknown()
+        if now - self._tuned_at < _RATE_DWELL:
+            return ""
+        lines = self._recogniser.found()
+        if lines.kind and math.isfinite(lines.rate):
+            what = f"numbers: {len(lines.labels)} columns"
+            what = what if lines.kind == "text" else f"JSON: {len(lines.labels)} numbers"
+            return f"sends {what}, {lines.rate:.{int(lines.rate < _SLOW)}f} lines/s"
+        if self._recogniser.garbled:
+            self._garbled = True
+            self._tune(next(self._rates))
+        return ""
+
+    def _unknown(self) -> str:
+        if self._connection.opening:
+            return "the system is still opening it"
+        if not self._heard:
+            return "silent"
+        if (wrong := self._recogniser.found().trouble) and not self._recogniser.garbled:
+            return "sends text, no rows of numbers"
+        return "sends binary data" if wrong or self._garbled else "sends too little to identify"
+
+    def close(self) -> None:
+        self._connection.close()
+
+
+def _information_text(text: str) -> str:
+    try:
+        sensor = information.sensor_from_json(text)
+    except SourceError:
+        return "Kappaskin device, with an invalid description"
+    name = printable(f"{sensor.name} ({sensor.serial_number})")
+    return f"Kappaskin device: {name}, {sensor.channels} channels"
 
 
 class WireMonitor:

@@ -15,19 +15,21 @@ from functools import partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import cast
+from urllib.parse import urlsplit
 
 import serial
 from serial.tools import list_ports
 from serial.urlhandler import protocol_socket
 
 from kappaskin.errors import SourceError
-from kappaskin.sources.inputs import EndOfInput, Input
+from kappaskin.sources.inputs import UDP, EndOfInput, Input
 
 BAUD_RATE = 2_000_000
 """Baud rate that 300 channels at 300 frames/s need on a UART; USB ports ignore it."""
 
 _SENT = 0.05  # s that a command may wait for room
 _HOLDERS_NAMED = 3
+_WITH_PORT = "socket://", "rfc2217://"  # URLs that need a port number
 
 BAUD_RATES = (BAUD_RATE, 1_000_000, 921_600, 500_000, 460_800, 230_400, 115_200)
 """Baud rates that a device may use, the usual one first."""
@@ -72,10 +74,21 @@ class Port:
         return self.port == other.port
 
     @property
+    def group(self) -> str:
+        """The group of users who may open it."""
+        try:
+            import grp  # not on Windows
+
+            return grp.getgrgid(os.stat(self.port).st_gid).gr_name
+        except (ImportError, OSError, KeyError):
+            return "dialout"
+
+    @property
     def permission_help(self) -> str:
         """How to get the permission to open it."""
-        group = _group(self.port)
-        return f"Join the port's group with `sudo usermod -aG {group} $USER`, then log in again"
+        return (
+            f"Join the port's group with `sudo usermod -aG {self.group} $USER`, then log in again"
+        )
 
     @staticmethod
     def found() -> "list[Port]":
@@ -132,6 +145,16 @@ def _why_not(url: str, error: Exception) -> str:
         return f"{url}: no permission to open it. {Port(url).permission_help}"
     if code in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in str(error):
         return f"{url}: busy, opened by {_holders_text(url)}; close that program"
+    if url.startswith(UDP):
+        return f"{url}: expected the format of the datagrams, too: sensor:FILE.toml:{UDP}host:port"
+    if url.startswith(_WITH_PORT) and not _port_number(url):
+        return f"{url}: expected host and port, such as socket://host:5000 (1 to 65535)"
+    if code == errno.EISDIR or "configure port" in str(error):
+        what = "a folder" if os.path.isdir(url) else "a file" if os.path.isfile(url) else "a device"
+        return (
+            f"{url}: {what}, not a serial port; expected a port such as /dev/ttyACM0 or COM3, "
+            "replay:FILE for a recording or sim:FILE for a scene"
+        )
     if code in (errno.ENOENT, errno.ENXIO, errno.ENODEV, errno.EIO):
         return (
             f"{url}: there is no such port; plug the sensor in, or choose one of the ports found "
@@ -145,13 +168,12 @@ def _why_not(url: str, error: Exception) -> str:
     )
 
 
-def _group(url: str) -> str:
+def _port_number(url: str) -> int:
+    """The port number of a URL, 0 without a valid one."""
     try:
-        import grp  # not on Windows
-
-        return grp.getgrgid(os.stat(url).st_gid).gr_name
-    except (ImportError, OSError, KeyError):
-        return "dialout"
+        return urlsplit(url).port or 0
+    except ValueError:
+        return 0
 
 
 def holders(url: str) -> list[str]:

@@ -32,7 +32,9 @@ _SPOKEN = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces"}
 _UNITS = {"time": "s", "time_ms": "ms", "time_us": "\N{MICRO SIGN}s"}
 _PRINTED = frozenset(range(32, 127)) | frozenset(b"\t\r\n")
 
-_RATES = (115_200, 9600, 57_600, 38_400, 19_200, *BAUD_RATES)
+TEXT_RATES = (115_200, 9600, 57_600, 38_400, 19_200, *BAUD_RATES)
+"""Baud rates of boards that print text, the usual one first."""
+
 _DWELL, _RETRY = 0.8, 1.0  # s of garbled bytes before another rate; s between two tries to open
 _ENOUGH = 64  # bytes by which they are judged
 _HEADING = 8  # first lines among which a heading may be
@@ -445,7 +447,7 @@ class RawLines:
     def __init__(self, url: str, clock: Callable[[], float] = time.monotonic) -> None:
         self.url, self._clock, self._plug = url, clock, Port.named(url)
         self.recogniser, self.trouble = Recogniser(), ""
-        self._rates = cycle(_RATES)
+        self._rates = cycle(TEXT_RATES)
         self.baud = next(self._rates)
         self._connection: SerialConnection | None = None
         self._next_try = self._since = -math.inf

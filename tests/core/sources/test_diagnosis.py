@@ -3,6 +3,9 @@
 import itertools
 import json
 import os
+import subprocess
+import sys
+import termios
 import threading
 from dataclasses import replace
 
@@ -10,7 +13,7 @@ import pytest
 
 from kappaskin import load_scene
 from kappaskin.cli import FAILED, main
-from kappaskin.sources import Accounting, Diagnosis, information
+from kappaskin.sources import Accounting, Diagnosis, identified_ports, information
 from kappaskin.sources.wire import encode_information
 
 pytest.importorskip("pty", reason="no pseudo-terminals on this system")
@@ -165,3 +168,77 @@ def test_losses_are_told_in_words():
     assert replace(many, restarts=2).words == f"{told}; the device restarted 2 times"
     assert "100 % of bytes" in replace(many, bytes_in=120).words
     assert "under 0.001 % of bytes" in replace(many, bytes_in=10**9).words
+
+
+@pytest.fixture
+def brief(monkeypatch):
+    monkeypatch.setattr("kappaskin.sources.diagnosis._SILENCE", 2.0)
+    monkeypatch.setattr("kappaskin.sources.diagnosis._SEARCH", 4.0)
+
+
+def numbers(number):
+    return f"{number}, 2.5, -3\n".encode()
+
+
+def test_each_port_is_identified_by_what_it_sends(brief, served, saying):
+    sent = {
+        saying(numbers): "sends numbers: 3 columns, ",
+        saying(lambda n: b'{"a": [1, %d], "b": 3}\n' % n): "sends JSON: 3 numbers, ",
+        saying(lambda _: b""): "silent",
+        saying(lambda _: b"ready\n"): "sends text, no rows of numbers",
+        saying(lambda _: bytes(range(128, 256))): "sends binary data",
+        saying(lambda n: b"7\n" * (n % 40 == 39)): "sends too little to identify",
+        saying(lambda _: encode_information(0, 0.0, "{}")): "Kappaskin device, with an invalid",
+        served: "Kappaskin device: Simulated skin (SIM-0001), 300 channels",
+        "/dev/ttyABSENT7": "there is no such port",
+    }
+    found = dict(identified_ports(list(sent)))
+    assert {url: text[: len(sent[url])] for url, text in found.items()} == sent
+
+
+def test_a_board_is_identified_at_its_baud_rate(saying):
+    ends = []
+
+    def at_9600(number):
+        here = termios.tcgetattr(ends[0])[5] == termios.B9600 if ends else False
+        return numbers(number) if here else bytes(range(128, 256))
+
+    url = saying(at_9600)
+    ends.append(os.open(url, os.O_RDWR | os.O_NOCTTY))
+    text = dict(identified_ports([url]))[url]
+    os.close(ends[0])
+    assert text.startswith("sends numbers: 3 columns")
+
+
+def test_nothing_is_sent_to_a_port_that_is_identified(brief):
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    os.set_blocking(master, False)
+    assert dict(identified_ports([os.ttyname(slave)])) == {os.ttyname(slave): "silent"}
+    with pytest.raises(BlockingIOError):
+        os.read(master, 1)
+    os.close(master)
+    os.close(slave)
+
+
+@pytest.mark.slow
+def test_a_port_of_another_program_is_not_opened(saying, monkeypatch):
+    url, opened = saying(numbers), []
+    monkeypatch.setattr("kappaskin.sources.diagnosis.SerialConnection", opened.append)
+    held = "import sys; port = open(sys.argv[1], 'rb'); print(flush=True); input()"
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-c", held, url], stdin=pipe, stdout=pipe) as other:
+        assert other.stdout is not None
+        other.stdout.readline()
+        text = dict(identified_ports([url]))[url]
+        other.communicate(b"\n")
+    assert (opened, text) == ([], f"in use by python (process {other.pid})")
+
+
+def test_identification_that_is_stopped_closes_the_ports(served):
+    stopped = threading.Event()
+    found = identified_ports(["/dev/ttyABSENT7", served], stopped.is_set)
+    assert [url for url, _ in (next(found), next(found))] == ["/dev/ttyABSENT7", served]
+    stopped.set()
+    assert list(found) == [(served, "")]
+    assert Diagnosis.of(served).why == ""

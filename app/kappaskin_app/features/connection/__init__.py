@@ -1,12 +1,19 @@
 """Connection: selection of the source of readings."""
 
 from pathlib import Path
+from threading import Event
 
 from PySide6.QtWidgets import QFileDialog
 
 from kappaskin.live import ResumeInfo
 from kappaskin.recording import Imported, ImportRequest, ImportTask, is_foreign
-from kappaskin.sources import described_source, is_description, load_description, parts_of
+from kappaskin.sources import (
+    described_source,
+    identified_ports,
+    is_description,
+    load_description,
+    parts_of,
+)
 from kappaskin_app.features.connection.panel import ConnectionPanel, PortSearch
 from kappaskin_app.features.connection.wizard import NewSensorDialog
 from kappaskin_app.guard import guarded
@@ -41,6 +48,12 @@ class ConnectionFeature:
         self.connection.cancel_requested.connect(guarded(self._cancel))
         self.connection.refresh_requested.connect(guarded(self.port_search.refresh))
         self.port_search.found.connect(guarded(self.connection.show_ports))
+        self._identifying = BackgroundTask[tuple[str, str]](
+            shell.tasks, "Identifying devices", self.connection.show_speaker, ended=self._go_on
+        )
+        self._stopped, self._waiting = Event(), ""  # source that waits until the ports are closed
+        self.connection.sources.identify_requested.connect(guarded(self._identify))
+        session.source_handlers.append(self._wait_for_ports)
         session.source_changed.connect(guarded(self.connection.show_source))
         session.source_refused.connect(guarded(self.connection.show_refusal))
         session.reasons.append(self.connection.message)
@@ -85,6 +98,29 @@ class ConnectionFeature:
         self.connection.show_source(source)
         self.port_search.refresh()
 
+    def _identify(self) -> None:
+        """Find out what speaks at each port that is not in use here."""
+        if self._identifying.running:
+            return
+        session = self._session
+        used = (session.engine.source, session.connecting, session.status.source)
+        at = {parts_of(source)[1] or source for source in used if source}
+        ports = [port for port in self.connection.unidentified() if port not in at]
+        self._stopped = Event()
+        self._identifying.run(identified_ports, ports, self._stopped.is_set)
+
+    def _wait_for_ports(self, source: str) -> bool:
+        """Close the ports that are being identified before a `source` is connected."""
+        self._stopped.set()
+        self._waiting = source if self._identifying.running else ""
+        return self._identifying.running
+
+    def _go_on(self) -> None:
+        """Connect the source that waits."""
+        source, self._waiting = self._waiting, ""
+        if source:
+            self._session.request_source(source)
+
     def _connect(self) -> None:
         self._session.request_source(self.connection.source())
 
@@ -113,6 +149,7 @@ class ConnectionFeature:
 
     def _free(self, port: str) -> None:
         """Let go of a port that the dialog is to read."""
+        self._stopped.set()
         source = self._session.engine.source or ""
         if port in (source, parts_of(source)[1]):
             self._freed = source
@@ -126,7 +163,8 @@ class ConnectionFeature:
             self._session.request_source(source)
 
     def _close(self) -> None:
-        self._freed = ""
+        self._freed = self._waiting = ""
+        self._stopped.set()
         self.new_sensor.reject()
 
     def _connect_new(self, file: Path, port: str, topic: str) -> None:

@@ -9,6 +9,7 @@ from PySide6.QtCore import (
     QObject,
     QPersistentModelIndex,
     QSignalBlocker,
+    QSize,
     Qt,
     QTimer,
     Signal,
@@ -65,15 +66,24 @@ class PortSearch(QObject):
 
 
 _SIMULATED = ("sim:", "Simulate a device")
+_IDENTIFY = "Identify devices"
+_IDENTIFY_HELP = "Opens each free port for up to 10 s; some boards restart."
+_UNKNOWN = "not identified"
 _NO_PORTS = ("sim:", "replay:", "feed:", "sensor:")
 _TIP = (
     "Click for the list of devices, or type a port or URL, such as /dev/ttyACM0, COM3 or "
     "socket://host:port."
 )
 _LONGEST, _TAIL = 64, 18  # characters of a line of the list, and how many of them from its end
-_MARGIN = 16  # px
+_MARGIN, _SPACE = 16, 6  # px
 _LOSSES_PERIOD = 1.0  # s between two updates of the losses
 _EDITING = Qt.Key.Key_Backspace, Qt.Key.Key_Delete, Qt.Key.Key_Left, Qt.Key.Key_Right
+_CHOOSING = Qt.Key.Key_Return, Qt.Key.Key_Enter
+_CLICKING = (
+    QEvent.Type.MouseButtonPress,
+    QEvent.Type.MouseButtonRelease,
+    QEvent.Type.MouseButtonDblClick,
+)
 _BREAK = "\N{LINE SEPARATOR}    "  # at which an item of a list is broken, and an indent
 _DETAILS = Qt.ItemDataRole.UserRole + 1
 
@@ -87,15 +97,22 @@ class _Rows(QStyledItemDelegate):
         super().initStyleOption(option, index)
         option.text = index.data(_DETAILS) or index.data()  # pyright: ignore[reportAttributeAccessIssue]
 
+    def sizeHint(
+        self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
+    ) -> QSize:
+        return super().sizeHint(option, index) + QSize(0, _SPACE)
+
 
 class SourceBox(QComboBox):
     """A list that opens on a click, with a line in which typed text replaces the selected text.
 
     `chosen` is emitted for what is chosen from the list alone: `activated` is for a typed name that
-    is listed, too, once the line loses the focus.
+    is listed, too, once the line loses the focus. `identify_requested` is for the entry without
+    data, at which the list stays open.
     """
 
     chosen = Signal()
+    identify_requested = Signal()
 
     def __init__(self) -> None:
         # Without looking for duplicates, or Return would choose from the list.
@@ -110,12 +127,20 @@ class SourceBox(QComboBox):
         self.line.textEdited.connect(self._leave_list)
         self.setItemDelegate(_Rows(self))
         self.view().setTextElideMode(Qt.TextElideMode.ElideNone)
-        for watched in (self.line, self.view()):
+        for watched in (self.line, self.view(), self.view().viewport()):
             watched.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if isinstance(event, QKeyEvent) and watched is self.view():
+            if event.key() in _CHOOSING and self._identifies(self.view().currentIndex()):
+                return self._identify(event.type() == QEvent.Type.KeyPress)
             return event.type() == QEvent.Type.KeyPress and self._typed(event)
+        if isinstance(event, QMouseEvent) and watched is self.view().viewport():
+            if event.type() not in _CLICKING or not self._identifies(
+                self.view().indexAt(event.position().toPoint())
+            ):
+                return False
+            return self._identify(event.type() == QEvent.Type.MouseButtonPress)
         if isinstance(event, QMouseEvent) and watched is self.line:
             if event.type() == QEvent.Type.MouseButtonPress:
                 self._opens = not self.line.isModified()  # while typing it places the cursor
@@ -128,6 +153,15 @@ class SourceBox(QComboBox):
                 return True
             return self._opens
         return super().eventFilter(watched, event)
+
+    def _identifies(self, index: QModelIndex) -> bool:
+        return index.isValid() and not index.data(Qt.ItemDataRole.UserRole)
+
+    def _identify(self, requested: bool) -> bool:
+        """Keep the list open for what will be identified."""
+        if requested:
+            self.identify_requested.emit()
+        return True
 
     def _typed(self, event: QKeyEvent) -> bool:
         """Type into the line what is typed while the list is open; whether it was text."""
@@ -228,7 +262,7 @@ class ConnectionPanel(Panel):
         """The name of the source that is selected or typed."""
         text = self.sources.currentText().strip()
         index = self.sources.findText(text)
-        return str(self.sources.itemData(index)) if index >= 0 else text
+        return str(self.sources.itemData(index) or text) if index >= 0 else text
 
     def _request(self) -> None:
         self._refusal = ""
@@ -254,7 +288,7 @@ class ConnectionPanel(Panel):
         self._selected = next(known, absent)
         words = "" if chosen == _SIMULATED[0] else chosen
         if self._selected is not None:
-            words = "\n".join(_lines_on(self._selected, ""))
+            words = "\n".join(self._lines_on(self._selected))
         self.sources.setToolTip(plain_tip(f"{words}\n\n{_TIP}" if words else _TIP))
 
     def show_ports(self, ports: list[Port]) -> None:
@@ -262,6 +296,8 @@ class ConnectionPanel(Panel):
         if ports == self._ports or self.sources.view().isVisible():
             return  # an open list is not changed under the mouse
         chosen, selected, self._ports = self.source(), self._selected, ports
+        here = [known for known in self._speakers if any(map(known[0].same_plug, ports))]
+        self._speakers = here
         if selected is not None and chosen == selected.port:
             chosen = next((port.port for port in ports if port.same_plug(selected)), chosen)
         line = self._line
@@ -277,26 +313,46 @@ class ConnectionPanel(Panel):
             self.sources.addItem(_SIMULATED[1], _SIMULATED[0])
             for port in self._ports:
                 self.sources.addItem(printable(port.port), port.port)
+            if self.unidentified():
+                self.sources.addItem(_IDENTIFY)
+                row = self.sources.count() - 1
+                self.sources.setItemData(row, f"{_IDENTIFY}{_BREAK}{_IDENTIFY_HELP}", _DETAILS)
             self._show_details()
 
     def _show_details(self) -> None:
         for row, port in enumerate(self._ports, 1):
-            speaks = (text for known, text in self._speakers if known.same_plug(port))
-            lines = _lines_on(port, next(speaks, ""))
+            lines = self._lines_on(port)
             self.sources.setItemData(row, _BREAK.join(map(_abbreviated, lines)), _DETAILS)
             tip = plain_tip("\n".join(lines))
             self.sources.setItemData(row, tip, Qt.ItemDataRole.ToolTipRole)
         # Wider than the panel, or the list would cut off the serial numbers of two of a kind.
         self.sources.view().setMinimumWidth(self.sources.view().sizeHintForColumn(0) + _MARGIN)
 
-    def _note_speaker(self, source: str, sensor: Sensor) -> None:
-        """Store which device speaks at a listed port, to show it in the list."""
-        at = parts_of(source)[1] or source
-        text = f"{sensor.name} ({sensor.serial_number}), {sensor.layout}"
+    def _lines_on(self, port: Port) -> list[str]:
+        """Its name and number, its description and maker, and what speaks there."""
+        known = (text for other, text in self._speakers if other.same_plug(port))
+        speaks = next(known, "" if port.port.startswith(_NO_PORTS) else _UNKNOWN)
+        if not port.opened:
+            speaks = f"no permission: add yourself to the group {port.group}"
+        number = port.serial_number and f"serial number {port.serial_number}"
+        maker = "" if port.maker in port.description else port.maker
+        named = ", ".join(filter(None, (port.port, number)))
+        described = ", ".join(filter(None, (port.description, maker)))
+        return [printable(line) for line in (named, described, speaks) if line]
+
+    def unidentified(self) -> list[str]:
+        """The listed ports that may be opened to identify what speaks there."""
+        return [
+            each.port for each in self._ports if each.opened and not each.port.startswith(_NO_PORTS)
+        ]
+
+    def show_speaker(self, found: tuple[str, str]) -> None:
+        """Show in the list what speaks at a listed port, the first of `found`; empty if unknown."""
+        at, text = found
         for port in self._ports:
             if port.port == at and (port, text) not in self._speakers:
                 others = [known for known in self._speakers if not known[0].same_plug(port)]
-                self._speakers = [*others, (port, text)]
+                self._speakers = [*others, *([(port, text)] if text else [])]
                 self._show_details()
 
     def show_source(self, source: str) -> None:
@@ -312,13 +368,14 @@ class ConnectionPanel(Panel):
 
     def show_refusal(self, why: str) -> None:
         """Show why the requested source is not used."""
-        self._refusal = why
+        self._refusal = why.replace(self.source(), _abbreviated(self.source()))
 
     def show_status(self, status: Status, simulating: bool) -> None:
         text = ""
         if status.sensor is not None and status.state == "streaming":
             text = _sensor_text(status.sensor, status.setup.calibration) + _recording_text(status)
-            self._note_speaker(status.source, status.sensor)
+            sensor, at = status.sensor, parts_of(status.source)[1] or status.source
+            self.show_speaker((at, f"{sensor.name} ({sensor.serial_number}), {sensor.layout}"))
         elif status.state == "waiting":
             text = "Waiting for the device's description\N{HORIZONTAL ELLIPSIS}"
         if text != self.device.text():
@@ -338,7 +395,8 @@ class ConnectionPanel(Panel):
         stays = "The simulation" if status.source.startswith("sim:") else status.source
         if status.connecting:
             why = status.source_refusal and f"\n{status.source_refusal}"
-            begun = f"Connecting to {status.connecting}{ELLIPSIS} {stays} runs until it answers."
+            to = f"Connecting to {_abbreviated(status.connecting)}{ELLIPSIS}"
+            begun = f"{to} {stays} runs until it answers."
             self.show_message(f"{begun}{why}", hint=not why)
         elif self._refusal:
             self.show_message(f"{self._refusal}\n{stays} stays connected.")
@@ -359,16 +417,6 @@ class ConnectionPanel(Panel):
     def show_message(self, text: str, hint: bool = False) -> None:
         super().show_message(text, hint)
         self.copy_button.setVisible(bool(COMMAND.search(text)))
-
-
-def _lines_on(port: Port, speaks: str) -> list[str]:
-    """Lines on a port: its name and number, its description and maker, and what speaks there."""
-    number = port.serial_number and f"serial number {port.serial_number}"
-    permission = "" if port.opened else "no permission"
-    maker = "" if port.maker in port.description else port.maker
-    named = ", ".join(filter(None, (port.port, number, permission)))
-    described = ", ".join(filter(None, (port.description, maker)))
-    return [printable(line) for line in (named, described, speaks) if line]
 
 
 def _abbreviated(words: str) -> str:

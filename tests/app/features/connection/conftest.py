@@ -1,6 +1,6 @@
 """What the tests of connecting share."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import pytest
 
@@ -9,10 +9,10 @@ from kappaskin_app.features.connection.panel import ConnectionPanel
 
 
 @pytest.fixture
-def shown(qtbot) -> Callable[[ConnectionPanel, Sequence[Port]], ConnectionPanel]:
+def shown(qtbot) -> Callable[[ConnectionPanel, list[Port]], ConnectionPanel]:
     """Shows a panel that lists these ports."""
 
-    def show(panel: ConnectionPanel, ports: Sequence[Port]) -> ConnectionPanel:
+    def show(panel: ConnectionPanel, ports: list[Port]) -> ConnectionPanel:
         qtbot.addWidget(panel)
         panel.resize(290, 200)
         panel.show()

@@ -1,6 +1,8 @@
 """The list of devices, with the mouse and the keys: choose, type, and what a failure leaves."""
 
 import os
+import threading
+import time
 
 import pytest
 
@@ -9,11 +11,13 @@ from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QApplication, QLabel
 
-from kappaskin.sources import Port
+from kappaskin import load_scene
+from kappaskin.sources import Port, PseudoDevice
 from kappaskin.sources.ports import open_port
 from kappaskin_app.features.connection.panel import ConnectionPanel
 
 PORTS = [Port("/dev/ttyACM0", "Fingertip", "Kappa Ltd", "SN-4711"), Port("/dev/ttyACM10")]
+DETAILS = Qt.ItemDataRole.UserRole + 1
 LEFT = Qt.MouseButton.LeftButton
 
 
@@ -201,3 +205,123 @@ def test_a_busy_port_is_named_with_who_has_it(window, qtbot, until):
     held.close()
     for end in (master, slave):
         os.close(end)
+
+
+@pytest.fixture
+def device():
+    """A simulated device that serves."""
+    made, stop = PseudoDevice(load_scene("centre")), threading.Event()
+    thread = threading.Thread(target=made.serve, args=(stop.is_set,))
+    thread.start()
+    yield made
+    stop.set()
+    thread.join()
+    made.close()
+
+
+@pytest.fixture
+def silent():
+    """The name of a port at which nothing sends."""
+    master, slave = os.openpty()
+    yield os.ttyname(slave)
+    os.close(master)
+    os.close(slave)
+
+
+@pytest.fixture
+def listing(window, monkeypatch, device, silent, until, qtbot):
+    """The window that lists a device, a silent port, and one that may not be opened."""
+    ports = [Port(device.port), Port(silent), Port("/dev/ttyUSB9", opened=False)]
+    monkeypatch.setattr(Port, "found", staticmethod(lambda: list(ports)))
+    until(lambda: window.connection.sources.count() == 5)
+    return window
+
+
+def clicked(panel, qtbot, row):
+    """Click a row of the open list."""
+    view = panel.sources.view()
+    where = view.visualRect(view.model().index(row, 0)).center()
+    qtbot.mouseMove(view.viewport(), where)
+    qtbot.wait(300)
+    qtbot.mouseClick(view.viewport(), LEFT, pos=where)
+
+
+def streams_from(window, source):
+    """Whether frames of a source are shown."""
+    status = window.session.status
+    return (window.session.source, status.source, status.state) == (source, source, "streaming")
+
+
+def speakers(panel):
+    """The last line of each listed port."""
+    rows = range(1, panel.sources.count() - 1)
+    return [panel.sources.itemData(row, DETAILS).splitlines()[-1].strip() for row in rows]
+
+
+def test_a_click_identifies_the_devices_in_the_open_list(listing, qtbot, until):
+    panel, connections = listing.connection, listing.session.status.connections
+    opened_by_click(panel, qtbot)
+    assert speakers(panel)[:2] == ["not identified", "not identified"]
+    clicked(panel, qtbot, 4)
+    until(lambda: any("listening" in text for text in speakers(panel)))
+    found = "Kappaskin device: Simulated skin (SIM-0001), 300 channels"
+    refused = "no permission: add yourself to the group dialout"
+    until(lambda: speakers(panel) == [found, "silent", refused])
+    assert panel.sources.view().isVisible()
+
+    qtbot.keyClick(panel.sources.view(), Qt.Key.Key_Escape)
+    assert (panel.source(), listing.display.badge.state) == ("sim:", "SIM")
+    assert listing.session.status.connections == connections
+    opened_by_click(panel, qtbot)
+    assert speakers(panel) == [found, "silent", refused]
+
+
+def test_return_identifies_the_devices_in_the_open_list(listing, qtbot, until):
+    panel = listing.connection
+    panel.sources.setFocus()
+    qtbot.keyClick(panel.sources, Qt.Key.Key_Down)
+    for _ in range(4):
+        qtbot.keyClick(panel.sources.view(), Qt.Key.Key_Down)
+    qtbot.keyClick(panel.sources.view(), Qt.Key.Key_Return)
+    until(lambda: speakers(panel)[0].startswith("Kappaskin device"))
+    assert panel.sources.view().isVisible()
+    assert panel.source() == "sim:"
+
+
+def test_a_device_is_connected_at_once_while_devices_are_identified(listing, device, qtbot, until):
+    panel = listing.connection
+    opened_by_click(panel, qtbot)
+    clicked(panel, qtbot, 4)
+    until(lambda: speakers(panel)[1].startswith("listening"))
+    clicked(panel, qtbot, 1)
+    until(lambda: streams_from(listing, device.port))
+    assert not panel.message.isVisible()
+    assert speakers(panel)[1] == "not identified"
+
+
+def test_the_device_in_use_is_not_opened_to_identify_it(listing, device, qtbot, until):
+    panel = listing.connection
+    opened_by_click(panel, qtbot)
+    clicked(panel, qtbot, 1)
+    until(lambda: streams_from(listing, device.port))
+    known = "Simulated skin (SIM-0001), 10 x 10 elements"
+    until(lambda: speakers(panel)[0] == known)
+    opened_by_click(panel, qtbot)
+    clicked(panel, qtbot, 4)
+    until(lambda: speakers(panel)[1] == "silent")
+    assert speakers(panel)[0] == known
+    assert listing.session.status.accounting.lost == 0
+    assert streams_from(listing, device.port)
+
+
+def test_closing_the_window_ends_the_identification(listing, silent, qtbot, until):
+    panel = listing.connection
+    opened_by_click(panel, qtbot)
+    clicked(panel, qtbot, 4)
+    until(lambda: speakers(panel)[1].startswith("listening"))
+    qtbot.keyClick(panel.sources.view(), Qt.Key.Key_Escape)
+    began = time.monotonic()
+    listing.close()
+    assert time.monotonic() - began < 2.5  # the silent port is listened to for longer
+    assert "identified_ports" not in [thread.name for thread in threading.enumerate()]
+    open_port(silent).close()

@@ -42,14 +42,19 @@ def details(panel, row):
 
 
 def test_ports_are_listed_with_maker_and_number_and_whether_they_may_be_opened(panel):
-    assert listed(panel) == ["Simulate a device", SKIN.port, BOARD.port]
+    assert listed(panel) == ["Simulate a device", SKIN.port, BOARD.port, "Identify devices"]
     assert details(panel, 0) == ["Simulate a device"]
     whole = [
         "/dev/ttyACM0, serial number SN-4711",
         "Fingertip of ten by ten elements, Kappa Ltd",
+        "not identified",
     ]
     assert details(panel, 1) == whole
-    assert details(panel, 2)[0] == "/dev/ttyUSB0, serial number beef, no permission"
+    assert details(panel, 2) == [
+        "/dev/ttyUSB0, serial number beef",
+        "CP2102N, Silicon Labs",
+        "no permission: add yourself to the group dialout",
+    ]
     assert panel.sources.itemData(1, Qt.ItemDataRole.ToolTipRole) == "\n".join(whole)
     panel.sources.setCurrentIndex(1)
     assert panel.source() == "/dev/ttyACM0"
@@ -64,19 +69,22 @@ def test_the_list_shows_what_speaks_at_a_port_even_under_another_name(panel):
     sensor = replace(load_scene("centre").sensor(), name="Thumb", serial_number="T-1")
     panel.show_status(Status(state="streaming", source=SKIN.port, sensor=sensor), False)
     assert details(panel, 1)[2] == "Thumb (T-1), 10 x 10 elements"
-    assert len(details(panel, 2)) == 2
+    assert "permission" in details(panel, 2)[2]
     panel.show_ports([BOARD, replace(SKIN, port="/dev/ttyACM1")])
     assert details(panel, 2)[2] == "Thumb (T-1), 10 x 10 elements"
     other = replace(sensor, name="Palm")
     panel.show_status(Status(state="streaming", source="/dev/ttyACM1", sensor=other), False)
     assert details(panel, 2)[2] == "Palm (T-1), 10 x 10 elements"
+    panel.show_ports([BOARD])
+    panel.show_ports([SKIN])
+    assert details(panel, 1)[2] == "not identified"
 
 
 def test_the_choice_stays_when_other_ports_come_and_go(panel):
     panel.sources.setCurrentIndex(1)
     panel.show_ports([SKIN])
     panel.show_ports([Port("/dev/ttyACM7"), SKIN, BOARD])
-    assert (panel.source(), panel.sources.count()) == (SKIN.port, 4)
+    assert (panel.source(), panel.sources.count()) == (SKIN.port, 5)
     panel.show_ports([])
     assert panel.source() == SKIN.port  # it may come back
 
@@ -101,10 +109,10 @@ def test_who_types_or_chooses_is_left_alone(panel, qtbot):
     assert line.text() == "/devx/ttyS"
     panel.sources.showPopup()
     panel.show_ports([SKIN, BOARD])
-    assert panel.sources.count() == 2
+    assert panel.sources.count() == 3
     panel.sources.hidePopup()
     panel.show_ports([SKIN, BOARD])
-    assert panel.sources.count() == 3
+    assert panel.sources.count() == 4
 
 
 def test_a_message_is_shown_whole_and_its_command_can_be_copied(panel):
@@ -149,7 +157,7 @@ def test_ports_are_searched_in_the_background_while_the_list_is_visible(panel, f
     taken = []
     search.found.connect(panel.show_ports)
     search.found.connect(taken.append)
-    until(lambda: len(found) > 1 and panel.sources.count() == 2)
+    until(lambda: len(found) > 1 and panel.sources.count() == 3)
     assert threading.main_thread() not in found
     panel.hide()
     search.refresh()  # unless a search is running: after it there is none
