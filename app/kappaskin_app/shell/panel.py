@@ -17,10 +17,11 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.theme import ALERT, FAINT, current, follow_look
 from kappaskin_app.widgets.layout import scroll_to
-from kappaskin_app.widgets.parts import Label
+from kappaskin_app.widgets.parts import ELLIPSIS, Label
 from kappaskin_app.widgets.text import COMMAND
 
 _GROWN = 20  # ms after which the page of a panel that grew has grown too
+_LONGEST, _BEGINNING = 800, 500  # characters of a message, and how many from its beginning
 
 
 class Panel(QGroupBox):
@@ -76,7 +77,9 @@ class Panel(QGroupBox):
         """Show the engine's status, and whether the app's own simulation runs."""
 
     def show_message(self, text: str, hint: bool = False) -> None:
-        """Show an alarm or a hint below; nothing where `text` is empty."""
+        """Show an alarm or a hint below, a very long one without its middle; nothing if empty."""
+        if len(text) > _LONGEST:
+            text = f"{text[:_BEGINNING]}{ELLIPSIS}{text[_BEGINNING - _LONGEST :]}"
         if (text, hint) != (self.message.text(), self._hint):
             self._hint = hint
             self.message.setText(printable(text, keep="\n"))

@@ -368,7 +368,7 @@ class ConnectionPanel(Panel):
 
     def show_refusal(self, why: str) -> None:
         """Show why the requested source is not used."""
-        self._refusal = why.replace(self.source(), _abbreviated(self.source()))
+        self._refusal = why
 
     def show_status(self, status: Status, simulating: bool) -> None:
         text = ""
@@ -395,8 +395,7 @@ class ConnectionPanel(Panel):
         stays = "The simulation" if status.source.startswith("sim:") else status.source
         if status.connecting:
             why = status.source_refusal and f"\n{status.source_refusal}"
-            to = f"Connecting to {_abbreviated(status.connecting)}{ELLIPSIS}"
-            begun = f"{to} {stays} runs until it answers."
+            begun = f"Connecting to {status.connecting}{ELLIPSIS} {stays} runs until it answers."
             self.show_message(f"{begun}{why}", hint=not why)
         elif self._refusal:
             self.show_message(f"{self._refusal}\n{stays} stays connected.")

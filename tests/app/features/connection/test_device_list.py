@@ -134,8 +134,11 @@ def test_the_wheel_does_not_change_the_source(panel, qtbot):
 
 def connected(window, qtbot, text):
     """Type a source over what is in the box, and press Return."""
-    opened_by_click(window.connection, qtbot)
-    typed(qtbot, text)
+    view = opened_by_click(window.connection, qtbot)
+    if text:
+        typed(qtbot, text)
+    else:
+        qtbot.keyClick(view, Qt.Key.Key_Delete)
     qtbot.keyClick(window.connection.sources, Qt.Key.Key_Return)
 
 
@@ -176,6 +179,69 @@ def test_a_wrong_path_leaves_the_simulation_and_one_reason(window, qtbot, until,
     connected(window, qtbot, "sim:circle")
     until(lambda: window.session.source == "sim:circle")
     until(lambda: places_of(window, reason) == 0)
+
+
+def test_bad_sources_each_have_one_reason_and_leave_the_simulation(window, qtbot, until, tmp_path):
+    text = tmp_path / "notes.txt"
+    text.write_text("hello")
+    address = "expected host and port, such as socket://host:5000"
+    nothing = "expected a source: sim:SCENE, replay:FILE, feed:NAME, a port or a URL; got no name"
+    reasons = {
+        f"{tmp_path}": f"{tmp_path}: a folder, not a serial port; expected a port such as",
+        "": nothing,
+        f"{text}": f"{text}: a file, not a serial port; expected a port such as",
+        "   ": nothing,
+        "/dev/null": "/dev/null: a device, not a serial port; expected a port such as",
+        "http://example.org": "http://example.org: cannot be opened",
+        "udp://[::1]:5005": "udp://[::1]:5005: expected the format of the datagrams",
+        "socket://localhost": f"socket://localhost: {address}",
+        "socket://localhost:99999": f"socket://localhost:99999: {address}",
+        f"replay:{tmp_path}": "expected a recording",
+        "a b  c": "a b  c: there is no such port",
+        "<b>bold</b>": "<b>bold</b>: there is no such port",
+    }
+    panel, connections = window.connection, window.session.status.connections
+    for source, reason in reasons.items():
+        connected(window, qtbot, source)
+        until(lambda reason=reason: places_of(window, reason) == 1)
+        assert places_of(window, "Connecting to") == 0
+        assert panel.sources.currentText() == source
+        assert (window.session.source, window.session.engine.source) == ("sim:", "sim:")
+    assert window.session.status.connections == connections
+    before = window.session.estimate.sequence
+    until(lambda: window.session.estimate.sequence > before + 20)
+    assert window.display.badge.state == "SIM"
+
+
+@pytest.mark.parametrize("scheme", ["", "sim:", "replay:"])
+def test_a_source_of_10000_characters_has_a_short_reason(window, qtbot, until, scheme):
+    panel, width = window.connection, window.width()
+    QApplication.clipboard().setText(scheme + "x" * 10_000)
+    view = opened_by_click(panel, qtbot)
+    qtbot.keyClick(view, Qt.Key.Key_V, Qt.KeyboardModifier.ControlModifier)
+    assert len(panel.sources.currentText()) == 10_000 + len(scheme)
+    qtbot.keyClick(panel.sources, Qt.Key.Key_Return)
+    reason = window.recording.message if scheme == "replay:" else panel.message
+    until(lambda: "xxx" in reason.text())
+    assert len(reason.text()) < 1000
+    assert window.width() == width
+    assert window.display.badge.state == "SIM"
+
+
+def test_a_port_that_vanishes_while_it_is_connected_leaves_the_simulation(window, qtbot, until):
+    master, slave = os.openpty()
+    port, panel = os.ttyname(slave), window.connection
+    connected(window, qtbot, port)
+    until(lambda: "The simulation runs until it answers." in panel.message.text())
+    os.close(slave)
+    os.close(master)
+    until(lambda: "connection lost" in panel.message.text() or "no such" in panel.message.text())
+    assert panel.message.text().count(port) <= 2  # what is connected, and why it is not
+    assert (window.session.source, window.display.badge.state) == ("sim:", "SIM")
+    qtbot.mouseClick(panel.disconnect_button, LEFT)  # Cancel
+    until(lambda: panel.disconnect_button.text() == "Disconnect")
+    assert not panel.message.isVisible()
+    assert panel.source() == "sim:"
 
 
 def test_a_silent_port_waits_beside_the_simulation_until_it_is_cancelled(window, qtbot, until):
