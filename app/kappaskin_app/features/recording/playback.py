@@ -149,8 +149,10 @@ class PlaybackControl(QObject):
         """Open `source` if it is a recording; whether it is."""
         if source.startswith(RECORDED):
             self.open_file(Path(source.removeprefix(RECORDED).strip()))
-        elif self.summary is None:
-            self._set_message("")  # of a recording that was refused
+        elif not self._reading.running:
+            self._asked = Path()  # or another refusal that names the file would seem to be of it
+            if self.summary is None:
+                self._set_message("")  # of a recording that was refused
         return source.startswith(RECORDED)
 
     def resume(self, source: str) -> None:
@@ -183,7 +185,10 @@ class PlaybackControl(QObject):
         self._use(found.setup_at(0.0))
         self._set_message(_opening_message(found), damaged=None if found.whole else found.path)
         self.opened.emit(source)
-        self.notified.emit(self.message or f"Playing {found.path.name}, with the settings recorded")
+        settings = (
+            "settings recorded" if found.setup_at(0.0) else "present settings, as it has none"
+        )
+        self.notified.emit(self.message or f"Playing {found.path.name}, with the {settings}")
 
     def _use(self, setup: Setup | None) -> None:
         """Use a recorded setup, as one change that can be undone."""

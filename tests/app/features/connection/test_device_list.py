@@ -3,6 +3,7 @@
 import os
 import threading
 import time
+from contextlib import closing
 
 import pytest
 
@@ -12,7 +13,8 @@ from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QApplication, QLabel
 
 from kappaskin import load_scene
-from kappaskin.sources import Port, PseudoDevice
+from kappaskin.recording import Recorder
+from kappaskin.sources import Port, PseudoDevice, SimulatedSource, VirtualClock
 from kappaskin.sources.ports import open_port
 from kappaskin_app.features.connection.panel import ConnectionPanel
 
@@ -226,6 +228,29 @@ def test_a_source_of_10000_characters_has_a_short_reason(window, qtbot, until, s
     assert len(reason.text()) < 1000
     assert window.width() == width
     assert window.display.badge.state == "SIM"
+
+
+def test_a_recording_without_settings_is_played_with_the_present_ones(
+    window, qtbot, until, tmp_path
+):
+    file, clock = tmp_path / "bare.mcap", VirtualClock(1000.0)
+    source = SimulatedSource(load_scene("circle"), clock, clock.sleep)
+    with closing(Recorder(file, clock())) as recorder:
+        source.record(recorder)
+        while clock.now < 1001.0:
+            source.read(0.1)
+    settings = window.history.settings
+    connected(window, qtbot, f"replay:{file}")
+    until(lambda: streams_from(window, f"replay:{file}"))
+    played = "Playing bare.mcap, with the present settings, as it has none"
+    until(lambda: places_of(window, played) == 1)
+    assert window.history.settings == settings
+
+    connected(window, qtbot, str(file))  # refused, and played on
+    until(lambda: places_of(window, "a file, not a serial port") == 1)
+    assert window.playback.summary is not None
+    assert window.transport.isVisible()
+    assert places_of(window, "bare.mcap is not played") == 0
 
 
 def test_a_port_that_vanishes_while_it_is_connected_leaves_the_simulation(window, qtbot, until):
