@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QStandardItemModel
-from PySide6.QtWidgets import QFileDialog
+from PySide6.QtWidgets import QComboBox, QFileDialog
 
 from kappaskin import Refusal
 from kappaskin_app.features.export.exports import ExportDialog
@@ -19,6 +19,7 @@ from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.pictures import save_view
 from kappaskin_app.shell.window import MainWindow
 
+LEFT = Qt.MouseButton.LeftButton
 CTRL = Qt.KeyboardModifier.ControlModifier
 
 
@@ -196,6 +197,53 @@ def test_contact_and_force_of_the_last_recording_are_exported_with_two_keys(
     assert dialog.expected.text() == "Already exists; choose another name."
     assert not dialog.export_button.isEnabled()
     assert sorted(path.name for path in folder.iterdir()) == ["last.csv", "last.mcap"]
+
+
+def clicked_entry(window, qtbot, menu: str, entry: str) -> None:
+    """Click an entry of the window's menu bar."""
+    bar = window.menuBar()
+    action = next(a for a in bar.actions() if a.text().replace("&", "") == menu)
+    qtbot.mouseClick(bar, LEFT, pos=bar.actionGeometry(action).center())
+    popup = action.menu()
+    qtbot.waitUntil(popup.isVisible)
+    found = next(a for a in popup.actions() if a.text().replace("&", "").startswith(entry))
+    qtbot.mouseMove(popup, popup.actionGeometry(found).center())
+    qtbot.mouseClick(popup, LEFT, pos=popup.actionGeometry(found).center())
+
+
+def clicked_item(box: QComboBox, qtbot, row: int) -> None:
+    """Click an item of a list, once it is open."""
+    qtbot.mouseClick(box, LEFT)
+    view = box.view()
+    qtbot.waitUntil(view.isVisible)
+    qtbot.wait(300)  # after which a release is no longer that of the click which opened it
+    where = view.visualRect(view.model().index(row, 0)).center()
+    qtbot.mouseMove(view.viewport(), where)
+    qtbot.mouseClick(view.viewport(), LEFT, pos=where)
+
+
+def test_it_is_recorded_and_exported_by_mouse_alone(window, until, folder, qtbot) -> None:
+    window.panels.reveal(window.recording)
+    qtbot.mouseClick(window.recording.record, LEFT)
+    until(lambda: window.recorder.written.messages > 0)
+    qtbot.mouseClick(window.recording.record, LEFT)
+    until(lambda: window.display.centre.banner.isVisible())
+    [last] = folder.iterdir()
+
+    clicked_entry(window, qtbot, "Export", "Recording")
+    dialog = window.exports.dialog
+    until(dialog.isVisible)
+    assert dialog.recording.text() == str(last)
+    clicked_item(dialog.preset, qtbot, 2)
+    clicked_item(dialog.format, qtbot, dialog.format.findData(".npz"))
+    assert dialog.preset.currentText() == "Everything"
+    assert dialog.to.text() == str(last.with_suffix(".npz"))
+    until(lambda: dialog.expected.text().startswith("About "))
+    qtbot.mouseClick(dialog.export_button, LEFT)
+    until(lambda: dialog.words.text().startswith(f"Written: {last.with_suffix('.npz')}"))
+    with np.load(last.with_suffix(".npz")) as written:
+        assert {"counts", "force"} <= set(written.files)
+    assert window.display.badge.state == "SIM"
 
 
 @pytest.mark.full
