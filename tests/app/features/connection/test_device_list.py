@@ -390,6 +390,18 @@ def test_a_device_is_connected_at_once_while_devices_are_identified(listing, dev
     assert speakers(panel)[1] == "not identified"
 
 
+def test_a_port_that_is_identified_is_closed_before_it_is_connected(listing, silent, qtbot, until):
+    panel, reasons = listing.connection, []
+    listing.session.source_refused.connect(reasons.append)
+    opened_by_click(panel, qtbot)
+    clicked(panel, qtbot, 4)
+    until(lambda: speakers(panel)[1].startswith("listening"))
+    clicked(panel, qtbot, 2)
+    until(lambda: panel.message.text().startswith(f"Connecting to {silent}"))
+    until(lambda: "silent" in panel.message.text())
+    assert reasons == []  # not busy
+
+
 def test_the_device_in_use_is_not_opened_to_identify_it(listing, device, qtbot, until):
     panel = listing.connection
     opened_by_click(panel, qtbot)
