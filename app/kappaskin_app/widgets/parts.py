@@ -73,11 +73,12 @@ class Heading(Label):
 
 
 class _PushedByEnter(QPushButton):
-    """A button that Enter pushes too, as Space does."""
+    """A button that Enter pushes too, as Space does; once while it is held."""
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
-            self.click()
+            if not event.isAutoRepeat():
+                self.click()
         else:
             super().keyPressEvent(event)
 
