@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin._text import printable
+from kappaskin_app.theme import follow_look
 
 ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
 
@@ -67,8 +68,11 @@ class Heading(Label):
         self.setFont(font)
 
     def event(self, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.ApplicationFontChange:
+        parent = self.parentWidget()
+        if event.type() == QEvent.Type.ApplicationFontChange:  # comes to windows alone
             self._enlarge()
+        elif event.type() == QEvent.Type.Polish and parent is not None:
+            follow_look(parent, self._enlarge)
         return super().event(event)
 
 

@@ -27,7 +27,7 @@ from kappaskin_app.widgets.parts import ELLIPSIS, Heading, Label, button, in_a_r
 
 _ENTER = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 _LARGER = 1.15  # times the letters: the title of a step
-_RIGHT = 3  # of the series: green, told apart from the colour of alarms
+_RIGHT, _DARKER = 3, 110  # of the series: green, told apart from the colour of alarms; by so much %
 
 
 class _Words(Label):
@@ -174,7 +174,7 @@ class QuestionView(QWidget):
 
     def _dress(self) -> None:
         right = self._answer.right and not self._message
-        colour = series(_RIGHT).name() if right else current().alert
+        colour = series(_RIGHT).darker(_DARKER).name() if right else current().alert
         self.feedback.setStyleSheet(f"color: {colour};")
         self.number.setMaximumWidth(12 * self.number.fontMetrics().averageCharWidth())
         for option in self.options.buttons():
@@ -287,10 +287,15 @@ class _List(QListWidget):
 
 
 class ListPage(QWidget):
-    """The list of lessons; `taken` brings the one to start, `open_wanted` requests a file."""
+    """The list of lessons; `taken` brings the one to start, `open_wanted` requests a file.
+
+    `hand_out_wanted` brings the lesson to print, `teacher_wanted` requests the teacher's page.
+    """
 
     taken = Signal(str)
     open_wanted = Signal()
+    hand_out_wanted = Signal(str)
+    teacher_wanted = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -310,18 +315,32 @@ class ListPage(QWidget):
             "restores them.",
         )
         self.open = button(f"&Open file{ELLIPSIS}", "open-lesson", "Open a lesson file.")
+        self.hand_out = button(
+            f"Save hand-ou&t{ELLIPSIS}",
+            "hand-out",
+            "The selected lesson as a PDF to print: texts, pictures, tasks with space for answers, "
+            "no solutions.",
+        )
+        self.teacher = button(
+            "Te&acher's page",
+            "teacher-page",
+            "Of each lesson: goal, time, answers, common mistakes, questions to discuss.",
+        )
         stack = QVBoxLayout(self)
         stack.setContentsMargins(8, 6, 8, 8)
         stack.addWidget(self.list, 1)
         stack.addWidget(self.about)
         stack.addWidget(self.message)
         stack.addLayout(in_a_row(self.begin, self.open))
+        stack.addLayout(in_a_row(self.hand_out, self.teacher))
         self._progress: Mapping[str, Progress] = {}
         self.list.currentItemChanged.connect(guarded(self._describe))
         self.list.itemDoubleClicked.connect(guarded(self._take))
         self.list.taken.connect(guarded(self._take))
         self.begin.clicked.connect(guarded(self._take))
         self.open.clicked.connect(guarded(lambda *_: self.open_wanted.emit()))
+        self.hand_out.clicked.connect(guarded(lambda *_: self.hand_out_wanted.emit(self.selected)))
+        self.teacher.clicked.connect(guarded(lambda *_: self.teacher_wanted.emit()))
 
     def show_lessons(self, progress: Mapping[str, Progress], message: str) -> None:
         """Show the lessons by file, their progress, and why a file could not be read."""
@@ -346,7 +365,8 @@ class ListPage(QWidget):
 
     def _describe(self, *_: object) -> None:
         one = self._progress.get(self.selected)
-        self.begin.setEnabled(one is not None)
+        for way in (self.begin, self.hand_out):
+            way.setEnabled(one is not None)
         if one is None:
             self.about.setText("")
             return

@@ -71,6 +71,7 @@ class LessonPanel(QWidget):
         self.seen.connect(guarded(teaching.look))
         self.list.taken.connect(guarded(teaching.take))
         self.list.open_wanted.connect(guarded(teaching.open))
+        self.list.hand_out_wanted.connect(guarded(teaching.hand_out))
         self.step.answered.connect(guarded(teaching.answer))
         self.step.show_wanted.connect(guarded(teaching.show_how))
         self.step.pressed.connect(guarded(teaching.press))
