@@ -13,7 +13,6 @@ from PySide6.QtCore import QBuffer, QMarginsF, QPointF, QRectF, QSizeF, Qt, QUrl
 from PySide6.QtGui import (
     QAbstractTextDocumentLayout,
     QColor,
-    QFont,
     QGuiApplication,
     QImage,
     QPageSize,
@@ -21,13 +20,7 @@ from PySide6.QtGui import (
     QPdfWriter,
     QPen,
     QPixmap,
-    QTextBlockFormat,
-    QTextCharFormat,
-    QTextCursor,
     QTextDocument,
-    QTextFormat,
-    QTextFrameFormat,
-    QTextImageFormat,
 )
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
@@ -135,11 +128,19 @@ def _answers(progress: Progress) -> str:
 # The hand-out.
 
 _DPI = 96  # px per inch of all that follows
-_PAGE, _GAP = QRectF(72, 68, 650, 970), 4  # of the text of a page; between its parts
+_PAGE, _GAP = QRectF(72, 68, 650, 970), 18  # of the text of a page; between its parts
 _IMAGE = int(QTextDocument.ResourceType.ImageResource)
 _DOTS = 3.0  # of a picture for each px of it
-_SMALL, _TEXT, _EQUATION, _STEP, _TITLE, _LINES = 11, 14, 17, 17, 27, 60
-"""Heights of letters, and of the room for an answer, in px."""
+_SMALL, _TEXT, _EQUATION = 11, 14, 17  # px
+_QUOTED = "margin-left:40px;"  # in the style of an equation, which is a quotation in a lesson
+_STYLE = (
+    "h1 { font-size: 27px; } h2 { font-size: 17px; margin-bottom: 2px; } .line { margin: 4px 0; }"
+)
+_ROOM, _BOX = "<p>&nbsp;</p>", "\N{BALLOT BOX} &nbsp;"  # to write and to tick
+_FRAME = (
+    "<p class=line></p><table width='100%' border='1' cellspacing='0' cellpadding='8' "
+    "style='border-style: solid; border-color: #b9bfc6'><tr><td>"
+)
 _INK, _PALE, _GREY = "#16191d", "#8a929b", "#b9bfc6"
 _PICTURE, _SPACE = QSizeF(_PAGE.width(), 190), QRectF(0, 16, 300, 158)  # px
 _MAPS = tuple(QRectF(left, 18, 135, 135) for left in (345, 515))
@@ -172,99 +173,53 @@ def write_hand_out(lesson: Lesson, path: Path) -> Iterator[float]:
 
 def _title(lesson: Lesson) -> QTextDocument:
     document = _empty()
-    cursor = QTextCursor(document)
-    _line(cursor, lesson.title, _TITLE, bold=True, first=True)
-    _line(
-        cursor, f"{lesson.learn} About {lesson.minutes} minutes, with the lesson open in the app."
+    document.setHtml(
+        f"<h1>{escape(lesson.title)}</h1><p>{escape(lesson.learn)} About {lesson.minutes} minutes, "
+        f"with the lesson open in the app.</p><p>Name: {'_' * 40} &nbsp; Date: {'_' * 16}</p>"
     )
-    _line(cursor, f"Name: {'_' * 40}    Date: {'_' * 16}", above=14)
     return document
 
 
 def step_page(number: int, step: Step, image: QImage | None) -> QTextDocument:
     """A step with its picture, if there is one, and its question in a frame."""
-    document = _empty()
-    cursor = QTextCursor(document)
-    _line(cursor, f"{number + 1}  {step.title}", _STEP, bold=True, first=True)
-    cursor.insertBlock(QTextBlockFormat(), QTextCharFormat())
-    cursor.insertMarkdown(step.text)
-    for button in step.buttons:
-        _line(cursor, f"Button in the app: {button.label}", above=4)
+    document, text = _empty(), QTextDocument()
+    text.setMarkdown(step.text)
+    text.setDefaultFont(document.defaultFont())
+    words = text.toHtml().replace(_QUOTED, f"{_QUOTED} font-size: {_EQUATION}px;")
+    parts = [f"<h2>{number + 1} &nbsp;{escape(step.title)}</h2>", words]
+    parts += [
+        f"<p class=line>Button in the app: {escape(button.label)}</p>" for button in step.buttons
+    ]
     if image is not None:
-        document.addResource(_IMAGE, QUrl("skin"), image)
-        shown = QTextImageFormat()
-        shown.setName("skin")
-        shown.setWidth(_PICTURE.width())
-        _line(cursor, "", above=8)
-        cursor.insertImage(shown)
+        parts.append(f"<p class=line><img src='skin' width='{_PICTURE.width()}'></p>")
     if step.question is not None:
-        _ask(cursor, step.question)
-    _enlarge_equations(document)
+        parts.append(_asked(step.question))
+    document.setHtml("".join(parts))
+    document.addResource(_IMAGE, QUrl("skin"), image)
     return document
 
 
-def _ask(cursor: QTextCursor, question: Question) -> None:
-    frame = QTextFrameFormat()
-    frame.setBorder(1)
-    frame.setBorderStyle(QTextFrameFormat.BorderStyle.BorderStyle_Solid)
-    frame.setBorderBrush(QColor(_GREY))
-    frame.setPadding(8)
-    frame.setTopMargin(8)
-    cursor.insertFrame(frame)
-    _line(cursor, question.text, bold=True, first=True)
+def _asked(question: Question) -> str:
     match question.how:
         case ChoiceAnswer(options=options):
-            for option in options:
-                _line(cursor, f"\N{BALLOT BOX}  {option}", above=4)
+            space = "".join(f"<p class=line>{_BOX}{escape(option)}</p>" for option in options)
         case NumberAnswer(unit=unit):
-            _line(cursor, f"Answer: {'_' * 18} {unit}", above=_LINES)
+            space = f"{2 * _ROOM}Answer: {'_' * 18} {unit}"
         case LessonTask():
-            _line(
-                cursor, "\N{BALLOT BOX}  Done. What did you change, and what did you see?", above=4
-            )
-            _line(cursor, "", above=_LINES)
+            done = "Done. What did you change, and what did you see?"
+            space = f"<p class=line>{_BOX}{done}</p>{2 * _ROOM}"
+    return f"{_FRAME}<b>{escape(question.text)}</b>{space}</td></tr></table>"
 
 
 def _empty() -> QTextDocument:
     document, font = QTextDocument(), QGuiApplication.font()
     font.setPixelSize(_TEXT)
     document.setDefaultFont(font)
+    document.setDefaultStyleSheet(_STYLE)
     document.setUseDesignMetrics(True)
     document.setDocumentMargin(0)
     document.setTextWidth(_PAGE.width())
     return document
-
-
-def _line(
-    cursor: QTextCursor,
-    text: str,
-    size: int = _TEXT,
-    *,
-    bold: bool = False,
-    above: float = 0.0,
-    first: bool = False,
-) -> None:
-    """Add a paragraph with letters of `size` px; the `first` of a document or frame is there."""
-    letters, block = QTextCharFormat(), QTextBlockFormat()
-    letters.setProperty(QTextFormat.Property.FontPixelSize, size)
-    letters.setFontWeight(QFont.Weight.Bold if bold else QFont.Weight.Normal)
-    block.setTopMargin(above)
-    if not first:
-        cursor.insertBlock()
-    cursor.setBlockFormat(block)
-    cursor.insertText(text, letters)
-
-
-def _enlarge_equations(document: QTextDocument) -> None:
-    """Enlarge what is a quotation in the text of a lesson."""
-    block, larger = document.begin(), QTextCharFormat()
-    larger.setProperty(QTextFormat.Property.FontPixelSize, _EQUATION)
-    while block.isValid():
-        if block.blockFormat().hasProperty(QTextFormat.Property.BlockQuoteLevel):
-            cursor = QTextCursor(block)
-            cursor.select(QTextCursor.SelectionType.BlockUnderCursor)
-            cursor.mergeCharFormat(larger)
-        block = block.next()
 
 
 def _pdf(title: str, parts: list[QTextDocument]) -> bytes:
