@@ -57,7 +57,7 @@ def _answer(question: Question) -> str:
             return f"{float(expected({})) / UNITS[unit]:.4g} {within}"
         case LessonTask(check=check, solution=solution):
             done = "; ".join(_setting(*each) for each in solution.items())
-            return f"{done}; or whatever else makes `{check.text}`"
+            return f"{done}; or whatever else makes `{check.text}` true"
 
 
 def _setting(name: str, value: object) -> str:
