@@ -1,4 +1,4 @@
-"""The commands `app`, `demo` and `replay`, which open the window."""
+"""The commands `app`, `demo` and `replay`, which open the window, and `handout`."""
 
 import ctypes
 import os
@@ -7,7 +7,16 @@ from pathlib import Path
 
 from cyclopts import App
 
-from kappaskin.cli import Described, Limit, SourceName, Switch, allow, check_output, of_sensor
+from kappaskin.cli import (
+    Described,
+    Limit,
+    ProgressLine,
+    SourceName,
+    Switch,
+    allow,
+    check_output,
+    of_sensor,
+)
 from kappaskin.errors import Refusal, lacking
 
 app = App(name="app", help_format="markdown")
@@ -149,3 +158,32 @@ def replay(
     allow(limit)
     with Recording(file):  # or refused here
         _open(f"replay:{file.absolute()}", seconds, screenshot)
+
+
+def handout(lesson: str, *, out: Path) -> None:
+    """Write the hand-out of a lesson: texts, pictures, tasks with space for answers, no solutions.
+
+    Example: `kappaskin handout 3 --out why-sines.pdf`
+
+    Parameters
+    ----------
+    lesson
+        The number of a lesson of the app, or a lesson file.
+    out
+        The PDF to write.
+    """
+    check_output(out, lesson)
+    if sys.platform.startswith("linux"):
+        os.environ["QT_QPA_PLATFORM"] = "offscreen"  # it needs no display
+    try:
+        from PySide6.QtGui import QGuiApplication
+
+        from kappaskin_app.features.lessons.lesson_file import lesson_called
+        from kappaskin_app.features.lessons.sheets import write_hand_out
+    except ImportError as error:
+        raise lacking("app", "the desktop app", error) from error
+    application = QGuiApplication.instance() or QGuiApplication(sys.argv[:1])
+    with ProgressLine() as show_progress:
+        for share in write_hand_out(lesson_called(lesson), out):
+            show_progress(f"{share:4.0%}")
+    del application

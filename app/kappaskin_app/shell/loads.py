@@ -48,16 +48,17 @@ class Cache(Generic[_Arguments, _Result]):
         self._results: dict[tuple[Any, ...], _Result] = {}
 
     def __call__(self, *arguments: _Arguments.args, **_: _Arguments.kwargs) -> _Result:
-        if arguments not in self._results:
-            self.store(arguments, self._function(*arguments, **_))
-        self._results[arguments] = self._results.pop(arguments)  # the latest comes last
-        return self._results[arguments]
+        found = self._results.pop(arguments, None)  # at once, as another thread may do it too
+        if found is None:
+            found = self._function(*arguments, **_)
+        self.store(arguments, found)  # the latest comes last
+        return found
 
     def store(self, arguments: tuple[Any, ...], result: _Result) -> None:
         """Store the `result` for these `arguments`."""
         self._results[arguments] = result
         if len(self._results) > self._size:
-            del self._results[next(iter(self._results))]
+            self._results.pop(next(iter(self._results)), None)
 
 
 _REFERENCE = 15  # basis functions of the true shape along a side, as in Table 1

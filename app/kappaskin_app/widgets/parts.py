@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin._text import printable
+from kappaskin_app.theme import follow_look
 
 ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
 
@@ -67,17 +68,21 @@ class Heading(Label):
         self.setFont(font)
 
     def event(self, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.ApplicationFontChange:
+        parent = self.parentWidget()
+        if event.type() == QEvent.Type.ApplicationFontChange:  # comes to windows alone
             self._enlarge()
+        elif event.type() == QEvent.Type.Polish and parent is not None:
+            follow_look(parent, self._enlarge)
         return super().event(event)
 
 
 class _PushedByEnter(QPushButton):
-    """A button that Enter pushes too, as Space does."""
+    """A button that Enter pushes too, as Space does; once while it is held."""
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
-            self.click()
+            if not event.isAutoRepeat():
+                self.click()
         else:
             super().keyPressEvent(event)
 

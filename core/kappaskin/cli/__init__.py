@@ -15,6 +15,7 @@ from kappaskin.cli.common import FAILED as FAILED
 from kappaskin.cli.common import REFUSED as REFUSED
 from kappaskin.cli.common import Described as Described
 from kappaskin.cli.common import Limit as Limit
+from kappaskin.cli.common import ProgressLine as ProgressLine
 from kappaskin.cli.common import SourceName as SourceName
 from kappaskin.cli.common import Switch as Switch
 from kappaskin.cli.common import allow as allow

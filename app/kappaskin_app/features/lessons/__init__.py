@@ -11,9 +11,11 @@ from kappaskin_app.features.lessons.pointing import ControlPointer
 from kappaskin_app.features.lessons.teaching import Teaching
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import Form
+from kappaskin_app.shell.parts import HELP
 from kappaskin_app.shell.window import MainWindow
 
 _ABOUT = "Lessons of ten to fifteen minutes, from the curvature gage to faults of a sensor"
+_TEACHER = "Of each lesson: goal, time, answers, common mistakes, questions to discuss"
 
 
 class LessonsFeature:
@@ -34,10 +36,13 @@ class LessonsFeature:
         )
         self.teaching = Teaching(
             *(shell.history, session, shell.display, shell),
-            *(session.request_source, self._seen),
+            *(session.request_source, self._seen, shell.tasks),
         )
         self.pointing = ControlPointer(self._forms, self._places, docks.reveal, shell)
         self.lesson.bind(self.teaching)
+        teacher = partial(shell.guide_requested.emit, "teach")
+        self.lesson.list.teacher_wanted.connect(guarded(teacher))
+        shell.actions_by_name.add("teacher", HELP, "&Teacher's page", teacher, "", _TEACHER)
         docks["lesson"].closed.connect(guarded(self.teaching.leave))
         self.teaching.pointed.connect(guarded(self.pointing.point))
         self.teaching.taken_up.connect(guarded(partial(docks.reveal, "lesson")))

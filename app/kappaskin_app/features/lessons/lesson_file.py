@@ -132,6 +132,15 @@ def read_lesson(file: Path) -> Lesson:
     return lesson_of(text, file.name)
 
 
+def lesson_called(name: str) -> Lesson:
+    """The lesson with this number among those of the program, or in the file `name`."""
+    if not name.isdecimal():
+        return read_lesson(Path(name))
+    if not 1 <= int(name) <= len(READY):
+        raise Refusal(f"expected a lesson from 1 to {len(READY)}, or a lesson file, got {name}")
+    return read_lesson(READY[int(name) - 1])
+
+
 def lesson_of(text: str, name: str) -> Lesson:
     """The lesson in a `text`, called `name`."""
     if len(text) > _LARGEST:

@@ -23,9 +23,11 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import pass_window_keys
 from kappaskin_app.theme import ALERT, current, follow_look, series
 from kappaskin_app.widgets.layout import scrolled
-from kappaskin_app.widgets.parts import ELLIPSIS, Label, button, in_a_row, text_label
+from kappaskin_app.widgets.parts import ELLIPSIS, Heading, Label, button, in_a_row, text_label
 
-_RIGHT = 3  # of the series: green, told apart from the colour of alarms
+_ENTER = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
+_LARGER = 1.15  # times the letters: the title of a step
+_RIGHT, _DARKER = 3, 110  # of the series: green, told apart from the colour of alarms; by so much %
 
 
 class _Words(Label):
@@ -39,11 +41,28 @@ class _Words(Label):
         self._radio.click()
 
 
+class _Option(QRadioButton):
+    """An option that the arrow keys select; it leaves Enter, which some desktops use, alone."""
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in _ENTER:
+            event.ignore()
+            return
+        super().keyPressEvent(event)
+        reached = self.window().focusWidget()  # Qt selects it only if another was selected
+        if isinstance(reached, _Option) and reached is not self:
+            reached.setChecked(True)
+
+
 class QuestionView(QWidget):
-    """A question; `answered` brings the answer, `show_wanted` requests the solution."""
+    """A question; `answered` brings the answer, `show_wanted` requests the solution.
+
+    Enter checks the answer. `edited` reports that the user changes it.
+    """
 
     answered = Signal(str)
     show_wanted = Signal()
+    edited = Signal()
 
     def __init__(self, question: Question) -> None:
         super().__init__()
@@ -66,35 +85,54 @@ class QuestionView(QWidget):
             case NumberAnswer(unit=unit):
                 self._add_number(unit)
             case LessonTask():
-                self.check.setToolTip("Check what the window shows.")
+                self.check.setToolTip("Check what the window shows (Enter).")
         row = in_a_row(self.check, self.show_how)
         row.addStretch(1)
         self._stack.addLayout(row)
         self._stack.addWidget(self.feedback)
         self.check.clicked.connect(guarded(self._give))
-        self.number.returnPressed.connect(guarded(self._give))
         self.show_how.clicked.connect(guarded(lambda *_: self.show_wanted.emit()))
         self.show_answer(self._answer, "")
         follow_look(self, self._dress)
 
     def _add_options(self, options: tuple[str, ...]) -> None:
         for index, words in enumerate(options):
-            radio = QRadioButton()
+            radio = _Option()
             radio.setAccessibleName(words)
             row = QHBoxLayout()
             row.addWidget(radio, 0, Qt.AlignmentFlag.AlignTop)
             row.addWidget(_Words(words, radio), 1)
             self._stack.addLayout(row)
             self.options.addButton(radio, index)
+        self.options.idToggled.connect(self.edited)
 
     def _add_number(self, unit: str) -> None:
         self.number.setAccessibleName(f"Answer in {unit}" if unit else "Answer")
-        self.number.setMaximumWidth(12 * self.number.fontMetrics().averageCharWidth())
+        self.number.textEdited.connect(self.edited)
         self.number.setMaxLength(20)
         pass_window_keys(self.number)
         row = in_a_row(self.number, Label(unit))
         row.addStretch(1)
         self._stack.addLayout(row)
+
+    @property
+    def field(self) -> QWidget | None:
+        """Where the answer is given; None once it is closed, unless its solution is offered."""
+        if self._answer.closed:
+            return self.show_how if self._offers_solution else None
+        match self._question.how:
+            case ChoiceAnswer():
+                return self.options.checkedButton() or self.options.buttons()[0]
+            case NumberAnswer():
+                return self.number
+            case LessonTask():
+                return self.check
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() not in _ENTER:
+            super().keyPressEvent(event)
+        elif not event.isAutoRepeat():
+            self.check.click()
 
     def _give(self, *_: object) -> None:
         match self._question.how:
@@ -111,13 +149,18 @@ class QuestionView(QWidget):
         self._answer, self._message = answer, message
         self.check.setEnabled(not answer.closed)
         self.number.setEnabled(not answer.closed)
+        self.number.selectAll()  # another number replaces it
         for option in self.options.buttons():
             option.setEnabled(not answer.closed)
-        task = isinstance(self._question.how, LessonTask)
-        self.show_how.setVisible(task and answer.closed and not answer.right)
+        self.show_how.setVisible(self._offers_solution)
         self.feedback.setText(self._feedback_text())
         self.feedback.setVisible(bool(self.feedback.text()))
         self._dress()
+
+    @property
+    def _offers_solution(self) -> bool:
+        task = isinstance(self._question.how, LessonTask)
+        return task and self._answer.closed and not self._answer.right
 
     def _feedback_text(self) -> str:
         answer, question = self._answer, self._question
@@ -131,8 +174,9 @@ class QuestionView(QWidget):
 
     def _dress(self) -> None:
         right = self._answer.right and not self._message
-        colour = series(_RIGHT).name() if right else current().alert
+        colour = series(_RIGHT).darker(_DARKER).name() if right else current().alert
         self.feedback.setStyleSheet(f"color: {colour};")
+        self.number.setMaximumWidth(12 * self.number.fontMetrics().averageCharWidth())
         for option in self.options.buttons():
             option.setStyleSheet(_radio_style())
 
@@ -157,13 +201,9 @@ class LessonStepPage(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.title, self.text = text_label(), text_label()
+        self.title, self.text = Heading(_LARGER), text_label()
         self.text.setTextFormat(Qt.TextFormat.MarkdownText)
         self.text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        bold = self.title.font()
-        bold.setBold(True)
-        bold.setPointSizeF(1.15 * bold.pointSizeF())
-        self.title.setFont(bold)
         self._inner = QWidget()
         self._below = QVBoxLayout(self._inner)
         self._below.setContentsMargins(0, 0, 0, 0)
@@ -190,6 +230,16 @@ class LessonStepPage(QWidget):
         if self.question_view is not None:
             self.area.ensureWidgetVisible(self.question_view.feedback)
 
+    def _see_answer(self, *_: object) -> None:
+        """Scroll to what the user types or selects."""
+        if (field := self.field) is not None:
+            self.area.ensureWidgetVisible(field)
+
+    @property
+    def field(self) -> QWidget | None:
+        """Where the answer to this step is given, if one can be."""
+        return None if self.question_view is None else self.question_view.field
+
     def _make(self, progress: Progress) -> None:
         step = progress.lesson.steps[progress.step]
         self.title.setText(step.title)
@@ -203,6 +253,7 @@ class LessonStepPage(QWidget):
         if step.question is not None:
             self.question_view = QuestionView(step.question)
             self.question_view.answered.connect(self.answered)
+            self.question_view.edited.connect(guarded(self._see_answer))
             self.question_view.show_wanted.connect(self.show_wanted)
             self._below.addWidget(self.question_view)
         self.area.verticalScrollBar().setValue(0)
@@ -229,17 +280,22 @@ class _List(QListWidget):
     taken = Signal()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+        if event.key() in _ENTER:
             self.taken.emit()
         else:
             super().keyPressEvent(event)
 
 
 class ListPage(QWidget):
-    """The list of lessons; `taken` brings the one to start, `open_wanted` requests a file."""
+    """The list of lessons; `taken` brings the one to start, `open_wanted` requests a file.
+
+    `hand_out_wanted` brings the lesson to print, `teacher_wanted` requests the teacher's page.
+    """
 
     taken = Signal(str)
     open_wanted = Signal()
+    hand_out_wanted = Signal(str)
+    teacher_wanted = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -259,18 +315,32 @@ class ListPage(QWidget):
             "restores them.",
         )
         self.open = button(f"&Open file{ELLIPSIS}", "open-lesson", "Open a lesson file.")
+        self.hand_out = button(
+            f"Save hand-ou&t{ELLIPSIS}",
+            "hand-out",
+            "The selected lesson as a PDF to print: texts, pictures, tasks with space for answers, "
+            "no solutions.",
+        )
+        self.teacher = button(
+            "Te&acher's page",
+            "teacher-page",
+            "Of each lesson: goal, time, answers, common mistakes, questions to discuss.",
+        )
         stack = QVBoxLayout(self)
         stack.setContentsMargins(8, 6, 8, 8)
         stack.addWidget(self.list, 1)
         stack.addWidget(self.about)
         stack.addWidget(self.message)
         stack.addLayout(in_a_row(self.begin, self.open))
+        stack.addLayout(in_a_row(self.hand_out, self.teacher))
         self._progress: Mapping[str, Progress] = {}
         self.list.currentItemChanged.connect(guarded(self._describe))
         self.list.itemDoubleClicked.connect(guarded(self._take))
         self.list.taken.connect(guarded(self._take))
         self.begin.clicked.connect(guarded(self._take))
         self.open.clicked.connect(guarded(lambda *_: self.open_wanted.emit()))
+        self.hand_out.clicked.connect(guarded(lambda *_: self.hand_out_wanted.emit(self.selected)))
+        self.teacher.clicked.connect(guarded(lambda *_: self.teacher_wanted.emit()))
 
     def show_lessons(self, progress: Mapping[str, Progress], message: str) -> None:
         """Show the lessons by file, their progress, and why a file could not be read."""
@@ -295,7 +365,8 @@ class ListPage(QWidget):
 
     def _describe(self, *_: object) -> None:
         one = self._progress.get(self.selected)
-        self.begin.setEnabled(one is not None)
+        for way in (self.begin, self.hand_out):
+            way.setEnabled(one is not None)
         if one is None:
             self.about.setText("")
             return

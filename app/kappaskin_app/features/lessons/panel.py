@@ -1,7 +1,7 @@
 """The lesson panel: the list, a step, the end."""
 
-from PySide6.QtCore import Signal
-from PySide6.QtGui import QShowEvent
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent, QShowEvent
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QProgressBar,
@@ -16,9 +16,14 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.theme import FAINT, current, follow_look
 from kappaskin_app.widgets.parts import Label, button
 
+_NEXT = "The step after this one (Enter after a right answer)."
+
 
 class LessonPanel(QWidget):
-    """Shows the lessons of `Teaching` and passes on requests; `seen` when it is shown."""
+    """Shows the lessons of `Teaching` and passes on requests; `seen` when it is shown.
+
+    A step that is shown has the keyboard where it is answered; Escape gives the keyboard up.
+    """
 
     seen = Signal()
 
@@ -33,7 +38,7 @@ class LessonPanel(QWidget):
         self.bar.setTextVisible(False)
         self.bar.setFixedHeight(4)
         self.back = button("\N{LEFTWARDS ARROW} &Back", "lesson-back", "The step before.")
-        self.next = button("&Next \N{RIGHTWARDS ARROW}", "lesson-next", "The step after this one.")
+        self.next = button("&Next \N{RIGHTWARDS ARROW}", "lesson-next", _NEXT)
         self.leave = button(
             "&Leave", "leave-lesson", "Back to the list, with the settings from before the lesson."
         )
@@ -66,6 +71,7 @@ class LessonPanel(QWidget):
         self.seen.connect(guarded(teaching.look))
         self.list.taken.connect(guarded(teaching.take))
         self.list.open_wanted.connect(guarded(teaching.open))
+        self.list.hand_out_wanted.connect(guarded(teaching.hand_out))
         self.step.answered.connect(guarded(teaching.answer))
         self.step.show_wanted.connect(guarded(teaching.show_how))
         self.step.pressed.connect(guarded(teaching.press))
@@ -83,12 +89,14 @@ class LessonPanel(QWidget):
         teaching = self._teaching
         if teaching is None:
             return
-        progress = teaching.progress
+        progress, left = teaching.progress, self.list.isHidden()
         self.list.setVisible(progress is None)
         self._taking.setVisible(progress is not None)
         if progress is None:
             self.list.show_lessons(teaching.taken, teaching.message)
             self.step.forget()
+            if left:
+                self.list.list.setFocus()
             return
         steps = len(progress.lesson.steps)
         at = "the end" if progress.at_end else f"step {progress.step + 1} of {steps}"
@@ -102,10 +110,25 @@ class LessonPanel(QWidget):
             self.end.show_progress(progress)
         else:
             self.step.show_progress(progress, teaching.message)
+        self._focus()
+
+    def _focus(self) -> None:
+        """Move the keyboard to what is to be done now."""
+        field = self.end.name if self.pages.currentWidget() is self.end else self.step.field
+        (field or self.next).setFocus(Qt.FocusReason.TabFocusReason)
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         self.seen.emit()
+        if self.list.isHidden():
+            self._focus()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        field = self.focusWidget()
+        if event.key() == Qt.Key.Key_Escape and field is not None and field.hasFocus():
+            field.clearFocus()
+        else:
+            super().keyPressEvent(event)
 
     def _dress(self) -> None:
         theme = current()

@@ -13,19 +13,21 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 from kappaskin.errors import Refusal
 from kappaskin.frames import Estimate
 from kappaskin_app.features.lessons.figures import RecentEstimates
-from kappaskin_app.features.lessons.hand_in import sheet
 from kappaskin_app.features.lessons.lesson import LessonTask, whole
 from kappaskin_app.features.lessons.lesson_file import READY, read_lesson
 from kappaskin_app.features.lessons.progress import Progress
+from kappaskin_app.features.lessons.sheets import sheet, write_hand_out
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.display import Display
-from kappaskin_app.shell.folders import recordings_folder
+from kappaskin_app.shell.folders import proposed, recordings_folder
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.pictures import caption_now, chosen_file, save_view
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.work_dialog import with_ending
 
-_FILES = "Lesson (*.md)"
+_FILES, _PDF = "Lesson (*.md)", "PDF (*.pdf)"
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Teaching(QObject):
     `progress` is that of the present lesson, None without one; `message` says why an answer could
     not be judged, or a file not be read. `notified` brings the result of a request, `pointed` the
     controls to point at, `taken_up` reports that a lesson is resumed by undo. `connect` changes the
-    source, `views` returns pictures for the figure to hand in.
+    source, `views` returns pictures for the figure to hand in, `tasks` writes hand-outs.
     """
 
     changed = Signal()
@@ -63,11 +65,16 @@ class Teaching(QObject):
         window: QWidget,
         connect: Callable[[str], None],
         views: Callable[[], list[QPixmap]],
+        tasks: Tasks,
     ) -> None:
         super().__init__(window)
         self._history, self._session, self._display = history, session, display
         self._window, self._connect = window, connect
-        self._views = views
+        self._views, self._hand_out = views, Path()
+        self._writing = BackgroundTask(
+            *(tasks, "Writing the hand-out", self._written),
+            cancelled="Cancelled; no hand-out was written.",
+        )
         self.taken: dict[str, Progress] = {}
         self.progress: Progress | None = None
         self.message = ""
@@ -211,6 +218,24 @@ class Teaching(QObject):
         except Refusal as refusal:
             self.notified.emit(str(refusal))
         made.deleteLater()
+
+    def hand_out(self, file: str) -> None:
+        """Ask for a file, and write the hand-out of the lesson in `file`."""
+        lesson = self.taken[file].lesson
+        asked = str(proposed(f"{Path(lesson.name).stem}.pdf"))
+        name, _ = QFileDialog.getSaveFileName(self._window, "Save the hand-out", asked, _PDF)
+        if not name:
+            return
+        try:
+            self._hand_out = with_ending(name, ".pdf")
+        except Refusal as refusal:
+            self.notified.emit(str(refusal))
+            return
+        self._writing.run(write_hand_out, lesson, self._hand_out)
+
+    def _written(self, share: float) -> None:
+        if share == 1:
+            self.notified.emit(f"Saved {self._hand_out}")
 
     def _put(self, text: str, sets: Mapping[str, Any]) -> None:
         """Apply settings to the simulated skin."""

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
 
 from kappaskin import Patch, SensorLayout
 from kappaskin.scenes.cylinders import schedule
@@ -90,9 +90,13 @@ def test_what_is_written_beside_a_cylinder_is_whole(large: QApplication, qtbot) 
 
 
 def test_a_heading_grows_with_the_other_letters(large: QApplication, qtbot) -> None:
-    heading = Heading(1.5)
-    qtbot.addWidget(heading)
+    alone, inside, around = Heading(1.5), Heading(1.5), QWidget()
+    QVBoxLayout(around).addWidget(inside)
+    for each in (alone, around):
+        qtbot.addWidget(each)
+        each.show()
     for percent in (100, 200):
         large.setFont(letters(percent))
         large.processEvents()
-        assert heading.font().pointSizeF() == 1.5 * letters(percent).pointSizeF()
+        for heading in (alone, inside):
+            assert heading.font().pointSizeF() == 1.5 * letters(percent).pointSizeF()

@@ -1,6 +1,8 @@
 """Lessons as files: what is read, what is refused and where, how answers are judged."""
 
 import math
+import re
+import runpy
 import textwrap
 from pathlib import Path
 
@@ -11,7 +13,13 @@ from hypothesis import strategies as st
 from kappaskin import Refusal
 from kappaskin_app.features.lessons.expression import NUMBER, TRUTH, WORD, expression
 from kappaskin_app.features.lessons.figures import KINDS, SETTINGS, RecentEstimates
-from kappaskin_app.features.lessons.lesson import UNITS, LessonTask, NumberAnswer, whole
+from kappaskin_app.features.lessons.lesson import (
+    UNITS,
+    ChoiceAnswer,
+    LessonTask,
+    NumberAnswer,
+    whole,
+)
 from kappaskin_app.features.lessons.lesson_file import (
     DOCKS,
     READY,
@@ -24,6 +32,7 @@ from kappaskin_app.features.lessons.progress import Answer, Progress, judged, nu
 from kappaskin_app.shell.settings import Settings, form_field
 from kappaskin_app.shell.settings.form_fields import Range
 
+TEACHER = runpy.run_path(str(Path(__file__).parents[3] / "guide_lessons.py"))
 FIGURES_SEEN = [name for name in KINDS if name not in SETTINGS]
 FIGURES = {"force": 0.2, "method": "bayes", "noise": math.nan, "functions_x": 8.0}
 HEAD = '+++\nformat = 1\ntitle = "A"\nminutes = 5\nlearn = "B"\n+++\n'
@@ -297,3 +306,36 @@ def test_a_text_that_names_files_is_refused_with_its_line(says: str) -> None:
     with pytest.raises(Refusal, match=r"x, line 7: expected a text without pictures and HTML"):
         lesson_of(f"{HEAD}## One\nText\n{says}\n", "x")
     assert lesson_of(f"{HEAD}## One\nIf force < 2 and x<3! [a link](b)\n", "x").steps
+
+
+def _notes(number: int) -> dict[str, str]:
+    """The notes on a lesson that the teacher's page has below its answers, by their names."""
+    page = TEACHER["PAGE"].read_text("utf-8")
+    part = re.search(rf"^## {number} .*?(?=^## |\Z)", page, re.DOTALL | re.MULTILINE)[0]
+    found = re.findall(r"^\*\*([\w ]+)\.\*\* (.*?)\n(?:\n|\Z)", part, re.DOTALL | re.MULTILINE)
+    return {name: text.replace("\n", " ") for name, text in found}
+
+
+def test_the_teachers_page_has_the_answers_that_the_lessons_accept() -> None:
+    page = TEACHER["PAGE"].read_text("utf-8")
+    for number, read in TEACHER["lessons"]():
+        assert TEACHER["told"](number, read) in page, "run python tests/guide_lessons.py"
+
+
+def test_the_teachers_page_has_notes_on_every_lesson_and_quotes_wrong_answers() -> None:
+    for number, read in TEACHER["lessons"]():
+        notes = _notes(number)
+        assert {"Before", "Common wrong answers", "Show", "Discuss"} <= set(notes), read.title
+        hows = [step.question.how for step in read.steps if step.question]
+        wrong = {
+            option
+            for how in hows
+            if isinstance(how, ChoiceAnswer)
+            for option in how.options
+            if option != how.options[how.right]
+        }
+        quoted = re.findall(r"(?<!\*)\*([^*]+)\*(?!\*)", notes["Common wrong answers"])
+        assert quoted
+        for quote in quoted:
+            assert any(option.startswith(quote) for option in wrong), (read.title, quote)
+        assert notes["Discuss"].count("?") >= 3

@@ -5,9 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QImage
-from PySide6.QtWidgets import QDockWidget, QFileDialog
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QImage, QKeyEvent
+from PySide6.QtWidgets import QApplication, QDockWidget, QFileDialog, QRadioButton
 
 from kappaskin_app.features.lessons.lesson import (
     UNITS,
@@ -140,22 +140,114 @@ def test_closing_the_lessons_leaves_the_lesson_and_covering_them_does_not(
     assert window.history.settings == before
 
 
-@pytest.mark.full
-def test_a_lesson_is_taken_answered_and_left_with_the_keyboard(window: MainWindow, qtbot) -> None:
+def press(qtbot, *keys: Qt.Key | str) -> None:
+    """Press keys, or type a text, wherever the keyboard is."""
+    for key in keys:
+        QApplication.processEvents()  # a new step is laid out
+        field = QApplication.focusWidget()
+        assert field is not None, "nothing has the keyboard"
+        qtbot.keyClicks(field, key) if isinstance(key, str) else qtbot.keyClick(field, key)
+
+
+def test_a_lesson_is_taken_and_answered_by_enter_alone(window: MainWindow, qtbot) -> None:
+    enter, lesson = Qt.Key.Key_Return, window.lesson
     window.actions_by_name["dock-lesson"].trigger()
-    lessons = window.lesson.list.list
-    lessons.setFocus()
-    qtbot.keyClick(lessons, Qt.Key.Key_Return)
-    window.lesson.next.setFocus()
-    qtbot.keyClick(window.lesson.next, Qt.Key.Key_Space)
-    asking = window.lesson.step.question_view
+    lesson.list.list.setFocus()
+    press(qtbot, enter)
+    first = lesson.step.question_view
+    assert first.options.buttons()[0].hasFocus()
+    press(qtbot, enter)
+    assert first.feedback.text().startswith("Choose one")
+    press(qtbot, Qt.Key.Key_Down, enter)
+    assert first.options.checkedId() == 1
+    assert first.feedback.text().startswith("Right.")
+    assert lesson.next.hasFocus()
+    press(qtbot, enter)
+    second = lesson.step.question_view
+    assert (lesson.step.title.text(), second.number.hasFocus()) == ("A number for bending", True)
     for typed, said in (("much", "Type a number"), ("2", "Not right."), ("20", "Right.")):
-        asking.number.clear()
-        qtbot.keyClicks(asking.number, typed)
-        qtbot.keyClick(asking.number, Qt.Key.Key_Return)
-        assert asking.feedback.text().startswith(said)
-    assert not asking.check.isEnabled()
+        press(qtbot, typed, Qt.Key.Key_Enter)
+        assert second.number.text() == typed
+        assert second.feedback.text().startswith(said)
+    assert not second.check.isEnabled()
     assert window.teaching.progress.answer.outcome() == "right at try 2"
+    press(qtbot, enter)
+    assert window.teaching.progress.step == 2
+
+
+@pytest.mark.full
+def test_enter_that_is_held_checks_once(window: MainWindow, qtbot) -> None:
+    take(window, "01-curvature-gage")
+    window.teaching.go(1)
+    press(qtbot, "20", Qt.Key.Key_Return)
+    assert window.lesson.next.hasFocus()
+    held = QKeyEvent(QEvent.Type.KeyPress, Qt.Key.Key_Return, Qt.KeyboardModifier(0), "\r", True)
+    QApplication.sendEvent(QApplication.focusWidget(), held)
+    assert window.teaching.progress.step == 1
+
+
+def test_escape_leaves_the_field_and_showing_the_lessons_returns_to_it(
+    window: MainWindow, qtbot
+) -> None:
+    take(window, "01-curvature-gage")
+    window.lesson.next.click()
+    number = window.lesson.step.question_view.number
+    press(qtbot, "2", Qt.Key.Key_Escape)
+    assert QApplication.focusWidget() is not number
+    assert number.text() == "2"
+    assert window.teaching.progress.step == 1
+    window.docks["lesson"].hide()
+    window.actions_by_name["dock-lesson"].trigger()
+    assert number.hasFocus()
+    assert number.selectedText() == "2"
+
+
+@pytest.mark.full
+def test_enter_goes_through_tasks_and_to_the_name_at_the_end(
+    window: MainWindow, qtbot, until
+) -> None:
+    enter, lesson = Qt.Key.Key_Return, window.lesson
+    take(window, "01-curvature-gage")
+    window.teaching.go(5)
+    view = lesson.step.question_view
+    assert view.check.hasFocus()
+    until(lambda: -9 < window.teaching.figures()["peak_xx"] < 0)
+    press(qtbot, enter, enter)
+    assert view.feedback.text().startswith("Not right.")
+    assert view.show_how.hasFocus()
+    press(qtbot, enter)
+    assert window.history.settings.force == 0.25
+    window.teaching.go(7)
+    press(qtbot, Qt.Key.Key_Space, enter, enter)
+    assert window.teaching.progress.at_end
+    assert lesson.end.name.hasFocus()
+    lesson.leave.click()
+    assert lesson.list.list.hasFocus()
+
+
+@pytest.mark.full
+def test_an_answer_is_scrolled_to_when_it_is_typed(window: MainWindow, qtbot, until) -> None:
+    window.resize(1024, 700)
+    window.requests.set("letters", 200.0)
+    take(window, "01-curvature-gage")
+    window.teaching.go(2)
+    number = window.lesson.step.question_view.number
+    until(lambda: window.lesson.step.area.verticalScrollBar().maximum() > 0)
+    assert number.visibleRegion().boundingRect().height() < number.height()
+    press(qtbot, "1")
+    until(lambda: number.visibleRegion().boundingRect().height() == number.height())
+
+
+@pytest.mark.full
+def test_enter_on_an_option_checks_where_a_desktop_lets_it_press_buttons(
+    window: MainWindow, qtbot
+) -> None:
+    take(window, "01-curvature-gage")
+    option = window.lesson.step.question_view.options.buttons()[0]
+    assert isinstance(option, QRadioButton)
+    event = QKeyEvent(QEvent.Type.KeyPress, Qt.Key.Key_Return, Qt.KeyboardModifier(0))
+    option.keyPressEvent(event)
+    assert not event.isAccepted()
 
 
 @pytest.mark.full
