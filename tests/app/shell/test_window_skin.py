@@ -265,12 +265,15 @@ def test_no_height_leaves_the_picture_and_the_true_one_is_written(
 ) -> None:
     window.history.change("High", -1, exaggeration=50, load_case="point", force=0.9)
     until(lambda: window.session.estimate.surface.max() > 0.02)
-    view, times = window.membrane, window.scale.times
-    until(lambda: times.text() != "height\n\N{MULTIPLICATION SIGN} 6")
+    view, written = window.membrane, window.membrane.exaggeration
+    until(lambda: written.words not in ("", "height \N{MULTIPLICATION SIGN} 6"))
     until(lambda: -view.skin.height.min() > 20)
     assert -view.skin.height.min() <= view.skin.deepest * (1 + 1e-9)
-    written = float(times.text().split()[-1])
-    assert written == pytest.approx(view.skin.deepest / window.display.ranges.deepest(), rel=5e-3)
+    times = float(written.words.split()[-1])
+    assert times == pytest.approx(view.skin.deepest / window.display.ranges.deepest(), rel=5e-3)
+    assert written.text.input == written.words
+    window.requests.set("exaggeration", 1.0)
+    until(lambda: written.text.input == "")
 
 
 @pytest.mark.full
