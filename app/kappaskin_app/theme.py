@@ -1,12 +1,15 @@
 """Colours: two themes for the window, and the colour maps of what is measured.
 
-The palette of the application says which theme is in use. Qt repaints every widget when it
-changes: what is painted with the colours of `current` follows by itself, and so do labels whose
-foreground role is `FAINT` or `ALERT`. Widgets with other colours use `follow_look`.
+The palette of the application has the theme in use, and its property `colourMap` the name of the
+colour map. Qt repaints every widget when the palette changes: what is painted with the colours of
+`current` follows by itself, and so do labels whose foreground role is `FAINT` or `ALERT`. Widgets
+with other colours use `follow_look`.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +30,7 @@ class Theme:
     faint: str
     line: str
     accent: str
+    on_accent: str
     scene: str
     scene_top: str
     missing: str
@@ -47,6 +51,7 @@ LIGHT = Theme(
     faint="#5b6470",
     line="#c6ccd4",
     accent="#1f6fb2",
+    on_accent="#ffffff",
     scene="#dfe4ea",
     scene_top="#f8fafc",
     missing="#9aa3ad",
@@ -66,6 +71,7 @@ DARK = Theme(
     faint="#a0a9b4",
     line="#3a424c",
     accent="#5aa9e6",
+    on_accent="#0f1216",
     scene="#0f1216",
     scene_top="#2b323b",
     missing="#59626d",
@@ -100,7 +106,7 @@ def palette(theme: Theme) -> QPalette:
         roles.ToolTipBase: theme.base,
         roles.ToolTipText: theme.text,
         roles.Highlight: theme.accent,
-        roles.HighlightedText: theme.base,
+        roles.HighlightedText: theme.on_accent,
         roles.Link: theme.accent,
         roles.Mid: theme.line,
     }.items():
@@ -125,8 +131,16 @@ def current() -> Theme:
     return next((theme for theme in THEMES.values() if theme.window == window), LIGHT)
 
 
-def apply_look(theme: Theme, percent: float = 100.0) -> None:
-    """Show every window in `theme`, with letters of so many percent of the system's size."""
+def apply_look(theme: Theme, percent: float = 100.0, colours: str = "standard") -> None:
+    """Show every window in `theme`, with letters of so many percent of the system's size.
+
+    `colours` is the name of a colour map of `COLOUR_MAPS`.
+    """
+    application = QApplication.instance()
+    if application is not None and application.property(_PROPERTY) != colours:
+        application.setProperty(_PROPERTY, colours)
+        for widget in QApplication.allWidgets():
+            QApplication.sendEvent(widget, QEvent(QEvent.Type.PaletteChange))
     QApplication.setPalette(palette(theme))
     QApplication.setPalette(bar_palette(theme), "QScrollBar")  # pyright: ignore[reportArgumentType]
     if (font := letters(percent)) != QApplication.font():
@@ -207,6 +221,49 @@ DIVERGING = _colour_map(
 # Dark blue to yellow, brighter all the way.
 SEQUENTIAL = _colour_map("#1a2a5e", "#2c5282", "#3f7f8f", "#63a878", "#a9c95b", "#f5e663")
 PULLED = SEQUENTIAL[::-1]  # the same for what lies below zero
+
+
+class ColourMap(NamedTuple):
+    """Colours (256, 3) of values above zero, of those below it, and of both signs."""
+
+    sequential: Colours
+    pulled: Colours
+    diverging: Colours
+
+
+# Sequential and diverging maps of Matplotlib and of Peter Kovesi (CET), from pyqtgraph. All are
+# ordered by lightness alone, and told apart in every common colour blindness.
+COLOUR_MAPS = {
+    "standard": ("", ""),
+    "viridis": ("viridis", "CET-D1A"),
+    "cividis": ("cividis", "CET-CBD1"),
+    "inferno": ("inferno", "CET-D6"),
+    "grey": ("CET-L2", "CET-D9"),
+}
+_PROPERTY = "colourMap"
+
+
+@cache
+def colour_map(name: str) -> ColourMap:
+    """The colour map of this name in `COLOUR_MAPS`."""
+    if name == "standard":
+        return ColourMap(SEQUENTIAL, PULLED, DIVERGING)
+    import pyqtgraph  # takes 0.3 s to load
+
+    maps: Any = pyqtgraph.colormap
+    sequential, diverging = (
+        maps.get(each).getLookupTable(nPts=256)[:, :3].astype(np.uint8)
+        for each in COLOUR_MAPS[name]
+    )
+    return ColourMap(sequential, sequential[::-1], diverging)
+
+
+def colours_in_use() -> ColourMap:
+    """The colour map of the application."""
+    application = QGuiApplication.instance()
+    used = application.property(_PROPERTY) if application is not None else None
+    return colour_map(used or "standard")
+
 
 # What is drawn over each: seen against every one of its colours.
 LIGHT_INK, DARK_INK = "#f4f6f8", "#16191d"

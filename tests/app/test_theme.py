@@ -13,24 +13,26 @@ from kappaskin.live import Status
 from kappaskin_app.shell import badge
 from kappaskin_app.shell import window as shell
 from kappaskin_app.shell.badge import GAP, LIVE, LOST, OFF, REPLAY, SIM, STALE, WAITING, colour_of
-from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings import Settings, form_field
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import (
     ALERT,
-    DARK_INK,
-    DIVERGING,
+    COLOUR_MAPS,
     FAINT,
     LIGHT_INK,
-    PULLED,
-    SEQUENTIAL,
+    OUT,
+    SATURATED,
     SERIES,
     THEMES,
     Theme,
     apply_look,
     bar_palette,
+    colour_map,
     current,
     follow_look,
 )
+from kappaskin_app.widgets.colour_bar import ColourBar
+from kappaskin_app.widgets.tint import Tint
 
 Array = NDArray[np.float64]
 
@@ -89,25 +91,70 @@ def contrast(one: str, other: str) -> float:
 
 
 @pytest.mark.parametrize("seen", SEEN_BY.values(), ids=SEEN_BY)
-class TestSeenByAll:
-    def test_brightness_alone_orders_the_map_of_one_sign(self, seen: Array) -> None:
-        for colours, sign in ((SEQUENTIAL, 1), (PULLED, -1)):
-            lightness = lab(colours, seen)[:, 0]
-            assert np.all(sign * np.diff(lightness[::8]) > 0.5)
-            assert abs(lightness[-1] - lightness[0]) > 60
+@pytest.mark.parametrize("name", COLOUR_MAPS)
+class TestMapsSeenByAll:
+    def test_brightness_alone_orders_the_map_of_one_sign(self, name: str, seen: Array) -> None:
+        sequential, pulled, _ = colour_map(name)
+        lightness = lab(sequential, seen)[:, 0]
+        assert np.all(np.diff(lightness[::8]) > 0.5)
+        assert lightness[-1] - lightness[0] > 60
+        assert np.array_equal(pulled, sequential[::-1])
 
-    def test_both_signs_are_darker_the_larger_and_alike(self, seen: Array) -> None:
-        lightness = lab(DIVERGING, seen)[:, 0]
+    def test_both_signs_are_further_from_zero_the_larger_and_alike(
+        self, name: str, seen: Array
+    ) -> None:
+        lightness = lab(colour_map(name).diverging, seen)[:, 0]
         below, above = lightness[127::-8], lightness[128::8]
-        assert np.all(np.diff(below) < 0)
-        assert np.all(np.diff(above) < 0)
+        darker = -1 if lightness[128] > lightness[0] else 1
+        assert np.all(darker * np.diff(below) > 0)
+        assert np.all(darker * np.diff(above) > 0)
         assert np.abs(below - above).max() < 20
 
-    def test_the_two_signs_are_told_apart(self, seen: Array) -> None:
-        colours = lab(DIVERGING, seen)
+    def test_the_two_signs_are_told_apart(self, name: str, seen: Array) -> None:
+        colours = lab(colour_map(name).diverging, seen)
         below, above = colours[127 - 25 :: -1], colours[128 + 25 :]
         assert np.linalg.norm(below - above, axis=-1).min() > 10
 
+
+@pytest.mark.parametrize("name", COLOUR_MAPS)
+def test_marks_and_ink_stand_out_from_every_map(name: str) -> None:
+    sequential, _, diverging = colour_map(name)
+    seen = SEEN_BY["everybody"]
+    for mark in (OUT, SATURATED):
+        for colours in (sequential, diverging):
+            away = lab(colours, seen) - lab(rgb_of(mark), seen)
+            assert np.linalg.norm(away, axis=-1).min() > 20, mark
+    lower_half = [f"#{bytes(rgb).hex()}" for rgb in sequential[:128:5]]
+    assert min(contrast(LIGHT_INK, colour) for colour in lower_half) >= 3
+    ink = Tint("diverging", (-1.0, 1.0), "", own=diverging).ink
+    assert contrast(ink, f"#{bytes(diverging[128]).hex()}") >= 4.5
+
+
+def test_the_colour_maps_are_those_that_can_be_selected() -> None:
+    field = form_field("colour_map")
+    assert [name for name, _ in field.options] == list(COLOUR_MAPS)
+    assert len(COLOUR_MAPS) == 5
+
+
+def test_another_colour_map_repaints_what_is_shown(qtbot) -> None:
+    bar = ColourBar()
+    qtbot.addWidget(bar)
+    apply_look(THEMES["dark"])
+    bar.show_tint(Tint("sequential", (0.0, 1.0), "mm"))
+    bar.resize(60, 200)
+    bar.show()
+    qtbot.waitExposed(bar)
+    painted: list[int] = []
+    for name in ("viridis", "standard"):
+        apply_look(THEMES["dark"], colours=name)
+        top = bar.grab().toImage().pixelColor(10, 30).getRgb()[:3]
+        near = np.abs(colour_map(name).sequential[-20:].astype(int) - top).sum(axis=1).min()
+        painted.append(int(near))
+    assert max(painted) < 12
+
+
+@pytest.mark.parametrize("seen", SEEN_BY.values(), ids=SEEN_BY)
+class TestSeenByAll:
     @pytest.mark.parametrize("ground", [0, 1], ids=["light", "dark"])
     def test_curves_are_told_apart(self, seen: Array, ground: int) -> None:
         colours = lab(np.array([rgb_of(pair[ground]) for pair in SERIES[:4]]), seen)
@@ -133,15 +180,9 @@ class TestContrast:
             assert contrast("#ffffff", colour_of(state, theme)) >= 4.5, state
 
 
-def test_ink_on_the_maps_stands_out_where_it_is_used() -> None:
-    lower_half = [f"#{bytes(rgb).hex()}" for rgb in SEQUENTIAL[:128:5]]
-    assert min(contrast(LIGHT_INK, colour) for colour in lower_half) >= 3
-    assert contrast(DARK_INK, f"#{bytes(DIVERGING[128]).hex()}") >= 4.5
-
-
 @pytest.mark.parametrize("theme", THEMES.values(), ids=THEMES)
 def test_what_is_chosen_and_links_stand_out(theme: Theme) -> None:
-    assert contrast(theme.base, theme.accent) >= 4.5
+    assert contrast(theme.on_accent, theme.accent) >= 5
     assert contrast(theme.accent, theme.base) >= 4.5
     assert contrast(theme.accent, theme.window) >= 4.5
 
@@ -219,6 +260,15 @@ def parts_of(window: MainWindow) -> dict[str, QWidget]:
     return {**docks, **panels, **frame, **centre, **view}
 
 
+def know_noise(window: MainWindow, status: Status, estimate: Estimate, qtbot) -> None:
+    """Wait for the noise of the displacement, which is computed in the background."""
+    colouring = window.display.colouring
+    window.session.blockSignals(True)
+    colouring.follow(status)
+    qtbot.waitUntil(lambda: colouring.noise("displacement", estimate) > 0)
+    window.session.blockSignals(False)
+
+
 def show_much(window: MainWindow, status: Status, estimate: Estimate) -> None:
     """Show what is felt, and nothing that comes later."""
     window.session.status, window.session.estimate = status, estimate
@@ -251,6 +301,7 @@ def test_a_window_that_is_switched_is_as_one_that_began_so(
     for begun in THEMES:
         monkeypatch.setattr(shell, "settings_for", lambda *_, begun=begun: Settings(theme=begun))
         window = opened("sim:")
+        know_noise(window, *felt, qtbot)
         show_much(window, *felt)
         qtbot.wait(100)
         window.history.change("Theme", -1, theme=theme)

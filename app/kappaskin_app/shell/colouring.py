@@ -17,7 +17,6 @@ from kappaskin.pipeline import ErrorBars, Quantities, SkinColour, colours_of, sk
 from kappaskin.sensing import SHOWN_UNITS, Sensor
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.settings import Settings, locked_at
-from kappaskin_app.theme import DIVERGING, PULLED, SEQUENTIAL
 from kappaskin_app.widgets.text import round_up
 from kappaskin_app.widgets.tint import Tint, rgb_of
 
@@ -40,7 +39,7 @@ HEALTH_COLOURS = rgb_of(
 )
 
 
-HEALTH = Tint(HEALTH_COLOURS, (0.0, len(FAULTS) - 1.0), "", kinds=HEALTH_WORDS)
+HEALTH = Tint("sequential", (0.0, len(FAULTS) - 1.0), "", kinds=HEALTH_WORDS, own=HEALTH_COLOURS)
 
 
 class Shade(SkinColour):
@@ -59,15 +58,18 @@ class Shade(SkinColour):
     def unit_shown(self) -> str:
         return self._shown[1]
 
-    def tint(self, limit: float, at_rest: float = 0.0, pulled: bool = False) -> Tint:
-        """The colours of values up to `limit` from what they are `at_rest`."""
+    def tint(
+        self, limit: float, at_rest: float = 0.0, pulled: bool = False, noise: float = 0.0
+    ) -> Tint:
+        """The colours of values with this `noise` up to `limit` from what they are `at_rest`."""
         if self.name == "health":
             return HEALTH
+        part, limits = "sequential", (0.0, limit)
         if self.signed:
-            return Tint(DIVERGING, (at_rest - limit, at_rest + limit), self.unit_shown, limit)
-        if pulled:
-            return Tint(PULLED, (-limit, 0.0), self.unit_shown, limit)
-        return Tint(SEQUENTIAL, (0.0, limit), self.unit_shown, limit)
+            part, limits = "diverging", (at_rest - limit, at_rest + limit)
+        elif pulled:
+            part, limits = "pulled", (-limit, 0.0)
+        return Tint(part, limits, self.unit_shown, limit, noise=noise)
 
     def written(self, value: float) -> str:
         """A value on the screen's scale, with its unit."""
@@ -89,7 +91,10 @@ SHADES = shades_of(skin_colours())  # of a curvature sensor
 
 _CLEARLY = 1.5  # times as far out as in, or in as out, before the colours change sides
 _SIGMAS = 5.0  # standard deviations that a range has at least: noise alone stays pale
-_MOST = {"1/m": 1e3, "1/m^2": 1e6}  # widest ranges: no object has a radius below 1 mm
+# Widest ranges in the units of the screen, of lengths in skins: no object has a radius below 1 mm.
+_MOST = {"mm": 1.0, "\N{MICRO SIGN}m": 1e3, "mrad": 2e3, "1/m": 1e3, "1/m\u00b2": 1e6}
+_LENGTHS = "mm", "\N{MICRO SIGN}m"
+_DISPLACED = "displacement", "difference"  # in m, of the whole surface
 _PATIENCE = 2.0  # s that the values must stay small before the range narrows
 
 
@@ -101,9 +106,12 @@ class SteadyRange:
         self.most = most
         self._small_since = math.inf
 
-    def follow(self, largest: float, now: float) -> float:
-        """The limit to use for values up to `largest` at time `now` in s."""
-        wanted = min(max(self.least, round_up(largest)), self.most)
+    def follow(self, largest: float, now: float, noise: float = 0.0) -> float:
+        """The limit to use for values up to `largest` at time `now` in s.
+
+        It is five times their `noise` at least.
+        """
+        wanted = min(max(self.least, round_up(max(largest, _SIGMAS * noise))), self.most)
         if wanted >= self.limit:
             self.limit, self._small_since = wanted, math.inf
         elif self._small_since == math.inf:
@@ -111,6 +119,11 @@ class SteadyRange:
         elif now - self._small_since > _PATIENCE:
             self.limit, self._small_since = wanted, math.inf
         return self.limit
+
+
+def largest(values: Array) -> float:
+    """The largest absolute value; 0 where none is known."""
+    return float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
 
 
 class Ranges:
@@ -125,7 +138,8 @@ class Ranges:
         self._steady = {
             name: SteadyRange(
                 shade.least * (side if shade.unit_shown == "mm" else 1.0),
-                side if shade.unit_shown == "mm" else _MOST.get(shade.unit, math.inf),
+                _MOST.get(shade.unit_shown, math.inf)
+                * (side if shade.unit_shown in _LENGTHS else 1.0),
             )
             for name, shade in shades.items()
         }
@@ -153,8 +167,7 @@ class Ranges:
 
         They count from what they are at rest. It is five times their `noise` at least.
         """
-        largest = float(np.max(np.abs(values), where=np.isfinite(values), initial=_SIGMAS * noise))
-        self._steady[name].follow(largest, now)
+        self._steady[name].follow(largest(values), now, noise)
         alike, group = [name], self._shades[name].group
         if settings.one_range and group:
             shown = {*settings.maps, settings.colour_by}
@@ -243,13 +256,21 @@ class Colouring:
         return self.shades[name].scale * found.of_elements(name, estimate)
 
     def noise(self, name: str, estimate: Estimate) -> float:
-        """The standard deviation of a value, as far as the estimate has it; 0 where it has none."""
-        unit, sd = self.shades[name].unit, math.nan
-        if unit == "1/m" and estimate.curvature.ndim == 2:
-            sd = estimate.noise
-        elif name == "displacement" and estimate.contact.single and not estimate.contact.near_rim:
-            sd = 1e3 * estimate.contact.displacement_sd
-        return sd if math.isfinite(sd) else 0.0
+        """The standard deviation of a value on the screen's scale; 0 where it is not known.
+
+        Of a curvature that of a reading, of the displacement its largest on the skin.
+        """
+        shade, sd, sensor = self.shades[name], math.nan, self._status.sensor
+        if name in _DISPLACED:
+            bars = self._bars_so_far(estimate)
+            sd = math.nan if bars is None else largest(bars.on_surface(estimate.noise))
+        elif estimate.curvature.ndim == 2:
+            sd = estimate.noise if shade.unit == "1/m" else math.nan
+        elif shade.row >= 0 and sensor is not None:
+            times = sensor.sigma
+            several = 1.0 if times is None else largest(sensor.layout.by_kind(times)[shade.row])
+            sd = estimate.noise * several
+        return shade.scale * sd if math.isfinite(sd) else 0.0
 
     def at_rest(self, name: str, estimate: Estimate) -> float:
         """The value of a quantity of a skin at rest."""
@@ -263,6 +284,11 @@ class Colouring:
         return found
 
     # Error bars: a moment for each set of readings, longer with many functions.
+
+    def _bars_so_far(self, estimate: Estimate) -> ErrorBars | None:
+        """Error bars of the setup of `estimate`, whatever readings were missing then."""
+        there = self.quantities(estimate) is not None and self._made.key[:-1] == self._key
+        return self._made.bars if there else self.error_bars(estimate)
 
     def error_bars(self, estimate: Estimate) -> ErrorBars | None:
         """The error bars of the setup of `estimate`; None until they are computed."""

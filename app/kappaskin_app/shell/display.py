@@ -166,7 +166,7 @@ class Display(QObject):
         noise = self.colouring.noise(name, estimate)
         limit = self.ranges.limit(name, values - at_rest, self.settings, now, noise)
         pulled = name == "displacement" and self.ranges.pulled(values)
-        return shade.tint(limit, at_rest, pulled)
+        return shade.tint(limit, at_rest, pulled, noise)
 
     def railed(self, estimate: Estimate, kinds: Kinds) -> Mask:
         """Which readings (k, P) are saturated, as far as that is known."""

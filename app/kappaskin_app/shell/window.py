@@ -105,9 +105,9 @@ class MainWindow(Parts):
         shown = self.display.colouring.possible(settings)
         self.display.show_settings(shown)
         self.settings_shown.emit(shown)
-        look = settings.theme, settings.letters
-        if before is None or look != (before.theme, before.letters):
-            apply_look(THEMES[settings.theme], settings.letters)
+        look = settings.theme, settings.letters, settings.colour_map
+        if before is None or look != (before.theme, before.letters, before.colour_map):
+            apply_look(THEMES[settings.theme], settings.letters, settings.colour_map)
 
     def _show_status(self, status: Status) -> None:
         self.panels.show_status(status, self.session.simulating and status.state == "streaming")

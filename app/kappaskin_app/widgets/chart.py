@@ -25,6 +25,7 @@ from PySide6.QtGui import (
     QPainter,
     QPalette,
     QShowEvent,
+    QWheelEvent,
 )
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import (
@@ -43,6 +44,7 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import FAINT, current, follow_look, series
+from kappaskin_app.widgets.layout import page_of
 from kappaskin_app.widgets.parts import ELLIPSIS, plain_tip, text_label
 from kappaskin_app.widgets.text import in_digits, round_up
 
@@ -205,7 +207,8 @@ class ChartPoint:
 class Chart(QWidget):
     """Series over two axes; an empty chart says what to do.
 
-    The wheel zooms, dragging pans, a double click shows all. `pointed` emits the `ChartPoint` next
+    The wheel zooms, dragging pans, a double click shows all. On a page that scrolls the wheel
+    scrolls it, and zooms with Ctrl. `pointed` emits the `ChartPoint` next
     to the mouse, or None; `clicked` the one that is clicked, `clicked_at` the x of any click.
     """
 
@@ -298,7 +301,8 @@ class Chart(QWidget):
         if self.isVisible() and self._view is None and not self.is_empty:
             self._view = _View(self, self._hold)
             self._around.addWidget(self._view.widget, 1)
-            self.canvas.installEventFilter(self)
+            for watched in (self.canvas, self._view.widget):
+                watched.installEventFilter(self)
             self._view.dress(self.x_axis, self.y_axis)
         if self.isVisible() and self._view is not None:
             self._view.widget.setVisible(not self.is_empty)
@@ -340,6 +344,10 @@ class Chart(QWidget):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         kinds, left = QEvent.Type, Qt.MouseButton.LeftButton
+        if isinstance(event, QWheelEvent):
+            return self._scrolls(event)
+        if watched is not self.canvas:
+            return False
         if isinstance(event, QHelpEvent):
             return self._under is not None  # whose text is shown, not that of the chart
         if isinstance(event, QMouseEvent) and event.type() == kinds.MouseMove:
@@ -357,6 +365,14 @@ class Chart(QWidget):
             pressed = event.type() == kinds.MouseButtonPress
             self._pressed = event.position() if pressed else None
         return False
+
+    def _scrolls(self, event: QWheelEvent) -> bool:
+        """Whether the wheel scrolls the page of the chart, which then gets the `event`."""
+        page = page_of(self)
+        scrolls = page is not None and page.verticalScrollBar().maximum() > 0
+        scrolls &= not event.modifiers() & Qt.KeyboardModifier.ControlModifier
+        event.setAccepted(not scrolls)
+        return scrolls
 
     def _click(self, began: QPointF, at: QPointF) -> None:
         if (at - began).manhattanLength() >= QApplication.startDragDistance():

@@ -1,30 +1,43 @@
-"""Colour bars: a scale with its limits and unit, and a lock."""
+"""Colour bars: a scale with its limits, unit and noise, and a pin that fixes it."""
 
 import numpy as np
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QToolButton, QVBoxLayout, QWidget
 
-from kappaskin_app.theme import DIVERGING, SEQUENTIAL, Colours
 from kappaskin_app.widgets.lettering import read_from_afar
 from kappaskin_app.widgets.parts import Label
 from kappaskin_app.widgets.text import in_digits
 from kappaskin_app.widgets.tint import Tint
 
-_COLOURS, _GAP = 22, 4  # px of the bar without its numbers, and right of them
+_COLOURS, _GAP = 24, 4  # px of the bar without its numbers, and right of them
 _WIDEST = "\N{MINUS SIGN}0.005"  # of the numbers, more or less
 _SWATCH = 10  # px of a colour in the legend
+_MARK, _LEAST_MARK = 4, 3.0  # px, width and least height of the mark of the noise
+# A pin in a square of 16 x 16.
+_PIN = QPolygonF(
+    [
+        QPointF(*at)
+        for at in (
+            *((4.5, 1), (11.5, 1), (11.5, 3), (10.2, 3), (10.8, 7), (13, 9), (13, 10.5)),
+            *((8.7, 10.5), (8, 15.5), (7.3, 10.5)),
+            *((3, 10.5), (3, 9), (5.2, 7), (5.8, 3), (4.5, 3)),
+        )
+    ]
+)
+_TILTED = 40.0  # degrees, of a pin that holds nothing
 
 
 class ColourBar(QWidget):
     """A vertical scale of colours with its limits and unit, above a legend of other colours.
 
-    Kinds, which have no scale, have the legend only.
+    A mark beside it is as long as noise alone reaches. Kinds, which have no scale, have the legend
+    only.
     """
 
     def __init__(self) -> None:
         super().__init__()
-        self._tint = Tint(DIVERGING, (-1.0, 1.0), "1/m")
+        self._tint = Tint("diverging", (-1.0, 1.0), "1/m")
         self.legend: tuple[tuple[str, str], ...] = ()
         """Colours, as #rrggbb, with their words, the lowest first."""
         self.widen()
@@ -66,18 +79,18 @@ class ColourBar(QWidget):
         """Whether there is a scale."""
         return not self._tint.kinds
 
-    def show_scale(self, colours: Colours, limits: tuple[float, float], unit: str) -> None:
-        self.show_tint(Tint(colours, limits, unit))
-
     def show_tint(self, tint: Tint, legend: tuple[tuple[str, str], ...] = ()) -> None:
         """Show a scale, and a `legend` of other visible colours, (#rrggbb, words)."""
-        was = self._tint
-        if (was.limits, was.unit, self.legend) != (tint.limits, tint.unit, legend) or (
-            was.colours is not tint.colours
-        ):
-            self._tint, self.legend = tint, legend
+        was, self._tint = (self._tint, self.legend), tint
+        if (was[0].limits, was[0].unit, was[1]) != (tint.limits, tint.unit, legend):
+            self.legend = legend
             self.widen()
             self.updateGeometry()
+            self.update()
+        floor = f"{tint.noise:.2g} {tint.unit}"
+        tip = f"The mark at the left is the noise floor: one standard deviation, {floor}."
+        if (tip := tip if tint.noise else "") != self.toolTip():
+            self.setToolTip(tip)
             self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -96,10 +109,15 @@ class ColourBar(QWidget):
             self._paint_scale(painter, line, bottom)
 
     def _paint_scale(self, painter: QPainter, line: int, bottom: float) -> None:
-        bar = QRectF(4, line + 4, 14, max(bottom - line - 10, 10))
+        bar = QRectF(_MARK + 2, line + 4, 14, max(bottom - line - 10, 10))
         ramp = np.ascontiguousarray(self._tint.colours[::-1, None])
         image = QImage(ramp.tobytes(), 1, 256, 3, QImage.Format.Format_RGB888)
         painter.drawImage(bar, image)
+        if self._tint.noise:
+            low, high = (bar.bottom() - share * bar.height() for share in self._tint.floor)
+            short = max(_LEAST_MARK - (low - high), 0.0) / 2
+            mark = QRectF(0, high - short, _MARK, low - high + 2 * short)
+            painter.fillRect(mark, painter.pen().color())
         painter.drawText(QPointF(2, painter.fontMetrics().ascent()), self._tint.unit)
         for share, text in self._numbers.items():
             if share == 0.5 and bar.height() < 3 * line:
@@ -109,15 +127,18 @@ class ColourBar(QWidget):
             painter.drawText(QPointF(bar.right() + 4, top + painter.fontMetrics().ascent()), text)
 
 
+_FREE = "The colour range follows the values shown. Click, or press Space, to fix it."
+_FIXED = "The colour range is fixed. Click, or press Space, to let it follow the values shown."
+
+
 class LockButton(QToolButton):
-    """A button that locks a range of colours; `wanted` requests it."""
+    """A pin that fixes a range of colours; `wanted` requests it."""
 
     wanted = Signal(bool)
 
     def __init__(self) -> None:
-        super().__init__()
-        self.setCheckable(True)
-        self.setToolTip("Fix the colour range; otherwise it follows the values shown.")
+        super().__init__(checkable=True, autoRaise=True)  # pyright: ignore[reportCallIssue]
+        self.setAccessibleName("Fixed colour range")
         self.clicked.connect(self._ask)
         self.show_locked(False)
 
@@ -127,11 +148,28 @@ class LockButton(QToolButton):
 
     def show_locked(self, locked: bool) -> None:
         self.setChecked(locked)
-        self.setText("Fixed" if locked else "Fix")
+        self.setToolTip(_FIXED if locked else _FREE)
+
+    def sizeHint(self) -> QSize:
+        side = self.fontMetrics().height() + 8
+        return QSize(side, side)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        ink, scale = self.palette().buttonText().color(), self.fontMetrics().height() / 16
+        painter.translate(QRectF(self.rect()).center())
+        painter.scale(scale, scale)
+        painter.rotate(0.0 if self.isChecked() else _TILTED)
+        painter.translate(-8, -8)
+        painter.setPen(QPen(ink, 1.2))
+        painter.setBrush(ink if self.isChecked() else Qt.BrushStyle.NoBrush)
+        painter.drawPolygon(_PIN)
 
 
 class SkinScale(QWidget):
-    """The scale of the skin: quantity, colour bar, lock, and vertical exaggeration."""
+    """The scale of the skin: quantity, colour bar and pin."""
 
     lock_wanted = Signal(bool)
 
@@ -139,24 +177,18 @@ class SkinScale(QWidget):
         super().__init__()
         self.what = Label(rich=True, alignment=Qt.AlignmentFlag.AlignHCenter)  # pyright: ignore[reportCallIssue]
         self.bar, self.lock = ColourBar(), LockButton()
-        self.bar.show_scale(SEQUENTIAL, (0.0, 1.0), "mm")
+        self.bar.show_tint(Tint("sequential", (0.0, 1.0), "mm"))
         self.lock.wanted.connect(self.lock_wanted)
         self._symbol = ""
-        self.times = Label(alignment=Qt.AlignmentFlag.AlignHCenter)  # pyright: ignore[reportCallIssue]
-        self.times.setToolTip(
-            "Vertical exaggeration in use: the one set under View, or less where it would not fit."
-        )
         around = QVBoxLayout(self)
         around.setContentsMargins(0, 4, 0, 4)
         around.addWidget(self.what)
         around.addWidget(self.bar, 1)
         around.addWidget(self.lock, 0, Qt.AlignmentFlag.AlignHCenter)
-        around.addWidget(self.times)
 
     def show_unit(self, unit: float) -> None:
         """Use large letters without controls where a unit is so many px; 0: the usual ones."""
-        for part in (self.lock, self.times):
-            part.setVisible(not unit)
+        self.lock.setVisible(not unit)
         self.setFont(read_from_afar(unit))
 
     def show_what(self, symbol: str, tip: str) -> None:
@@ -165,9 +197,3 @@ class SkinScale(QWidget):
             self._symbol = symbol
             self.what.setText(f"<b>{symbol}</b>")
             self.what.setToolTip(tip)
-
-    def show_times(self, times: float) -> None:
-        """Show the vertical exaggeration."""
-        text = f"height\n\N{MULTIPLICATION SIGN} {times:.3g}"
-        if text != self.times.text():
-            self.times.setText(text)

@@ -75,12 +75,17 @@ class _Scrolled(QScrollArea):
         return super().eventFilter(watched, event)
 
 
-def scroll_to(widget: QWidget) -> None:
-    """Scroll to a widget, where it is on a scrolled page."""
+def page_of(widget: QWidget) -> QScrollArea | None:
+    """The scrolled page that a widget is on, if it is on one."""
     area = widget.parentWidget()
     while area is not None and not isinstance(area, QScrollArea):
         area = area.parentWidget()
-    if area is not None:
+    return area
+
+
+def scroll_to(widget: QWidget) -> None:
+    """Scroll to a widget, where it is on a scrolled page."""
+    if (area := page_of(widget)) is not None:
         area.ensureWidgetVisible(widget)
 
 

@@ -6,11 +6,11 @@ from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from kappaskin.frames import Array
-from kappaskin_app.theme import DARK_INK, LIGHT_INK, SEQUENTIAL, Colours, current, follow_look
+from kappaskin_app.theme import DARK_INK, LIGHT_INK, Colours, current, follow_look
 from kappaskin_app.widgets.colour_bar import ColourBar
 from kappaskin_app.widgets.line import Line
 from kappaskin_app.widgets.parts import Label
-from kappaskin_app.widgets.tint import Tint
+from kappaskin_app.widgets.tint import Part, Tint
 
 _DOT = 1.8  # px, the radius of a point
 _LINES = 5  # of letters, as high as a map is at least
@@ -102,7 +102,7 @@ class SurfaceMap(QWidget):
         bold.setBold(True)
         self.title.setFont(bold)
         self.map, self.bar, self._unit = _Map(), ColourBar(), unit
-        self._tint = Tint(SEQUENTIAL, (0.0, 1.0), unit)
+        self._tint = Tint("sequential", (0.0, 1.0), unit)
         self.bar.show_tint(self._tint)
         self._values: Array | None = None
         self._sides, self._contact = (1.0, 1.0), np.full(2, np.nan)
@@ -124,13 +124,17 @@ class SurfaceMap(QWidget):
         self,
         values: Array | None,
         limits: tuple[float, float],
-        colours: Colours,
+        part: Part,
         contact: Array,
         sides: tuple[float, float],
+        noise: float = 0.0,
     ) -> None:
-        """Show `values` (ny, nx) in the unit of the scale, NaN off the skin; None for nothing."""
+        """Show `values` (ny, nx) in the unit of the scale, NaN off the skin; None for nothing.
+
+        `part` of the colour map is used; `noise` is the standard deviation of a value.
+        """
         self._values, self._contact, self._sides = values, contact, sides
-        self._tint = Tint(colours, limits, self._unit)
+        self._tint = Tint(part, limits, self._unit, noise=noise)
         self.bar.show_tint(self._tint)
         self._show()
 

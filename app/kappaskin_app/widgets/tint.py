@@ -1,11 +1,16 @@
 """Colours of numbers: a colour map between limits, or a colour for each whole number."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from kappaskin.frames import Array, Mask
-from kappaskin_app.theme import DARK_INK, DIVERGING, LIGHT_INK, SATURATED, Colours
+from kappaskin_app.theme import DARK_INK, LIGHT_INK, SATURATED, Colours, colours_in_use
+
+Part = Literal["sequential", "pulled", "diverging"]
+"""The colours of values above zero, below it, and of both signs."""
+_LIGHT = 128  # of 255, least of a light colour
 
 
 def rgb_of(*colours: str) -> Colours:
@@ -14,22 +19,38 @@ def rgb_of(*colours: str) -> Colours:
 
 @dataclass(frozen=True, eq=False)
 class Tint:
-    """How numbers become colours now: of a map of 256 `colours`, between `limits` in `unit`.
+    """How numbers become colours: by a `part` of the colour map in use, between `limits` in `unit`.
 
-    `limit` is how far they reach, as a range is locked to it. A tint of `kinds` has one colour
-    for each whole number instead.
+    `limit` is how far they reach, as a range is locked to it; `noise` is the standard deviation of
+    a number, 0 where it is not known. A tint of `kinds` has one colour of its `own` for each whole
+    number instead.
     """
 
-    colours: Colours
+    part: Part
     limits: tuple[float, float]
     unit: str
     limit: float = 1.0
     kinds: tuple[str, ...] = ()
+    own: Colours | None = None
+    noise: float = 0.0
+
+    @property
+    def colours(self) -> Colours:
+        return getattr(colours_in_use(), self.part) if self.own is None else self.own
 
     @property
     def ink(self) -> str:
         """What is seen against every one of the colours."""
-        return DARK_INK if self.colours is DIVERGING else LIGHT_INK
+        middle = int(self.colours[len(self.colours) // 2].min())
+        return DARK_INK if self.part == "diverging" and middle > _LIGHT else LIGHT_INK
+
+    @property
+    def floor(self) -> tuple[float, float]:
+        """The ends of what noise alone reaches, one standard deviation, as shares of the scale."""
+        low, high = self.limits
+        middle = (low + high) / 2 if self.part == "diverging" else 0.0
+        ends = np.array([middle - self.noise, middle + self.noise])
+        return tuple(np.clip((ends - low) / (high - low), 0.0, 1.0).tolist())
 
     def rgb(self, values: Array, missing: str, railed: Mask | None = None) -> Colours:
         """Colours (..., 3) of `values` (...); NaN is `missing`, what is `railed` has its own."""

@@ -1170,12 +1170,14 @@ def skin_colours() -> dict[str, SkinColour]:
 def colours_of(layout: SensorLayout) -> dict[str, SkinColour]:
     """All that the skin of a sensor may be coloured by, by name.
 
-    Where it reads other than xx, yy and xy, these are of the fit, beside what is read.
+    Where it reads other than xx, yy and xy, these are of the fit, beside what is read. A strip,
+    which bends along x only, has neither yy nor xy.
     """
-    if not layout.reads:
-        return skin_colours()
     found: list[SkinColour] = []
     for quantity in REPORTED:
+        if not layout.reads:
+            found += quantity.shaded()
+            continue
         if quantity.colours and quantity.of_readings:
             found += quantity.read_by(layout)
         found += [
@@ -1183,7 +1185,11 @@ def colours_of(layout: SensorLayout) -> dict[str, SkinColour]:
             for colour in quantity.shaded()
             if colour.on_surface or colour.row < 0
         ]
-    return {colour.name: colour for colour in found}
+    absent = _ACROSS if layout.patch.strip else ()
+    return {colour.name: colour for colour in found if colour.name not in absent}
+
+
+_ACROSS = "yy", "xy", "residual_yy", "residual_xy"
 
 
 class Readout(NamedTuple):

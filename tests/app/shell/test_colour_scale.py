@@ -2,10 +2,12 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Pipeline, Setup, Simulator, load_scene
+from kappaskin.live import Status
 from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.colouring import Colouring, Ranges, SteadyRange
 from kappaskin_app.shell.settings import Settings
@@ -54,16 +56,25 @@ def test_no_range_is_wider_than_a_skin_or_an_object_can_be() -> None:
     assert limits == [100.0, 1e3, 1e3]
 
 
-def test_the_noise_of_a_colour_is_that_of_the_estimate() -> None:
+def test_the_noise_of_a_colour_is_that_of_the_estimate_with_and_without_a_contact(qtbot) -> None:
     scene = load_scene("centre")
-    estimate = Pipeline(scene.sensor(), Setup())(Simulator(scene).frame(0, lambda: 0.0))
-    colouring = Colouring(Tasks())
+    sensor = scene.sensor()
+    estimate = Pipeline(sensor, Setup())(Simulator(scene).frame(0, lambda: 0.0))
+    tasks = Tasks()
+    colouring = Colouring(tasks)
+    colouring.follow(Status(sensor=sensor, setup=Setup()))
     assert colouring.noise("xx", estimate) == estimate.noise > 0
-    depth = 1e3 * estimate.contact.displacement_sd
-    assert colouring.noise("displacement", estimate) == depth > 0
-    for doubt in ({"single": False}, {"near_rim": True}):
-        doubtful = replace(estimate, contact=replace(estimate.contact, **doubt))
-        assert colouring.noise("displacement", doubtful) == 0
+    untouched = replace(estimate, contact=replace(estimate.contact, displacement_sd=math.nan))
+    qtbot.waitUntil(lambda: colouring.noise("displacement", untouched) > 0)
+    bars = colouring.error_bars(estimate)
+    largest = 1e3 * float(np.nanmax(bars.on_surface(estimate.noise)))
+    for name in ("displacement", "difference"):
+        assert colouring.noise(name, untouched) == pytest.approx(largest)
+        limit = Ranges(side=100.0).limit(name, np.zeros(4), Settings(), 0.0, largest)
+        assert limit >= 5 * largest
+    assert colouring.noise("mean", estimate) == estimate.noise
+    assert colouring.noise("gaussian", estimate) == 0
+    tasks.close()
 
 
 def test_a_skin_at_rest_keeps_its_side() -> None:

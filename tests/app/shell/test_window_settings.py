@@ -136,7 +136,7 @@ def test_the_colours_of_the_skin_can_be_locked_and_undone(window: MainWindow, un
     assert scale.bar.limits == (0.0, 5.0)
     window.history.stack.undo()
     window.history.stack.undo()
-    assert scale.lock.text() == "Fix"
+    assert not scale.lock.isChecked()
     window.history.change("Colour", -1, colour_by="xy")
     until(lambda: scale.bar.limits[0] < 0)
     scale.lock.click()

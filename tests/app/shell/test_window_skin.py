@@ -11,6 +11,7 @@ from kappaskin.bases import edges_of
 from kappaskin.scenes.cylinders import CylinderStep
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import current
+from kappaskin_app.widgets.lettering import CAPTION
 
 
 def _shown(window: MainWindow) -> bool:
@@ -265,12 +266,15 @@ def test_no_height_leaves_the_picture_and_the_true_one_is_written(
 ) -> None:
     window.history.change("High", -1, exaggeration=50, load_case="point", force=0.9)
     until(lambda: window.session.estimate.surface.max() > 0.02)
-    view, times = window.membrane, window.scale.times
-    until(lambda: times.text() != "height\n\N{MULTIPLICATION SIGN} 6")
+    view, written = window.membrane, window.membrane.exaggeration
+    until(lambda: written.words not in ("", "height \N{MULTIPLICATION SIGN} 6"))
     until(lambda: -view.skin.height.min() > 20)
     assert -view.skin.height.min() <= view.skin.deepest * (1 + 1e-9)
-    written = float(times.text().split()[-1])
-    assert written == pytest.approx(view.skin.deepest / window.display.ranges.deepest(), rel=5e-3)
+    times = float(written.words.split()[-1])
+    assert times == pytest.approx(view.skin.deepest / window.display.ranges.deepest(), rel=5e-3)
+    assert written.text.input == written.words
+    window.requests.set("exaggeration", 1.0)
+    until(lambda: written.text.input == "")
 
 
 @pytest.mark.full
@@ -290,6 +294,25 @@ def test_the_whole_skin_is_seen_from_every_side(window: MainWindow, until) -> No
         written = [bool(label.GetVisibility()) for label in window.membrane.sides.labels]
         end_on = {"look-along-x": 1, "look-along-y": 2}.get(name)
         assert written == [number != end_on for number in range(3)], name
+
+
+def test_axes_and_exaggeration_have_large_letters_in_full_screen(window: MainWindow, until) -> None:
+    view = window.membrane
+    until(lambda: view.exaggeration.text.input)
+
+    def sizes() -> list[int]:
+        return [view.exaggeration.text.prop.font_size, *(one.size for one in view.sides.labels)]
+
+    usual = sizes()
+    window.actions_by_name["layout-presenter"].trigger()
+    until(lambda: window.presenter_view.active and sizes() != usual)
+    wanted = CAPTION * window.presenter_view.unit / 0.72  # by the height of its capitals
+    until(lambda: sizes()[0] == pytest.approx(wanted, abs=1))
+    most = int(0.2 * view.plotter.width() / 5.2)  # or they would need the room of the skin
+    assert sizes()[1:] == [pytest.approx(min(wanted, most), abs=1)] * 3
+    assert min(sizes()) > max(usual)
+    window.actions_by_name["layout-live"].trigger()
+    until(lambda: sizes() == usual)
 
 
 def test_on_a_calibration_cylinder_there_are_no_contact_numbers(window: MainWindow, until) -> None:

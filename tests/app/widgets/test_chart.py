@@ -19,10 +19,12 @@ from PySide6.QtGui import (
     QImage,
     QWheelEvent,
 )
-from PySide6.QtWidgets import QApplication, QFileDialog, QMenu, QMessageBox, QToolTip
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QFileDialog, QMenu, QMessageBox, QToolTip, QWidget
 
 from kappaskin_app.theme import DARK, SERIES, apply_look, letters
 from kappaskin_app.widgets.chart import Chart, ChartAxis, ChartLine, Series
+from kappaskin_app.widgets.layout import scrolled
 from kappaskin_app.widgets.text import duration
 
 X = np.linspace(0.0, 10.0, 11)
@@ -64,6 +66,13 @@ def roll(chart: Chart, at: QPointF, steps: int) -> None:
     QApplication.sendEvent(chart.canvas, QWheelEvent(at, over, QPoint(), turned, *none, False))
 
 
+def turn(chart: Chart, at: QPointF, steps: int, keys=Qt.KeyboardModifier.NoModifier) -> None:
+    """Turn the wheel of the window, which passes it to the parents of what does not take it."""
+    window = chart.window()
+    place = QPointF(window.mapFromGlobal(chart.canvas.mapToGlobal(at.toPoint())))
+    QTest.wheelEvent(window.windowHandle(), place, QPoint(0, 120 * steps), QPoint(), keys)
+
+
 def drag(qtbot, chart: Chart, start: QPoint, by: QPoint) -> None:
     qtbot.mouseMove(chart.canvas, start)
     qtbot.mousePress(chart.canvas, LEFT, pos=start)
@@ -90,6 +99,31 @@ def test_the_wheel_zooms_about_the_mouse_and_a_double_click_shows_all(chart, qtb
     assert (still - at).manhattanLength() < 1.0
     double_click(qtbot, chart, at.toPoint())
     assert ends(chart) == pytest.approx(was)
+
+
+@pytest.mark.parametrize("high", [900, 200])
+def test_on_a_page_that_scrolls_the_wheel_scrolls_it_and_zooms_with_ctrl(
+    chart, qtbot, until, high: int
+) -> None:
+    below = QWidget()
+    below.setFixedHeight(high)
+    page = scrolled(chart, below)
+    qtbot.addWidget(page)
+    chart.setFixedHeight(260)
+    page.resize(440, 520)
+    page.show()
+    until(lambda: chart.place_of(10.0, 0.0).x() > 300 and page.isVisible())
+    was, at, bar = ends(chart), chart.place_of(4.0, 1.2), page.verticalScrollBar()
+    assert (bar.maximum() > 0) == (high == 900)
+
+    turn(chart, at, -1)
+
+    assert (bar.value() > 0, ends(chart) == pytest.approx(was)) == (high == 900, high == 900)
+    value, was = bar.value(), ends(chart)
+    turn(chart, at, 1, Qt.KeyboardModifier.ControlModifier)
+    assert bar.value() == value
+    assert ends(chart) != pytest.approx(was)
+    chart.setParent(None)  # or it would go with the page
 
 
 def test_dragging_pans_and_new_values_leave_the_view_until_a_double_click(chart, qtbot) -> None:

@@ -299,6 +299,13 @@ def test_colours_of_what_is_read_are_those_of_small_elements_all_over_the_skin(p
         np.testing.assert_allclose(found, values, atol=1e-9 * np.abs(values).max())
 
 
+def test_a_strip_has_neither_a_curvature_across_it_nor_a_twist():
+    strip = colours_of(SensorLayout.regular(Patch(0.1, 0.02, strip=True), 6, 1))
+    sheet = colours_of(SensorLayout.regular(Patch(0.1, 0.02), 6, 1))
+    assert {*sheet} - {*strip} == {"yy", "xy", "residual_yy", "residual_xy"}
+    assert {*strip} < {*sheet}
+
+
 def test_a_skin_may_be_coloured_by_what_it_reads_and_its_residuals_in_their_units():
     colours = colours_of(scene_of("a mix").layout)
     units = {name: colour.unit for name, colour in colours.items() if colour.row >= 0}

@@ -12,11 +12,11 @@ from kappaskin.pipeline import Readout
 from kappaskin.sensing import Sensor
 from kappaskin_app.features.compare.comparison import Pair, SetupComparison
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.colouring import SteadyRange
+from kappaskin_app.shell.colouring import Colouring, SteadyRange, largest
 from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
-from kappaskin_app.theme import DIVERGING, SEQUENTIAL, follow_look, grown
+from kappaskin_app.theme import follow_look, grown
 from kappaskin_app.widgets.layout import scrolled
 from kappaskin_app.widgets.parts import button, sentence
 from kappaskin_app.widgets.surface_map import SurfaceMap
@@ -35,7 +35,10 @@ _COLUMNS = ("", "A", "B", "B \N{MINUS SIGN} A")
 _TABLE_WIDTH = 460  # px
 _MILLIMETRES = 1e3
 _SURFACE = "Displacement of the skin, on a common scale of A and B; the cross is the contact."
-_DIFFERENCE = "B minus A, on its own scale."
+_DIFFERENCE = (
+    "B minus A, on its own scale: five standard deviations of the displacement, or more where they "
+    "differ more."
+)
 _TABLE = (
     "Position, force and depth of the contact, and the principal curvatures of the skin there, "
     "each with its standard deviation. Place and force are the same where the settings do not "
@@ -70,9 +73,9 @@ class OtherForm(Form):
 class ComparePanel(QWidget):
     """The form of B, both surfaces, their difference, and the contact readouts of both."""
 
-    def __init__(self) -> None:
+    def __init__(self, colouring: Colouring) -> None:
         super().__init__()
-        self.form = OtherForm()
+        self.form, self._colouring = OtherForm(), colouring
         numbers = range(1, len(_COLUMNS))
         title = "Contact readouts of A and B"
         self.table = Table("compared", title, _COLUMNS, right=numbers, stretched=numbers)
@@ -116,7 +119,7 @@ class ComparePanel(QWidget):
 
     def _empty(self) -> None:
         for view in self.maps.values():
-            view.show_surface(None, (0.0, 1.0), SEQUENTIAL, np.full(2, np.nan), self._sides)
+            view.show_surface(None, (0.0, 1.0), "sequential", np.full(2, np.nan), self._sides)
             view.words.show_text("")
         self.table.setRowCount(0)
 
@@ -131,20 +134,22 @@ class ComparePanel(QWidget):
             return
         a, b = _MILLIMETRES * pair.a.surface, _MILLIMETRES * pair.b.surface
         now = pair.a.ready_time
-        limit = self._scale.follow(max(_largest(a), _largest(b)), now)
+        noise = self._colouring.noise("displacement", pair.a)
+        self._scale.most = self._difference.most = _MILLIMETRES * max(self._sides)
+        limit = self._scale.follow(max(largest(a), largest(b)), now, noise)
         into = max(float(np.nanmax(a)), 0.0) >= max(-float(np.nanmin(a)), 0.0)
         limits = (0.0, limit) if into else (-limit, 0.0)
-        colours = SEQUENTIAL if into else SEQUENTIAL[::-1]
+        part = "sequential" if into else "pulled"
         for name, values, estimate in (("a", a, pair.a), ("b", b, pair.b)):
             self.maps[name].show_surface(
-                values, limits, colours, estimate.contact.position, self._sides
+                values, limits, part, estimate.contact.position, self._sides, noise
             )
         difference = pair.difference
         if difference is not None:
             difference = _MILLIMETRES * difference
-            limit = self._difference.follow(_largest(difference), now)
+            limit = self._difference.follow(largest(difference), now, noise)
             self.maps["difference"].show_surface(
-                difference, (-limit, limit), DIVERGING, np.full(2, np.nan), self._sides
+                difference, (-limit, limit), "diverging", np.full(2, np.nan), self._sides, noise
             )
         self._show_words(pair)
         self._show_figures(pair)
@@ -180,7 +185,3 @@ def difference_text(a: Readout, b: Readout) -> str:
     if (a.value, a.sd) == (b.value, b.sd):
         return _SAME
     return rounded(b.value - a.value, min(a.sd, b.sd), a.digits, "+")[0]
-
-
-def _largest(values: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> float:
-    return float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))

@@ -54,7 +54,6 @@ from kappaskin_app.features.connection.panel import PortSearch
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.folders import proposed
-from kappaskin_app.theme import DIVERGING
 from kappaskin_app.widgets.parts import ELLIPSIS, Label, button, in_a_row, sentence
 from kappaskin_app.widgets.surface_map import SurfaceMap
 from kappaskin_app.widgets.table import Table
@@ -553,7 +552,7 @@ class NewSensorDialog(QDialog):
         nowhere = np.full(2, np.nan)
         self.map.title.setText(f"Change of {first} now, in {self.unit.currentText()}")
         cells = values.reshape(m, n).T.repeat(_CELL, 0).repeat(_CELL, 1)
-        self.map.show_surface(cells, (-most, most), DIVERGING, nowhere, sides)
+        self.map.show_surface(cells, (-most, most), "diverging", nowhere, sides)
 
     # The steps.
 

@@ -19,7 +19,6 @@ from kappaskin_app.shell.settings import Settings, form_field
 from kappaskin_app.shell.settings.designed import DesignSettings
 from kappaskin_app.shell.settings.form_fields import Range
 from kappaskin_app.shell.settings.scene import SHAPES
-from kappaskin_app.theme import SEQUENTIAL
 from kappaskin_app.widgets.chart import Chart, ChartAxis, Series
 from kappaskin_app.widgets.layout import row, scrolled
 from kappaskin_app.widgets.parts import ELLIPSIS, button, sentence, text_label
@@ -185,7 +184,7 @@ class DesignPanel(QWidget):
             ((self.predicted, found, "predicted"), (self.simulated, check, "simulated"))
         ):
             sd = None if source is None else 1e3 * source.sd
-            view.show_surface(sd, (0.0, limit), SEQUENTIAL, np.full(2, np.nan), sides)
+            view.show_surface(sd, (0.0, limit), "sequential", np.full(2, np.nan), sides)
             view.map.show_points(None if sd is None or found is None else found.positions)
             if sd is not None and found is not None:
                 curves.append(Series(name, 1e3 * found.x, sd[len(sd) // 2], number))

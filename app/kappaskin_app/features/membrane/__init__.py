@@ -29,6 +29,7 @@ class MembraneFeature:
         shell.settings_shown.connect(guarded(view.show_settings))
         shell.settings_shown.connect(guarded(self._show_colours))
         shell.display.unit_changed.connect(guarded(self.scale.show_unit))
+        shell.display.unit_changed.connect(guarded(self.membrane.show_unit))
         shell.display.unit_changed.connect(guarded(self._enable_alarm))
         # Queued: the next update follows the drawing, without waiting for the timer.
         self.membrane.drawn.connect(shell.session.tick, Qt.ConnectionType.QueuedConnection)

@@ -11,6 +11,7 @@ from kappaskin.frames import Array, Indices
 from kappaskin.skin import Distances
 from kappaskin_app.shell.drawn_skin import MM, Direction, DrawnSkin
 from kappaskin_app.theme import WANTED, current, follow_look, grown
+from kappaskin_app.widgets.lettering import CAPTION
 
 UNLIT = {"lighting": False, "pickable": False, "reset_camera": False, "render": False}
 """Arguments of `add_mesh`: no lighting, no rendering, no change of the camera."""
@@ -26,21 +27,39 @@ _MARGIN = 0.015  # of the view's width, on both sides
 _LEAST = 12  # characters in a line
 
 
-def room_for(plotter: Any, px: float) -> int:
-    """Number of letters of `px` that fit in the view's width at the present letter size."""
-    room = (1 - 2 * _MARGIN) * plotter.width() / (_LETTER * grown(px))
+_CAPITAL = 0.72  # height of a capital, of that of the letters
+
+
+def letters_of(px: float, unit: float) -> int:
+    """Height in px of letters of `px`; of the presenter's captions where its unit is not 0."""
+    return round(CAPTION * unit / _CAPITAL) if unit else grown(px)
+
+
+def room_for(plotter: Any, letters: float) -> int:
+    """Number of letters of this height in px that fit in the view's width."""
+    room = (1 - 2 * _MARGIN) * plotter.width() / (_LETTER * letters)
     return max(int(room), _LEAST)
 
 
 class Caption:
-    """Text in letters of `px` at a relative `height` of a `plotter`."""
+    """Text in letters of `px` at a relative `height` of a `plotter`, at its left or right."""
 
-    def __init__(self, plotter: Any, px: float, height: float, vertical: str = "bottom") -> None:
-        self._plotter, self._px, self.words = plotter, px, ""
+    def __init__(
+        self,
+        plotter: Any,
+        px: float,
+        height: float,
+        vertical: str = "bottom",
+        side: str = "left",
+        spared: int = 0,
+    ) -> None:
+        self._plotter, self._px, self.words, self.unit = plotter, px, "", 0.0
+        self._spared = spared  # letters left free on the other side
         self.text: Any = pv.Text("")
         self.text.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
-        self.text.position = _MARGIN, height
+        self.text.position = _MARGIN if side == "left" else 1 - _MARGIN, height
         self.text.prop.justification_vertical = vertical
+        self.text.prop.justification_horizontal = side
         plotter.add_actor(self.text, reset_camera=False, render=False)
         follow_look(plotter, self.fit)
 
@@ -52,8 +71,10 @@ class Caption:
     def fit(self) -> None:
         """Wrap the text at the present size of letters and view."""
         whole = self.words.replace(" mm", "\N{NO-BREAK SPACE}mm")
-        lines = textwrap.wrap(whole, room_for(self._plotter, self._px))
-        self.text.prop.font_size, self.text.prop.color = grown(self._px), current().text
+        letters = letters_of(self._px, self.unit)
+        room = max(room_for(self._plotter, letters) - self._spared, _LEAST)
+        lines = textwrap.wrap(whole, room)
+        self.text.prop.font_size, self.text.prop.color = letters, current().text
         self.text.input = "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")
 
 
@@ -72,6 +93,7 @@ class Sides:
         self._lines: Any = pv.PolyData(np.zeros((3, 3)), lines=[3, 1, 0, 2])
         self.actor = plotter.add_mesh(self._lines, line_width=pixels(plotter, 1), **UNLIT)
         self.actor.visibility = False
+        self.unit = 0.0
         self.labels: list[Any] = [pv.Label() for _ in range(3)]
         for label in self.labels:
             plotter.add_actor(label, reset_camera=False, render=False)
@@ -98,7 +120,9 @@ class Sides:
 
     def fit(self, wide: float) -> float:
         """Fit the letters to a view of `wide` px; the share of it that a label takes."""
-        size = max(1, min(grown(_SIDE_LETTERS), int(_MOST_WIDTH * wide / _LABEL_WIDTH)))
+        size = max(
+            1, min(letters_of(_SIDE_LETTERS, self.unit), int(_MOST_WIDTH * wide / _LABEL_WIDTH))
+        )
         for label in self.labels:
             label.size = size
         return _LABEL_WIDTH * size / wide
@@ -229,7 +253,7 @@ class Alarm:
     def fit(self) -> None:
         """Wrap the text at the present size of letters and view."""
         head, _, rest = self.text.partition("\n")
-        wide = min(room_for(self._plotter, _ALARM_LETTERS), _WIDTH)
+        wide = min(room_for(self._plotter, grown(_ALARM_LETTERS)), _WIDTH)
         most = _LINES * _WIDTH // wide
         lines = textwrap.wrap(rest, wide, max_lines=most, placeholder=" ...")
         self.actor.prop.font_size = grown(_ALARM_LETTERS)

@@ -27,6 +27,7 @@ from kappaskin_app.shell.drawn_skin import MM, DrawnSkin
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, current, follow_look
 
 _LETTERS = 14  # px, of the caption
+_CORNER = 14  # letters at its right: the vertical exaggeration
 _LIFT = 0.006  # of the skin's size above the surface, which would hide half of a line
 _POINT, _POINTS = 5, 80  # px of an element, and of many in a row: or they would hide the skin
 _CONTACT = "#1fd17a"  # the mark of a contact
@@ -111,8 +112,9 @@ class MembraneView(QWidget):
             for _ in range(2)
         ]
         self.sides = Sides(plotter)
-        self._caption = Caption(plotter, _LETTERS, 0.98, "top")
+        self._caption = Caption(plotter, _LETTERS, 0.98, "top", spared=_CORNER)
         self.caption: Any = self._caption.text
+        self.exaggeration = Caption(plotter, _LETTERS, 0.98, "top", "right")
         self.alarm = Alarm(plotter)
 
     def _make_lights(self) -> None:
@@ -206,7 +208,8 @@ class MembraneView(QWidget):
     def _fit(self) -> None:
         """Fit camera and texts to the size of the view."""
         self.camera_control.fit()
-        self._caption.fit()
+        for caption in (self._caption, self.exaggeration):
+            caption.fit()
         self.alarm.fit()
 
     # Estimates.
@@ -223,6 +226,7 @@ class MembraneView(QWidget):
         if estimate.surface.shape != skin.height.shape or self.surface.lost:
             return  # of another skin, or received after the loss
         skin.height = -MM * times * np.nan_to_num(estimate.surface)
+        self._show_times(times)
         self.surface.show_shape(skin)
         self.surface.show_values(skin, values, limits)
         self._show_truth(skin, estimate.true_surface, times)
@@ -243,6 +247,12 @@ class MembraneView(QWidget):
         self._frame_time = estimate.taken if known else estimate.host_time
         self.age_sd = estimate.taken_sd if known else math.inf
         self._request()
+
+    def _show_times(self, times: float) -> None:
+        """State the vertical exaggeration, unless there is none."""
+        text = f"height \N{MULTIPLICATION SIGN} {times:.3g}"
+        if (text := text if times != 1 else "") != self.exaggeration.words:
+            self.exaggeration.show(text)
 
     def _show_truth(self, skin: DrawnSkin, surface: Array, times: float) -> None:
         true = surface.ravel()[self._wire_points]
@@ -267,6 +277,12 @@ class MembraneView(QWidget):
         self.drag.handles = self._loads.show(loads, self.skin, self.lift)
 
     # Options.
+
+    def show_unit(self, unit: float) -> None:
+        """Use the presenter's large letters where a unit of it is so many px; 0: the usual ones."""
+        for part in (self.sides, self._caption, self.exaggeration):
+            part.unit = unit
+        self._fit_timer.start()
 
     def show_options(self, elements: bool, truth: bool) -> None:
         self._elements_shown, self._truth_shown = elements, truth

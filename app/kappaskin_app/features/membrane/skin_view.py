@@ -18,7 +18,7 @@ from kappaskin_app.shell.loads import loads_at
 from kappaskin_app.shell.selection import Selection
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings, locked_at
-from kappaskin_app.theme import DIVERGING, current, follow_look
+from kappaskin_app.theme import current, follow_look
 from kappaskin_app.widgets.colour_bar import SkinScale
 from kappaskin_app.widgets.tint import Tint
 
@@ -126,7 +126,7 @@ class SkinView(QObject):
         name, times, display = self._settings.colour_by, self._times(), self._display
         estimate, mode, shade, beside = shown.estimate, self._selection.mode, self._shade, ()
         if mode is not None and mode.shape == estimate.surface.shape:
-            tint, values = Tint(DIVERGING, (-1.0, 1.0), "shape"), mode
+            tint, values = Tint("diverging", (-1.0, 1.0), "shape"), mode
         elif shade.on_surface is not None and self._settings.colour_from == "smooth":
             values = display.colouring.on_surface(name, estimate)
             tint = display.tint(name, estimate, values, shown.now)
@@ -144,7 +144,6 @@ class SkinView(QObject):
         self.membrane.show_estimate(estimate, values, tint.limits, times)
         self.scale.bar.show_tint(tint, beside)
         self.scale.show_what("" if tint.unit == "shape" else shade.symbol, shade.tip)
-        self.scale.show_times(times)
 
     def _show_reason(self, name: str, values: NDArray[np.generic]) -> None:
         """Show in the view why there are no colours."""

@@ -25,7 +25,7 @@ class ViewPanel(Form):
 
     def __init__(self) -> None:
         names = (
-            *("colour_by", "colour_from", "maps", "one_range"),
+            *("colour_by", "colour_from", "colour_map", "maps", "one_range"),
             *("exaggeration", "show_elements", "show_truth", "show_directions", "show_band"),
             *("show_frame", "show_object", "show_pressed", "from_x", "to_x", "from_y", "to_y"),
             *("from_z", "to_z", "theme", "letters", "show_start"),

@@ -56,11 +56,11 @@ class DemoObject:
 
 
 DEMO_OBJECTS = (
-    DemoObject("Ball 40 mm", "A ball of 40 mm radius.", {"what": "sphere", "radius": 0.04}),
-    DemoObject("Ball 60 mm", "A ball of 60 mm radius.", {"what": "sphere", "radius": 0.06}),
-    DemoObject("Ball 80 mm", "A ball of 80 mm radius.", {"what": "sphere", "radius": 0.08}),
+    DemoObject("Ball, radius 40 mm", "A ball of 40 mm radius.", {"what": "sphere", "radius": 0.04}),
+    DemoObject("Ball, radius 60 mm", "A ball of 60 mm radius.", {"what": "sphere", "radius": 0.06}),
+    DemoObject("Ball, radius 80 mm", "A ball of 80 mm radius.", {"what": "sphere", "radius": 0.08}),
     DemoObject(
-        "Pipe 150 mm",
+        "Pipe, radius 150 mm",
         "A pipe of 150 mm radius and 50 mm length that lies along x.",
         {"what": "cylinder", "radius": 0.15, "length": 0.05},
     ),
@@ -315,7 +315,7 @@ _HINT = (
     "hand. Dot: estimated contact."
 )
 _UNDO_HINT = "Ctrl+Z undoes."
-_COLUMNS = 3
+_COLUMNS = 2
 _BUTTON = 15.0  # units, height of a capital on a button
 _TOP = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop
 
@@ -408,6 +408,6 @@ class OperatorControls(QWidget):
     def _apply_theme(self) -> None:
         theme = current()
         self._selection.setStyleSheet(
-            f"QPushButton:checked {{ background: {theme.accent}; color: {theme.base};"
+            f"QPushButton:checked {{ background: {theme.accent}; color: {theme.on_accent};"
             f" border: 1px solid {theme.accent}; border-radius: 3px; padding: 4px; }}"
         )

@@ -9,7 +9,7 @@ from kappaskin.frames import Array
 from kappaskin.sensing import SensorLayout
 from kappaskin_app.features.stability.observability import Spectrum
 from kappaskin_app.guard import guarded
-from kappaskin_app.theme import DIVERGING, current
+from kappaskin_app.theme import current
 from kappaskin_app.widgets.chart import Chart, ChartAxis, ChartLine, Series
 from kappaskin_app.widgets.tint import Tint
 
@@ -45,7 +45,7 @@ class ModeMap(QWidget):
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         area = self._area(self._layout)
         # y points up on the skin, down in an image.
-        rgb = Tint(DIVERGING, (-1.0, 1.0), "").rgb(self._surface[::-1], current().window)
+        rgb = Tint("diverging", (-1.0, 1.0), "").rgb(self._surface[::-1], current().window)
         ny, nx = self._surface.shape
         image = QImage(
             np.ascontiguousarray(rgb).tobytes(), nx, ny, 3 * nx, QImage.Format.Format_RGB888

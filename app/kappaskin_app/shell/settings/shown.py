@@ -138,6 +138,22 @@ class View(ColourRanges):
             (("smooth", "Smooth"), ("elements", "Per element")),
         ),
     )
+    colour_map: str = setting(
+        "standard",
+        Choice(
+            "Colour map",
+            "Colours of the skin and of all maps. Each has a sequential map for quantities of one "
+            "sign and a diverging one, with zero in its middle, for quantities of both signs. All "
+            "are perceptual: equal steps look equal, also with a colour vision deficiency.",
+            (
+                ("standard", "Blue to yellow"),
+                ("viridis", "Viridis"),
+                ("cividis", "Cividis"),
+                ("inferno", "Inferno, dark zero"),
+                ("grey", "Grey"),
+            ),
+        ),
+    )
     maps: tuple[str, ...] = setting(
         ("xx", "yy", "xy"),
         Several(
@@ -160,8 +176,8 @@ class View(ColourRanges):
         Range(
             "Vertical exaggeration",
             "Largest factor by which the displacement is drawn enlarged. The factor is reduced "
-            "where the surface would leave the view; the current factor is shown below the colour "
-            "scale.",
+            "where the surface would leave the view; the view shows the current factor, unless it "
+            "is 1.",
             1,
             50,
             1,

@@ -21,7 +21,7 @@ from kappaskin_app.shell.settings.form_fields import Range
 from kappaskin_app.shell.settings.scene import SHAPES
 from kappaskin_app.shell.simulation import with_consequences
 from kappaskin_app.shell.window import MainWindow
-from kappaskin_app.theme import DARK, SEQUENTIAL, apply_look
+from kappaskin_app.theme import DARK, apply_look
 from kappaskin_app.widgets.surface_map import SurfaceMap
 
 RANGES = [n for n in DesignSettings.__dataclass_fields__ if isinstance(form_field(n), Range)]
@@ -186,7 +186,7 @@ def test_what_lies_beside_a_round_skin_has_the_colour_of_the_window(qtbot) -> No
     view.resize(200, 200)
     values = np.ones((20, 20))
     values[-1, 0] = np.nan
-    view.show_surface(values, (0.0, 2.0), SEQUENTIAL, np.full(2, np.nan), (1.0, 1.0))
+    view.show_surface(values, (0.0, 2.0), "sequential", np.full(2, np.nan), (1.0, 1.0))
 
     apply_look(DARK)
     QApplication.processEvents()
