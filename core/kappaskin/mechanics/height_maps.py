@@ -182,8 +182,10 @@ _TRIED = 2**25  # pixels tried in all: many large triangles above each other tak
 _SIZES = (1e-4, 1.0)  # m
 _EDGE_ON = 1e-9  # pixels: a face seen with less area is seen from the side
 _ON_EDGE = 1e-9  # of a face: a pixel as far beside it is on it
-# What trimesh raises on files of other contents, a local variable that was never set among it.
+# What trimesh raises on files of other contents, a local variable that was never set among it, and
+# that it lacks the package which guesses an encoding.
 _UNREADABLE = (
+    ImportError,
     OSError,
     ValueError,
     LookupError,
