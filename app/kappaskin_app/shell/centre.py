@@ -130,6 +130,7 @@ class Centre(QWidget):
     def show_view(self, view: QWidget) -> None:
         """Set the main view."""
         self.view = view
+        self.setFocusProxy(view)
         self._row.insertWidget(0, view, 1)
 
     def add_beside(self, widget: QWidget) -> None:

@@ -8,6 +8,8 @@ from PySide6.QtCore import QObject
 
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
+from kappaskin.scenes import Indenter
+from kappaskin_app.features.membrane.legend import Legend
 from kappaskin_app.features.membrane.measuring import Measurement
 from kappaskin_app.features.membrane.membrane import MembraneView
 from kappaskin_app.features.membrane.overlays import Overlays
@@ -26,7 +28,7 @@ _MARKS = 0.06  # s between two updates of the marks
 
 
 class SkinView(QObject):
-    """Shows the data of the `display` on the `membrane` with its colour `scale`.
+    """Shows the data of the `display` on the `membrane`, with its colour `scale` and `legend`.
 
     With `alarm_enabled` the view shows the reason why no data arrives.
     """
@@ -34,7 +36,7 @@ class SkinView(QObject):
     def __init__(self, display: Display, session: Session, selection: Selection) -> None:
         super().__init__(display)
         self._display, self._session, self._selection = display, session, selection
-        self.membrane, self.scale = MembraneView(), SkinScale()
+        self.membrane, self.scale, self.legend = MembraneView(), SkinScale(), Legend()
         self.measurement = Measurement(self.membrane)
         self.overlays = Overlays(self.membrane, display.colouring, session)
         self.alarm_enabled = True
@@ -55,11 +57,18 @@ class SkinView(QObject):
 
     def show_settings(self, settings: Settings) -> None:
         self._settings = settings
+        self.legend.show_settings(settings)
         self.scale.lock.show_locked(locked_at(settings.colour_by, settings) > 0)
         self._allow_lock()
         s = settings
         self.membrane.show_box((s.from_x, s.to_x, s.from_y, s.to_y, s.from_z, s.to_z))
-        self.membrane.show_options(settings.show_elements, settings.show_truth)
+        self.membrane.show_options(
+            fit=s.show_fit,
+            elements=s.show_elements,
+            truth=s.show_truth,
+            contact=s.show_contact,
+            load=s.show_load,
+        )
         self.membrane.camera_control.show(settings.look, settings.camera)
 
     @property
@@ -97,6 +106,19 @@ class SkinView(QObject):
         self.membrane.show_lost(self._display.old)
         if self._display.old:
             self.overlays.hide()
+        self._show_available()
+
+    def _show_available(self) -> None:
+        """Show in the legend what can be drawn of the present source."""
+        session, estimate = self._session, self._session.estimate
+        stimuli = session.scene.stimuli if session.inside else ()
+        known = estimate is not None and bool(np.isfinite(estimate.true_surface).any())
+        self.legend.show_available(
+            show_object=not self.membrane.skin.patch.strip,
+            show_truth=known,
+            show_pressed=any(isinstance(stimulus.what, Indenter) for stimulus in stimuli),
+            show_load=bool(stimuli),
+        )
 
     def _ages(self) -> list[float]:
         """Ages in s of the frames drawn within the last second."""
@@ -140,6 +162,7 @@ class SkinView(QObject):
         if tint.colours is not self._colours:
             self._colours = tint.colours
             self.membrane.show_colours(tint.colours, tint.ink)
+            self.legend.show_colours(tint.colours)
         self._show_reason(name, values)
         self.membrane.show_estimate(estimate, values, tint.limits, times)
         self.scale.bar.show_tint(tint, beside)
