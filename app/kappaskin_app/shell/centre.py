@@ -137,4 +137,5 @@ class Centre(QWidget):
         self._row.addWidget(widget)
 
     def add_below(self, widget: QWidget) -> None:
-        self._column.addWidget(widget)
+        """Put a widget between the main view and those put there before."""
+        self._column.insertWidget(2, widget)

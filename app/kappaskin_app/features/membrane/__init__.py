@@ -68,6 +68,7 @@ class MembraneFeature:
         """Connect the mouse and keys that move and press the drawn load."""
         drag, load = self.membrane.drag, shell.selection.load
         drag.grabbed.connect(load.grabbed)
+        drag.grabbed.connect(guarded(lambda *_: self._selection.over.emit(None)))
         drag.dragged.connect(load.dragged)
         drag.pressed.connect(load.pressed)
         drag.released.connect(load.released)

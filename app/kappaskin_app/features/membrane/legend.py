@@ -50,11 +50,9 @@ class Legend(QWidget):
         flow.setContentsMargins(6, 2, 6, 2)
         self.setLayout(flow)
         for name, entry in _ENTRIES.items():
-            button = self.buttons[name] = QToolButton()
+            button = self.buttons[name] = QToolButton(checkable=True, autoRaise=True)  # pyright: ignore[reportCallIssue]
             button.setText(entry.words)
             button.setToolTip(f"{form_field(name).label}: click to show or hide it.")
-            button.setCheckable(True)
-            button.setAutoRaise(True)
             button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
             button.clicked.connect(guarded(lambda *_, name=name: self.toggled.emit(name)))
             flow.addWidget(button)

@@ -1,7 +1,7 @@
 """Mouse and keys on the skin: pointing, clicks, and loads that are moved and pressed."""
 
 import numpy as np
-from PySide6.QtCore import QEvent, QObject, QPointF, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QObject, QPointF, Qt, QTimer, Signal, SignalInstance
 from PySide6.QtGui import QKeyEvent, QMouseEvent, QWheelEvent
 from pyvistaqt import QtInteractor
 
@@ -58,7 +58,7 @@ class LoadDrag(QObject):
         self._factor, self._height = 1.0, 0.0
         self._at, self._offset, self._held = QPointF(), np.zeros(2), np.zeros(2)
         self._timer = QTimer(self, interval=_RELEASE_DELAY, singleShot=True)  # pyright: ignore[reportCallIssue]
-        self._timer.timeout.connect(guarded(self._release))
+        self._timer.timeout.connect(guarded(lambda: self._end(self.released)))
         plotter.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
@@ -80,7 +80,8 @@ class LoadDrag(QObject):
             if kind == QEvent.Type.MouseButtonRelease and self._swallowing:
                 if event.button() == _LEFT:
                     self._swallowing = False
-                    self._release()
+                    self._end(self.released)
+                    self.show_cursor(self._held)
                 return True
         return False
 
@@ -103,18 +104,15 @@ class LoadDrag(QObject):
             self._factor *= times
             self.pressed.emit(self._factor)
 
-    def _release(self) -> None:
+    def _end(self, how: SignalInstance) -> None:
         self._timer.stop()
         if self.holding:
             self.holding = False
-            self.released.emit()
+            how.emit()
 
     def give_up(self) -> None:
         """Cancel the drag, if there is one."""
-        self._timer.stop()
-        if self.holding:
-            self.holding = False
-            self.cancelled.emit()
+        self._end(self.cancelled)
 
     # The mouse.
 
@@ -150,7 +148,7 @@ class LoadDrag(QObject):
         if handle is None:
             handle = self._nearest(place)
         self._swallowing = True
-        self._plotter.setFocus(Qt.FocusReason.MouseFocusReason)  # for the keys
+        self._plotter.setFocus(Qt.FocusReason.MouseFocusReason)  # for the keys and Escape
         self._plotter.setCursor(Qt.CursorShape.ClosedHandCursor)
         self._grab(handle)
         if place is not handle and not shift:
@@ -187,8 +185,8 @@ class LoadDrag(QObject):
             return
         presses = over is not None and self.enabled and len(self.handles)
         shape = Qt.CursorShape.CrossCursor if presses else Qt.CursorShape.ArrowCursor
-        near = self._handle_near(self._at) is not None
-        self._plotter.setCursor(Qt.CursorShape.OpenHandCursor if near else shape)
+        on_arrow = self._handle_near(self._at) is not None
+        self._plotter.setCursor(Qt.CursorShape.OpenHandCursor if on_arrow else shape)
 
     # Keys.
 

@@ -45,12 +45,14 @@ class SkinView(QObject):
         self._excluded = np.empty(0, np.intp)  # elements
         self._shown: Shown | None = None
         self._next_marks = 0.0
-        follow_look(self.membrane, lambda: self._shown and self._colour(self._shown))
+        follow_look(self.membrane, self._redraw)
         display.ages, display.limits = self._ages, [*display.limits, self._limits]
         display.restarted.connect(guarded(self._restart))
         display.status_shown.connect(guarded(self._show_status))
         display.shown.connect(guarded(self._show))
-        display.object_found.connect(guarded(lambda what, _: self.overlays.set_object(what)))
+        display.object_found.connect(
+            guarded(lambda what, _: (self.overlays.set_object(what), self._redraw()))
+        )
         selection.pointed.connect(guarded(self.membrane.point))
         selection.target_changed.connect(guarded(lambda *_: self._show_marked()))
         selection.mode_changed.connect(guarded(self._show_mode))
@@ -70,6 +72,7 @@ class SkinView(QObject):
             load=s.show_load,
         )
         self.membrane.camera_control.show(settings.look, settings.camera)
+        self._redraw()
 
     @property
     def _shade(self) -> Shade:
@@ -97,7 +100,7 @@ class SkinView(QObject):
     def _restart(self, status: Status) -> None:
         if status.sensor is not None:
             self._selection.point(-1)
-            self._excluded = np.empty(0, np.intp)
+            self._excluded, self._shown = np.empty(0, np.intp), None
             self.membrane.show_skin(status.sensor, status.setup.nx, status.setup.ny)
 
     def _show_status(self, _: Status) -> None:
@@ -112,10 +115,9 @@ class SkinView(QObject):
         """Show in the legend what can be drawn of the present source."""
         session, estimate = self._session, self._session.estimate
         stimuli = session.scene.stimuli if session.inside else ()
-        known = estimate is not None and bool(np.isfinite(estimate.true_surface).any())
         self.legend.show_available(
             show_object=not self.membrane.skin.patch.strip,
-            show_truth=known,
+            show_truth=estimate is not None and bool(np.isfinite(estimate.true_surface).any()),
             show_pressed=any(isinstance(stimulus.what, Indenter) for stimulus in stimuli),
             show_load=bool(stimuli),
         )
@@ -132,14 +134,20 @@ class SkinView(QObject):
         noise = self._display.colouring.noise("displacement", estimate)
         self._display.ranges.limit("displacement", 1e3 * estimate.surface, settings, now, noise)
         self._shown = shown
-        self._colour(shown)
-        self._show_loads(estimate)
-        self.overlays.show(estimate, settings, self._times())
-        self.measurement.show(estimate)
+        self._redraw()
         if now >= self._next_marks:
             self._next_marks = now + _MARKS
             self._excluded = np.flatnonzero(shown.kinds.any(axis=0))
             self._show_marked()
+
+    def _redraw(self) -> None:
+        """Draw the present estimate, also while a recording is paused."""
+        if self._shown is not None and not self._display.old:
+            estimate = self._shown.estimate
+            self._colour(self._shown)
+            self._show_loads(estimate)
+            self.overlays.show(estimate, self._settings, self._times())
+            self.measurement.show(estimate)
 
     def _show_marked(self) -> None:
         self.membrane.show_marked(self._excluded, self._selection.target)

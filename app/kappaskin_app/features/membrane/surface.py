@@ -108,9 +108,8 @@ class GridLines:
     def show(self, skin: DrawnSkin, height: Array) -> None:
         """Draw them `height` (ny, nx) mm above the skin at rest; hide them where it is unknown."""
         there = height.ravel()[self._which]
-        self.actor.visibility = known = bool(np.isfinite(there).any())
-        if known:
-            self._points[:] = skin.points(self._which, np.nan_to_num(there))
+        self.actor.visibility = bool(np.isfinite(there).any())
+        self._points[:] = skin.points(self._which, np.nan_to_num(there))
 
 
 class Surface:

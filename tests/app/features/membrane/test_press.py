@@ -46,10 +46,13 @@ def test_the_left_button_on_the_skin_presses_there_and_drags(
 ) -> None:
     plotter, settings = pressed.membrane.plotter, pressed.history.settings
     count, start = pressed.history.stack.count(), pixel_of(pressed, (0.03, 0.065))
+    move(pressed, start, held=Qt.MouseButton.NoButton)
+    until(lambda: pressed.selection.element >= 0)
     qtbot.mousePress(plotter, LEFT, pos=start)
     now = pressed.history.settings
     assert (now.x, now.y) == pytest.approx((0.03, 0.065), abs=1e-3)
     until(lambda: abs(pressed.session.estimate.true_contact[0] - now.x) < 1e-3)
+    assert pressed.selection.element == -1  # no element is marked under the held load
     for step in range(1, 7):
         move(pressed, start + QPoint(5 * step, 0))
     dragged = pressed.history.settings
@@ -206,3 +209,19 @@ def test_the_legend_names_what_the_source_has(opened, recording, until) -> None:
     until(lambda: shown(window) == always | {"show_truth", "show_pressed", "show_load"})
     window.session.connect_to(f"replay:{recording}")
     until(lambda: shown(window) == always | {"show_truth"})
+
+
+def test_what_is_hidden_while_a_recording_is_paused_is_hidden_at_once(
+    opened, recording, until, qtbot
+) -> None:
+    window = opened(f"replay:{recording}")
+    until(lambda: window.display.badge.state.startswith("REPLAY") and window.session.estimate)
+    window.playback.go(False)
+    window.playback.seek(0.3)
+    until(lambda: window.session.status.replay.at == 0.3)
+    truth = window.membrane._truth.actor  # noqa: SLF001
+    until(lambda: truth.visibility)
+    qtbot.wait(300)
+    for shown in (False, True):
+        qtbot.mouseClick(window.legend.buttons["show_truth"], LEFT)
+        until(lambda shown=shown: bool(truth.visibility) == shown, 5.0)
