@@ -75,10 +75,10 @@ class MembraneView(QWidget):
         self._box = Box()
         self.setMinimumSize(300, 160)
         self.ages: deque[tuple[float, float]] = deque(maxlen=8192)
-        """(when, age of its frame in s) of each drawing completed."""
+        """(when, age in s) of each frame drawn, once its first drawing is completed."""
         self.age_sd = float("inf")
         """Standard deviation in s of the last age; infinite where it is a lower bound."""
-        self._frame_time = float("nan")
+        self._frame_time = self._noted = float("nan")
         self._drawn = True
         self.plotter.renderer.AddObserver("EndEvent", self._note_drawing)
         self.skin = self.drag.skin
@@ -130,7 +130,9 @@ class MembraneView(QWidget):
     def _note_drawing(self, *_: object) -> None:
         now = time.monotonic()
         self._drawn = True
-        self.ages.append((now, now - self._frame_time))
+        if self._frame_time != self._noted:  # else drawn again, by the camera or while paused
+            self._noted = self._frame_time
+            self.ages.append((now, now - self._noted))
         self.drawn.emit()
 
     # Skin: rebuilt only for another one.

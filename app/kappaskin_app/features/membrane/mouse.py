@@ -139,19 +139,18 @@ class LoadDrag(QObject):
 
     def _take(self, event: QMouseEvent) -> bool:
         """Hold the load under the mouse, or move the nearest one there; whether there is one."""
-        at, shift = event.position(), event.modifiers() & _SHIFT
+        at = event.position()
         place = handle = self._handle_near(at)
         if place is None and self.enabled and len(self.handles):
             place = self.skin.hit(*self._projection.line(at))
         if place is None:
             return False
-        if handle is None:
-            handle = self._nearest(place)
+        handle = self._nearest(place) if handle is None else handle
         self._swallowing = True
         self._plotter.setFocus(Qt.FocusReason.MouseFocusReason)  # for the keys and Escape
         self._plotter.setCursor(Qt.CursorShape.ClosedHandCursor)
         self._grab(handle)
-        if place is not handle and not shift:
+        if place is not handle and not event.modifiers() & _SHIFT:
             self._move_to(place)
         self._taken = place is not handle
         self._height = float(self.skin.height_at(place[None])[0])

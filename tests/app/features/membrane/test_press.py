@@ -222,6 +222,9 @@ def test_what_is_hidden_while_a_recording_is_paused_is_hidden_at_once(
     truth = window.membrane._truth.actor  # noqa: SLF001
     until(lambda: truth.visibility)
     qtbot.wait(300)
+    drawn = len(window.membrane.ages)
     for shown in (False, True):
         qtbot.mouseClick(window.legend.buttons["show_truth"], LEFT)
         until(lambda shown=shown: bool(truth.visibility) == shown, 5.0)
+    qtbot.wait(300)
+    assert len(window.membrane.ages) == drawn  # the frame counts once, and its age stays unknown
