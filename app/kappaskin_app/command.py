@@ -95,7 +95,7 @@ def present(*, seconds: float | None = None, screenshot: Path | None = None) -> 
     """Demonstrate telemanipulation with no hardware: a hand presses and rolls an object.
 
     The mouse moves and presses the object. The app shows the estimated force, radius and
-    position, each with its error bar, readable from three metres. Drag on the pad moves the
+    position, each with its error bar, readable from three metres. Drag on the skin moves the
     object, the wheel changes the force, the buttons select another object; Esc shows the whole
     window, F11 the full screen.
 

@@ -18,6 +18,7 @@ from shiboken6 import getAllValidWrappers
 
 from kappaskin import Engine
 from kappaskin_app import features, guard
+from kappaskin_app.features.membrane.camera import Projection
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.window import Feature, MainWindow
 from kappaskin_app.theme import LIGHT, apply_look, current
@@ -201,6 +202,17 @@ def points_at() -> Callable[[QWidget, QPoint], None]:
         QApplication.sendEvent(widget, QMouseEvent(QEvent.Type.MouseMove, *there, *none))
 
     return move
+
+
+@pytest.fixture(scope="session")
+def pixel_of() -> Callable[[MainWindow, Sequence[float]], QPoint]:
+    """Where a window shows the place (x, y) in m of the drawn skin, in its 3-D view."""
+
+    def find(window: MainWindow, place: Sequence[float]) -> QPoint:
+        (point,), _ = window.membrane.skin.place(np.array([place]))
+        return QPointF(*Projection(window.membrane.plotter).to_screen(point)).toPoint()
+
+    return find
 
 
 @pytest.fixture(scope="session")

@@ -130,10 +130,12 @@ class Centre(QWidget):
     def show_view(self, view: QWidget) -> None:
         """Set the main view."""
         self.view = view
+        self.setFocusProxy(view)
         self._row.insertWidget(0, view, 1)
 
     def add_beside(self, widget: QWidget) -> None:
         self._row.addWidget(widget)
 
     def add_below(self, widget: QWidget) -> None:
-        self._column.addWidget(widget)
+        """Put a widget between the main view and those put there before."""
+        self._column.insertWidget(2, widget)

@@ -27,7 +27,8 @@ from kappaskin_app.shell.status_bar import Notice, StatusBar, SteadySlope, warni
 from kappaskin_app.widgets.tint import Tint
 
 _OLD = (LOST, OFF, STALE, WAITING, GAP)  # the values shown are not the present ones
-_HINT, _NO_LOAD_HINT = "Drag the red arrow to move the load; F1: shortcuts", "F1: shortcuts"
+_HINT = "Left button on the skin: press, wheel: force; right button: turn; F1: shortcuts"
+_NO_LOAD_HINT = "F1: shortcuts"
 _NUMBERS = 0.2  # s between two updates of numbers
 _SLOW = 0.95  # times real time: a slower simulation is marked
 

@@ -94,11 +94,11 @@ class DrawnSkin:
         corners = corners[self.on.ravel()[corners].any(axis=1)]
         return np.insert(corners, 0, 4, axis=1)
 
-    def lines(self, stride: int) -> list[Indices]:
-        """Every so many lines of the grid along x and y, as the points that they run through."""
+    def lines(self, stride: int, first: int = 0) -> list[Indices]:
+        """Every so many lines of the grid along x and y from the `first` on, as their points."""
         index = np.arange(self.on.size).reshape(self.on.shape)
         found: list[Indices] = []
-        for line in (*index[::stride], *index[:, ::stride].T):
+        for line in (*index[first::stride], *index[:, first::stride].T):
             on = self.on.ravel()[line]
             drawn = on.copy()  # and as far as the rim
             drawn[1:] |= on[:-1]

@@ -19,7 +19,10 @@ from kappaskin_app.shell.finder import Listing, best, clearable, row, score
 from kappaskin_app.shell.history import History
 from kappaskin_app.widgets.parts import Label, button, in_a_row
 
-_MOUSE = "Drag the red arrow to move the load, drag elsewhere to turn, wheel to zoom."
+_MOUSE = (
+    "Left button on a simulated skin: press and drag, with the wheel or Shift for the force; "
+    "elsewhere, or right button: turn. Wheel: zoom. Right click on the skin: its element."
+)
 _SIZE = 620, 640  # px
 _MENU = 150  # px
 

@@ -13,7 +13,7 @@ from kappaskin_app.shell.session import Session
 
 _LASTS = 60.0  # s, unless it is in use
 _TIP = (
-    "The skin below is simulated: drag the red arrow. These actions are in the menus too; "
+    "The skin below is simulated: press on it with the mouse. These actions are in the menus too; "
     "Help > Welcome shows this again."
 )
 

@@ -24,12 +24,12 @@ def _shown(window: MainWindow) -> bool:
 
 @pytest.mark.full
 def test_a_load_dragged_on_the_skin_is_where_the_mouse_let_go(
-    window: MainWindow, until, qtbot
+    window: MainWindow, until, qtbot, pixel_of
 ) -> None:
     window.history.change("Point", -1, load_case="point", x=0.05, y=0.05)
     until(lambda: _shown(window))
     view, count = window.membrane, window.history.stack.count()
-    start = view.drag.on_screen().toPoint() - QPoint(0, 8)
+    start = pixel_of(window, view.drag.handles[0]) - QPoint(0, 8)
     qtbot.mousePress(view.plotter, Qt.MouseButton.LeftButton, pos=start)
     for step in range(1, 9):
         qtbot.mouseMove(view.plotter, start + QPoint(9 * step, 2 * step))
@@ -39,7 +39,7 @@ def test_a_load_dragged_on_the_skin_is_where_the_mouse_let_go(
     assert moved.x > 0.06
     assert window.history.stack.count() == count + 1
     until(lambda: _shown(window))
-    end = view.drag.on_screen().toPoint()
+    end = pixel_of(window, view.drag.handles[0])
     assert (end - start - QPoint(72, 24)).manhattanLength() <= 12
     window.history.stack.undo()
     assert window.history.settings.x == 0.05
@@ -221,14 +221,14 @@ def test_a_round_skin_is_made_beside_the_window_and_drawn_round(
 
 @pytest.mark.full
 def test_a_load_dragged_on_a_bent_skin_is_where_the_mouse_let_go(
-    window: MainWindow, until, qtbot
+    window: MainWindow, until, qtbot, pixel_of
 ) -> None:
     window.requests.set("shape", "cylinder")
     window.history.change("Point", -1, load_case="point", force=0.3)
     _met(window, until)
     until(lambda: _shown(window))
     view = window.membrane
-    start = view.drag.on_screen().toPoint()
+    start = pixel_of(window, view.drag.handles[0])
     qtbot.mousePress(view.plotter, Qt.MouseButton.LeftButton, pos=start)
     for step in range(1, 9):
         qtbot.mouseMove(view.plotter, start + QPoint(-9 * step, 4 * step))
@@ -236,18 +236,18 @@ def test_a_load_dragged_on_a_bent_skin_is_where_the_mouse_let_go(
     qtbot.mouseRelease(view.plotter, Qt.MouseButton.LeftButton, pos=start + QPoint(-72, 32))
     assert window.history.settings.x < 0.017
     until(lambda: _shown(window))
-    end = view.drag.on_screen().toPoint()
+    end = pixel_of(window, view.drag.handles[0])
     assert (end - start - QPoint(-72, 32)).manhattanLength() <= 12
 
 
 @pytest.mark.full
 def test_escape_puts_a_dragged_load_back_and_leaves_nothing_to_redo(
-    window: MainWindow, until, qtbot
+    window: MainWindow, until, qtbot, pixel_of
 ) -> None:
     window.history.change("Point", -1, load_case="point", x=0.05, y=0.05)
     until(lambda: _shown(window))
     view, was, count = window.membrane, window.history.settings, window.history.stack.count()
-    start = view.drag.on_screen().toPoint()
+    start = pixel_of(window, view.drag.handles[0])
     qtbot.mousePress(view.plotter, Qt.MouseButton.LeftButton, pos=start)
     qtbot.mouseMove(view.plotter, start + QPoint(40, 0))
     assert window.history.settings != was

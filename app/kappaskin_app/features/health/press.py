@@ -127,7 +127,7 @@ _WHAT = (
     "<b>Press here</b> tests the channel map: press the elements one by one as they are framed in "
     "yellow in the heatmaps and on the skin; the element that responds is detected."
 )
-_DRAG = " To press the simulated skin, drag the red arrow there."
+_DRAG = " To press the simulated skin, click there in the 3-D view."
 _WAIT = {
     PressPhase.REST: "Wait until the readings settle: take your hand off, or hold still.",
     PressPhase.PRESS: "Press it now.",

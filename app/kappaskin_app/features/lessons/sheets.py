@@ -47,7 +47,7 @@ from kappaskin_app.shell.settings import Settings, form_field
 from kappaskin_app.shell.settings.form_fields import Choice, Range, Several, Switch, setup_values
 from kappaskin_app.shell.settings.shown import EstimatorSettings
 from kappaskin_app.shell.simulation import scene_of
-from kappaskin_app.theme import DIVERGING, LIGHT, SEQUENTIAL, Colours, palette
+from kappaskin_app.theme import LIGHT, Colours, colours_in_use, palette
 from kappaskin_app.widgets.parts import Label
 from kappaskin_app.widgets.text import round_up
 from kappaskin_app.widgets.tint import Tint
@@ -280,7 +280,7 @@ def skin_picture(settings: Settings) -> QImage:
         _paint_skin(painter, skin, scene, estimate.surface, settings.exaggeration)
         readings = np.atleast_2d(estimate.curvature)[: 1 if scene.plate.patch.strip else 2]
         limit = round_up(float(np.nanmax(np.abs(readings))))
-        tint = Tint(DIVERGING, (-limit, limit), "1/m")
+        tint = Tint("diverging", (-limit, limit), "1/m")
         for title, values, place in zip(_TITLES, readings, _MAPS, strict=False):
             _paint_map(painter, scene.layout, tint.rgb(values, _GREY), title, limit, place)
     return image
@@ -312,7 +312,9 @@ def _paint_skin(
     faces, normals = skin.faces()[:, 1:], skin.shading()
     share = skin.values(np.abs(skin.height)) / max(float(np.abs(skin.height).max()), 1e-12)
     lit = _BACK + np.maximum(normals @ _LAMP, 0)
-    rgb = np.minimum(SEQUENTIAL[np.rint(255 * share).astype(int)] * lit[:, None], 255)
+    rgb = np.minimum(
+        colours_in_use().sequential[np.rint(255 * share).astype(int)] * lit[:, None], 255
+    )
     colours, corners = rgb[faces].mean(axis=1).astype(int).tolist(), at(points)
     for k in np.argsort(points[faces].mean(axis=1) @ towards):
         colour = QColor(*colours[k])
@@ -350,7 +352,7 @@ def _paint_map(
     painter.setBrush(Qt.BrushStyle.NoBrush)
     painter.drawRect(area)
     scale = QRectF(room.left(), area.bottom() + 8, room.width(), 7)
-    ramp = np.ascontiguousarray(DIVERGING[None]).tobytes()
+    ramp = np.ascontiguousarray(colours_in_use().diverging[None]).tobytes()
     painter.drawImage(scale, QImage(ramp, 256, 1, QImage.Format.Format_RGB888))
     painter.setPen(QColor(_INK))
     painter.drawText(QPointF(room.left(), 11), title)

@@ -1,4 +1,4 @@
-"""Membrane: 3-D view of the skin with colours, loads, contact and overlays."""
+"""Membrane: 3-D view of the skin with colours, loads, contact, overlays and legend."""
 
 from PySide6.QtCore import Qt
 
@@ -19,6 +19,8 @@ class MembraneFeature:
         self.panel = shell.panels.add(LIVE, ViewPanel())
         shell.display.centre.show_view(self.membrane)
         shell.display.centre.add_beside(self.scale)
+        self.legend = view.legend
+        shell.display.centre.add_below(self.legend)
         self.view_actions = ViewActions(shell.history, shell.requests, shell.display, view)
         self.view_actions.add_actions(shell.actions_by_name)
         self._connect(shell)
@@ -28,8 +30,9 @@ class MembraneFeature:
         view, selection = self.view, shell.selection
         shell.settings_shown.connect(guarded(view.show_settings))
         shell.settings_shown.connect(guarded(self._show_colours))
-        shell.display.unit_changed.connect(guarded(self.scale.show_unit))
-        shell.display.unit_changed.connect(guarded(self.membrane.show_unit))
+        self.legend.toggled.connect(guarded(shell.requests.toggle))
+        for part in (self.scale, self.legend, self.membrane):
+            shell.display.unit_changed.connect(guarded(part.show_unit))
         shell.display.unit_changed.connect(guarded(self._enable_alarm))
         # Queued: the next update follows the drawing, without waiting for the timer.
         self.membrane.drawn.connect(shell.session.tick, Qt.ConnectionType.QueuedConnection)
@@ -62,9 +65,14 @@ class MembraneFeature:
             self._selection.clicked.emit(x, y)
 
     def _connect_drag(self, shell: MainWindow) -> None:
-        """Connect the drag of the drawn load."""
+        """Connect the mouse and keys that move and press the drawn load."""
         drag, load = self.membrane.drag, shell.selection.load
         drag.grabbed.connect(load.grabbed)
+        drag.grabbed.connect(guarded(lambda *_: self._selection.over.emit(None)))
         drag.dragged.connect(load.dragged)
+        drag.pressed.connect(load.pressed)
         drag.released.connect(load.released)
         drag.cancelled.connect(load.cancelled)
+        shell.closing.connect(guarded(drag.give_up))
+        # A click measures then.
+        self.view.measurement.changed.connect(lambda on: setattr(drag, "enabled", not on))

@@ -13,7 +13,8 @@ from kappaskin_app.features.membrane.mouse import ARROW
 from kappaskin_app.shell.drawn_skin import DrawnSkin
 from kappaskin_app.shell.loads import footprint
 
-_RED = "#e8543f"
+LOAD = "#e8543f"
+"""The colour of what is simulated: loads and the true shape."""
 
 
 class DrawnLoads:
@@ -30,25 +31,27 @@ class DrawnLoads:
         self._line_actor = plotter.add_mesh(
             self._line,
             line_width=pixels(plotter, 5),
-            color=_RED,
+            color=LOAD,
             **UNLIT,
         )
 
-    def show(self, loads: Sequence[Load], skin: DrawnSkin, lift: float) -> Array:
-        """Draw `loads` on `skin`; their positions (k, 2) in m."""
+    def show(
+        self, loads: Sequence[Load], skin: DrawnSkin, lift: float, visible: bool = True
+    ) -> Array:
+        """Draw `loads` on `skin` if `visible`; their positions (k, 2) in m."""
         centres = np.array([load.centre() for load in loads]).reshape(-1, 2)
         while len(self._arrows) < len(centres):
             self._arrows.append(
-                self._plotter.add_mesh(self._arrow, color=_RED, reset_camera=False, render=False)
+                self._plotter.add_mesh(self._arrow, color=LOAD, reset_camera=False, render=False)
             )
         for number, arrow in enumerate(self._arrows):
-            there = number < len(centres)
+            there = visible and number < len(centres)
             # Inwards for a push; for a pull outwards, from the surface.
             pulls = there and loads[number].force < 0
             arrow.scale = (skin.size, skin.size, -skin.size if pulls else skin.size)
             place = centres[number] if there else np.full(2, np.nan)
             put_upright(arrow, skin, place, ARROW * skin.size if pulls else 0.0)
-        self._show_footprints(loads, skin, lift)
+        self._show_footprints(loads if visible else (), skin, lift)
         return centres
 
     def _show_footprints(self, loads: Sequence[Load], skin: DrawnSkin, lift: float) -> None:

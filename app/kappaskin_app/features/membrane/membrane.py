@@ -19,9 +19,9 @@ from kappaskin.mechanics import Load
 from kappaskin.sensing import Sensor
 from kappaskin_app.features.membrane.annotations import UNLIT, Alarm, Caption, Marks, Sides, pixels
 from kappaskin_app.features.membrane.camera import CameraControl
-from kappaskin_app.features.membrane.loads import DrawnLoads, put_upright
+from kappaskin_app.features.membrane.loads import LOAD, DrawnLoads, put_upright
 from kappaskin_app.features.membrane.mouse import LoadDrag, SurfacePointer
-from kappaskin_app.features.membrane.surface import WHOLE, Box, Shares, Surface
+from kappaskin_app.features.membrane.surface import WHOLE, Box, GridLines, Shares, Surface
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.drawn_skin import MM, DrawnSkin
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, current, follow_look
@@ -30,9 +30,10 @@ _LETTERS = 14  # px, of the caption
 _CORNER = 14  # letters at its right: the vertical exaggeration
 _LIFT = 0.006  # of the skin's size above the surface, which would hide half of a line
 _POINT, _POINTS = 5, 80  # px of an element, and of many in a row: or they would hide the skin
-_CONTACT = "#1fd17a"  # the mark of a contact
+CONTACT = "#1fd17a"
+"""The colour of what is estimated of the contact."""
 _PIN = 0.3  # of the skin's size, length of the mark of a contact
-_STRIDE = 8  # surface lines between two lines of the true surface's wireframe
+_FITTED, _TRUE = (8, 0), (16, 8)  # lines drawn: every so many, from which one on
 
 
 def _spare(length: int, ratio: float) -> int:
@@ -65,22 +66,26 @@ class MembraneView(QWidget):
         )  # after the drag: of filters the last goes first
         self.drag = LoadDrag(self.plotter)
         self.camera_control = CameraControl(self.plotter, self.sides)
+        self.pointer.moved.connect(guarded(self.drag.show_cursor))
+        self.setFocusProxy(self.plotter)
+        # Left of the skin turns the camera; the right button also where the left one presses.
+        self.plotter.enable_custom_trackball_style(right="rotate")
         # After VTK has the new size.
         self._fit_timer = QTimer(self, singleShot=True, interval=0)  # pyright: ignore[reportCallIssue]
         self._fit_timer.timeout.connect(guarded(self._fit))
         self._box = Box()
         self.setMinimumSize(300, 160)
         self.ages: deque[tuple[float, float]] = deque(maxlen=8192)
-        """(when, age of its frame in s) of each drawing completed."""
+        """(when, age in s) of each frame drawn, once its first drawing is completed."""
         self.age_sd = float("inf")
         """Standard deviation in s of the last age; infinite where it is a lower bound."""
-        self._frame_time = float("nan")
+        self._frame_time = self._noted = float("nan")
         self._drawn = True
         self.plotter.renderer.AddObserver("EndEvent", self._note_drawing)
         self.skin = self.drag.skin
         self.lift = 0.0
         """Height in mm of lines and points above the skin."""
-        self._elements_shown = self._truth_shown = True
+        self._shown = dict.fromkeys(("fit", "elements", "truth", "contact", "load"), True)
         self._of_elements: Indices = np.empty(0, np.intp)
         self._elements_at_rest = (np.empty((0, 3)), np.empty((0, 3)))
         self._positions, self._marked = np.empty((0, 2)), (b"", -1)
@@ -91,10 +96,9 @@ class MembraneView(QWidget):
     def _make_actors(self) -> None:
         plotter = self.plotter
         self.surface = Surface(plotter)
-        self._wire: Any = pv.PolyData(np.zeros((2, 3)), lines=[2, 0, 1])
         self._elements: Any = pv.PolyData(np.zeros((1, 3)))
-        self._wire_actor = plotter.add_mesh(self._wire, line_width=pixels(plotter, 1), **UNLIT)
-        self._wire_actor.visibility = False
+        self._grid = GridLines(plotter, *_FITTED, opacity=0.45)
+        self._truth = GridLines(plotter, *_TRUE, color=LOAD)
         self._elements_actor = plotter.add_mesh(
             self._elements, style="points", point_size=pixels(plotter, _POINT), **UNLIT
         )
@@ -108,7 +112,7 @@ class MembraneView(QWidget):
         )
         pin = needle.append_polydata(pv.Sphere(radius=0.018))
         self._contacts = [
-            plotter.add_mesh(pin, color=_CONTACT, ambient=0.6, reset_camera=False, render=False)
+            plotter.add_mesh(pin, color=CONTACT, ambient=0.6, reset_camera=False, render=False)
             for _ in range(2)
         ]
         self.sides = Sides(plotter)
@@ -128,7 +132,9 @@ class MembraneView(QWidget):
     def _note_drawing(self, *_: object) -> None:
         now = time.monotonic()
         self._drawn = True
-        self.ages.append((now, now - self._frame_time))
+        if self._frame_time != self._noted:  # else drawn again, by the camera or while paused
+            self._noted = self._frame_time
+            self.ages.append((now, now - self._noted))
         self.drawn.emit()
 
     # Skin: rebuilt only for another one.
@@ -140,8 +146,10 @@ class MembraneView(QWidget):
         skin = DrawnSkin(patch, nx, ny)
         self.skin = self.drag.skin = self.pointer.skin = self.camera_control.skin = skin
         self.surface.show_skin(skin, sensor.layout)
+        self.show_options(**self._shown)
         self.lift = _LIFT * skin.size
-        self._place_wire(skin)
+        for grid in (self._grid, self._truth):
+            grid.show_skin(skin)
         self._positions = sensor.layout.positions
         self.show_marked(np.empty(0, np.intp), -1)
         self.point(-1)
@@ -149,27 +157,17 @@ class MembraneView(QWidget):
         for ball in self._contacts:
             ball.scale = skin.size
         # VTK arrays that change; looking them up takes longer than filling them.
-        self._arrays = {"wire": self._wire.points, "elements": self._elements.points}
+        self._arrays = {"elements": self._elements.points}
         self.sides.show_skin(skin)
         self.show_box(self._box.shares)
         if another:
             self.camera_control.place()
 
-    def _place_wire(self, skin: DrawnSkin) -> None:
-        """Draw every few lines of the grid, with their own points."""
-        lines = skin.lines(_STRIDE)
-        self._wire_points = np.concatenate(lines)
-        ends = np.cumsum([len(line) for line in lines])
-        cells = [np.r_[len(x), np.arange(e - len(x), e)] for x, e in zip(lines, ends, strict=True)]
-        lift = np.full(len(self._wire_points), self.lift)
-        self._wire.points = skin.points(self._wire_points, lift)
-        self._wire.lines = np.concatenate(cells)
-
     def _place_elements(self, positions: Array) -> None:
         self._elements_at_rest = self.skin.at_rest(positions)
         self._of_elements = self.skin.nearest(positions)
         points, out = self._elements_at_rest
-        self._elements_actor.visibility = self._elements_shown
+        self._elements_actor.visibility = self._shown["elements"]
         size = min(_POINT, _POINTS / max(len(positions), 1) ** 0.5)
         self._elements_actor.prop.point_size = pixels(self.plotter, size)
         self._elements.points = points + self.lift * out
@@ -229,7 +227,7 @@ class MembraneView(QWidget):
         self._show_times(times)
         self.surface.show_shape(skin)
         self.surface.show_values(skin, values, limits)
-        self._show_truth(skin, estimate.true_surface, times)
+        self._show_grids(skin, estimate.true_surface, times)
         if self._elements_actor.visibility:
             points, out = self._elements_at_rest
             height = skin.height.ravel()[self._of_elements] + self.lift
@@ -239,7 +237,8 @@ class MembraneView(QWidget):
         self._follow_pointed()
         for ball, contact in zip(self._contacts, (estimate.contact, estimate.second), strict=True):
             put_upright(ball, skin, contact.position)
-            ball.prop.color = current().faint if contact.near_rim else _CONTACT
+            ball.visibility = ball.visibility and self._shown["contact"]
+            ball.prop.color = current().faint if contact.near_rim else CONTACT
         if self._box.shares != WHOLE:
             self._box.cut(self.plotter.actors.values())  # some may be new
         known = math.isfinite(estimate.taken)
@@ -254,12 +253,12 @@ class MembraneView(QWidget):
         if (text := text if times != 1 else "") != self.exaggeration.words:
             self.exaggeration.show(text)
 
-    def _show_truth(self, skin: DrawnSkin, surface: Array, times: float) -> None:
-        true = surface.ravel()[self._wire_points]
-        self._wire_actor.visibility = bool(np.isfinite(true).any()) and self._truth_shown
-        if self._wire_actor.visibility:
-            height = -MM * times * np.nan_to_num(true) + self.lift
-            self._arrays["wire"][:] = skin.points(self._wire_points, height)
+    def _show_grids(self, skin: DrawnSkin, true: Array, times: float) -> None:
+        """Draw the lines of the fitted and of the `true` (ny, nx) surface."""
+        self._grid.show(skin, skin.height + self.lift / 2)
+        self._truth.show(skin, self.lift - MM * times * true)
+        self._grid.actor.visibility &= self._shown["fit"]
+        self._truth.actor.visibility &= self._shown["truth"]
 
     def _request(self) -> None:
         # One drawing at a time: further requests would queue up in Qt.
@@ -274,7 +273,7 @@ class MembraneView(QWidget):
     def show_loads(self, loads: Sequence[Load]) -> None:
         """Draw the simulated loads; none while the connection is lost."""
         loads = [load for load in loads if load.force and not self.surface.lost]
-        self.drag.handles = self._loads.show(loads, self.skin, self.lift)
+        self.drag.handles = self._loads.show(loads, self.skin, self.lift, self._shown["load"])
 
     # Options.
 
@@ -284,9 +283,12 @@ class MembraneView(QWidget):
             part.unit = unit
         self._fit_timer.start()
 
-    def show_options(self, elements: bool, truth: bool) -> None:
-        self._elements_shown, self._truth_shown = elements, truth
-        self._elements_actor.visibility = elements and self.surface.actor is not None
+    def show_options(self, **shown: bool) -> None:
+        """Draw or hide the fit, the elements, the truth, the contact and the load."""
+        self._shown = shown
+        if self.surface.actor is not None:
+            self._elements_actor.visibility = shown["elements"]
+            self.surface.actor.visibility = shown["fit"]
         self.plotter.update()
 
     def show_box(self, shares: Shares) -> None:
@@ -307,7 +309,7 @@ class MembraneView(QWidget):
         self.surface.show_colours(colours)
         self._ink = ink
         self._elements_actor.prop.color = ink
-        self._wire_actor.prop.color = ink
+        self._grid.actor.prop.color = ink
 
     def show_lost(self, lost: bool) -> None:
         """Grey the skin while the connection is lost."""

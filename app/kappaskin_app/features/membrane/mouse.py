@@ -1,58 +1,120 @@
-"""Mouse on the skin: pointing, clicks and drags of loads."""
+"""Mouse and keys on the skin: pointing, clicks, and loads that are moved and pressed."""
 
 import numpy as np
-from PySide6.QtCore import QEvent, QObject, QPointF, Qt, QTimer, Signal
-from PySide6.QtGui import QKeyEvent, QMouseEvent
+from PySide6.QtCore import QEvent, QObject, QPointF, Qt, QTimer, Signal, SignalInstance
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QWheelEvent
 from pyvistaqt import QtInteractor
 
 from kappaskin.frames import Array
 from kappaskin_app.features.membrane.camera import Projection
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.drawn_skin import NO_SKIN
+from kappaskin_app.shell.drawn_skin import MM, NO_SKIN
 
 ARROW = 0.22  # from a load's tip to its tail, as a share of the skin's size
 _NEAR = 14.0  # px around an arrow in which the mouse grabs it
+_PER_NOTCH = 1.08  # factor of the force per notch of the wheel or key
+_PER_PIXEL = 1.01  # factor of the force per px of Shift and drag
+_STEP = 0.01  # of the skin's longer side, per key
+_RELEASE_DELAY = 400  # ms after the last key
+
+_MOVE_KEYS = {
+    Qt.Key.Key_Left: (-1, 0),
+    Qt.Key.Key_Right: (1, 0),
+    Qt.Key.Key_Up: (0, 1),
+    Qt.Key.Key_Down: (0, -1),
+}
+_FORCE_KEYS = {
+    Qt.Key.Key_PageUp: 1,
+    Qt.Key.Key_Plus: 1,
+    Qt.Key.Key_PageDown: -1,
+    Qt.Key.Key_Minus: -1,
+}
+_MODIFIED = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier
+_LEFT, _SHIFT = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.ShiftModifier
 
 
 class LoadDrag(QObject):
-    """Drags of loads with the mouse; positions are (x, y) on the skin in m.
+    """Moves and presses loads with mouse and keys; positions are (x, y) on the skin in m.
 
-    `handles` (k, 2) are the positions of the drawn loads on the `skin`. Escape cancels a drag.
+    The left button on the `skin` takes the nearest load there, on an arrow its load. While it is
+    held, `dragged` follows the mouse, and the wheel, or Shift and drag, emits `pressed` with the
+    factor of the force since `grabbed`. Arrow keys move, Page Up and Page Down press; Escape emits
+    `cancelled`. `handles` (k, 2) are the positions of the drawn loads: without any, or while not
+    `enabled`, the mouse moves the camera.
     """
 
     grabbed = Signal(float, float)
     dragged = Signal(float, float)
+    pressed = Signal(float)
     released = Signal()
     cancelled = Signal()
 
     def __init__(self, plotter: QtInteractor) -> None:
         super().__init__(plotter)
         self._plotter, self._projection = plotter, Projection(plotter)
-        self.skin = NO_SKIN
+        self.skin, self.enabled = NO_SKIN, True
         self.handles: Array = np.empty((0, 2))
-        self._pressed = self._dragging = False
-        self._offset, self._held = np.zeros(2), np.zeros(2)
+        self.holding = self._swallowing = self._taken = False
+        self._factor, self._height = 1.0, 0.0
+        self._at, self._offset, self._held = QPointF(), np.zeros(2), np.zeros(2)
+        self._timer = QTimer(self, interval=_RELEASE_DELAY, singleShot=True)  # pyright: ignore[reportCallIssue]
+        self._timer.timeout.connect(guarded(lambda: self._end(self.released)))
         plotter.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        kind, left = event.type(), Qt.MouseButton.LeftButton
-        if kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
-            escapes = isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_Escape
+        kind = event.type()
+        if isinstance(event, QKeyEvent) and kind != QEvent.Type.ShortcutOverride:
             # Else VTK's own keys would switch to stereo or wireframe.
-            event.setAccepted(escapes and self._dragging)
-            if escapes:
-                self._give_up()
+            event.setAccepted(kind == QEvent.Type.KeyPress and self._key(event))
+            return True
+        if isinstance(event, QWheelEvent) and self._swallowing:
+            # Shift makes it a horizontal wheel.
+            notches = (event.angleDelta().y() or event.angleDelta().x()) / 120
+            self._press(_PER_NOTCH**notches)
             return True
         if isinstance(event, QMouseEvent):
-            presses = (QEvent.Type.MouseButtonPress, QEvent.Type.MouseButtonDblClick)
-            if kind in presses and event.button() == left:
-                return self._grab(event.position())
+            if kind in (QEvent.Type.MouseButtonPress, QEvent.Type.MouseButtonDblClick):
+                return self._swallowing or (event.button() == _LEFT and self._take(event))
             if kind == QEvent.Type.MouseMove:
-                return self._move(event.position())
-            if kind == QEvent.Type.MouseButtonRelease and self._pressed:
-                self._release()
+                return self._move(event)
+            if kind == QEvent.Type.MouseButtonRelease and self._swallowing:
+                if event.button() == _LEFT:
+                    self._swallowing = False
+                    self._end(self.released)
+                    self.show_cursor(self._held)
                 return True
         return False
+
+    # Holding a load.
+
+    def _grab(self, handle: Array) -> None:
+        """Hold the load at `handle`, unless one is held."""
+        self._timer.stop()
+        if not self.holding:
+            self.holding, self._factor, self._held = True, 1.0, handle
+            self.grabbed.emit(*handle)
+
+    def _move_to(self, place: Array) -> None:
+        if self.holding:
+            self._held = place
+            self.dragged.emit(*place)
+
+    def _press(self, times: float) -> None:
+        if self.holding:
+            self._factor *= times
+            self.pressed.emit(self._factor)
+
+    def _end(self, how: SignalInstance) -> None:
+        self._timer.stop()
+        if self.holding:
+            self.holding = False
+            how.emit()
+
+    def give_up(self) -> None:
+        """Cancel the drag, if there is one."""
+        self._end(self.cancelled)
+
+    # The mouse.
 
     def _ends(self, handle: Array) -> tuple[Array, Array]:
         """Widget pixels (2,) of the tip and the tail of the arrow at `handle`."""
@@ -62,7 +124,7 @@ class LoadDrag(QObject):
 
     def _handle_near(self, at: QPointF) -> Array | None:
         """The handle (2,) in m of an arrow near `at`, if any."""
-        for handle in self.handles:
+        for handle in self.handles if self.enabled else ():
             tip, tail = self._ends(handle)
             along = tail - tip
             point = np.array([at.x(), at.y()])
@@ -71,53 +133,84 @@ class LoadDrag(QObject):
                 return handle
         return None
 
-    def _grab(self, at: QPointF) -> bool:
-        handle = self._handle_near(at)
-        if handle is None:
+    def _nearest(self, place: Array) -> Array:
+        """The handle (2,) in m nearest to `place`."""
+        return self.handles[np.argmin(np.linalg.norm(self.handles - place, axis=1))]
+
+    def _take(self, event: QMouseEvent) -> bool:
+        """Hold the load under the mouse, or move the nearest one there; whether there is one."""
+        at = event.position()
+        place = handle = self._handle_near(at)
+        if place is None and self.enabled and len(self.handles):
+            place = self.skin.hit(*self._projection.line(at))
+        if place is None:
             return False
-        self._pressed = self._dragging = True
-        self._plotter.setFocus(Qt.FocusReason.MouseFocusReason)  # for Escape
-        self._held = handle
-        self._offset = handle - self._position_at(at, handle)
-        self.grabbed.emit(*handle)
-        return True
-
-    def _release(self) -> None:
-        self._pressed = False
-        if self._dragging:
-            self._dragging = False
-            self.released.emit()
-
-    def _give_up(self) -> None:
-        if self._dragging:
-            self._dragging = False
-            self.cancelled.emit()
-
-    def _move(self, at: QPointF) -> bool:
-        if not self._pressed:
-            over = self._handle_near(at) is not None
-            shape = Qt.CursorShape.OpenHandCursor if over else Qt.CursorShape.ArrowCursor
-            self._plotter.setCursor(shape)
-            return False
+        handle = self._nearest(place) if handle is None else handle
+        self._swallowing = True
+        self._plotter.setFocus(Qt.FocusReason.MouseFocusReason)  # for the keys and Escape
         self._plotter.setCursor(Qt.CursorShape.ClosedHandCursor)
-        if self._dragging:
-            held = self._held
-            if len(self.handles):  # at the height of the load, which changes as it moves
-                held = self.handles[np.argmin(np.linalg.norm(self.handles - held, axis=1))]
-            self._held = self._position_at(at, held) + self._offset
-            self.dragged.emit(*self._held)
+        self._grab(handle)
+        if place is not handle and not event.modifiers() & _SHIFT:
+            self._move_to(place)
+        self._taken = place is not handle
+        self._height = float(self.skin.height_at(place[None])[0])
+        self._at, self._offset = at, self._held - self._under(at)
         return True
 
-    def _position_at(self, at: QPointF, handle: Array) -> Array:
-        """Position (2,) in m under `at` on the skin at the drawn height of `handle`."""
-        near, far = self._projection.line(at)
-        return self.skin.seen_at(near, far, float(self.skin.height_at(handle[None])[0]), handle)
+    def _move(self, event: QMouseEvent) -> bool:
+        before, self._at = self._at, event.position()
+        if not self._swallowing:
+            return False
+        if event.modifiers() & _SHIFT:
+            self._press(_PER_PIXEL ** (before.y() - self._at.y()))
+            self._offset = self._held - self._under(self._at)
+        else:
+            self._move_to(self._under(self._at) + self._offset)
+        return True
 
-    def on_screen(self) -> QPointF | None:
-        """Pixel of the tip of the first load's arrow, None without a load."""
-        if not len(self.handles):
-            return None
-        return QPointF(*self._ends(self.handles[0])[0])
+    def _under(self, at: QPointF) -> Array:
+        """Position (2,) in m under `at` for the held load.
+
+        An arrow stays under the mouse as the skin under it rises and sinks. A load that was taken
+        to the mouse follows it at one height, or it would jump as the skin sinks under it.
+        """
+        if not self._taken and len(self.handles):
+            self._height = float(self.skin.height_at(self._nearest(self._held)[None])[0])
+        return self.skin.seen_at(*self._projection.line(at), self._height, self._held)
+
+    def show_cursor(self, over: Array | None) -> None:
+        """Show what the left button does at the mouse, `over` a position of the skin or None."""
+        if self._swallowing:
+            return
+        presses = over is not None and self.enabled and len(self.handles)
+        shape = Qt.CursorShape.CrossCursor if presses else Qt.CursorShape.ArrowCursor
+        on_arrow = self._handle_near(self._at) is not None
+        self._plotter.setCursor(Qt.CursorShape.OpenHandCursor if on_arrow else shape)
+
+    # Keys.
+
+    def _key(self, event: QKeyEvent) -> bool:
+        """Move or press the held load, or else the first one; whether the key does so."""
+        key = Qt.Key(event.key())
+        if key == Qt.Key.Key_Escape and self.holding:
+            self.give_up()
+            return True
+        if (
+            not (self.enabled and (self.holding or len(self.handles)))
+            or event.modifiers() & _MODIFIED
+            or key not in _MOVE_KEYS | _FORCE_KEYS
+        ):
+            return False
+        self._grab(self._held if self.holding else self.handles[0])
+        if key in _FORCE_KEYS:
+            self._press(_PER_NOTCH ** _FORCE_KEYS[key])
+        else:
+            sides = self.skin.patch.a, self.skin.patch.b
+            step = _STEP * self.skin.side / MM * np.array(_MOVE_KEYS[key])
+            self._move_to(np.clip(self._held + step, 0.0, sides))
+        if not self._swallowing:
+            self._timer.start()
+        return True
 
 
 _STILL = 4.0  # px that the mouse may move in a click
@@ -127,7 +220,7 @@ _PERIOD = 30  # ms between two positions
 class SurfacePointer(QObject):
     """Position of the mouse on the `skin`, (x, y) in m.
 
-    `moved` emits None outside the skin.
+    `moved` emits None outside the skin. The left and the right button click.
     """
 
     clicked = Signal(float, float)
@@ -143,14 +236,14 @@ class SurfacePointer(QObject):
         plotter.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        kind, left = event.type(), Qt.MouseButton.LeftButton
+        kind, buttons = event.type(), (_LEFT, Qt.MouseButton.RightButton)
         if kind == QEvent.Type.Leave:
             self._moved_to = None
             self.moved.emit(None)
         if isinstance(event, QMouseEvent):
             at = event.position()
             if kind == QEvent.Type.MouseButtonPress:
-                self._pressed_at = at if event.button() == left else None
+                self._pressed_at = at if event.button() in buttons else None
             elif kind == QEvent.Type.MouseButtonRelease:
                 self._release(at)
             elif kind == QEvent.Type.MouseMove and not event.buttons():

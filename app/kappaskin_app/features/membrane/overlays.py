@@ -12,7 +12,8 @@ from kappaskin.frames import Array, Estimate, Indices
 from kappaskin.mechanics import PlacedObject
 from kappaskin.scenes import Indenter
 from kappaskin_app.features.membrane.annotations import UNLIT, pixels
-from kappaskin_app.features.membrane.membrane import MembraneView
+from kappaskin_app.features.membrane.loads import LOAD
+from kappaskin_app.features.membrane.membrane import CONTACT, MembraneView
 from kappaskin_app.shell.colouring import Colouring, SteadyRange
 from kappaskin_app.shell.drawn_skin import MM, DrawnSkin
 from kappaskin_app.shell.session import Session
@@ -201,23 +202,28 @@ class ContactFrame:
             self._cone.points[:] = np.vstack([origin, origin + rim])
 
 
-_AROUND, _OUT, _FINE = 64, 14, 48  # points around, outward, and to find the extent
+_AROUND, _OUT, _FINE = 48, 14, 32  # points around, outward, and to find the extent
 _ABOVE = 0.35  # of the skin's size: the highest part drawn
 _WAYS = 2 * np.pi * np.arange(_AROUND) / _AROUND
 _SIDES = np.stack([np.cos(_WAYS), np.sin(_WAYS)], axis=-1)
 
 
 class ObjectMesh:
-    """Translucent mesh of an object, exaggerated in height as the skin is."""
+    """Translucent lit mesh of an object, exaggerated in height as the skin is."""
 
     def __init__(self, plotter: Any, colour: str) -> None:
         self._mesh: Any = pv.PolyData(np.zeros((_OUT * _AROUND, 3)), faces=_faces())
+        self._mesh.point_data.active_normals = np.zeros((_OUT * _AROUND, 3))
         self.actor = plotter.add_mesh(
             self._mesh,
             color=colour,
-            opacity=0.35,
-            **UNLIT,
+            opacity=0.45,
+            ambient=0.6,
+            diffuse=0.5,
+            specular=0.25,
+            **UNLIT | {"lighting": True},
         )
+        self.actor.prop.interpolation = "Gouraud"
         self.actor.visibility = False
 
     def show(self, stands: PlacedObject | None, skin: DrawnSkin, times: float) -> None:
@@ -226,6 +232,16 @@ class ObjectMesh:
         self.actor.visibility = points is not None
         if points is not None:
             self._mesh.points[:] = points
+            self._mesh.point_data.active_normals[:] = _normals(points)
+
+
+def _normals(points: Array) -> Array:
+    """Unit normals (k, 3) of the rings of `points` (k, 3), towards the inside of the object."""
+    rings = points.reshape(_OUT, _AROUND, 3)
+    around = np.roll(rings, -1, axis=1) - np.roll(rings, 1, axis=1)
+    around[0] = around[1]  # the first ring is a point
+    normals = np.cross(np.gradient(rings, axis=0), around).reshape(-1, 3)
+    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
 
 
 def underside(stands: PlacedObject, skin: DrawnSkin, times: float) -> Array | None:
@@ -271,7 +287,6 @@ def _faces() -> Indices:
 
 _LEAST = 2.0  # 1/m of the longest line at least, so that noise stays short
 _OLD = 2.0  # s after which a recognised object is discarded
-_FOUND, _PRESSED = "#1fd17a", "#e8543f"  # as the contact and the loads are marked
 
 
 class Overlays:
@@ -282,7 +297,7 @@ class Overlays:
         plotter = membrane.plotter
         self.directions, self.frame = Directions(plotter), ContactFrame(plotter)
         self.band = Band(plotter)
-        self.found, self.pressed = ObjectMesh(plotter, _FOUND), ObjectMesh(plotter, _PRESSED)
+        self.found, self.pressed = ObjectMesh(plotter, CONTACT), ObjectMesh(plotter, LOAD)
         self._longest = SteadyRange(_LEAST)
         self._object: ContactObject | None = None
         self._object_time = -math.inf
@@ -297,11 +312,12 @@ class Overlays:
         self._show_band(estimate, settings, times)
         self._show_frame(estimate, settings, times)
         skin = self._membrane.skin
-        self.found.show(
-            self._recognised_object(estimate) if settings.show_object else None, skin, times
-        )
+        found = self._recognised_object(estimate) if settings.show_object else None
         stands = self._pressed_object(estimate) if settings.show_pressed else None
+        self.found.show(found, skin, times)
         self.pressed.show(stands, skin, times)
+        # Two translucent surfaces at one place could not be told apart.
+        self.found.actor.prop.style = "surface" if stands is None else "wireframe"
 
     def hide(self) -> None:
         """Hide all overlays."""
@@ -343,6 +359,8 @@ class Overlays:
         what, contact = self._object, estimate.contact
         if what is None or not contact.present or time.monotonic() - self._object_time > _OLD:
             return None
+        if what.kind in ("sphere", "cylinder") and not math.isfinite(what.radius):
+            return None  # a bound is no size
         patch = self._membrane.skin.patch
         return placed_object(what, contact.position, max(patch.a, patch.b))
 

@@ -8,6 +8,8 @@ from PySide6.QtCore import QObject
 
 from kappaskin.frames import Estimate
 from kappaskin.live import Status
+from kappaskin.scenes import Indenter
+from kappaskin_app.features.membrane.legend import Legend
 from kappaskin_app.features.membrane.measuring import Measurement
 from kappaskin_app.features.membrane.membrane import MembraneView
 from kappaskin_app.features.membrane.overlays import Overlays
@@ -26,7 +28,7 @@ _MARKS = 0.06  # s between two updates of the marks
 
 
 class SkinView(QObject):
-    """Shows the data of the `display` on the `membrane` with its colour `scale`.
+    """Shows the data of the `display` on the `membrane`, with its colour `scale` and `legend`.
 
     With `alarm_enabled` the view shows the reason why no data arrives.
     """
@@ -34,7 +36,7 @@ class SkinView(QObject):
     def __init__(self, display: Display, session: Session, selection: Selection) -> None:
         super().__init__(display)
         self._display, self._session, self._selection = display, session, selection
-        self.membrane, self.scale = MembraneView(), SkinScale()
+        self.membrane, self.scale, self.legend = MembraneView(), SkinScale(), Legend()
         self.measurement = Measurement(self.membrane)
         self.overlays = Overlays(self.membrane, display.colouring, session)
         self.alarm_enabled = True
@@ -43,24 +45,34 @@ class SkinView(QObject):
         self._excluded = np.empty(0, np.intp)  # elements
         self._shown: Shown | None = None
         self._next_marks = 0.0
-        follow_look(self.membrane, lambda: self._shown and self._colour(self._shown))
+        follow_look(self.membrane, self._redraw)
         display.ages, display.limits = self._ages, [*display.limits, self._limits]
         display.restarted.connect(guarded(self._restart))
         display.status_shown.connect(guarded(self._show_status))
         display.shown.connect(guarded(self._show))
-        display.object_found.connect(guarded(lambda what, _: self.overlays.set_object(what)))
+        display.object_found.connect(
+            guarded(lambda what, _: (self.overlays.set_object(what), self._redraw()))
+        )
         selection.pointed.connect(guarded(self.membrane.point))
         selection.target_changed.connect(guarded(lambda *_: self._show_marked()))
         selection.mode_changed.connect(guarded(self._show_mode))
 
     def show_settings(self, settings: Settings) -> None:
         self._settings = settings
+        self.legend.show_settings(settings)
         self.scale.lock.show_locked(locked_at(settings.colour_by, settings) > 0)
         self._allow_lock()
         s = settings
         self.membrane.show_box((s.from_x, s.to_x, s.from_y, s.to_y, s.from_z, s.to_z))
-        self.membrane.show_options(settings.show_elements, settings.show_truth)
+        self.membrane.show_options(
+            fit=s.show_fit,
+            elements=s.show_elements,
+            truth=s.show_truth,
+            contact=s.show_contact,
+            load=s.show_load,
+        )
         self.membrane.camera_control.show(settings.look, settings.camera)
+        self._redraw()
 
     @property
     def _shade(self) -> Shade:
@@ -88,7 +100,7 @@ class SkinView(QObject):
     def _restart(self, status: Status) -> None:
         if status.sensor is not None:
             self._selection.point(-1)
-            self._excluded = np.empty(0, np.intp)
+            self._excluded, self._shown = np.empty(0, np.intp), None
             self.membrane.show_skin(status.sensor, status.setup.nx, status.setup.ny)
 
     def _show_status(self, _: Status) -> None:
@@ -97,6 +109,18 @@ class SkinView(QObject):
         self.membrane.show_lost(self._display.old)
         if self._display.old:
             self.overlays.hide()
+        self._show_available()
+
+    def _show_available(self) -> None:
+        """Show in the legend what can be drawn of the present source."""
+        session, estimate = self._session, self._session.estimate
+        stimuli = session.scene.stimuli if session.inside else ()
+        self.legend.show_available(
+            show_object=not self.membrane.skin.patch.strip,
+            show_truth=estimate is not None and bool(np.isfinite(estimate.true_surface).any()),
+            show_pressed=any(isinstance(stimulus.what, Indenter) for stimulus in stimuli),
+            show_load=bool(stimuli),
+        )
 
     def _ages(self) -> list[float]:
         """Ages in s of the frames drawn within the last second."""
@@ -110,14 +134,20 @@ class SkinView(QObject):
         noise = self._display.colouring.noise("displacement", estimate)
         self._display.ranges.limit("displacement", 1e3 * estimate.surface, settings, now, noise)
         self._shown = shown
-        self._colour(shown)
-        self._show_loads(estimate)
-        self.overlays.show(estimate, settings, self._times())
-        self.measurement.show(estimate)
+        self._redraw()
         if now >= self._next_marks:
             self._next_marks = now + _MARKS
             self._excluded = np.flatnonzero(shown.kinds.any(axis=0))
             self._show_marked()
+
+    def _redraw(self) -> None:
+        """Draw the present estimate, also while a recording is paused."""
+        if self._shown is not None and not self._display.old:
+            estimate = self._shown.estimate
+            self._colour(self._shown)
+            self._show_loads(estimate)
+            self.overlays.show(estimate, self._settings, self._times())
+            self.measurement.show(estimate)
 
     def _show_marked(self) -> None:
         self.membrane.show_marked(self._excluded, self._selection.target)
@@ -140,6 +170,7 @@ class SkinView(QObject):
         if tint.colours is not self._colours:
             self._colours = tint.colours
             self.membrane.show_colours(tint.colours, tint.ink)
+            self.legend.show_colours(tint.colours)
         self._show_reason(name, values)
         self.membrane.show_estimate(estimate, values, tint.limits, times)
         self.scale.bar.show_tint(tint, beside)

@@ -1,4 +1,4 @@
-"""Surface of the skin: mesh, colours and clipping box."""
+"""Surface of the skin: mesh, lines of its grid, colours and clipping box."""
 
 from typing import Any
 
@@ -8,8 +8,9 @@ import scipy
 from numpy.typing import NDArray
 from vtkmodules.vtkCommonDataModel import vtkPlane, vtkPlaneCollection
 
-from kappaskin.frames import Indices
+from kappaskin.frames import Array, Indices
 from kappaskin.sensing import SensorLayout
+from kappaskin_app.features.membrane.annotations import UNLIT, pixels
 from kappaskin_app.shell.drawn_skin import DrawnSkin
 from kappaskin_app.theme import Colours, current, follow_look
 
@@ -84,6 +85,31 @@ class Box:
             mapper = getattr(actor, "mapper", None)
             if mapper is not None and mapper.GetClippingPlanes() is not wanted:
                 mapper.SetClippingPlanes(wanted)
+
+
+class GridLines:
+    """Every `stride`th line of the grid from the `first` on, on a surface over the skin."""
+
+    def __init__(self, plotter: Any, stride: int, first: int, **style: Any) -> None:
+        self._stride, self._first = stride, first
+        self._mesh: Any = pv.PolyData(np.zeros((2, 3)), lines=[2, 0, 1])
+        self.actor = plotter.add_mesh(self._mesh, line_width=pixels(plotter, 1), **style, **UNLIT)
+        self.actor.visibility = False
+
+    def show_skin(self, skin: DrawnSkin) -> None:
+        lines = skin.lines(self._stride, self._first)
+        self._which = np.concatenate(lines)
+        ends = np.cumsum([len(line) for line in lines])
+        cells = [np.r_[len(x), np.arange(e - len(x), e)] for x, e in zip(lines, ends, strict=True)]
+        self._mesh.points = skin.points(self._which)
+        self._mesh.lines = np.concatenate(cells)
+        self._points = self._mesh.points  # looking it up takes longer than filling it
+
+    def show(self, skin: DrawnSkin, height: Array) -> None:
+        """Draw them `height` (ny, nx) mm above the skin at rest; hide them where it is unknown."""
+        there = height.ravel()[self._which]
+        self.actor.visibility = bool(np.isfinite(there).any())
+        self._points[:] = skin.points(self._which, np.nan_to_num(there))
 
 
 class Surface:

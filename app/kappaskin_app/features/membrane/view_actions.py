@@ -26,7 +26,15 @@ class ViewPanel(Form):
     def __init__(self) -> None:
         names = (
             *("colour_by", "colour_from", "colour_map", "maps", "one_range"),
-            *("exaggeration", "show_elements", "show_truth", "show_directions", "show_band"),
+            *(
+                "exaggeration",
+                "show_fit",
+                "show_elements",
+                "show_truth",
+                "show_contact",
+                "show_load",
+            ),
+            *("show_directions", "show_band"),
             *("show_frame", "show_object", "show_pressed", "from_x", "to_x", "from_y", "to_y"),
             *("from_z", "to_z", "theme", "letters", "show_start"),
         )
@@ -56,6 +64,9 @@ _DIRECTIONS = (
     ),
 )
 _TOGGLES = (
+    ("fit", "&fitted surface", ""),
+    ("contact", "&contact", ""),
+    ("load", "&load", ""),
     ("elements", "&elements", "Ctrl+E"),
     ("truth", "&true surface", "Ctrl+U"),
     ("directions", "principal &directions", "Ctrl+Alt+D"),

@@ -12,9 +12,8 @@ from kappaskin.frames import Estimate
 from kappaskin.live import Status
 from kappaskin_app.features.presenter.feedback import Feedback, Recognised, feedback_of
 from kappaskin_app.features.presenter.indicators import REMEDIES, age_in_words
-from kappaskin_app.features.presenter.pad import DEMO_OBJECTS, Hand
 from kappaskin_app.features.presenter.sound import Sound
-from kappaskin_app.features.presenter.view import PresenterView
+from kappaskin_app.features.presenter.view import DEMO_OBJECTS, Hand, PresenterView
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.badge import GAP, SIM, origin
 from kappaskin_app.shell.centre import ActionBanner
@@ -60,12 +59,6 @@ class PresenterController(QObject):
         self._recognised: Recognised | None = None
         self._recognised_at = -math.inf
         self._next_figures = self._next_drawing = 0.0
-        pad = view.controls.pad
-        pad.grabbed.connect(load.grabbed)
-        pad.dragged.connect(load.dragged)
-        pad.pressed.connect(load.pressed)
-        pad.released.connect(load.released)
-        pad.cancelled.connect(load.cancelled)
         view.controls.chosen.connect(guarded(self._select_object))
 
     @property
@@ -89,7 +82,7 @@ class PresenterController(QObject):
             self.view.present(True)
             self._show_hand()
             window.showFullScreen()
-        self.view.controls.pad.setFocus()
+        self._display.centre.setFocus()  # for the keys that move and press
 
     def leave(self) -> None:
         """Restore the window."""
@@ -97,7 +90,6 @@ class PresenterController(QObject):
             return
         window, before = self._window, self._before
         self._before = None
-        self.view.controls.pad.release()
         self.sound.set_level(math.nan)
         with drawn_once(window):
             self.view.present(False)
@@ -109,8 +101,7 @@ class PresenterController(QObject):
             window.restoreState(before.layout)
 
     def close(self) -> None:
-        """Cancel a drag and stop the sound before the window closes."""
-        self.view.controls.pad.give_up()
+        """Stop the sound before the window closes."""
         self.sound.close()
 
     def _surroundings(self) -> list[QWidget]:
@@ -172,11 +163,10 @@ class PresenterController(QObject):
         session = self._session
         scene, inside = session.scene, session.inside and origin(session.badge()) == SIM
         there = loads_at(scene, session.time) if inside else []
-        self.view.show_controls(bool(there) or (inside and self.view.controls.pad.holding))
+        self.view.show_controls(bool(there))
         if there:
             load = there[0].load
             x, y = (float(value) for value in load.centre())
-            self.view.controls.pad.show_skin(scene.plate.patch)
             self.view.controls.show_hand(Hand(x, y, load.force), session.refusal)
             present = [n for n, made in enumerate(DEMO_OBJECTS) if made.is_in(scene)]
             self.view.controls.show_objects(
@@ -184,7 +174,7 @@ class PresenterController(QObject):
             )
 
     def _select_object(self, number: int) -> None:
-        hand = self.view.controls.pad.hand
+        hand = self.view.controls.hand_text.hand
         if hand is not None:
             self._load.replaced.emit(DEMO_OBJECTS[number].settings, *hand)
 

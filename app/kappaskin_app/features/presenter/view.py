@@ -1,12 +1,25 @@
-"""Presenter view: the skin with large numbers, or a banner with the remedy of a fault."""
+"""Presenter view: the skin with large numbers and controls of the object, or a fault's remedy."""
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QGridLayout,
+    QHBoxLayout,
+    QPushButton,
+    QSizePolicy,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
 
 from kappaskin._text import NO_FORCE, rounded
+from kappaskin.scenes import Indenter, Scene
 from kappaskin_app.features.presenter.feedback import Feedback, RadiusEstimate
 from kappaskin_app.features.presenter.indicators import (
     Banner,
@@ -16,7 +29,9 @@ from kappaskin_app.features.presenter.indicators import (
     RadiusView,
     StatusStrip,
 )
-from kappaskin_app.features.presenter.pad import OperatorControls
+from kappaskin_app.guard import guarded
+from kappaskin_app.theme import current, follow_look
+from kappaskin_app.widgets.lettering import CAPTION, Words, letters, shrunk
 from kappaskin_app.widgets.text import NONE
 
 _HEIGHT, _WIDTH = 1080.0, 1920.0  # px of the screen for which a unit is one px
@@ -25,6 +40,146 @@ _EDGE = 26.0  # units around the numbers
 _RADIUS = "Radius of the object"
 _FLAT = 1e3  # mm: a bound beyond says nothing of an object
 _OBJECTS = {"sphere": "ball", "cylinder": "pipe", "plane": "flat face", "skin": "skin at contact"}
+
+
+@dataclass(frozen=True)
+class DemoObject:
+    """An object of the demonstration: title and tooltip of its button, and its scene settings."""
+
+    title: str
+    tip: str
+    settings: Mapping[str, Any]
+
+    def is_in(self, scene: Scene) -> bool:
+        """Whether it is the object in `scene`."""
+        what = scene.stimuli[0].what
+        rigid = what.rigid if isinstance(what, Indenter) else what
+        named = type(rigid).__name__.removesuffix("Load").lower()
+        sizes = {name: value for name, value in self.settings.items() if name != "what"}
+        return named == self.settings["what"] and all(
+            getattr(rigid, name, None) == value for name, value in sizes.items()
+        )
+
+
+DEMO_OBJECTS = (
+    DemoObject("Ball, radius 40 mm", "A ball of 40 mm radius.", {"what": "sphere", "radius": 0.04}),
+    DemoObject("Ball, radius 60 mm", "A ball of 60 mm radius.", {"what": "sphere", "radius": 0.06}),
+    DemoObject("Ball, radius 80 mm", "A ball of 80 mm radius.", {"what": "sphere", "radius": 0.08}),
+    DemoObject(
+        "Pipe, radius 150 mm",
+        "A pipe of 150 mm radius and 50 mm length that lies along x.",
+        {"what": "cylinder", "radius": 0.15, "length": 0.05},
+    ),
+    DemoObject(
+        "Edge",
+        "The edge of a box, 40 mm long, along x.",
+        {"what": "wedge", "angle": math.pi / 2, "length": 0.04, "width": 0.02},
+    ),
+    DemoObject("Point", "A point, without a radius.", {"what": "point"}),
+)
+
+
+class Hand(NamedTuple):
+    """Position in m and force in N of the simulated object."""
+
+    x: float
+    y: float
+    force: float
+
+
+_CONTROLS = 210.0  # units, height
+_HINT = (
+    "Press on the skin with the left button and drag; the wheel, or Shift and drag, changes the "
+    "force. The right button turns the view."
+)
+_UNDO_HINT = "Ctrl+Z undoes."
+_COLUMNS = 3
+_BUTTON = 15.0  # units, height of a capital on a button
+_TOP = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop
+
+
+class _HandText(Indicator):
+    """Force and position of the simulated object, and how to move it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.hand: Hand | None = None
+        self.refusal = ""
+
+    def show_hand(self, hand: Hand | None, refusal: str) -> None:
+        if (hand, refusal) != (self.hand, self.refusal):
+            self.hand, self.refusal = hand, refusal
+            self.update()
+
+    def words(self) -> list[Words]:
+        if self.hand is None:
+            return []
+        place, third = self.rect().toRectF(), self.height() / 3
+        x, y, force = 1e3 * self.hand.x, 1e3 * self.hand.y, self.hand.force
+        hand_text = f"Your hand: {force:.2f} N at {x:.0f}, {y:.0f} mm"
+        above = place.adjusted(0, 0, 0, -2 * third)
+        below = place.adjusted(0, third, 0, 0)
+        hint = f"{self.refusal}. {_UNDO_HINT}" if self.refusal else _HINT
+        large, small = self.letters(CAPTION, bold=True), self.letters(0.8 * CAPTION)
+        return [
+            shrunk(Words(hand_text, large, above, align=_TOP)),
+            shrunk(Words(hint, small, below, faint=True, align=_TOP, lines=True)),
+        ]
+
+
+class OperatorControls(QWidget):
+    """The hand, and buttons of the objects; `chosen` emits a number in `DEMO_OBJECTS`."""
+
+    chosen = Signal(int)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.hand_text = _HandText()
+        self.objects, self._selection = QButtonGroup(self), QWidget()
+        self._selection.setAccessibleName("Object")
+        grid = QGridLayout(self._selection)
+        grid.setContentsMargins(0, 0, 0, 0)
+        for number, demo_object in enumerate(DEMO_OBJECTS):
+            button = QPushButton(demo_object.title)
+            button.setCheckable(True)
+            button.setToolTip(demo_object.tip)
+            button.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+            self.objects.addButton(button, number)
+            grid.addWidget(button, *divmod(number, _COLUMNS))
+        self.objects.idClicked.connect(guarded(self.chosen.emit))
+        self._column = QVBoxLayout(self)
+        self._column.addWidget(self.hand_text, 1)
+        self._column.addWidget(self._selection)
+        follow_look(self, self._apply_theme)
+
+    def show_unit(self, unit: float) -> None:
+        self.setFixedHeight(round(_CONTROLS * unit))
+        edge = round(12 * unit)
+        self._column.setContentsMargins(edge, edge, edge, edge)
+        self.hand_text.show_unit(unit)
+        for button in self.objects.buttons():
+            button.setFont(letters(self.font(), _BUTTON * unit))
+
+    def show_hand(self, hand: Hand | None, refusal: str = "") -> None:
+        """Show the simulated object, and why the last requested scene was refused."""
+        self.hand_text.show_hand(hand, refusal)
+
+    def show_objects(self, selectable: bool, number: int) -> None:
+        """Check the present one of `DEMO_OBJECTS`, -1 for none; hidden if not `selectable`."""
+        self._selection.setVisible(selectable)
+        checked = self.objects.checkedId()
+        if number != checked:
+            self.objects.setExclusive(False)
+            for button in self.objects.buttons():
+                button.setChecked(self.objects.id(button) == number)
+            self.objects.setExclusive(True)
+
+    def _apply_theme(self) -> None:
+        theme = current()
+        self._selection.setStyleSheet(
+            f"QPushButton:checked {{ background: {theme.accent}; color: {theme.on_accent};"
+            f" border: 1px solid {theme.accent}; border-radius: 3px; padding: 4px; }}"
+        )
 
 
 class PresenterView(QWidget):
@@ -114,7 +269,6 @@ class PresenterView(QWidget):
         self, feedback: Feedback | None, why_none: str = "no contact", recorded: bool = False
     ) -> None:
         """Write the feedback, or the reason why there is none; of a recording if `recorded`."""
-        self.controls.pad.show_feedback(feedback)
         if feedback is None:
             for figure in (self.force, self.displacement, self.place):
                 figure.show_figure(NONE, why_none if figure is self.force else "")

@@ -20,8 +20,8 @@ class LoadPanel(SimulationForm):
     """The form of the load: case, force, position and size."""
 
     purpose = (
-        "Load on the simulated skin: position, size and force. Drag the red arrow on the skin, or "
-        "enter numbers here."
+        "Load on the simulated skin: position, size and force. Press on the skin with the mouse, "
+        "or enter numbers here."
     )
     guide_page = "scenes"
 

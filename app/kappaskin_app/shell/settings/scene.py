@@ -200,7 +200,7 @@ class LoadSettings:
         "circle",
         Choice(
             "Case",
-            "Load on the simulated skin. Drag the load with the mouse to move it freely.",
+            "Load on the simulated skin. Press on the skin with the mouse to move it freely.",
             LOAD_CASES,
         ),
     )

@@ -185,10 +185,22 @@ class View(ColourRanges):
             "times",
         ),
     )
+    show_fit: bool = setting(
+        True, Switch("Fitted surface", "Draw the fitted surface with lines of its grid.")
+    )
     show_elements: bool = setting(True, Switch("Elements", "Draw the sensing elements as points."))
     show_truth: bool = setting(
         True,
-        Switch("True surface", "Draw the true surface of the simulation as a wireframe."),
+        Switch("True surface", "Draw the true surface of the simulation as red lines."),
+    )
+    show_contact: bool = setting(
+        True, Switch("Contact", "Draw a green pin at the estimated contact, grey near the rim.")
+    )
+    show_load: bool = setting(
+        True,
+        Switch(
+            "Load", "Draw the simulated load as a red arrow, with its outline if it has an area."
+        ),
     )
     show_directions: bool = setting(
         False,
@@ -218,20 +230,20 @@ class View(ColourRanges):
         ),
     )
     show_object: bool = setting(
-        False,
+        True,
         Switch(
             "Estimated object",
-            "The object estimated from the readings (plane, cylinder, sphere or edge), in "
-            "translucent green at the contact, with the vertical exaggeration of the skin. Where "
-            "only an upper limit of the radius is known, it is drawn with that radius.",
+            "The object that is named from the readings (plane, cylinder, sphere or edge), in "
+            "translucent green at the contact, in its size, with the vertical exaggeration of the "
+            "skin; as lines where the true object is drawn. Not drawn while its radius is unknown.",
         ),
     )
     show_pressed: bool = setting(
-        False,
+        True,
         Switch(
             "True object",
-            "The rigid object of a simulated scene, in translucent red, with the vertical "
-            "exaggeration of the skin. The loads of the panel Load have no object.",
+            "The rigid object of a simulated scene, in translucent red, in its size, with the "
+            "vertical exaggeration of the skin. The loads of the panel Load have no object.",
         ),
     )
     from_x: float = setting(0.0, _cut("From", "x"))

@@ -6,12 +6,11 @@ import pytest
 from kappaskin import Patch, load_scene
 from kappaskin.contact import ContactObject
 from kappaskin.mechanics import PlacedObject
-from kappaskin_app.features.membrane.overlays import underside
+from kappaskin_app.features.membrane.overlays import _normals, underside
 from kappaskin_app.shell.drawn_skin import DrawnSkin
 from kappaskin_app.shell.window import MainWindow
 
 FLAT, ARC = Patch(0.1, 0.1), Patch(0.04, 0.03, 0.0129)
-WANTED = ("directions", "band", "frame", "object", "pressed")
 BALL = load_scene("sphere").stimuli[0].what.rigid  # of 20 mm
 
 
@@ -36,28 +35,51 @@ def test_an_object_touches_the_drawn_skin_and_enters_it_nowhere(patch: Patch, ti
         np.testing.assert_allclose(sag, times * (20 - np.sqrt(400 - far**2)), atol=1e-9)
 
 
-@pytest.mark.full
-def test_nothing_is_drawn_over_the_skin_until_it_is_wanted_and_then_all_of_it(
-    opened, until, monkeypatch
-) -> None:
-    # This ball is too large to be sure of; what is not sure is not drawn.
-    monkeypatch.setattr(ContactObject, "sure", property(lambda self: bool(self.kind)))
-    window: MainWindow = opened("sim:sphere")
-    until(lambda: window.display.badge.state == "SIM" and window.session.estimate.contact.present)
+def _drawn(window: MainWindow) -> dict[str, bool]:
     over = window.view.overlays
-    assert not over.frame.actor.visibility
-    assert over.directions.actor is None
-    for name in WANTED:
+    actors = {
+        "directions": over.directions.actor,
+        "frame": over.frame.actor,
+        "object": over.found.actor,
+        "pressed": over.pressed.actor,
+    }
+    return {name: bool(actor and actor.visibility) for name, actor in actors.items()}
+
+
+@pytest.mark.full
+def test_objects_are_drawn_at_first_the_rest_once_wanted_and_nothing_when_nothing_comes(
+    opened, until
+) -> None:
+    window: MainWindow = opened("sim:demo")
+    over = window.view.overlays
+    first = {"directions": False, "frame": False, "object": True, "pressed": True}
+    until(lambda: _drawn(window) == first)
+    assert over.found.actor.prop.style == "Wireframe"  # it lies on the true one
+    assert 0.3 < over.pressed.actor.prop.opacity < 0.7
+    window.actions_by_name["pressed"].trigger()
+    until(lambda: _drawn(window) == first | {"pressed": False})
+    assert over.found.actor.prop.style == "Surface"
+    for name in ("directions", "frame", "pressed"):
         window.actions_by_name[name].trigger()
-
-    def seen() -> list[bool]:
-        sheets = (over.found, over.pressed)
-        actors = [over.frame.actor, over.frame.cone, over.directions.actor]
-        return [bool(actor.visibility) for actor in [*actors, *(s.actor for s in sheets)]]
-
-    until(lambda: over.directions.actor is not None and all(seen()))
+    until(lambda: all(_drawn(window).values()))
     window.actions_by_name["disconnect"].trigger()
-    until(lambda: not any(seen()))
-    for _ in WANTED:
-        window.history.stack.undo()
-    assert not window.history.settings.show_directions
+    until(lambda: not any(_drawn(window).values()))
+
+
+@pytest.mark.full
+def test_an_object_of_unknown_radius_is_not_drawn(opened, until, monkeypatch) -> None:
+    monkeypatch.setattr(ContactObject, "sure", property(lambda self: bool(self.kind)))
+    window: MainWindow = opened("sim:demo")
+    window.editing.write(window.history.settings.written.text.replace("= 0.5", "= 0.1"))
+    found: list[ContactObject] = []
+    window.display.object_found.connect(lambda what, _: found.append(what))
+    until(lambda: bool(found) and found[-1].kind == "sphere" and np.isnan(found[-1].radius))
+    until(lambda: not _drawn(window)["object"] and _drawn(window)["pressed"])
+
+
+def test_the_normals_of_a_drawn_object_point_to_one_side_of_it() -> None:
+    skin, place = DrawnSkin(FLAT, 65, 65), np.array([0.05, 0.05])
+    points = underside(PlacedObject(BALL, place, 0.0), skin, 1.0)
+    centre = points[0] + (0.0, 0.0, 20.0)
+    towards = (centre - points) / 20.0
+    np.testing.assert_allclose(np.vecdot(_normals(points), towards), 1.0, atol=0.05)

@@ -21,9 +21,12 @@ def demo(opened, until):
     until(lambda: window.isActiveWindow() and window.display.badge.state == "SIM")
     window.presenter.enter()
     until(lambda: window.presenter.feedback is not None)
-    pad = window.presenter.view.controls.pad
-    until(lambda: pad.height() > 100 and pad.hand is not None)
+    until(lambda: len(window.membrane.drag.handles) == 1 and hand(window) is not None)
     return window
+
+
+def hand(window):
+    return window.presenter.view.controls.hand_text.hand
 
 
 def _size(dock):
@@ -73,57 +76,64 @@ def test_shortcuts_work_while_presenting(demo, qtbot, until) -> None:
     until(lambda: not demo.presenter.on)
 
 
-def test_escape_during_a_drag_gives_it_up_and_stays(demo, qtbot) -> None:
-    pad = demo.presenter.view.controls.pad
-    qtbot.mousePress(pad, LEFT, pos=pad.to_pixel(0.06, 0.06).toPoint())
-    qtbot.keyClick(pad, Qt.Key.Key_Escape)
+def test_escape_during_a_drag_gives_it_up_and_stays(demo, qtbot, until) -> None:
+    plotter = demo.membrane.plotter
+    qtbot.mousePress(plotter, LEFT, pos=QPoint(plotter.width() // 2, plotter.height() // 2))
+    assert demo.membrane.drag.holding
+    qtbot.keyClick(plotter, Qt.Key.Key_Escape)
     assert demo.presenter.on
-    qtbot.mouseRelease(pad, LEFT)
-    qtbot.keyClick(pad, Qt.Key.Key_Escape)
+    qtbot.mouseRelease(plotter, LEFT)
+    qtbot.keyClick(plotter, Qt.Key.Key_Escape)
     assert not demo.presenter.on
 
 
 @pytest.mark.full
-def test_a_drag_on_the_pad_moves_the_contact_and_the_cue_follows(demo, until, qtbot) -> None:
-    pad, count = demo.presenter.view.controls.pad, demo.history.stack.count()
+def test_a_drag_on_the_skin_moves_the_contact_and_the_cue_follows(
+    demo, until, qtbot, pixel_of
+) -> None:
+    plotter, count = demo.membrane.plotter, demo.history.stack.count()
     until(lambda: abs(demo.presenter.feedback.position[0] - 0.05) < 0.002)
-    start, end = pad.to_pixel(0.05, 0.05).toPoint(), pad.to_pixel(0.065, 0.04).toPoint()
-    qtbot.mousePress(pad, LEFT, pos=start)
+    start = pixel_of(demo, demo.membrane.drag.handles[0]) - QPoint(0, 8)
+    qtbot.mousePress(plotter, LEFT, pos=start)
     for step in range(1, 9):
-        qtbot.mouseMove(pad, start + (end - start) * step / 8)
+        qtbot.mouseMove(plotter, start + QPoint(5 * step, 0))
         qtbot.wait(20)
-    until(lambda: abs(demo.session.scene.stimuli[0].what.x - 0.065) < 0.001)
+    until(lambda: demo.session.scene.stimuli[0].what.x > 0.055)
+    ball = demo.session.scene.stimuli[0].what
     # The skin is inclined there: the ball touches it further out than where the hand is.
-    until(lambda: math.dist(demo.presenter.feedback.position, (0.0708, 0.0372)) < 0.0015)
-    assert math.dist(demo.session.estimate.true_contact, (0.0708, 0.0372)) < 0.001
-    qtbot.mouseRelease(pad, LEFT, pos=end)
+    until(lambda: demo.presenter.feedback.position[0] > ball.x + 0.001)
+    until(lambda: math.dist(demo.presenter.feedback.position, _touched(demo)) < 0.0015)
+    qtbot.mouseRelease(plotter, LEFT, pos=start + QPoint(40, 0))
     until(lambda: demo.history.stack.count() == count + 1)
-    until(lambda: abs(demo.session.scene.stimuli[0].what.x - 0.065) < 0.001)
+    until(lambda: abs(demo.session.scene.stimuli[0].what.x - ball.x) < 1e-4)
     demo.history.stack.undo()
     until(lambda: abs(demo.presenter.feedback.position[0] - 0.05) < 0.002)
 
 
+def _touched(demo):
+    return demo.session.estimate.true_contact
+
+
 @pytest.mark.full
 def test_pressing_harder_is_felt(demo, until, qtbot) -> None:
-    presenter = demo.presenter
-    pad, force = presenter.view.controls.pad, lambda: presenter.feedback.force
+    presenter, drag = demo.presenter, demo.membrane.drag
+    force = lambda: presenter.feedback.force  # noqa: E731
     until(lambda: abs(force() - 0.5) < 0.02)
     for _ in range(4):
-        qtbot.keyClick(pad, Qt.Key.Key_PageDown)
+        qtbot.keyClick(demo.focusWidget(), Qt.Key.Key_PageDown)
     lighter = 0.5 / 1.08**4
     until(lambda: abs(force() - lighter) < 0.02)
     until(lambda: f"{lighter:.2f} N" in presenter.view.controls.hand_text.words()[0].text)
-    until(lambda: not pad.holding)
+    until(lambda: not drag.holding)
     assert f"force = {lighter:.4g}" in demo.history.settings.written.text
     until(lambda: presenter.view.force.value.endswith(" N"))
 
 
 @pytest.mark.full
 def test_no_hand_presses_the_skin_out_of_the_picture(demo, until, qtbot) -> None:
-    pad = demo.presenter.view.controls.pad
     for _ in range(60):
-        qtbot.keyClick(pad, Qt.Key.Key_PageUp)
-    until(lambda: not pad.holding)
+        qtbot.keyClick(demo.focusWidget(), Qt.Key.Key_PageUp)
+    until(lambda: not demo.membrane.drag.holding)
     assert 0.5 < demo.session.scene.stimuli[0].what.force < 0.8
     until(lambda: demo.display.badge.state == "SIM")
     until(lambda: demo.presenter.feedback and 0.5 < demo.presenter.feedback.force < 0.8)
@@ -206,25 +216,23 @@ def test_nothing_that_touches_is_said_to_be_nothing(demo, until) -> None:
 
 def test_a_moving_simulation_of_the_panels_is_held_and_pressed_too(window, until, qtbot) -> None:
     window.presenter.enter()
-    view = window.presenter.view
-    pad = view.controls.pad
-    until(lambda: pad.hand is not None and pad.height() > 100)
-    assert not view.controls.objects.button(0).isVisible()
-    qtbot.mousePress(pad, LEFT, pos=pad.to_pixel(0.04, 0.06).toPoint())
-    qtbot.mouseRelease(pad, LEFT)
+    plotter, drag = window.membrane.plotter, window.membrane.drag
+    until(lambda: hand(window) is not None and len(drag.handles) == 1)
+    assert not window.presenter.view.controls.objects.button(0).isVisible()
+    qtbot.mouseClick(plotter, LEFT, pos=QPoint(plotter.width() // 2, plotter.height() // 2))
     settings = window.history.settings
-    assert (settings.load_case, settings.x) == ("point", pytest.approx(0.04, abs=0.001))
+    assert settings.load_case == "point"
     force = settings.force
-    qtbot.keyClick(pad, Qt.Key.Key_PageUp)
+    qtbot.keyClick(plotter, Qt.Key.Key_PageUp)
     until(lambda: window.history.settings.force == pytest.approx(1.08 * force))
-    until(lambda: not pad.holding)
+    until(lambda: not drag.holding)
 
 
 @pytest.mark.full
-def test_the_3d_arrow_is_still_dragged_while_presenting(demo, until, qtbot) -> None:
+def test_the_3d_arrow_is_still_dragged_while_presenting(demo, until, qtbot, pixel_of) -> None:
     until(lambda: len(demo.membrane.drag.handles) == 1)
     view = demo.membrane
-    start = view.drag.on_screen().toPoint() - QPoint(0, 8)
+    start = pixel_of(demo, view.drag.handles[0]) - QPoint(0, 8)
     qtbot.mousePress(view.plotter, LEFT, pos=start)
     qtbot.mouseMove(view.plotter, start + QPoint(30, 0))
     until(lambda: demo.session.scene.stimuli[0].what.x > 0.052)
@@ -235,7 +243,7 @@ def test_the_3d_arrow_is_still_dragged_while_presenting(demo, until, qtbot) -> N
 
 
 @pytest.mark.full
-def test_a_scene_that_is_refused_says_so_beside_the_pad_until_it_is_taken_back(
+def test_a_scene_that_is_refused_says_so_below_the_skin_until_it_is_taken_back(
     demo, until, qtbot
 ) -> None:
     told, objects = demo.presenter.view.controls.hand_text, demo.presenter.view.controls.objects
@@ -253,11 +261,11 @@ def test_a_scene_that_is_refused_says_so_beside_the_pad_until_it_is_taken_back(
 def test_two_points_pressed_harder_keep_their_share(window, until, qtbot) -> None:
     window.history.change("Two", -1, load_case="two-points", force=0.1)
     window.presenter.enter()
-    pad = window.presenter.view.controls.pad
-    until(lambda: pad.hand is not None and pad.hand.force == pytest.approx(0.05))
-    qtbot.keyClick(pad, Qt.Key.Key_PageUp)
+    until(lambda: hand(window) is not None and hand(window).force == pytest.approx(0.05))
+    until(lambda: len(window.membrane.drag.handles) == 2)
+    qtbot.keyClick(window.focusWidget(), Qt.Key.Key_PageUp)
     until(lambda: window.history.settings.force == pytest.approx(0.108))
-    until(lambda: not pad.holding)
+    until(lambda: not window.membrane.drag.holding)
 
 
 @pytest.mark.full

@@ -11,8 +11,7 @@ from PySide6.QtGui import QFontMetricsF
 
 from kappaskin_app.features.presenter.feedback import Feedback, RadiusEstimate
 from kappaskin_app.features.presenter.indicators import REMEDIES, age_in_words
-from kappaskin_app.features.presenter.pad import Hand
-from kappaskin_app.features.presenter.view import PresenterView
+from kappaskin_app.features.presenter.view import Hand, PresenterView
 from kappaskin_app.shell.badge import GAP, LIVE, LOST, OFF, SIM, STALE, WAITING
 from kappaskin_app.theme import THEMES, apply_look
 from kappaskin_app.widgets.colour_bar import SkinScale
@@ -139,7 +138,7 @@ _AT_150 = """
 from PySide6.QtWidgets import QApplication, QWidget
 app = QApplication([]); app.setStyle("Fusion")
 import sys; sys.path[:0] = [{here!r}]
-from kappaskin_app.features.presenter.view import PresenterView
+from kappaskin_app.features.presenter.view import Hand, PresenterView
 from kappaskin_app.features.presenter.feedback import Feedback, RadiusEstimate
 view = PresenterView(QWidget()); view.resize(1280, 720); view.present(True); view.show()
 assert view.devicePixelRatioF() == 1.5

@@ -1,0 +1,230 @@
+"""The mouse and keys on the skin move and press a simulated load, or else turn the camera."""
+
+import math
+
+import pytest
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtGui import QMouseEvent, QWheelEvent
+from PySide6.QtWidgets import QApplication
+
+from kappaskin_app.shell.window import MainWindow
+
+LEFT, RIGHT = Qt.MouseButton.LeftButton, Qt.MouseButton.RightButton
+NONE, SHIFT = Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ShiftModifier
+
+
+def move(window: MainWindow, at: QPoint, held=LEFT, keys=NONE) -> None:
+    plotter = window.membrane.plotter
+    there = QPointF(at), QPointF(plotter.mapToGlobal(at))
+    none = Qt.MouseButton.NoButton
+    QApplication.sendEvent(plotter, QMouseEvent(QEvent.Type.MouseMove, *there, none, held, keys))
+
+
+def notch(window: MainWindow, at: QPoint, times: int, held=LEFT) -> None:
+    plotter = window.membrane.plotter
+    there = QPointF(at), QPointF(plotter.mapToGlobal(at))
+    turned, phase = QPoint(0, 120 * times), Qt.ScrollPhase.NoScrollPhase
+    event = QWheelEvent(*there, QPoint(), turned, held, NONE, phase, False)
+    QApplication.sendEvent(plotter, event)
+
+
+@pytest.fixture(params=["window", "presenter"])
+def pressed(request: pytest.FixtureRequest, window: MainWindow, until) -> MainWindow:
+    """The window with a point load at rest, or the same in the presenter."""
+    window.history.change("Point", -1, load_case="point", x=0.05, y=0.05, force=0.1)
+    if request.param == "presenter":
+        window.presenter.enter()
+        until(lambda: window.membrane.plotter.height() > 300)
+        QApplication.processEvents()
+    until(lambda: window.membrane.drag.handles.tolist() == [[0.05, 0.05]])
+    until(lambda: abs(window.session.estimate.true_contact[0] - 0.05) < 1e-6)
+    return window
+
+
+def test_the_left_button_on_the_skin_presses_there_and_drags(
+    pressed, qtbot, until, pixel_of
+) -> None:
+    plotter, settings = pressed.membrane.plotter, pressed.history.settings
+    count, start = pressed.history.stack.count(), pixel_of(pressed, (0.03, 0.065))
+    move(pressed, start, held=Qt.MouseButton.NoButton)
+    until(lambda: pressed.selection.element >= 0)
+    qtbot.mousePress(plotter, LEFT, pos=start)
+    now = pressed.history.settings
+    assert (now.x, now.y) == pytest.approx((0.03, 0.065), abs=1e-3)
+    until(lambda: abs(pressed.session.estimate.true_contact[0] - now.x) < 1e-3)
+    assert pressed.selection.element == -1  # no element is marked under the held load
+    for step in range(1, 7):
+        move(pressed, start + QPoint(5 * step, 0))
+    dragged = pressed.history.settings
+    assert dragged.x > 0.033
+    notch(pressed, start + QPoint(30, 0), 3)
+    assert pressed.history.settings.force == pytest.approx(0.1 * 1.08**3)
+    move(pressed, start + QPoint(30, -40), keys=SHIFT)
+    pressing = pressed.history.settings
+    assert pressing.force == pytest.approx(0.1 * 1.08**3 * 1.01**40)
+    assert (pressing.x, pressing.y) == (dragged.x, dragged.y)
+    move(pressed, start + QPoint(31, -40))
+    after = pressed.history.settings
+    assert math.dist((after.x, after.y), (dragged.x, dragged.y)) < 0.002
+    qtbot.mouseRelease(plotter, LEFT, pos=start + QPoint(31, -40))
+    move(pressed, start, held=Qt.MouseButton.NoButton)
+    assert pressed.history.settings == after  # it stays where it was released
+    assert after.camera == settings.camera
+    assert pressed.history.stack.count() == count + 1
+    pressed.history.stack.undo()
+    assert pressed.history.settings == settings
+
+
+def test_escape_returns_the_load_that_is_held(pressed, qtbot, pixel_of) -> None:
+    plotter, settings = pressed.membrane.plotter, pressed.history.settings
+    qtbot.mousePress(plotter, LEFT, pos=pixel_of(pressed, (0.03, 0.06)))
+    assert pressed.history.settings != settings
+    presenting = pressed.presenter.on
+    qtbot.keyClick(plotter, Qt.Key.Key_Escape)
+    assert pressed.history.settings == settings
+    move(pressed, pixel_of(pressed, (0.07, 0.06)))
+    qtbot.mouseRelease(plotter, LEFT)
+    assert pressed.history.settings == settings
+    assert pressed.presenter.on == presenting
+
+
+def test_keys_move_and_press_the_load(pressed, qtbot, until) -> None:
+    if not pressed.presenter.on:  # which gives the view the keys itself
+        pressed.membrane.setFocus()
+    plotter, count = pressed.membrane.plotter, pressed.history.stack.count()
+    until(plotter.hasFocus)
+    for key in ("Right", "Right", "Down", "PageUp"):
+        qtbot.keyClick(plotter, getattr(Qt.Key, f"Key_{key}"))
+    settings = pressed.history.settings
+    assert (settings.x, settings.y) == pytest.approx((0.052, 0.049))
+    assert settings.force == pytest.approx(0.108)
+    until(lambda: not pressed.membrane.drag.holding)
+    assert pressed.history.stack.count() == count + 1
+
+
+def test_off_the_skin_and_with_the_right_button_the_mouse_turns_the_view(
+    pressed, qtbot, pixel_of
+) -> None:
+    plotter, settings = pressed.membrane.plotter, pressed.history.settings
+    for button, start in ((LEFT, QPoint(20, 20)), (RIGHT, pixel_of(pressed, (0.03, 0.06)))):
+        was = pressed.history.settings.camera
+        qtbot.mousePress(plotter, button, pos=start)
+        for step in range(1, 5):
+            move(pressed, start + QPoint(15 * step, 4 * step), held=button)
+        qtbot.mouseRelease(plotter, button, pos=start + QPoint(60, 16))
+        now = pressed.history.settings
+        assert now.camera != was
+        # It turned: the distance from what it looks at is the same.
+        far = [math.dist(camera[:3], camera[3:6]) for camera in (was, now.camera) if camera]
+        assert far == pytest.approx([far[0]] * len(far))
+        assert (now.x, now.y, now.force) == (settings.x, settings.y, settings.force)
+
+
+def test_the_cursor_shows_what_the_left_button_does(pressed, until, pixel_of) -> None:
+    plotter, none = pressed.membrane.plotter, Qt.MouseButton.NoButton
+    tip = pixel_of(pressed, (0.05, 0.05))
+    for at, shape in (
+        (pixel_of(pressed, (0.02, 0.08)), Qt.CursorShape.CrossCursor),
+        (tip - QPoint(0, 8), Qt.CursorShape.OpenHandCursor),
+        (QPoint(20, 20), Qt.CursorShape.ArrowCursor),
+    ):
+        move(pressed, at, held=none)
+        until(lambda shape=shape: plotter.cursor().shape() == shape)
+
+
+def test_a_right_click_selects_the_element_and_moves_nothing(
+    window, qtbot, until, pixel_of
+) -> None:
+    window.history.change("Point", -1, load_case="point", x=0.05, y=0.05)
+    until(lambda: window.membrane.drag.handles.tolist() == [[0.05, 0.05]])
+    settings = window.history.settings
+    qtbot.mouseClick(window.membrane.plotter, RIGHT, pos=pixel_of(window, (0.03, 0.07)))
+    positions = window.session.status.sensor.layout.positions
+    found = positions[window.selected_element.element]
+    assert found == pytest.approx((0.03, 0.07), abs=0.006)
+    assert window.history.settings == settings
+
+
+def test_while_measuring_a_click_measures_and_presses_nothing(
+    window, qtbot, until, pixel_of
+) -> None:
+    until(lambda: len(window.membrane.drag.handles) == 1)
+    settings = window.history.settings
+    window.actions_by_name["measure"].trigger()
+    qtbot.mouseClick(window.membrane.plotter, LEFT, pos=pixel_of(window, (0.02, 0.02)))
+    ((x, y),) = window.view.measurement.places
+    assert (x, y) == pytest.approx((0.02, 0.02), abs=2e-3)
+    assert window.history.settings == settings
+    window.actions_by_name["measure"].trigger()
+    qtbot.mousePress(window.membrane.plotter, LEFT, pos=pixel_of(window, (0.03, 0.03)))
+    assert window.history.settings.x == pytest.approx(0.03, abs=2e-3)
+    qtbot.mouseRelease(window.membrane.plotter, LEFT)
+
+
+def test_on_a_recording_the_left_button_turns_the_view(
+    opened, recording, until, qtbot, pixel_of
+) -> None:
+    window = opened(f"replay:{recording}")
+    until(lambda: window.display.badge.state.startswith("REPLAY") and window.session.estimate)
+    until(lambda: len(window.membrane.ages) > 2)
+    plotter, start = window.membrane.plotter, pixel_of(window, (0.03, 0.06))
+    move(window, start, held=Qt.MouseButton.NoButton)
+    qtbot.mousePress(plotter, LEFT, pos=start)
+    for step in range(1, 5):
+        move(window, start + QPoint(15 * step, 4 * step))
+    qtbot.mouseRelease(plotter, LEFT, pos=start + QPoint(60, 16))
+    assert window.history.settings.camera
+    assert plotter.cursor().shape() == Qt.CursorShape.ArrowCursor
+
+
+def shown(window: MainWindow) -> set[str]:
+    return {name for name, button in window.legend.buttons.items() if button.isVisible()}
+
+
+def test_the_legend_hides_what_is_clicked_and_shows_it_again(window, until, qtbot) -> None:
+    membrane, legend = window.membrane, window.legend.buttons
+    actors = {
+        "show_fit": membrane.surface.actor,
+        "show_truth": membrane._truth.actor,  # noqa: SLF001
+        "show_contact": membrane._contacts[0],  # noqa: SLF001
+        "show_elements": membrane._elements_actor,  # noqa: SLF001
+        "show_load": membrane._loads._arrows[0],  # noqa: SLF001
+    }
+    until(lambda: all(actor.visibility for actor in actors.values()))
+    until(lambda: actors.keys() < shown(window))
+    for name, actor in actors.items():
+        qtbot.mouseClick(legend[name], LEFT)
+        until(lambda actor=actor: not actor.visibility)
+        assert legend[name].font().strikeOut()
+        legend[name].setFocus(Qt.FocusReason.TabFocusReason)
+        qtbot.keyClick(legend[name], Qt.Key.Key_Space)
+        until(lambda actor=actor: actor.visibility)
+        assert not legend[name].font().strikeOut()
+    assert legend["show_fit"].focusPolicy() & Qt.FocusPolicy.TabFocus
+
+
+def test_the_legend_names_what_the_source_has(opened, recording, until) -> None:
+    window = opened("sim:demo")
+    always = {"show_fit", "show_elements", "show_contact", "show_frame", "show_object"}
+    until(lambda: shown(window) == always | {"show_truth", "show_pressed", "show_load"})
+    window.session.connect_to(f"replay:{recording}")
+    until(lambda: shown(window) == always | {"show_truth"})
+
+
+def test_what_is_hidden_while_a_recording_is_paused_is_hidden_at_once(
+    opened, recording, until, qtbot
+) -> None:
+    window = opened(f"replay:{recording}")
+    until(lambda: window.display.badge.state.startswith("REPLAY") and window.session.estimate)
+    window.playback.go(False)
+    window.playback.seek(0.3)
+    until(lambda: window.session.status.replay.at == 0.3)
+    truth = window.membrane._truth.actor  # noqa: SLF001
+    until(lambda: truth.visibility)
+    qtbot.wait(300)
+    drawn = len(window.membrane.ages)
+    for shown in (False, True):
+        qtbot.mouseClick(window.legend.buttons["show_truth"], LEFT)
+        until(lambda shown=shown: bool(truth.visibility) == shown, 5.0)
+    qtbot.wait(300)
+    assert len(window.membrane.ages) == drawn  # the frame counts once, and its age stays unknown
