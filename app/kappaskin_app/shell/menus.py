@@ -1,6 +1,5 @@
 """Menus: the shell's own actions, undo and redo, the finder and the shortcuts."""
 
-from collections.abc import Callable
 from functools import partial
 
 from PySide6.QtCore import QObject, Signal
@@ -16,31 +15,21 @@ from kappaskin_app.widgets.parts import ELLIPSIS, plain_tip
 
 _LONGEST = 60  # characters of a step in a menu
 _TIPS = {
-    "undo": "Undo the last change of a setting, scene or layout; readings continue",
+    "undo": "Undo the last change of a setting or scene; readings continue",
     "redo": "Repeat the change that was undone last",
 }
 
 
 class UndoActions(QObject):
-    """The actions Undo and Redo of a `stack`; `settle` first records pending changes."""
+    """The actions Undo and Redo of a `stack`."""
 
-    def __init__(
-        self, stack: QUndoStack, settle: Callable[[], object], actions: Actions, menu: str
-    ) -> None:
+    def __init__(self, stack: QUndoStack, actions: Actions, menu: str) -> None:
         super().__init__(stack)
-        self._stack, self._settle, self._actions = stack, settle, actions
-        actions.add("undo", menu, "&Undo", self._undo, "Ctrl+Z", _TIPS["undo"])
-        actions.add("redo", menu, "&Redo", self._redo, "Ctrl+Shift+Z", _TIPS["redo"])
+        self._stack, self._actions = stack, actions
+        actions.add("undo", menu, "&Undo", stack.undo, "Ctrl+Z", _TIPS["undo"])
+        actions.add("redo", menu, "&Redo", stack.redo, "Ctrl+Shift+Z", _TIPS["redo"])
         stack.indexChanged.connect(guarded(self._show))
         self._show()
-
-    def _undo(self) -> None:
-        self._settle()
-        self._stack.undo()
-
-    def _redo(self) -> None:
-        self._settle()
-        self._stack.redo()
 
     def _show(self, *_: object) -> None:
         for name, text in (("undo", self._stack.undoText()), ("redo", self._stack.redoText())):
@@ -52,7 +41,10 @@ class UndoActions(QObject):
 
 
 _FIND = "Find commands, settings, scenes, panels and files by a few letters"
-_RESET = "All settings to their defaults, except calibration, tare and publishing"
+_RESET = (
+    "All settings to their defaults, except calibration, tare, publishing and the look of the "
+    "window"
+)
 _PAUSE = "Pause or continue a scene or a recording; a sensor is not paused"
 _THEME = "Switch between the light and the dark theme"
 _QUIT = "Close the program; asks for confirmation during a recording"
@@ -88,9 +80,7 @@ class Menus(QObject):
         )
         self.finder = Finder(lambda: entries_in(window, self.entry_sources), window)
         add = window.actions_by_name.add
-        self.undoing = UndoActions(
-            window.history.stack, window.layouts.note, window.actions_by_name, EDIT
-        )
+        self.undoing = UndoActions(window.history.stack, window.actions_by_name, EDIT)
         add("reset", EDIT, "&Reset settings", window.requests.reset, "", _RESET)
         find = self.finder.open_empty
         add("find", EDIT, f"&Find a command{ELLIPSIS}", find, "Ctrl+K", _FIND)
@@ -108,7 +98,7 @@ class Menus(QObject):
         add("last-panels", VIEW, "&Previous panels", before, "Ctrl+PgUp", _PREVIOUS)
         window.docks.add_actions(window.actions_by_name, VIEW)
         window.layouts.add_actions(window.actions_by_name)
-        self.shortcuts = ShortcutDialog(window.actions_by_name, window.history, window)
+        self.shortcuts = ShortcutDialog(window.actions_by_name, window)
         add("shortcuts", HELP, "&Shortcuts", self.shortcuts.open_all, "F1", _SHEET)
         add("begin", HELP, "&Welcome", self.welcome.offer, "", _WELCOME)
         window.actions_by_name.drop_empty_menus()

@@ -89,7 +89,6 @@ class MainWindow(Parts):
         )
         self.panels.build()
         self.menus.finish()
-        self.layouts.begin()
         self.display.centre.banner.shown.connect(guarded(self.actions_by_name.update_tips))
         self._show_settings(self.history.settings, anew=True)
         self.resize(1280, 800)

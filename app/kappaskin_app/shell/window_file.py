@@ -4,7 +4,7 @@ import itertools
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -326,7 +326,7 @@ class WindowSaver(QObject):
             window.showMaximized()
         chosen = {"show_start": state.start, "letters": state.letters}
         chosen |= {"theme": state.theme} if state.theme else {}
-        window.history.apply(replace(window.history.settings, **chosen))
+        window.history.change("", **chosen)
         window.opening.recent = [Path(file) for file in state.files]
         self._menus.finder.recent = list(state.done)
         window.layouts.own = dict(state.own)

@@ -46,7 +46,6 @@ class SceneFeature:
         )
         shell.docks.put_below("scene", "Scene", self.scene, "F2", _ABOUT, height=0.38)
         shell.display.centre.add_below(self.timeline)
-        shell.layouts.pages.append(self.scene)
         self._wire(shell)
         self._add_actions(shell)
 

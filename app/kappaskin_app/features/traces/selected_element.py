@@ -187,15 +187,9 @@ class SelectedElement(QObject):
         selection.chosen.connect(guarded(self._select_chosen))
 
     def select(self, element: int) -> None:
-        """Select an element, as an undoable step."""
+        """Select an element; -1 for none."""
         self.selected.emit(element)
-        if element != self.element:
-            self._history.step(f"select element {element}", self._set, self.element, element)
-
-    def _set(self, element: int) -> None:
-        """Show an element; none if the connected sensor has fewer."""
-        sensor = self._session.status.sensor
-        self.element = element if sensor is not None and element < len(sensor.layout) else -1
+        self.element = element
         self._next_plots = self._next_facts = self._next_spectrum = 0.0
         if self.element < 0:
             self.panel.show_facts("", "")

@@ -27,9 +27,20 @@ class Camera:
 
 
 @dataclass(frozen=True)
-class TextSize:
-    """The text size of the window."""
+class Look:
+    """The look of the window: kept from one start to the next, and not part of undo."""
 
+    theme: str = setting(
+        "dark", Choice("Theme", "Colours of the window.", (("light", "Light"), ("dark", "Dark")))
+    )
+    show_start: bool = setting(
+        True,
+        Switch(
+            "Welcome",
+            "Show when the window opens how to start: with a scene, a sensor, a lesson or a "
+            "recording.",
+        ),
+    )
     letters: float = setting(
         100.0,
         Range(
@@ -224,17 +235,6 @@ class View(ColourRanges):
     to_y: float = setting(1.0, _cut("To", "y"))
     from_z: float = setting(0.0, _cut_level("From", "below"))
     to_z: float = setting(1.0, _cut_level("To", "above"))
-    theme: str = setting(
-        "dark", Choice("Theme", "Colours of the window.", (("light", "Light"), ("dark", "Dark")))
-    )
-    show_start: bool = setting(
-        True,
-        Switch(
-            "Welcome",
-            "Show when the window opens how to start: with a scene, a sensor, a lesson or a "
-            "recording.",
-        ),
-    )
     traced: tuple[int, ...] = ()  # elements whose last seconds are drawn
     strips: tuple[str, ...] = ("force", "displacement")  # quantities drawn over time
     strip_seconds: float = 60.0
