@@ -39,11 +39,12 @@ from kappaskin_app.shell.settings.form_fields import Choice, FormField, Range, S
 from kappaskin_app.widgets.parts import Label
 
 _ITS = QKeySequence.StandardKey
-_LEFT = (_ITS.Undo, _ITS.Redo, _ITS.DeleteEndOfLine)  # the last is Ctrl+K to an editor
+# To an editor Ctrl+K, Ctrl+E and Ctrl+U are the last ones.
+_LEFT = (_ITS.Undo, _ITS.Redo, _ITS.DeleteEndOfLine, _ITS.MoveToEndOfLine, _ITS.DeleteCompleteLine)
 
 
 def for_the_window(event: QEvent) -> bool:
-    """Whether an event asks an editor for a shortcut of the window: undo, redo, Ctrl+K."""
+    """Whether an event asks an editor for a shortcut of the window, as Undo or Ctrl+K."""
     return (
         event.type() == QEvent.Type.ShortcutOverride
         and isinstance(event, QKeyEvent)

@@ -100,7 +100,7 @@ def test_every_action_can_be_taken_and_its_settings_undone_and_redone(
             assert history.settings == wanted, (name, way)
             assert _seen(window) == seen, (name, way)
         changed |= {name} if after != before else set()
-    assert {"look-from-above", "calibrate"} < changed
+    assert {"look-from-above", "band"} < changed
     window.session.request_source("sim:")
     until(lambda: window.display.badge.state == "SIM")
 
