@@ -73,7 +73,9 @@ class Layouts(QObject):
         for name, (tip, _) in self._ready.items():
             act = partial(self.choose, name)
             add(f"layout-{name.lower()}", text=f"&{name}", act=act, tip=tip)
-        own = add("layout-own", text="Your &own", act=lambda: None, tip="Layouts you saved")
+        own = add(
+            "layout-own", text="Saved la&youts", act=lambda: None, tip="Layouts that you saved"
+        )
         own.setMenu(self._menu)
         for name, text, act, tip in (
             (
@@ -206,4 +208,4 @@ class Layouts(QObject):
             action = self._menu.addAction(name.replace("&", "&&"))
             action.triggered.connect(guarded(lambda *_, name=name: self.choose(name)))
         if self._menu.isEmpty():
-            self._menu.addAction("None yet: save one").setEnabled(False)
+            self._menu.addAction("No saved layout yet").setEnabled(False)

@@ -18,7 +18,7 @@ from kappaskin_app.shell.actions import Actions, plain
 from kappaskin_app.shell.finder import Listing, best, clearable, row, score
 from kappaskin_app.widgets.parts import Label, button, in_a_row
 
-_MOUSE = "Drag the red arrow to move the load, drag elsewhere to turn, wheel to zoom."
+_MOUSE = "Drag the red arrow to move the load, drag elsewhere to rotate the view, wheel to zoom."
 _SIZE = 620, 640  # px
 _MENU = 150  # px
 
@@ -148,12 +148,14 @@ class ShortcutDialog(QDialog):
             return
         self._finish()
         words = plain(self._actions[name].text())
-        self.message.setText(f"{words} is {key} now." if key else f"{words} has no shortcut now.")
+        self.message.setText(
+            f"{words} has the shortcut {key} now." if key else f"{words} has no shortcut now."
+        )
 
     def _reset_all(self) -> None:
         self._actions.take_keys({})
         self._finish()
-        self.message.setText("All shortcuts are the defaults again.")
+        self.message.setText("All shortcuts are reset to their defaults.")
 
     def _finish(self) -> None:
         self._list()

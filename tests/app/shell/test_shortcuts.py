@@ -75,7 +75,7 @@ def test_a_shortcut_is_found_changed_and_reset_with_the_keyboard(
     qtbot.keyClick(sheet.edit, Qt.Key.Key_J, CONTROL)
     until(lambda: _shown(sheet) == ["Ctrl+J *"])
     assert actions.key("theme") == "Ctrl+J"
-    assert "Theme is Ctrl+J now." in sheet.message.text()
+    assert "Theme has the shortcut Ctrl+J now." in sheet.message.text()
     qtbot.keyClick(sheet.edit, Qt.Key.Key_S, CONTROL)
     until(lambda: "Ctrl+S belongs to Picture" in sheet.message.text())
     assert sheet.edit.keySequence().toString() == "Ctrl+J"

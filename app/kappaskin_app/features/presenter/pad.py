@@ -122,7 +122,7 @@ class Pad(Indicator):
         self.setAccessibleName("Pad: drag to move the object, wheel to press harder")
         self.setToolTip(
             "Drag to move the object; wheel, or Shift and drag, to press harder. Arrow keys move, "
-            "Page Up and Page Down press, Escape cancels."
+            "Page Up and Page Down press, Esc cancels."
         )
         self.setCursor(Qt.CursorShape.CrossCursor)
         self._patch: Patch | None = None
