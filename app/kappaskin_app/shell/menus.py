@@ -3,15 +3,16 @@
 from functools import partial
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtGui import QUndoStack
+from PySide6.QtGui import QActionGroup, QUndoStack
 
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.actions import Actions
+from kappaskin_app.shell.actions import WITHIN, Actions
 from kappaskin_app.shell.finder import EntrySource, Finder, entries_in
 from kappaskin_app.shell.parts import EDIT, FILE, HELP, VIEW, Parts
 from kappaskin_app.shell.shortcuts import ShortcutDialog
 from kappaskin_app.shell.welcome import Welcome
 from kappaskin_app.widgets.parts import ELLIPSIS, plain_tip
+from kappaskin_app.widgets.text import ERROR_BARS
 
 _LONGEST = 60  # characters of a step in a menu
 _TIPS = {
@@ -47,6 +48,11 @@ _RESET = (
 )
 _PAUSE = "Pause or continue a scene or a recording; a sensor is not paused"
 _THEME = "Switch between the light and the dark theme"
+_BARS = f"{VIEW}{WITHIN}&Error bars"
+_BARS_TIP = (
+    "Error bars of all views: 1 \u03c3, the standard deviation, or the half width of the 95 % "
+    "interval; files and messages always have standard deviations"
+)
 _QUIT = "Close the program; asks for confirmation during a recording"
 _NEXT = "Next page of Settings: Live, Skin, Sensor, Calibrate"
 _PREVIOUS = "Previous page of Settings"
@@ -85,7 +91,21 @@ class Menus(QObject):
         find = self.finder.open_empty
         add("find", EDIT, f"&Find a command{ELLIPSIS}", find, "Ctrl+K", _FIND)
         add("pause", VIEW, "&Pause or continue", window.session.pause, "Ctrl+P", _PAUSE)
-        add("theme", VIEW, "Light or &dark", window.requests.switch_theme, "Ctrl+T", _THEME)
+        add("theme", VIEW, "Light or &dark theme", window.requests.switch_theme, "Ctrl+T", _THEME)
+        self._add_error_bars()
+
+    def _add_error_bars(self) -> None:
+        """Register an action for each kind of error bars, of which the one in use is checked."""
+        window, kinds = self._window, QActionGroup(self)
+        for name, bars in ERROR_BARS.items():
+            use = partial(window.requests.set, "error_bars", name)
+            title = f"Error bars: {bars.title}"
+            action = window.actions_by_name.add(f"bars-{name}", _BARS, title, use, "", _BARS_TIP)
+            action.setCheckable(True)
+            kinds.addAction(action)
+            window.settings_shown.connect(
+                lambda s, a=action, n=name: a.setChecked(s.error_bars == n)
+            )
 
     def finish(self) -> None:
         """Register the actions that follow those of features."""
@@ -94,8 +114,8 @@ class Menus(QObject):
         recent.setMenu(window.opening.menu)
         add("quit", FILE, "&Quit", self.quit_requested.emit, "Ctrl+Q", _QUIT)
         after, before = (partial(window.panels.turn, pages) for pages in (1, -1))
-        add("next-panels", VIEW, "&Next panels", after, "Ctrl+PgDown", _NEXT)
-        add("last-panels", VIEW, "&Previous panels", before, "Ctrl+PgUp", _PREVIOUS)
+        add("next-panels", VIEW, "&Next settings page", after, "Ctrl+PgDown", _NEXT)
+        add("last-panels", VIEW, "&Previous settings page", before, "Ctrl+PgUp", _PREVIOUS)
         window.docks.add_actions(window.actions_by_name, VIEW)
         window.layouts.add_actions(window.actions_by_name)
         self.shortcuts = ShortcutDialog(window.actions_by_name, window)

@@ -144,7 +144,8 @@ class SkinScale(QWidget):
         self._symbol = ""
         self.times = Label(alignment=Qt.AlignmentFlag.AlignHCenter)  # pyright: ignore[reportCallIssue]
         self.times.setToolTip(
-            "Vertical exaggeration in use: the one set under View, or less where it would not fit."
+            "Vertical exaggeration in use: the one set under View, or less where it would not fit. "
+            "Errors: of the error band and of the cone of the contact frame."
         )
         around = QVBoxLayout(self)
         around.setContentsMargins(0, 4, 0, 4)
@@ -166,8 +167,9 @@ class SkinScale(QWidget):
             self.what.setText(f"<b>{symbol}</b>")
             self.what.setToolTip(tip)
 
-    def show_times(self, times: float) -> None:
-        """Show the vertical exaggeration."""
+    def show_times(self, times: float, bars: str = "") -> None:
+        """Show the vertical exaggeration, and which error `bars` are drawn if any are."""
         text = f"height\n\N{MULTIPLICATION SIGN} {times:.3g}"
+        text += f"\nerrors\n{bars}" if bars else ""
         if text != self.times.text():
             self.times.setText(text)

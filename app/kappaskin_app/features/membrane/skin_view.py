@@ -20,6 +20,7 @@ from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings, locked_at
 from kappaskin_app.theme import DIVERGING, current, follow_look
 from kappaskin_app.widgets.colour_bar import SkinScale
+from kappaskin_app.widgets.text import ErrorBars
 from kappaskin_app.widgets.tint import Tint
 
 _MARKS = 0.06  # s between two updates of the marks
@@ -144,7 +145,8 @@ class SkinView(QObject):
         self.membrane.show_estimate(estimate, values, tint.limits, times)
         self.scale.bar.show_tint(tint, beside)
         self.scale.show_what("" if tint.unit == "shape" else shade.symbol, shade.tip)
-        self.scale.show_times(times)
+        barred = self._settings.show_band or self._settings.show_frame
+        self.scale.show_times(times, ErrorBars.now.label if barred else "")
 
     def _show_reason(self, name: str, values: NDArray[np.generic]) -> None:
         """Show in the view why there are no colours."""

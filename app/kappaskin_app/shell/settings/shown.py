@@ -30,6 +30,7 @@ class Camera:
 class Look:
     """The look of the window: kept from one start to the next, and not part of undo."""
 
+    error_bars: str = "sigma"  # of `ERROR_BARS`
     theme: str = setting(
         "dark", Choice("Theme", "Colours of the window.", (("light", "Light"), ("dark", "Dark")))
     )
@@ -198,9 +199,9 @@ class View(ColourRanges):
         False,
         Switch(
             "Error band",
-            "Two translucent surfaces, two standard deviations below and above the estimated one: "
-            "the true surface lies between them at about 95 % of the points, as far as noise is "
-            "the only error.",
+            "Two translucent surfaces, one error bar (\N{PLUS-MINUS SIGN}1 \u03c3 or 95 %, menu "
+            "View) below and above the estimated one: the true surface lies between them at "
+            "about 68 or 95 % of the points, as far as noise is the only error.",
         ),
     )
     show_frame: bool = setting(
@@ -208,8 +209,9 @@ class View(ColourRanges):
         Switch(
             "Contact frame",
             "Normal of the skin at the contact (green) and the two principal directions (orange, "
-            "blue). The cone is the 95 % confidence region of the normal, from the standard "
-            "deviations of the slopes; it has the vertical exaggeration of the skin.",
+            "blue). The cone contains the normals whose slopes differ by one error bar "
+            "(\N{PLUS-MINUS SIGN}1 \u03c3 or 95 %, menu View); it has the vertical "
+            "exaggeration of the skin.",
         ),
     )
     show_object: bool = setting(
