@@ -17,7 +17,7 @@ def keys() -> str:
     """A row for each key of a message about a contact."""
     rows = SWITCHES | {number.key: number.text for number in CONTACT}
     keys = ", ".join(f"`{number.key}`" for number in SECOND)
-    rows |= {"second": f"null, or a weaker contact that is told beside the first: {keys}"}
+    rows |= {"second": f"null, or a weaker contact besides the first: {keys}"}
     return "".join(f"| `{key}` | {text} |\n" for key, text in rows.items())
 
 

@@ -27,6 +27,8 @@ NONE = "\N{EN DASH}"
 """What is shown where nothing is known."""
 NO_FORCE = "edge: no force"
 """What is shown instead of the force of a contact near a held edge, which does not determine it."""
+ONE_SIGMA = "\N{PLUS-MINUS SIGN}1 \u03c3"
+"""The error bars of commands, files and messages: one standard deviation."""
 _EXACT = 1e-9  # of a value, or of its unit: a smaller error is of rounding
 _UNKNOWN = 1e9  # of the unit: a value or an error as large is no result
 

@@ -75,8 +75,8 @@ class Badge(Label):
             lost = f"{recorded.lost:,} lost"
             also = [f"REC {lost if recorded.lost else elapsed(recorded.seconds)}"]
             tips.append(
-                f"Recording to {recorded.path}: {file_size(recorded.size)}, {lost} by a slow disk. "
-                "Ctrl+R stops."
+                f"Recording to {recorded.path}: {file_size(recorded.size)}, {lost} because of a "
+                "slow disk. Ctrl+R stops."
             )
         self.setText("\n".join([*parts, *also][:2]))
         self.setAccessibleName(", ".join([*parts, *["recording"] * recorded.active]))

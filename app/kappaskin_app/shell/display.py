@@ -24,6 +24,7 @@ from kappaskin_app.shell.colouring import Colouring, Ranges
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.status_bar import Notice, StatusBar, SteadySlope, warnings
+from kappaskin_app.widgets.parts import capital
 from kappaskin_app.widgets.tint import Tint
 
 _OLD = (LOST, OFF, STALE, WAITING, GAP)  # the values shown are not the present ones
@@ -145,7 +146,7 @@ class Display(QObject):
             texts.append(warnings(estimate, int(crossed.sum()), method, slope))
         if (pace := self._session.status.pace) < _SLOW:
             texts.append(f"simulated at {pace:.1f} x real time: this computer is not fast enough")
-        self.notice.show_warning("; ".join(filter(None, texts)))
+        self.notice.show_warning(capital("; ".join(filter(None, texts))))
 
     def estimate_shown(self) -> Estimate | None:
         """The newest estimate, None while it is old."""

@@ -170,7 +170,10 @@ def _files(window: Parts) -> Iterator[FinderEntry]:
 def _layouts(window: Parts) -> Iterator[FinderEntry]:
     for name in window.layouts.own:
         yield FinderEntry(
-            f"layout:{name}", name, "Layout menu, Your own", partial(window.layouts.choose, name)
+            f"layout:{name}",
+            name,
+            "Layout menu, Saved layouts",
+            partial(window.layouts.choose, name),
         )
 
 
@@ -181,6 +184,7 @@ _ELSEWHERE = 0.4  # of the points, for what is found only in the place of an ent
 _SYNONYMS = {
     "baud": "connection",
     "capture": "record picture",
+    "confidence": "error",
     "csv": "export copy",
     "dark": "theme",
     "data": "export",
@@ -199,9 +203,11 @@ _SYNONYMS = {
     "ros": "publish",
     "screenshot": "picture",
     "serial": "connect connection",
+    "sigma": "error",
     "stream": "publish",
     "table": "export numbers",
     "udp": "publish",
+    "uncertainty": "error",
     "usb": "connect connection",
     "video": "film",
     "zero": "tare",

@@ -34,16 +34,17 @@ from PySide6.QtWidgets import (
 
 from kappaskin.live import Status
 from kappaskin_app.shell.panel import Panel
-from kappaskin_app.shell.settings import Settings, form_field
+from kappaskin_app.shell.settings import Look, Settings, form_field
 from kappaskin_app.shell.settings.form_fields import Choice, FormField, Range, Several, Switch, Text
 from kappaskin_app.widgets.parts import Label
 
 _ITS = QKeySequence.StandardKey
-_LEFT = (_ITS.Undo, _ITS.Redo, _ITS.DeleteEndOfLine)  # the last is Ctrl+K to an editor
+# To an editor Ctrl+K, Ctrl+E and Ctrl+U are the last ones.
+_LEFT = (_ITS.Undo, _ITS.Redo, _ITS.DeleteEndOfLine, _ITS.MoveToEndOfLine, _ITS.DeleteCompleteLine)
 
 
 def for_the_window(event: QEvent) -> bool:
-    """Whether an event asks an editor for a shortcut of the window: undo, redo, Ctrl+K."""
+    """Whether an event asks an editor for a shortcut of the window, as Undo or Ctrl+K."""
     return (
         event.type() == QEvent.Type.ShortcutOverride
         and isinstance(event, QKeyEvent)
@@ -345,7 +346,8 @@ class Form(Panel):
         self.reset = QToolButton(text="Reset")  # pyright: ignore[reportCallIssue]
         self.reset.setAccessibleName(f"Reset {title}")
         self.reset.setToolTip("Reset the settings of this panel; Ctrl+Z undoes it.")
-        self.reset.clicked.connect(lambda: self.reset_wanted.emit(title, self.names))
+        self._undoable = tuple(name for name in names if not hasattr(Look, name))
+        self.reset.clicked.connect(lambda: self.reset_wanted.emit(title, self._undoable))
         self.reset.hide()
         self._corner.insertWidget(0, self.reset)
 
@@ -383,7 +385,7 @@ class Form(Panel):
             with QSignalBlocker(editor.widget):
                 editor.show(getattr(settings, name))
         self.reset.setVisible(
-            any(getattr(settings, name) != getattr(_AT_FIRST, name) for name in self._editors)
+            any(getattr(settings, name) != getattr(_AT_FIRST, name) for name in self._undoable)
         )
         self.place_corner()
 

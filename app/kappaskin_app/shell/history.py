@@ -1,18 +1,19 @@
-"""The history of the settings: every change is an undoable command."""
+"""The history of the settings: every change but of the look is an undoable command."""
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 from typing import Any, TypeVar
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoCommand, QUndoStack
 
-from kappaskin_app.shell.settings import Settings, change_text
+from kappaskin_app.shell.settings import Look, Settings, change_text
 
 _IN_A_ROW = 1.0  # s from one change of a setting to the next
 _MOST = 500  # steps that can be undone: a scene's text may be a megabyte
+_LOOK = {field.name for field in fields(Look)}
 _Some = TypeVar("_Some")
 Description = Callable[[_Some, _Some], str]
 
@@ -58,7 +59,7 @@ class _Step(QUndoCommand):
 class History(QObject):
     """Holds the `settings`; `changed` reports new ones.
 
-    Its `stack` also has the steps that are not settings.
+    What is undone or redone leaves the look of the window as it is.
     """
 
     changed = Signal(Settings)
@@ -94,6 +95,9 @@ class History(QObject):
     def _change(
         self, describe: Description[Settings], gesture: int, values: dict[str, Any]
     ) -> None:
+        look = {name: values.pop(name) for name in _LOOK & values.keys()}
+        if (dressed := replace(self.settings, **look)) != self.settings:
+            self._take(dressed)
         after = replace(self.settings, **values)
         if after != self.settings:
             self.stack.push(_Step(self.apply, self.settings, after, describe, gesture))
@@ -101,7 +105,7 @@ class History(QObject):
     def step(
         self, text: str, apply: Callable[[_Some], object], before: _Some, after: _Some
     ) -> None:
-        """Apply a change that is not a setting, as one command called `text`."""
+        """Apply a change of settings with more that belongs to it, as one command called `text`."""
         self.stack.push(_Step(apply, before, after, lambda *_: text, -1))
 
     def cancel(self, gesture: int) -> None:
@@ -114,7 +118,10 @@ class History(QObject):
             self.apply(before)
 
     def apply(self, settings: Settings) -> None:
-        """For commands only: make `settings` the present ones."""
+        """For commands only: make `settings` the present ones, except for the look."""
+        self._take(replace(settings, **{name: getattr(self.settings, name) for name in _LOOK}))
+
+    def _take(self, settings: Settings) -> None:
         self._requested = ""  # an undo or redo ends a row of requests
         self.settings = settings
         self.changed.emit(settings)

@@ -13,7 +13,6 @@ from kappaskin.errors import Refusal
 from kappaskin.live import Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.folders import proposed
-from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.work_dialog import with_ending
 from kappaskin_app.widgets.parts import plain_tip
@@ -72,9 +71,9 @@ class Opening(QObject):
     notified = Signal(str)
     changed = Signal()
 
-    def __init__(self, window: QWidget, history: History, session: Session) -> None:
+    def __init__(self, window: QWidget, session: Session) -> None:
         super().__init__(window)
-        self._history, self._session = history, session
+        self._session = session
         self._kinds: list[Kind] = []
         self.others: Callable[[], list[Path]] = list
         """Files listed after the recent ones."""
@@ -155,10 +154,7 @@ class Opening(QObject):
 
     def clear(self) -> None:
         """Clear the list of recent files."""
-        self._history.step("clear the recent files", self._restore, self.recent, [])
-
-    def _restore(self, recent: list[Path]) -> None:
-        self.recent = recent
+        self.recent = []
         self.changed.emit()
 
     def last_ones(self) -> list[Path]:

@@ -51,8 +51,8 @@ class Parts(QMainWindow):
         self.display = Display(self.session, self.tasks, self)
         self.actions_by_name = Actions(self, MENUS)
         self.docks, self.panels = Docks(self), Pages()
-        self.opening = Opening(self, self.history, self.session)
-        self.layouts = Layouts(self, self.docks, self.panels, self.history)
+        self.opening = Opening(self, self.session)
+        self.layouts = Layouts(self, self.docks, self.panels)
 
     def notify(self, text: str) -> None:
         """Show a message for some seconds."""

@@ -6,7 +6,7 @@ from typing import Any
 
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
-from kappaskin_app.shell.settings import Settings, locking
+from kappaskin_app.shell.settings import Look, Settings, locking
 from kappaskin_app.shell.settings.publishing import PublishSettings
 from kappaskin_app.shell.simulation import with_consequences
 
@@ -33,11 +33,12 @@ class Requests:
         self.set("theme", "light" if self._history.settings.theme == "dark" else "dark")
 
     def reset(self) -> None:
-        """Reset all settings except calibration, tare and publishing."""
+        """Reset all settings except calibration, tare, publishing and the look of the window."""
         now = self._history.settings
         rest = Settings(calibration=now.calibration, tare=now.tare)
-        sending = {field.name: getattr(now, field.name) for field in fields(PublishSettings)}
-        self._history.change("Reset settings", -1, **vars(rest) | sending)
+        kept = (field.name for kind in (PublishSettings, Look) for field in fields(kind))
+        values = {name: getattr(now, name) for name in kept}
+        self._history.change("Reset settings", -1, **vars(rest) | values)
 
     def reset_panel(self, title: str, names: Sequence[str]) -> None:
         """Reset some settings, with what follows from each."""

@@ -16,7 +16,6 @@ from kappaskin.errors import Refusal
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import Actions, plain
 from kappaskin_app.shell.finder import Listing, best, clearable, row, score
-from kappaskin_app.shell.history import History
 from kappaskin_app.widgets.parts import Label, button, in_a_row
 
 _MOUSE = (
@@ -32,12 +31,12 @@ class ShortcutDialog(QDialog):
 
     changed = Signal()
 
-    def __init__(self, actions: Actions, history: History, parent: QWidget) -> None:
+    def __init__(self, actions: Actions, parent: QWidget) -> None:
         super().__init__(parent)
         self.setObjectName("cheat-sheet")
         self.setWindowTitle("Shortcuts")
         self.resize(*_SIZE)
-        self._actions, self.history = actions, history
+        self._actions = actions
         self.line = QLineEdit(placeholderText="Search for a command, a menu or a key")  # pyright: ignore[reportCallIssue]
         clearable(self.line)
         self.line.setAccessibleName("Search shortcuts")
@@ -143,22 +142,24 @@ class ShortcutDialog(QDialog):
         self._set_key(self._actions.own_key(self.chosen()))
 
     def _set_key(self, key: str) -> None:
-        name, before = self.chosen(), self._actions.changed_keys()
+        name = self.chosen()
         try:
             self._actions.change_key(name, key)
         except Refusal as refusal:
             self.message.setText(f"{refusal}.")
             self._show_key(self._actions.key(name))
             return
-        words, after = plain(self._actions[name].text()), self._actions.changed_keys()
-        self.history.step(f"shortcut of {words}", self._apply_keys, before, after)
-        self.message.setText(f"{words} is {key} now." if key else f"{words} has no shortcut now.")
+        self._finish()
+        words = plain(self._actions[name].text())
+        self.message.setText(
+            f"{words} has the shortcut {key} now." if key else f"{words} has no shortcut now."
+        )
 
     def _reset_all(self) -> None:
-        self.history.step("reset all shortcuts", self._apply_keys, self._actions.changed_keys(), {})
-        self.message.setText("All shortcuts are the defaults again.")
+        self._actions.take_keys({})
+        self._finish()
+        self.message.setText("All shortcuts are reset to their defaults.")
 
-    def _apply_keys(self, changed: dict[str, str]) -> None:
-        self._actions.take_keys(changed)
+    def _finish(self) -> None:
         self._list()
         self.changed.emit()

@@ -47,7 +47,7 @@ _TIP = (
     "Strain: beyond 1 % a metal gage is not elastic; these elements are crossed out in the "
     "heatmaps. Drift: all readings have shifted smoothly over the skin, which no load does; "
     "the contact and the surface are those without it (Tracking keeps it in the surface). "
-    "Slopes: most estimators take the skin for nearly flat; select Finite slope (Basis). "
+    "Slopes: most estimators assume a nearly flat skin; select Finite slope (Basis). "
     "Excluded: elements, counted from 0, that are inconsistent with the others, or have "
     "faulty channels: Health (F3) lists these, and letters in the heatmaps give the reason."
 )
@@ -80,7 +80,7 @@ def warnings(estimate: Estimate, strained: int, method: str, slope: float = 0.0)
         parts.append(f"{strained} element{'s' if strained > 1 else ''} over 1 % strain")
     if estimate.drift:
         by = f"{estimate.drift:.2g}{' 1/m' * (estimate.curvature.ndim == 2)}"
-        parts.append(f"readings drifted by {by}, by warmth or a bent mount: tare at rest")
+        parts.append(f"readings drifted by {by}, by temperature or a bent mount: tare at rest")
     if estimate.contact.near_rim:
         parts.append("contact near the rim: unreliable")
     if slope:

@@ -4,7 +4,7 @@ import itertools
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -22,6 +22,7 @@ from kappaskin_app.shell.parts import Parts
 from kappaskin_app.shell.settings import form_field
 from kappaskin_app.shell.settings.form_fields import Range
 from kappaskin_app.theme import THEMES
+from kappaskin_app.widgets.text import ERROR_BARS
 
 FORMAT = 1
 _LONGEST = 200  # characters of a name
@@ -38,7 +39,8 @@ class WindowState:
 
     `place` is (x, y, width, height) in px, `keys` are the changed shortcuts, `done` and `files`
     the recent commands and files, `own` the saved layouts, `now` the present one, `start` whether
-    the welcome banner is shown, and `letters` the size of the font in percent.
+    the welcome banner is shown, `letters` the size of the font in percent, and `error_bars` those
+    that are shown.
     """
 
     theme: str = ""
@@ -51,6 +53,7 @@ class WindowState:
     own: Mapping[str, Layout] = field(default_factory=dict)
     start: bool = True
     letters: float = 100.0
+    error_bars: str = "sigma"
 
 
 def merged(mine: WindowState, before: WindowState, theirs: WindowState) -> WindowState:
@@ -93,7 +96,7 @@ def to_text(state: WindowState) -> str:
 
 def _window(state: WindowState) -> dict[str, Any]:
     table: dict[str, Any] = {"theme": state.theme, "start": state.start, "full": state.full}
-    table["letters"] = state.letters
+    table |= {"letters": state.letters, "error_bars": state.error_bars}
     table |= {"done": list(state.done), "files": list(state.files)}
     return table | ({"place": list(state.place)} if state.place else {})
 
@@ -138,6 +141,7 @@ def from_text(text: str) -> WindowState:
         _layouts(document),
         _part(window, "start", bool, True),
         _letters(window),
+        _one_of(_part(window, "error_bars", str, "sigma"), tuple(ERROR_BARS)),
     )
 
 
@@ -324,9 +328,10 @@ class WindowSaver(QObject):
             window.setGeometry(clamped(QRect(*state.place), screens))
         if state.full:
             window.showMaximized()
-        chosen = {"show_start": state.start, "letters": state.letters}
+        chosen: dict[str, Any] = {"show_start": state.start, "letters": state.letters}
+        chosen |= {"error_bars": state.error_bars}
         chosen |= {"theme": state.theme} if state.theme else {}
-        window.history.apply(replace(window.history.settings, **chosen))
+        window.history.change("", **chosen)
         window.opening.recent = [Path(file) for file in state.files]
         self._menus.finder.recent = list(state.done)
         window.layouts.own = dict(state.own)
@@ -340,6 +345,7 @@ class WindowSaver(QObject):
             theme=window.history.settings.theme,
             start=window.history.settings.show_start,
             letters=window.history.settings.letters,
+            error_bars=window.history.settings.error_bars,
             place=(place.x(), place.y(), place.width(), place.height()),
             full=window.isMaximized(),
             keys=window.actions_by_name.changed_keys(),

@@ -46,7 +46,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.theme import FAINT, current, follow_look, series
 from kappaskin_app.widgets.layout import page_of
 from kappaskin_app.widgets.parts import ELLIPSIS, plain_tip, text_label
-from kappaskin_app.widgets.text import in_digits, round_up
+from kappaskin_app.widgets.text import ErrorBars, in_digits, round_up
 
 _NEAR = 12.0  # px from the mouse, within which a point is shown
 _ROOM = 0.06  # of the data's extent, on either side of marks and on a logarithmic axis
@@ -161,7 +161,8 @@ class Series:
     """Points `x` (n,), `y` (n,) called `name`, joined by a `line`, with a `mark` each, or both.
 
     The legend has those with a name. `colour` is the number of a colour of `theme.SERIES` or the
-    name of one of `Theme`. The `band` (n,) lies above and below the points. `tips` has the text of
+    name of one of `Theme`. The `band` (n,) of standard deviations is drawn above and below the
+    points as the error bars of all views. `tips` has the text of
     each point, by default its values. What is marked with the `key` is drawn boldly.
     """
 
@@ -176,6 +177,11 @@ class Series:
     band: Array | None = None
     tips: Sequence[str] = ()
     key: Any = None
+
+    @property
+    def off(self) -> Array:
+        """The band drawn, on each side of the points."""
+        return np.zeros(1) if self.band is None else ErrorBars.now.of(self.band)
 
     @property
     def ink(self) -> QColor:
@@ -325,8 +331,7 @@ class Chart(QWidget):
         """The ends of both axes at which all is shown."""
         marked = any(each.mark for each in self.series)
         x = np.concatenate([each.x for each in self.series] or [np.empty(0)])
-        bands = [(each.y, 0.0 if each.band is None else each.band) for each in self.series]
-        y = [part for y, band in bands for part in (y - band, y + band)]
+        y = [part for each in self.series for part in (each.y - each.off, each.y + each.off)]
         y += [np.array([line.value]) for line in self._lines if not line.upright]
         return self.x_axis.ends(x, marked, False), self.y_axis.ends(
             np.concatenate(y or [np.empty(0)]), marked, True
@@ -427,8 +432,8 @@ class Chart(QWidget):
             self.y_axis.value_text(float(each.y[index]), spans[1]),
         )
         if each.band is not None:
-            band = self.y_axis.value_text(float(each.band[index]), spans[1])
-            y += f" \N{PLUS-MINUS SIGN} {band}"
+            band = self.y_axis.value_text(float(each.off[index]), spans[1])
+            y += f" \N{PLUS-MINUS SIGN} {band} ({ErrorBars.now.label})"
         rows = (each.name, f"{self.y_axis.title}: {y}", f"{self.x_axis.title}: {x}")
         return "\n".join(filter(None, rows))
 
@@ -463,7 +468,8 @@ class Chart(QWidget):
                 columns.append([self.x_axis.label, *each.x.tolist()])
             columns.append([f"{name}{self.y_axis.label}", *each.y.tolist()])
             if each.band is not None:
-                columns.append([f"{name}band, {self.y_axis.unit}", *each.band.tolist()])
+                head = f"{name}standard deviation, {self.y_axis.unit}"
+                columns.append([head, *each.band.tolist()])
             last = each.x
         text = io.StringIO()
         lines = csv.writer(text, delimiter=separator, lineterminator="\n")
@@ -633,12 +639,12 @@ class _View:
         for item, each in zip(self._pooled(self._curves, len(shown)), shown, strict=False):
             self._draw_series(item, each, key is not None and each.key == key)
         x, y = self._axes
-        banded = [(each, each.band) for each in shown if each.band is not None]
+        banded = [each for each in shown if each.band is not None]
         bands = self._pooled(self._bands, len(banded), self._pg.PlotCurveItem)
-        for item, (each, band) in zip(bands, banded, strict=False):
+        for item, each in zip(bands, banded, strict=False):
             ink = each.ink
             ink.setAlpha(_BAND)
-            at, low, high = x.shown(each.x), y.shown(each.y - band), y.shown(each.y + band)
+            at, low, high = x.shown(each.x), y.shown(each.y - each.off), y.shown(each.y + each.off)
             around, edge, joined = _enclosed(at, low, high)
             item.setData(around, edge, connect=joined, pen=None, fillLevel="enclosed", brush=ink)
             item.setZValue(-1)

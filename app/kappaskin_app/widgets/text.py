@@ -1,16 +1,51 @@
-"""Numbers, lengths, times and dates as text."""
+"""Numbers, error bars, lengths, times and dates as text."""
 
 import math
 import re
+from dataclasses import dataclass
 from datetime import datetime
+from typing import Any, ClassVar
 
-from kappaskin._text import NONE
+from kappaskin._text import NONE, ONE_SIGMA
 
 COMMAND = re.compile("`([^`]+)`")
 """A command in a message."""
 _LENGTHS = ((0.0, 1e-3, "mm"),)
 _MOST_DIGITS = 7  # after the point: a tenth of a nanometre in mm
 _TIMES = ((120.0, 60.0, "min"), (1.0, 1.0, "s"), (1e-3, 1e-3, "ms"), (0.0, 1e-6, "\N{MICRO SIGN}s"))
+
+
+_NORMAL_95 = 1.96  # standard deviations in the half width of a 95 % interval
+
+
+@dataclass(frozen=True)
+class ErrorBars:
+    """Error bars of so many standard deviations: `now` are those of all views."""
+
+    label: str
+    title: str
+    times: float
+
+    now: ClassVar["ErrorBars"]
+
+    def of(self, sd: Any, half_width: float = math.nan) -> Any:
+        """The error bar of a standard deviation, or of an array of them.
+
+        A known `half_width` of the 95 % interval, as Student's t gives it, is its own error bar.
+        """
+        return self.times * sd if self.times == 1 or math.isnan(half_width) else half_width
+
+    def of_half_width(self, half_width: float) -> float:
+        """The error bar of what has only the half width of a 95 % interval."""
+        return half_width * self.times / _NORMAL_95
+
+
+ERROR_BARS = {
+    "sigma": ErrorBars(ONE_SIGMA, f"{ONE_SIGMA} (68 %)", 1.0),
+    "95": ErrorBars("95 %", "95 %", _NORMAL_95),
+}
+"""The error bars that may be shown, by the value of the setting."""
+ErrorBars.now = ERROR_BARS["sigma"]
 
 
 def length(metres: float) -> str:

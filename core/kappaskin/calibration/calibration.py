@@ -16,7 +16,7 @@ import numpy as np
 
 from kappaskin._files import open_file, write_whole
 from kappaskin._state import Stateful
-from kappaskin._text import with_error
+from kappaskin._text import ONE_SIGMA, with_error
 from kappaskin._toml import table
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
@@ -125,10 +125,11 @@ class KnownWeights:
         """A summary and a line for each weight."""
         worst = max(range(len(self.weights)), key=lambda n: abs(self.left_out[n]))
         verdict = (
-            f"passed: every weight is told by the others within {100 * LIMIT:g} %"
+            f"passed: the fit to the others estimates every weight within {100 * LIMIT:g} %"
             if self.passed
-            else f"failed: weight {worst + 1} is told {100 * self.left_out[worst]:+.1f} % wrong by "
-            f"the others, more than {100 * LIMIT:g} %; check its mass, or take a lighter one"
+            else f"failed: the fit to the others estimates weight {worst + 1} with an error of "
+            f"{100 * self.left_out[worst]:+.1f} %, more than {100 * LIMIT:g} %; check its mass, or "
+            "take a lighter one"
         )
         stiff = (
             f"it stretches as a sheet of {1e3 * self.thickness:.3g} mm"
@@ -137,13 +138,15 @@ class KnownWeights:
         )
         if self.rim_stiffness:
             stiff = f"its edge gives: {self.rim_stiffness:.3g} N/m^2"
-        head = f"rigidity {with_error(self.rigidity, self.rigidity_sd, 'N m')}; {stiff}"
+        rigidity = with_error(self.rigidity, self.rigidity_sd, "N m")
+        head = f"rigidity {rigidity} ({ONE_SIGMA}); {stiff}"
         each = zip(self.weights, self.told, self.left_out, strict=True)
         return [
             head,
             *(
-                f"  weight {n}  {1e3 * laid / GRAVITY:8.2f} g  {laid:.4f} N  told {told:.4f} N "
-                f"({100 * (told / laid - 1):+.2f} %), by the others {100 * left:+.2f} %"
+                f"  weight {n}  {1e3 * laid / GRAVITY:8.2f} g  {laid:.4f} N  "
+                f"estimated {told:.4f} N ({100 * (told / laid - 1):+.2f} %), "
+                f"by the others {100 * left:+.2f} %"
                 for n, (laid, told, left) in enumerate(each, 1)
             ),
             verdict,

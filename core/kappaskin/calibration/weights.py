@@ -56,7 +56,7 @@ class WeightFit:
         self.sensor, self.edge = sensor, edge or sensor.edge
         if not sensor.plate.rigidity:
             raise Refusal(
-                "expected a skin with some rigidity; known weights tell nothing of a drum head: "
+                "expected a skin with some rigidity; known weights do not determine a drum head: "
                 "measure its tension"
             )
         patch = sensor.layout.patch
@@ -318,8 +318,8 @@ class Weighing:
         mass, told = self.masses[self.step - 1], 1e3 * force / GRAVITY
         if not 1 / _ABSURD < told / mass < _ABSURD:
             raise Refusal(
-                f"the readings tell about {told:.3g} g, where {mass:g} g were expected: give all "
-                "masses in grams, and check the rigidity that the sensor states"
+                f"the readings correspond to about {told:.3g} g, where {mass:g} g were expected: "
+                "give all masses in grams, and check the rigidity in the sensor's description"
             )
 
     def redo(self) -> None:

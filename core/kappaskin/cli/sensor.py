@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kappaskin._text import with_error
+from kappaskin._text import ONE_SIGMA, with_error
 from kappaskin.cli.common import (
     FAILED,
     Described,
@@ -257,7 +257,7 @@ def _print_tare(taken: "Tare", before: "Tare | None") -> None:
     warm = "" if taken.temperature is None else f" at {taken.temperature:.1f} degrees Celsius"
     show(
         f"{taken.name} {taken.serial_number}: {np.isfinite(taken.offset).sum()} of {len(taken)} "
-        f"channels tared{warm}, offsets of {with_error(offset, error, '1/m')} (RMS)"
+        f"channels tared{warm}, offsets of {with_error(offset, error, '1/m')} ({ONE_SIGMA}, RMS)"
     )
     if before is not None:
         moved = math.sqrt(float(np.nanmean((taken.offset - before.offset) ** 2)))

@@ -111,7 +111,7 @@ class ContactObject:
         parts = [self.kind]
         if self.kind in ("cylinder", "sphere"):
             low, high = map(_millimetres, self.radius_95)
-            parts.append(f"radius {_millimetres(self.radius)} mm ({low} to {high})")
+            parts.append(f"radius {_millimetres(self.radius)} mm (95 %: {low} to {high})")
         if self.kind in ("cylinder", "edge"):
             long = f"{1e3 * self.length:.0f} mm long, " if math.isfinite(self.length) else ""
             parts.append(f"{long}axis {math.degrees(self.axis):.0f} deg")

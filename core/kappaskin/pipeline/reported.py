@@ -676,7 +676,8 @@ _FIT = (
                 f"Residual {name}",
                 f"r<sub>{name}</sub>",
                 "Residual of each reading: reading minus fitted value. Noise alone has no "
-                "pattern; a lasting pattern indicates too few functions or a wrong edge.",
+                "pattern; a lasting pattern indicates too few functions or a wrong boundary "
+                "condition.",
                 least=0.1,
                 group="residual",
             )
@@ -696,9 +697,9 @@ _FIT = (
                 "error_bar",
                 "Error bar",
                 f"{_SIGMA}<sub>w</sub>",
-                "The standard deviation of the displacement due to the noise of the readings"
-                ": \u221a(b' C b), with the functions b there and the covariance C of their "
-                "coefficients. For Tracking, that of a single frame.",
+                "The standard deviation (always 1 \u03c3) of the displacement due to the noise of "
+                "the readings: \u221a(b' C b), with the functions b there and the covariance C of "
+                "their coefficients. For Tracking, that of a single frame.",
                 unknown="Computing the standard deviation\N{HORIZONTAL ELLIPSIS}",
                 signed=False,
                 least=1e-5,
@@ -780,10 +781,10 @@ _FIT = (
     ReportedQuantity(
         "drift",
         "1/m",
-        "smooth shift of all readings by RMS, 0 where none is told",
+        "smooth shift of all readings by RMS, 0 where none is detected",
         "drift",
         group="fit",
-        keys=(("drift_per_m", "smooth shift of all readings by RMS, 0 where none is told"),),
+        keys=(("drift_per_m", "smooth shift of all readings by RMS, 0 where none is detected"),),
         form="%.3g",
         as_readings=True,
         quick=lambda r: [_per_metre(r.estimate.drift, r)],
@@ -877,9 +878,9 @@ _CONTACT = (
         header=HeaderNumber(
             "force",
             20,
-            "Force of that point load, with its error bar; \u2265: a lower bound, for the skin may "
-            "stretch. Its thickness is not given; 0.25 mm would change the force by more than the "
-            "error bar.",
+            "Force of the point load that fits best, with its error bar; \u2265: a lower bound, as "
+            "the skin may stretch: its thickness is not given, and 0.25 mm would change the force "
+            "by more than the error bar.",
         ),
     ),
     ReportedQuantity(
@@ -924,7 +925,7 @@ _CONTACT = (
         _OF_LOAD,
         "contact.load_radius",
         symbol="r",
-        keys=(("load_radius_m", f"{_OF_LOAD}; null where the skin does not tell it"),),
+        keys=(("load_radius_m", f"{_OF_LOAD}; null where the readings do not determine it"),),
         labels_shown=("Load radius",),
         at_rim="edge: no radius",
         shown=("mm", 1e3, 2),

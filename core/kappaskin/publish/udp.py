@@ -8,7 +8,7 @@ import time
 from contextlib import suppress
 from typing import Any, cast
 
-from kappaskin._text import NO_FORCE, printable, with_error
+from kappaskin._text import NO_FORCE, ONE_SIGMA, printable, with_error
 from kappaskin.errors import Refusal
 from kappaskin.publish.message import LARGEST, VERSION, EstimateMessage, SourceState
 from kappaskin.publish.publishing import Receiver, Target, reason
@@ -187,7 +187,8 @@ class UdpListener:
     @property
     def summary(self) -> str:
         foreign = f", {self.foreign} foreign datagrams" if self.foreign else ""
-        return f"{self.contacts} contacts received, {self.lost} lost{foreign}"
+        counts = f"{self.contacts} contacts received, {self.lost} lost{foreign}"
+        return f"{counts}; error bars: {ONE_SIGMA}"
 
     def close(self) -> None:
         self._socket.close()

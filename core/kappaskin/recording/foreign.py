@@ -77,7 +77,7 @@ class FileRow(NamedTuple):
 
 
 def rows_of(file: Path, description: Description, topic: str, scratch: Path) -> Iterator[FileRow]:
-    """The rows of a `file`, or of a folder with a bag of ROS 2; of messages those of a `topic`.
+    """The rows of a `file`, or of a folder with a ROS 2 bag; of messages those of a `topic`.
 
     Arrays are unpacked in the folder `scratch`. A `Refusal` where it is no file of that kind, or
     does not fit; other errors as the libraries that read it raise them.
@@ -103,9 +103,7 @@ def _kind_of(file: Path) -> bytes:
     with open_file(file) as opened:
         head = opened.read(len(_SQLITE))
     if head.startswith(b"#ROSBAG"):
-        raise Refusal(
-            f"{file}: expected a bag of ROS 2, got one of ROS 1; rosbags-convert mends it"
-        )
+        raise Refusal(f"{file}: expected a ROS 2 bag, got one of ROS 1; rosbags-convert mends it")
     kind = next((kind for kind in _KINDS if head.startswith(kind)), b"")
     expected = next(
         (kind for kind, suffix in _KINDS.items() if suffix == file.suffix.lower()), kind
@@ -359,7 +357,7 @@ def _sqlite_messages(path: Path) -> Iterator[_Message]:
         database.execute(f"PRAGMA locking_mode = {'NORMAL' if used else 'EXCLUSIVE'}")
         tables = "SELECT name FROM sqlite_master WHERE type = 'table'"  # a view may never end
         if not {"topics", "messages"} <= {name for (name,) in database.execute(tables)}:
-            raise Refusal("expected tables topics and messages, as in a bag of ROS 2, got others")
+            raise Refusal("expected tables topics and messages, as in a ROS 2 bag, got others")
         found = database.execute("SELECT id, name, type, serialization_format FROM topics")
         topics = {n: _Topic(*map(str, rest)) for n, *rest in found}
         ((total,),) = database.execute("SELECT count(*) FROM messages")
@@ -374,7 +372,7 @@ def _messages(file: Path) -> Iterator[_Message]:
     parts = _parts_of(file) if file.is_dir() else [file]
     if not parts or len({part.suffix for part in parts}) > 1:
         raise Refusal(
-            f"{file}: expected a bag of ROS 2, with .mcap or .db3 files, got "
+            f"{file}: expected a ROS 2 bag, with .mcap or .db3 files, got "
             f"{', '.join(sorted(part.name for part in file.iterdir())[:5]) or 'nothing'}; "
             "`ros2 bag convert` makes one of others"
         )
@@ -480,7 +478,7 @@ _BAGS = {MAGIC: _mcap_messages, _SQLITE: _sqlite_messages}
 
 
 def is_foreign(file: Path) -> bool:
-    """Whether this is a bag of ROS 2, its folder, or an MCAP file of another program."""
+    """Whether this is a ROS 2 bag, its folder, or an MCAP file of another program."""
     try:
         if file.is_dir():
             return bool(_parts_of(file))

@@ -310,7 +310,7 @@ def description_of(text: str, name: str, serial_number: str = "") -> Description
     plate = replace(plate, unknown_material=plate.unknown_material or "rigidity" not in skin)
     elements = top.table("elements")
     if "reads" in elements:
-        raise elements.refusal("expected none: the columns tell what is read", "reads")
+        raise elements.refusal("expected none: the columns determine what is read", "reads")
     layout = read_elements(elements, plate.patch)
     line = top.table("line")
     kind = LINE.value(line, "kind")

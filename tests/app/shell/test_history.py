@@ -84,12 +84,29 @@ def test_wishes_that_end_where_they_began_are_no_step(qapp: QApplication) -> Non
     assert (history.stack.count(), history.settings) == (0, Settings())
 
 
-def test_what_is_no_setting_is_a_step_too(qapp: QApplication) -> None:
+def test_more_than_settings_may_be_a_step(qapp: QApplication) -> None:
     history, seen = History(Settings()), []
-    history.step("turn the page", seen.append, 1, 2)
+    history.step("lesson step 2", seen.append, 1, 2)
     history.stack.undo()
     history.stack.redo()
     assert seen == [2, 1, 2]
+
+
+def test_the_look_of_the_window_is_no_step_and_stays_when_others_are_undone(
+    qapp: QApplication,
+) -> None:
+    history = History(Settings())
+    gesture = history.new_gesture()
+    history.change("Both", gesture, theme="light", x=0.01)
+    history.request("letters", letters=150.0)
+    look = {"theme": "light", "letters": 150.0}
+    assert (history.stack.count(), history.settings) == (1, replace(Settings(), x=0.01, **look))
+    history.stack.undo()
+    assert history.settings == replace(Settings(), **look)
+    history.stack.redo()
+    history.request("theme", theme="dark")
+    history.cancel(gesture)
+    assert history.settings == replace(Settings(), letters=150.0)
 
 
 def test_ten_thousand_steps_are_bounded_and_the_last_ones_stay(qapp: QApplication) -> None:

@@ -32,7 +32,7 @@ def shared(qapp: QApplication, until, window_class) -> Iterator[MainWindow]:
     until(lambda: bool(window.display.status_bar.object.text()))
     window.requests.set("letters", 200.0)
     yield window
-    window.history.stack.setIndex(0)
+    window.requests.set("letters", 100.0)
     window.close()
     window.deleteLater()
 

@@ -1,13 +1,11 @@
-"""What is no setting comes back too: where the camera stands, docks, pages, files."""
+"""Undo covers settings and the camera, and leaves tabs, docks and the look of the window."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
-from PySide6.QtWidgets import QApplication, QTabBar
+from PySide6.QtWidgets import QApplication
 
 from kappaskin_app.shell.window import MainWindow
 
@@ -123,165 +121,62 @@ def test_another_skin_is_seen_from_where_the_last_one_was(here: MainWindow, unti
 
 
 @pytest.mark.full
-def test_a_dock_that_is_closed_and_a_tab_that_is_clicked_come_back(here: MainWindow, qtbot) -> None:
-    for name in ("cost", "numbers"):
-        here.actions_by_name[f"dock-{name}"].trigger()
-        _settle()
-    (tabs,) = [b for b in here.findChildren(QTabBar) if b.parent() is here and b.isVisible()]
-    tabs.setCurrentIndex(0)
-    _settle()
-    here.docks["numbers"].close()
-    _settle()
-    here.panels.setCurrentIndex(2)
-    _settle()
-    assert _texts(here) == [
-        *("show Cost of accuracy", "show Numbers", "show Cost of accuracy"),
-        *("hide Numbers", "page Sensor"),
-    ]
-    undo = here.actions_by_name["undo"]
-    assert undo.toolTip() == "Undo: page Sensor"
-    for _ in range(3):
-        undo.trigger()
-        _settle()
-    assert here.panels.currentIndex() == 0
-    assert here.docks["numbers"].visibleRegion().boundingRect().height() > 0
-    assert here.docks["cost"].visibleRegion().isEmpty()
-
-
-@pytest.mark.full
-def test_a_dock_that_is_moved_comes_back(here: MainWindow) -> None:
-    curvature, left = here.docks["curvature"], Qt.DockWidgetArea.LeftDockWidgetArea
-    was = here.dockWidgetArea(curvature)
-    here.addDockWidget(left, curvature)
-    _settle()
-    assert _texts(here) == ["move By element"]
-    here.actions_by_name["undo"].trigger()
-    _settle()
-    assert here.dockWidgetArea(curvature) == was
-    assert here.actions_by_name["redo"].text() == "&Redo: move By element"
-
-
-@pytest.mark.full
-def test_an_edge_that_is_dragged_is_one_step(here: MainWindow, qtbot) -> None:
-    dock = here.docks["settings"]
-    wide, edge = dock.width(), QPoint(dock.geometry().right() + 3, dock.geometry().center().y())
-    qtbot.mousePress(here, LEFT, pos=edge)
-    for step in (20, 40, 60):
-        qtbot.mouseMove(here, edge + QPoint(step, 0))
-        _settle()
-    qtbot.mouseRelease(here, LEFT, pos=edge + QPoint(60, 0))
-    _settle()
-    assert dock.width() > wide + 30
-    assert _texts(here) == ["size of the panels"]
-    here.actions_by_name["undo"].trigger()
-    _settle()
-    assert abs(dock.width() - wide) <= 2
-
-
-@pytest.mark.full
-def test_a_window_that_grows_for_a_dock_has_that_as_a_step(here: MainWindow) -> None:
-    here.resize(here.minimumSizeHint())
-    _settle()
-    here.actions_by_name["dock-cost"].trigger()
-    _settle()
-    assert _texts(here) == ["show Cost of accuracy"]
-    here.resize(1280, 800)
-    _settle()
-    assert _texts(here) == ["show Cost of accuracy"]
-
-
-@pytest.mark.full
-def test_what_is_undone_at_once_is_what_was_done_last(here: MainWindow) -> None:
-    here.requests.set("letters", 110.0)
-    _settle()
-    here.docks["settings"].hide()
-    here.actions_by_name["undo"].trigger()
-    assert not here.docks["settings"].isHidden()
-    assert here.history.settings.letters == 110.0
-
-
-def test_the_page_of_the_scene_comes_back(here: MainWindow) -> None:
-    here.actions_by_name["dock-scene"].trigger()
-    here.scene.setCurrentIndex(1)
-    _settle()
-    here.actions_by_name["undo"].trigger()
-    assert here.scene.currentIndex() == 0
-    assert here.docks["scene"].isHidden()
-
-
-def test_a_list_of_files_that_was_cleared_comes_back(here: MainWindow) -> None:
-    here.opening.note(Path("/there/a.toml"))
-    files = here.opening.recent
-    here.opening.clear()
-    assert here.opening.recent == []
-    here.actions_by_name["undo"].trigger()
-    assert here.opening.recent == files
-
-
-@pytest.mark.full
 def test_with_nothing_to_undo_the_action_says_so(here: MainWindow) -> None:
     undo: Callable[[], bool] = here.actions_by_name["undo"].isEnabled
     assert not undo()
     assert here.actions_by_name.why_not("undo") == "there is nothing to undo"
-    here.requests.set("letters", 110.0)
+    here.requests.set("functions_x", 6)
     assert undo()
-    assert here.actions_by_name["undo"].text() == "&Undo: text size 100 \N{RIGHTWARDS ARROW} 110 %"
+    arrow = "\N{RIGHTWARDS ARROW}"
+    assert here.actions_by_name["undo"].text() == f"&Undo: basis functions in x 8 {arrow} 6"
 
 
-def test_measuring_and_each_place_of_it_come_back(here: MainWindow) -> None:
-    measuring, undo = here.view.measurement, here.actions_by_name["undo"]
-    here.actions_by_name["measure"].trigger()
-    for place in ((0.02, 0.03), (0.05, 0.06)):
-        here.membrane.pointer.clicked.emit(*place)
-    assert _texts(here) == ["measure", "measure from here", "measure to here"]
-    undo.trigger()
-    assert measuring.places == ((0.02, 0.03),)
-    here.actions_by_name["measure"].trigger()
-    assert measuring.places is None
-    undo.trigger()
-    assert here.actions_by_name["measure"].isChecked()
-    assert measuring.places == ((0.02, 0.03),)
-    undo.trigger()
-    undo.trigger()
-    assert not measuring.on
-
-
-def test_places_beside_the_skin_that_there_is_now_do_not_come_back(here: MainWindow) -> None:
-    measuring = here.view.measurement
-    measuring.set_places(((0.02, 0.03), (0.1, 0.1)))
-    assert len(measuring.places) == 2
-    measuring.set_places(((0.02, 0.03), (0.11, 0.1)))
-    assert measuring.places == ()
-    assert "click a place" in measuring.ruler.text.input
-    measuring.set_places(None)
-
-
-@pytest.mark.full
-def test_the_element_that_was_picked_before_comes_back_and_then_its_dock_goes(
-    here: MainWindow,
-) -> None:
-    for element in (17, 44):
-        here.heatmaps["xx"].chosen.emit(element)
+def test_undo_by_its_keys_leaves_tabs_docks_layouts_and_the_theme(here: MainWindow, qtbot) -> None:
+    keys, none = Qt.Key, Qt.KeyboardModifier.NoModifier
+    control, shift = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ShiftModifier
+    theme = here.history.settings.theme
+    box = here.basis.editor("functions_x")
+    here.panels.setCurrentIndex(0)
+    here.activateWindow()
+    QApplication.processEvents()
+    box.setFocus()
+    qtbot.keyClick(box, keys.Key_Down)
+    assert _texts(here) == ["basis functions in x 8 \N{RIGHTWARDS ARROW} 7"]
+    for key, how in (
+        (keys.Key_T, control),  # the theme
+        (keys.Key_E, control | Qt.KeyboardModifier.AltModifier),  # the dock Element
+        (keys.Key_PageDown, control),  # the next page of settings
+        (keys.Key_F12, none),  # the sound
+    ):
+        qtbot.keyClick(here, key, how)
         _settle()
-    assert _texts(here) == ["show Element", "select element 17", "select element 44"]
-    here.actions_by_name["undo"].trigger()
-    assert here.selected_element.element == 17
-    here.actions_by_name["undo"].trigger()
+    here.actions_by_name["layout-study"].trigger()
+    here.panels.tabBar().setCurrentIndex(2)
+    here.heatmaps["xx"].chosen.emit(17)
     _settle()
-    assert here.selected_element.element == -1
-    assert "Click an element" in here.selected_element.panel.title.text()
-    here.actions_by_name["undo"].trigger()
+    assert len(_texts(here)) == 1
+    assert here.history.settings.theme != theme
+    seen = here.layouts.now
+
+    qtbot.keyClick(here, keys.Key_Z, control)
     _settle()
-    assert here.docks["element"].isHidden()
+    assert here.history.settings.functions_x == 8
+    qtbot.keyClick(here, keys.Key_Z, control | shift)
+    _settle()
+    assert here.history.settings.functions_x == 7
+    assert here.layouts.now == seen
+    assert (here.panels.currentIndex(), here.selected_element.element) == (2, 17)
+    assert here.history.settings.theme != theme
+    here.requests.set("theme", theme)
+    here.layouts.reset()
 
 
-def test_an_element_that_the_skin_has_no_more_is_not_picked_again(here: MainWindow, until) -> None:
-    here.heatmaps["xx"].chosen.emit(90)
-    here.heatmaps["xx"].chosen.emit(3)
-    here.history.apply(replace(here.history.settings, elements_x=4, elements_y=4))
-    until(lambda: len(here.session.status.sensor.layout) == 16)
-    here.actions_by_name["undo"].trigger()
-    assert here.selected_element.element == -1
+def test_a_reset_leaves_the_look_of_the_window(here: MainWindow) -> None:
+    here.requests.set("letters", 110.0)
+    here.requests.set("functions_x", 6)
+    here.actions_by_name["reset"].trigger()
+    assert (here.history.settings.functions_x, here.history.settings.letters) == (8, 110.0)
+    here.requests.set("letters", 100.0)
 
 
 @pytest.mark.full

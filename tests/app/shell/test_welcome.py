@@ -113,7 +113,7 @@ def test_ways_to_begin_never_cover_the_skin_and_are_not_shown_again_where_unwant
     assert not WindowFile(tmp_path / "window.toml").read()[0].start
     window.menus.welcome.begin()
     assert not window.display.centre.banner.isVisible()
-    window.history.stack.undo()
+    window.requests.set("show_start", True)
     with monkeypatch.context() as patch:
         patch.setattr(window.session, "source", "/dev/ttyACM0")  # as the command may say
         window.menus.welcome.begin()

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QImage
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QDockWidget, QMenu, QPushButton, QScrollArea, QScrollBar
 
 from kappaskin.errors import Refusal
@@ -122,6 +123,35 @@ def test_every_shortcut_is_read_on_a_small_screen_under_its_menu(window: MainWin
         for entry in window.actions_by_name.entries.values()
     ]
     sheet.close()
+
+
+def test_every_shortcut_takes_its_action_wherever_the_focus_is(window: MainWindow, until) -> None:
+    taken, failed = list[str](), list[tuple[str, str, list[str]]]()
+    keys = {name: entry.action for name, entry in window.actions_by_name.entries.items()}
+    keys = {name: action for name, action in keys.items() if not action.shortcut().isEmpty()}
+    assert len(keys) > 60
+    for name, action in keys.items():
+        action.triggered.disconnect()  # not to quit, record or open dialogs
+        action.triggered.connect(lambda *_, name=name: taken.append(name))
+        if action.isCheckable():  # that of a dock, which its own action would show
+            action.setCheckable(False)
+    window.docks.reveal("numbers")
+    places = (
+        window.membrane.plotter,
+        window.basis.editor("functions_x"),
+        window.numbers.elements,
+        window.panels.tabBar(),
+    )
+    for place in places:
+        place.setFocus()
+        until(place.hasFocus)
+        for name, action in keys.items():
+            action.setEnabled(True)  # the engine's status may disable it meanwhile
+            taken.clear()
+            QTest.keySequence(place, action.shortcut())
+            if taken != [name]:
+                failed.append((action.shortcut().toString(), type(place).__name__, list(taken)))
+    assert failed == []
 
 
 @pytest.mark.full

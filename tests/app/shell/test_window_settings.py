@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin_app.shell.form import Form
-from kappaskin_app.shell.settings import Settings
+from kappaskin_app.shell.settings import Look, Settings
 from kappaskin_app.shell.window import MainWindow
 
 
@@ -181,13 +181,17 @@ def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
                     qtbot.keyClick(editor, Qt.Key.Key_Up)
                 now = window.history.settings
                 assert now != was, editor.objectName()
+                obeyed.add(editor.objectName())
+                if hasattr(Look, editor.objectName()):  # which undo leaves
+                    assert window.history.stack.index() == index
+                    window.requests.set(editor.objectName(), getattr(was, editor.objectName()))
+                    continue
                 assert window.history.stack.index() == index + 1
                 window.history.stack.undo()
                 assert window.history.settings == was
                 window.history.stack.redo()
                 assert window.history.settings == now
                 window.history.stack.undo()
-                obeyed.add(editor.objectName())
     asked = {f.name for f in fields(Settings) if "form" in f.metadata}
     hidden = {"rim_radius", "size", "size_y", "design_base_radius", "design_rim_radius"}
     hidden |= {"design_height_noise", "design_slope_noise"}

@@ -266,7 +266,7 @@ def test_no_height_leaves_the_picture_and_the_true_one_is_written(
 ) -> None:
     window.history.change("High", -1, exaggeration=50, load_case="point", force=0.9)
     until(lambda: window.session.estimate.surface.max() > 0.02)
-    view, written = window.membrane, window.membrane.exaggeration
+    view, written = window.membrane, window.membrane.corner
     until(lambda: written.words not in ("", "height \N{MULTIPLICATION SIGN} 6"))
     until(lambda: -view.skin.height.min() > 20)
     assert -view.skin.height.min() <= view.skin.deepest * (1 + 1e-9)
@@ -298,10 +298,10 @@ def test_the_whole_skin_is_seen_from_every_side(window: MainWindow, until) -> No
 
 def test_axes_and_exaggeration_have_large_letters_in_full_screen(window: MainWindow, until) -> None:
     view = window.membrane
-    until(lambda: view.exaggeration.text.input)
+    until(lambda: view.corner.text.input)
 
     def sizes() -> list[int]:
-        return [view.exaggeration.text.prop.font_size, *(one.size for one in view.sides.labels)]
+        return [view.corner.text.prop.font_size, *(one.size for one in view.sides.labels)]
 
     usual = sizes()
     window.actions_by_name["layout-presenter"].trigger()

@@ -155,7 +155,8 @@ def test_the_cursor_shows_the_point_under_the_mouse_with_units(
     points_at(chart.canvas, chart.place_of(3.0, 1.0).toPoint() + QPoint(2, -3))
 
     until(lambda: QToolTip.isVisible())
-    assert QToolTip.text() == "second\nForce: 1 N \N{PLUS-MINUS SIGN} 0.1 N\nTime: 3 s"
+    bars = "\N{PLUS-MINUS SIGN} 0.1 N (\N{PLUS-MINUS SIGN}1 \u03c3)"
+    assert QToolTip.text() == f"second\nForce: 1 N {bars}\nTime: 3 s"
     assert (seen[-1].series.key, seen[-1].index) == (7, 3)
     # The chart's own tip does not replace it.
     at = chart.place_of(3.0, 1.0).toPoint()
@@ -374,7 +375,7 @@ def rows_of(text: str, separator: str) -> list[list[str]]:
     return list(csv.reader(io.StringIO(text), delimiter=separator))
 
 
-HEADS = ["Time, s", "first: Force, N", "second: Force, N", "second: band, N"]
+HEADS = ["Time, s", "first: Force, N", "second: Force, N", "second: standard deviation, N"]
 
 
 def test_the_menu_copies_the_data(chart, qtbot) -> None:

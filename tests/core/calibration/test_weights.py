@@ -86,7 +86,9 @@ def test_a_weight_that_is_wrong_is_named() -> None:
     weights[2] *= 1.1
     known = WeightFit(SENSOR)(weights, bent)
     assert not known.passed
-    assert "failed: weight 3 is told -9." in known.lines()[-1]
+    assert (
+        "failed: the fit to the others estimates weight 3 with an error of -9." in known.lines()[-1]
+    )
 
 
 @pytest.mark.full
@@ -147,7 +149,7 @@ def test_masses_in_kilograms_are_noticed_at_the_first_weight() -> None:
     weighing, at = Weighing(SENSOR, (0.05, 0.1, 0.2)), SENSOR.layout.positions
     (heavy, *_), rest = newtons((50, 100, 200)), np.zeros((1, SENSOR.channels))
     weighing.take(rest)
-    with pytest.raises(Refusal, match=r"the readings tell about .* g, where 0\.05 g were expected"):
+    with pytest.raises(Refusal, match=r"to about .* g, where 0\.05 g were expected"):
         weighing.take(HINGED.readings(Load(0.05, 0.05, heavy, radius=4e-3), at).reshape(1, -1))
 
 

@@ -504,7 +504,7 @@ def test_a_touch_that_flattens_nothing_is_not_called_a_plane(finger):
 def test_one_line_describes_it():
     rod, ball = PAPER.find(noisy(RODS[0])), PAPER.find(noisy(BALLS[0]))
 
-    text = r"{}, radius [\d.]+ mm \([\d.]+ to [\d.]+\){}, or a flat face [\d.]+ mm wide; .*"
+    text = r"{}, radius [\d.]+ mm \(95 %: [\d.]+ to [\d.]+\){}, or a flat face [\d.]+ mm wide; .*"
     narrow = {"face": math.nan, "face_95": (0.0, 0.004), "radius_95": (0.0, 0.03)}
     ends = "or any two ends less than 4 mm wide; second guess"
     sharp = {"edge": 0.7, "cylinder": 0.25, "sphere": 0.05, "plane": 0.0}

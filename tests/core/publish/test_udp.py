@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Refusal, load_scene
-from kappaskin._text import with_error
+from kappaskin._text import ONE_SIGMA, with_error
 from kappaskin.publish import Publishing, SourceState, UdpListener, targets_of
 from kappaskin.publish import udp as transport
 from kappaskin.publish.message import EstimateMessage
@@ -308,7 +308,7 @@ def test_a_contact_is_told_with_its_error_bars_and_age(listener, message: Estima
     assert touch.force_is_lower_bound
     assert "force is a lower bound" in said
     assert "age" in said
-    assert listener.summary == "1 contacts received, 0 lost"
+    assert listener.summary == f"1 contacts received, 0 lost; error bars: {ONE_SIGMA}"
 
 
 def test_the_force_of_a_contact_near_the_rim_is_not_told(listener, message) -> None:
@@ -322,7 +322,7 @@ def test_losses_are_told_by_gaps(listener) -> None:
     said = send(listener, *(numbered(n) for n in (5, 6, 9, 10, 0, 1)))
     assert said.count("2 messages lost") == 1
     assert "the sender restarted" in said
-    assert listener.summary == "6 contacts received, 2 lost"
+    assert listener.summary == f"6 contacts received, 2 lost; error bars: {ONE_SIGMA}"
 
 
 def test_a_state_is_told_once_and_cannot_speak_to_the_terminal(listener) -> None:

@@ -229,7 +229,7 @@ def test_what_is_no_bag_of_another_program(tmp_path) -> None:
 
     for name in ("empty", "a.npz", "out.mcap", "cut.mcap", "none.db3"):
         assert not is_foreign(tmp_path / name), name
-    assert "expected a bag of ROS 2" in FileLines(tmp_path / "empty").trouble
+    assert "expected a ROS 2 bag" in FileLines(tmp_path / "empty").trouble
     assert "expected .mcap contents" in FileLines(tmp_path / "text.mcap").trouble
 
 

@@ -108,7 +108,7 @@ class CostPanel(QWidget):
                 self.figures[name, what].setToolTip(tip)
                 grid.addWidget(self.figures[name, what], row, column)
         for column, widget in enumerate((Label("Whole frame"), self.computed, self.each)):
-            widget.setToolTip("Frames computed per second, and the time that each takes in all.")
+            widget.setToolTip("Frames computed per second, and the total computing time of each.")
             grid.addWidget(widget, len(tips), column)
         grid.setColumnStretch(1, 2)
         grid.setColumnStretch(2, 3)
@@ -260,7 +260,7 @@ class CostPanel(QWidget):
         self.each.setToolTip(
             f"Fit, contact, geometry, error bars, surface: {duration(computed.estimate)}\n"
             f"Publishing: {duration(computed.publishing)}\n"
-            f"Recording, and for the window to read: {duration(computed.keeping)}"
+            f"Recording, and transfer to the window: {duration(computed.keeping)}"
         )
 
     def _show_slider(self, present: Cost | None) -> None:

@@ -46,9 +46,7 @@ from kappaskin_app.widgets.parts import (
 )
 
 _LOOP_HIGH = 230  # px
-EQUATION_8 = (
-    "Nominal curvature, as Eq. 8 reads it from the voltage: kappa = 4 V / (V_in GF (t_s + t_g) G). "
-)
+EQUATION_8 = "Nominal curvature, by Eq. 8 from the voltage: kappa = 4 V / (V_in GF (t_s + t_g) G). "
 
 
 class StartPage(QWidget):

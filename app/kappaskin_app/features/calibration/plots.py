@@ -195,7 +195,7 @@ def _paint_arrow(painter: QPainter, skin: QRectF, dx: float, dy: float, colour: 
 
 LOOP_AXES = ChartAxis("Reading", "1/m"), ChartAxis("Applied", "1/m")
 LOOP_TIP = (
-    "Nominal curvature as Eq. 8 reads it, 4 V / (V_in GF (t_s + t_g) G), over that of the "
+    "Nominal curvature by Eq. 8, 4 V / (V_in GF (t_s + t_g) G), over that of the "
     "cylinder. Dashed: line of the calibration. Filled points: falling radius; open "
     "points: rising radius. Their difference is hysteresis."
 )

@@ -196,12 +196,12 @@ class _ResultPage(QWidget):
         self.verdict, self.found = Heading(1.3), text_label()
         self.why = text_label()
         tip = (
-            "Each weight, what all together tell it as, and how wrong the fit to the others tells "
-            "it."
+            "Each weight, its mass as estimated by the fit to all weights, and the error of its "
+            "estimate by the fit to the others."
         )
         self.table = text_label(tip=tip, rich=True)
         self.use = self.first = button(
-            "Use", "use-weights", "Tell forces with this stiffness (Ctrl+Z undoes)."
+            "Use", "use-weights", "Estimate forces with this stiffness (Ctrl+Z undoes)."
         )
         self.save = button(f"Save{ELLIPSIS}", "save-weights", "Write the calibration to a file.")
         tip = "Start again; discard an unsaved result."
@@ -222,7 +222,7 @@ class _ResultPage(QWidget):
         head, *_, why = known.lines()
         self.found.setText(sentence(head))
         self.why.setText(sentence(why.partition(": ")[2]))
-        rows = [("<i>weight</i>", "<i>told</i>", "<i>by the others</i>")]
+        rows = [("<i>weight</i>", "<i>estimated</i>", "<i>error by the others</i>")]
         rows += [
             (
                 f"{1e3 * laid / GRAVITY:.4g} g",

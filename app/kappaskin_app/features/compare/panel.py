@@ -21,7 +21,7 @@ from kappaskin_app.widgets.layout import scrolled
 from kappaskin_app.widgets.parts import button, sentence
 from kappaskin_app.widgets.surface_map import SurfaceMap
 from kappaskin_app.widgets.table import Table
-from kappaskin_app.widgets.text import length
+from kappaskin_app.widgets.text import ErrorBars, length
 
 _SETTINGS = (
     "other_x",
@@ -41,7 +41,7 @@ _DIFFERENCE = (
 )
 _TABLE = (
     "Position, force and depth of the contact, and the principal curvatures of the skin there, "
-    "each with its standard deviation. Place and force are the same where the settings do not "
+    "each with its error bar. Place and force are the same where the settings do not "
     "change them: they follow from the readings without the functions. A and B use the same "
     "readings, so that the errors of a difference do not follow from those of A and B."
 )
@@ -105,6 +105,8 @@ class ComparePanel(QWidget):
 
     def show_settings(self, settings: Settings) -> None:
         self.form.show_settings(settings)
+        heads = f"Error bars: {ErrorBars.now.label}", *_COLUMNS[1:]
+        self.table.setHorizontalHeaderLabels(heads)
 
     def show_status(self, status: Status, old: bool) -> None:
         """Show the status of B, and whether the values shown are `old`."""
@@ -171,7 +173,7 @@ class ComparePanel(QWidget):
         for row, (a, b) in enumerate(figures):
             texts = (
                 f"{a.label}, {a.unit}",
-                *(e.words or with_error(e.value, e.sd, digits=e.digits) for e in (a, b)),
+                *(e.words or with_error(e.value, _off(e), digits=e.digits) for e in (a, b)),
                 difference_text(a, b),
             )
             for column, text in enumerate(texts):
@@ -184,4 +186,8 @@ def difference_text(a: Readout, b: Readout) -> str:
         return NONE
     if (a.value, a.sd) == (b.value, b.sd):
         return _SAME
-    return rounded(b.value - a.value, min(a.sd, b.sd), a.digits, "+")[0]
+    return rounded(b.value - a.value, min(_off(a), _off(b)), a.digits, "+")[0]
+
+
+def _off(of: Readout) -> float:
+    return ErrorBars.now.of(of.sd, of.half_width)

@@ -82,7 +82,7 @@ class ConnectionFeature:
         for kind in (
             Kind("sensor description", (".toml",), self._connect_described, is_description),
             Kind("table of readings", (".csv", ".npz", ".parquet"), begin),
-            Kind("bag of ROS 2", (".db3", ".mcap", folder), begin, is_foreign),
+            Kind("ROS 2 bag", (".db3", ".mcap", folder), begin, is_foreign),
         ):
             shell.opening.add(kind)
         shell.menus.welcome.add(

@@ -90,7 +90,8 @@ _UNITS = {
 }
 _HINTS = (
     "Plug the board in, or type its port or URL, such as /dev/ttyACM0, COM3 or udp://:9870.",
-    "Let go of the skin, then press it: columns that answer light up. Select rows to change them.",
+    "Let go of the skin, then press it: columns that respond are highlighted. Select rows to "
+    "change them.",
     "Press the skin: the map shows where. Element 0 is at low x and low y, at the lower left.",
 )
 _FILE_HINTS = (
@@ -282,7 +283,7 @@ class NewSensorDialog(QDialog):
                 pair.setStretch(place, 1)
             form.addRow(words, pair)
         form.addRow("Next element is", self.along)
-        form.addRow("A number of 1 is", in_a_row(self.scale, self.unit))
+        form.addRow("A number of 1 means", in_a_row(self.scale, self.unit))
         form.addRow("Rate", self.rate)
         form.addRow("", self.free)
         form.addRow("Skin", in_a_row(self.known, self.rigidity))
@@ -301,7 +302,7 @@ class NewSensorDialog(QDialog):
             (self.reads, "What each element reads; the columns are guessed by it."),
             (self.order, "How the readings of several kinds follow each other in a line."),
             (self.table, "A row for each column. Select rows to change what they are."),
-            (self.meaning, "What they are, once Set is pressed."),
+            (self.meaning, "What the selected columns are; Set applies it."),
             (self.element, "Element of the first selected column; the next ones follow."),
             (self.name, "Name of the sensor, shown wherever it is connected."),
             (self.sides[0], "Length of the skin in x."),
@@ -309,9 +310,9 @@ class NewSensorDialog(QDialog):
             (self.grid[0], "Number of elements in x."),
             (self.grid[1], "Number of elements in y."),
             (self.along, "Where element 1 is, beside element 0."),
-            (self.scale, "A reading for each unit of the board's numbers."),
+            (self.scale, "Reading for a number of 1 from the board."),
             (self.unit, "Unit of a reading."),
-            (self.rate, "Rows of the file in a second, as it has no times."),
+            (self.rate, "Rows of the file per second, as it has no times."),
             (self.rigidity, "Bending rigidity D = E h\u00b3 / (12 (1 \u2212 \u03bd\u00b2))."),
         ]
 

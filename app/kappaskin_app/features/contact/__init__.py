@@ -11,11 +11,12 @@ from kappaskin_app.features.contact.readouts import Readouts
 from kappaskin_app.features.contact.recognition import ObjectRecognition
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.widgets.text import ErrorBars
 
 _FULL_SCREEN_PERIOD, _PERIOD = 0.25, 1.0  # s between two recognitions: in full screen, and else
 _OBJECT = (
-    "The object recognised from the readings with 95 % interval and the probability of the second "
-    "guess, and the principal curvatures of the skin at the contact."
+    "The object recognised from the readings, the 95 % interval of its radius and the probability "
+    "of the second guess; the principal curvatures of the skin at the contact with error bars."
 )
 
 _TIP = "Tables of the contact, the object and every element, copied as CSV"
@@ -36,6 +37,7 @@ class ContactFeature:
             display.places[f"readout-{name}"] = parts
         display.places["readouts"] = [self.readouts]
         display.numbers.connect(guarded(self._show))
+        shell.settings_shown.connect(guarded(lambda _: self.readouts.show_bars(ErrorBars.now)))
         display.status_shown.connect(guarded(self._follow))
         self.recognition.described.connect(guarded(display.status_bar.object.show_text))
         self.recognition.found.connect(display.object_found)

@@ -17,8 +17,10 @@ from kappaskin.sensing import Sensor
 from kappaskin_app.guard import guarded
 from kappaskin_app.widgets.lettering import LEFT
 from kappaskin_app.widgets.table import Table
+from kappaskin_app.widgets.text import ERROR_BARS, ErrorBars
 
-FACTS = ("Quantity", "Value", "95 % half-width", "Unit")
+FACTS = ("Quantity", "Value", "Standard deviation", "Unit")
+"""The head of the table of the contact as CSV, with standard deviations."""
 _READ = tuple(quantity for quantity in REPORTED if quantity.traced)
 _HEADS = (f"{of.name.replace('_', ' ')} [{each.unit}]" for each in _READ for of in each.colours)
 ELEMENTS = ("Element", "x [mm]", "y [mm]", *_HEADS, "Fault")
@@ -27,14 +29,13 @@ _OTHERS = {"m": 7, "m/m": 6, "1/m": 2}  # digits of readings, in SI units
 Rows = list[tuple[str, ...]]
 
 
-def facts_of(estimate: Estimate, object_: str) -> Rows:
+def facts_of(estimate: Estimate, object_: str, bars: ErrorBars) -> Rows:
     """Rows of the contact, the `object_` in words, and the accuracy of the shape."""
-    rows = [
-        (each.label, *rounded(each.value, each.half_width, each.digits), each.unit)
-        if not each.words
-        else (each.label, each.words, "", "")
-        for each in readouts(estimate)
-    ]
+    rows = Rows()
+    for each in readouts(estimate):
+        off = bars.of(each.sd, each.half_width)
+        number = (*rounded(each.value, off, each.digits), each.unit)
+        rows.append((each.label, *((each.words, "", "") if each.words else number)))
     return [*rows, ("Object", object_ or "unknown", "", "")]
 
 
@@ -114,8 +115,13 @@ class NumbersPanel(QWidget):
         self._next = now + _PERIOD
         self._facts, self._elements = [], []
         if estimate is not None and sensor is not None:
-            self._facts, self._elements = facts_of(estimate, what), elements_of(estimate, sensor)
-        _fill(self.facts, FACTS, self._facts)
+            self._facts = facts_of(estimate, what, ERROR_BARS["sigma"])
+            self._elements = elements_of(estimate, sensor)
+        bars = ErrorBars.now
+        shown = facts_of(estimate, what, bars) if self._facts and estimate is not None else []
+        heads = (*FACTS[:2], f"Error bar ({bars.label})", FACTS[3])
+        self.facts.setHorizontalHeaderLabels(list(heads))
+        _fill(self.facts, heads, shown)
         if head_of(sensor) != self._head:
             self._head = head_of(sensor)
             texts = len(self._head) - 1

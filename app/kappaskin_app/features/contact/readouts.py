@@ -12,7 +12,7 @@ from kappaskin.pipeline import REPORTED, Reported, readouts_of
 from kappaskin_app.theme import FAINT, follow_look
 from kappaskin_app.widgets.line import Line
 from kappaskin_app.widgets.parts import Label
-from kappaskin_app.widgets.text import NONE
+from kappaskin_app.widgets.text import NONE, ErrorBars
 
 _NEGLIGIBLE_SD = 0.05  # ms: a smaller error bar is omitted
 
@@ -21,8 +21,8 @@ FIELDS = {
     "rate": ("Frames", "Frames received per second, and pictures drawn of them."),
     "age": (
         "Age",
-        "Time from the start of a scan to its drawing, with the standard deviation of the device's "
-        "clock from pings. A device that answers no pings: time since its bytes were received, a "
+        "Time from the start of a scan to its drawing, with the error of the device's clock from "
+        "pings. Of a device that does not answer pings: time since its bytes were received, a "
         "lower bound.",
     ),
     "lost": (
@@ -31,14 +31,15 @@ FIELDS = {
     ),
     "contact": (
         "Contact",
-        "Position of the load that fits the readings best, or of two that are told apart; "
-        "distributed: over a line, a large area or several places, neither fits; near rim: too "
+        "Position of the load that fits the readings best, or of two loads where two fit; "
+        "distributed: neither fits, as for a line, a large area or several places; near rim: too "
         "close to a held edge to be reliable.",
     ),
 }
 _WIDTHS = {"contact": 26, "rate": 15, "lost": 19, "age": 10}
 """Usual number of characters of each."""
 _NUMBERS = [(each, each.header) for each in REPORTED if each.header is not None]
+_BARRED = ["contact", *(header.key for of, header in _NUMBERS if of.sd is not None)]
 FIELDS |= {header.key: (of.labels_shown[0], header.tip) for of, header in _NUMBERS}
 _WIDTHS |= {header.key: header.width for _, header in _NUMBERS}
 
@@ -69,14 +70,19 @@ def _contact(contact: Contact, second: Contact) -> str:
 
 def _place(contact: Contact) -> tuple[str, str]:
     """The position in mm, and the larger of its error bars with the unit."""
-    sd = 1e3 * float(np.max(contact.position_sd))
-    (x, bar), (y, _) = (rounded(1e3 * value, sd, 1) for value in contact.position.tolist())
+    sd, half = (1e3 * float(np.max(of)) for of in (contact.position_sd, contact.position_95))
+    off = ErrorBars.now.of(sd, half)
+    (x, bar), (y, _) = (rounded(1e3 * value, off, 1) for value in contact.position.tolist())
     return f"({x}, {y})", f"mm {bar}" if bar == "exact" else f"\N{PLUS-MINUS SIGN} {bar} mm"
 
 
 def _forces(*contacts: Contact) -> str:
     """The forces of two contacts, without error bars, for which there is no room."""
-    texts = ["edge" if of.near_rim else rounded(of.force, of.force_sd)[0] for of in contacts]
+    off = ErrorBars.now.of
+    texts = [
+        "edge" if of.near_rim else rounded(of.force, off(of.force_sd, of.force_95))[0]
+        for of in contacts
+    ]
     return NONE if NONE in texts else f"{', '.join(texts)} N"
 
 
@@ -86,7 +92,7 @@ def _age(age: float, sd: float) -> str:
         return NONE
     if not math.isfinite(sd):
         return f"\N{GREATER-THAN OR EQUAL TO} {age:.0f} ms"
-    return f"{age:.0f} ms" if sd < _NEGLIGIBLE_SD else with_error(age, sd, "ms")
+    return f"{age:.0f} ms" if sd < _NEGLIGIBLE_SD else with_error(age, ErrorBars.now.of(sd), "ms")
 
 
 class Readouts(QWidget):
@@ -146,6 +152,15 @@ class Readouts(QWidget):
             label.setFont(font)
         self._fit()
 
+    def show_bars(self, bars: ErrorBars) -> None:
+        """Name the error bars of the numbers that have them."""
+        for (key, (name, tip)), label in zip(FIELDS.items(), self._names, strict=True):
+            if key in _BARRED:
+                label.setText(f"{name} ({bars.label})")
+            if key in (*_BARRED, "age"):
+                for widget in (label, self._numbers[key]):
+                    widget.setToolTip(f"{tip} Error bar: {bars.title}.")
+
     def text(self, key: str) -> str:
         return self._numbers[key].text()
 
@@ -191,7 +206,8 @@ class Readouts(QWidget):
         for quantity, header in _NUMBERS:
             (found,) = readouts_of(quantity, reported)
             sign = "+" if header.signed else ""
-            words = with_error(found.value, found.sd, found.unit, found.digits, sign)
+            off = ErrorBars.now.of(found.sd, found.half_width)
+            words = with_error(found.value, off, found.unit, found.digits, sign)
             if header.key == "force" and estimate.second.present:
                 words = _forces(estimate.contact, estimate.second)
             if header.key == "force" and estimate.contact.force_is_lower_bound:

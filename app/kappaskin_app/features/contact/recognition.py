@@ -23,21 +23,23 @@ from kappaskin.pipeline import Setup
 from kappaskin.sensing import Sensor
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.widgets.parts import capital
+from kappaskin_app.widgets.text import ErrorBars
 
-_UNFIT = "; press it straight at one place: it may bear at several or on its rim"
+_UNFIT = "; press it straight at one place: it may touch at several or with its rim"
 _AT_EDGE = "shape unknown (contact at the edge)"
 _AS_ONE = "as one object: "  # of two contacts
 _DRIFTING = "no object is named while readings drift: tare at rest"
-_PREPARING = "computing the model readings of objects on this skin\N{HORIZONTAL ELLIPSIS}"
+_PREPARING = "Computing the model readings of objects on this skin\N{HORIZONTAL ELLIPSIS}"
 
 
 def curvature_text(estimate: Estimate) -> str:
-    """Text of the principal curvatures of the skin at a contact; empty near the rim."""
+    """The end of a text: principal curvatures of the skin at a contact; empty near the rim."""
     if not estimate.contact.present or estimate.contact.near_rim:
         return ""
     found = zip(estimate.geometry.principal, estimate.geometry.principal_sd, strict=True)
-    one, other = (with_error(value, sd, "1/m", sign="+") for value, sd in found)
-    return f"principal curvatures {one} and {other}"
+    bars = ErrorBars.now
+    one, other = (with_error(value, bars.of(sd), "1/m", sign="+") for value, sd in found)
+    return f"; principal curvatures {one} and {other} ({bars.label})"
 
 
 def object_text(found: ContactObject, estimate: Estimate) -> str:
@@ -110,10 +112,11 @@ class ObjectRecognition(QObject):
         """Store the finder, or the reason why there is none."""
         self._finder = str(finder) if isinstance(finder, Exception) else finder
 
-    def _finish(self, recognised: tuple[str, str, ContactObject, Estimate]) -> None:
-        what, curvatures, found, estimate = recognised
+    def _finish(self, recognised: tuple[str, ContactObject, Estimate]) -> None:
+        what, found, estimate = recognised
         found = self._steady(found, time.monotonic())
         what = what or object_text(found, estimate)
+        curvatures = curvature_text(estimate)
         more = "".join(what.partition("; ")[1:])  # the second guess, or a cause
         self.described.emit(f"{capital(what)}{curvatures}", curvatures, more)
         self.found.emit(found, estimate)
@@ -136,7 +139,7 @@ def _finder(
 
 def _recognise(
     finder: ObjectFinder | ImprintObjects | str, estimate: Estimate
-) -> tuple[str, str, ContactObject, Estimate]:
+) -> tuple[str, ContactObject, Estimate]:
     if isinstance(finder, str):
         found, what = NO_OBJECT, finder
     elif estimate.contact.near_rim:
@@ -147,5 +150,4 @@ def _recognise(
         whole = as_one(estimate.contact, estimate.second)
         found = finder(estimate.curvature, estimate.noise, whole)
         what = ""
-    curvatures = curvature_text(estimate)
-    return what, f"; {curvatures}" if curvatures else "", found, estimate
+    return what, found, estimate

@@ -120,7 +120,7 @@ class DesignPanel(QWidget):
         self.form = DesignForm()
         self.predicted = SurfaceMap("Predicted", "mm", _PREDICTED)
         self.simulated = SurfaceMap("Simulated", "mm", _SIMULATED)
-        self.along = Chart(ChartAxis("Error bar along x", "mm"), ChartAxis("x", "mm"), _ALONG)
+        self.along = Chart(ChartAxis("Standard deviation", "mm"), ChartAxis("x", "mm"), _ALONG)
         self.words = text_label()
         self.simulate = button(
             "Check by simulation",

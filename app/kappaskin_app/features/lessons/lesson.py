@@ -33,7 +33,6 @@ _PLAIN = {
     field.name: getattr(kind(), field.name)
     for kind in (SceneSettings, EstimatorSettings, Scanning, View)
     for field in fields(kind)
-    if field.name != "theme"
 } | {"calibration": None, "tare": None}
 
 

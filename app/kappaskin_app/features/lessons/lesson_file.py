@@ -30,15 +30,9 @@ from kappaskin_app.shell.settings.form_fields import Choice, FormField, Range, S
 from kappaskin_app.shell.settings.scene import Scanning
 from kappaskin_app.shell.settings.shown import EstimatorSettings, View
 
-_OWN = ("theme", "show_start")  # preferences
 _LISTS = ("dead_elements", "region_elements")
 _KINDS = (SceneSettings, EstimatorSettings, Scanning, View)
-SETTABLE = {
-    field.name
-    for kind in _KINDS
-    for field in fields(kind)
-    if "form" in field.metadata and field.name not in _OWN
-}
+SETTABLE = {field.name for kind in _KINDS for field in fields(kind) if "form" in field.metadata}
 """Settings that a lesson may set, besides lists of elements; none sends data."""
 
 

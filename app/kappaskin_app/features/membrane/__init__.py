@@ -38,13 +38,6 @@ class MembraneFeature:
         self.membrane.drawn.connect(shell.session.tick, Qt.ConnectionType.QueuedConnection)
         self.membrane.drawn.connect(shell.display.drawn)
         self.membrane.pointer.moved.connect(selection.over)
-        view.measurement.stepped.connect(
-            guarded(
-                lambda words, *places: shell.history.step(
-                    words, view.measurement.set_places, *places
-                )
-            )
-        )
         self.scale.lock_wanted.connect(guarded(self.view_actions.lock))
         self.membrane.pointer.clicked.connect(guarded(self._click))
         self._selection, self._colouring = selection, shell.display.colouring

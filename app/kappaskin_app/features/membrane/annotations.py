@@ -73,7 +73,7 @@ class Caption:
         whole = self.words.replace(" mm", "\N{NO-BREAK SPACE}mm")
         letters = letters_of(self._px, self.unit)
         room = max(room_for(self._plotter, letters) - self._spared, _LEAST)
-        lines = textwrap.wrap(whole, room)
+        lines = [line for part in whole.split("\n") for line in textwrap.wrap(part, room)]
         self.text.prop.font_size, self.text.prop.color = letters, current().text
         self.text.input = "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")
 

@@ -4,7 +4,7 @@ import numpy as np
 from PySide6.QtCore import QObject, Signal
 
 from kappaskin.frames import Estimate
-from kappaskin.skin import Patch, distances
+from kappaskin.skin import distances
 from kappaskin_app.features.membrane.annotations import Ruler
 from kappaskin_app.features.membrane.membrane import MembraneView
 
@@ -13,19 +13,16 @@ Places = tuple[tuple[float, float], ...] | None
 _FIRST = "Measure: click a place on the skin; Esc ends"
 _SECOND = "Measure: click another place; Esc ends"
 
-_INWARD = 1 - 1e-9  # scale towards the middle, so that rounding leaves no place outside the rim
 _HINTS = (_FIRST, _SECOND)  # by the number of places
 
 
 class Measurement(QObject):
     """Measurement by clicks while it is `on`; a third click starts again.
 
-    `changed` emits whether it is on; `stepped` the words of a step and the `places` before and
-    after it: up to two (x, y) in m, None while off.
+    `places` are up to two (x, y) in m, None while off. `changed` emits whether it is on.
     """
 
     changed = Signal(bool)
-    stepped = Signal(str, object, object)
 
     def __init__(self, membrane: MembraneView) -> None:
         super().__init__(membrane)
@@ -41,25 +38,20 @@ class Measurement(QObject):
         if self.on:
             self.end()
         else:
-            self._step("measure", ())
+            self.set_places(())
 
     def end(self) -> None:
         if self.on:
-            self._step("end measurement", None)
+            self.set_places(None)
 
     def add_place(self, x: float, y: float) -> None:
         """Add the place (x, y) in m as the first or second."""
         before = self.places if self.places is not None and len(self.places) < 2 else ()
-        self._step("measure to here" if before else "measure from here", (*before, (x, y)))
-
-    def _step(self, words: str, after: Places) -> None:
-        self.stepped.emit(words, self.places, after)
+        self.set_places((*before, (x, y)))
 
     def set_places(self, places: Places) -> None:
         """Measure between these places; None switches off."""
         was, self._skin = self.on, self._membrane.skin
-        if places and not _lie_on(self._skin.patch, places):
-            places = ()  # restored by undo, but outside the present skin
         self.places = places
         self.ruler.show_hint(_HINTS[len(places)] if places is not None and len(places) < 2 else "")
         self._membrane.plotter.update()
@@ -80,9 +72,3 @@ class Measurement(QObject):
         if len(places) == 2:
             found = distances(skin.patch, estimate.surface, *places)
         self.ruler.show(skin, places, 2 * self._membrane.lift, found)
-
-
-def _lie_on(patch: Patch, places: tuple[tuple[float, float], ...]) -> bool:
-    """Whether all `places` in m are on a patch, including its rim despite rounding."""
-    middle = np.array([patch.a, patch.b]) / 2
-    return bool(patch.contains(middle + _INWARD * (np.array(places) - middle)).all())

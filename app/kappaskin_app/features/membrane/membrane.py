@@ -27,7 +27,7 @@ from kappaskin_app.shell.drawn_skin import MM, DrawnSkin
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, current, follow_look
 
 _LETTERS = 14  # px, of the caption
-_CORNER = 14  # letters at its right: the vertical exaggeration
+_CORNER = 14  # letters at its right: the vertical exaggeration, and which error bars are drawn
 _LIFT = 0.006  # of the skin's size above the surface, which would hide half of a line
 _POINT, _POINTS = 5, 80  # px of an element, and of many in a row: or they would hide the skin
 CONTACT = "#1fd17a"
@@ -118,7 +118,7 @@ class MembraneView(QWidget):
         self.sides = Sides(plotter)
         self._caption = Caption(plotter, _LETTERS, 0.98, "top", spared=_CORNER)
         self.caption: Any = self._caption.text
-        self.exaggeration = Caption(plotter, _LETTERS, 0.98, "top", "right")
+        self.corner, self.error_bars = Caption(plotter, _LETTERS, 0.98, "top", "right"), ""
         self.alarm = Alarm(plotter)
 
     def _make_lights(self) -> None:
@@ -206,7 +206,7 @@ class MembraneView(QWidget):
     def _fit(self) -> None:
         """Fit camera and texts to the size of the view."""
         self.camera_control.fit()
-        for caption in (self._caption, self.exaggeration):
+        for caption in (self._caption, self.corner):
             caption.fit()
         self.alarm.fit()
 
@@ -224,7 +224,7 @@ class MembraneView(QWidget):
         if estimate.surface.shape != skin.height.shape or self.surface.lost:
             return  # of another skin, or received after the loss
         skin.height = -MM * times * np.nan_to_num(estimate.surface)
-        self._show_times(times)
+        self._show_corner(times)
         self.surface.show_shape(skin)
         self.surface.show_values(skin, values, limits)
         self._show_grids(skin, estimate.true_surface, times)
@@ -247,11 +247,12 @@ class MembraneView(QWidget):
         self.age_sd = estimate.taken_sd if known else math.inf
         self._request()
 
-    def _show_times(self, times: float) -> None:
-        """State the vertical exaggeration, unless there is none."""
-        text = f"height \N{MULTIPLICATION SIGN} {times:.3g}"
-        if (text := text if times != 1 else "") != self.exaggeration.words:
-            self.exaggeration.show(text)
+    def _show_corner(self, times: float) -> None:
+        """State the vertical exaggeration, unless there is none, and which error bars are drawn."""
+        height = f"height \N{MULTIPLICATION SIGN} {times:.3g}" if times != 1 else ""
+        bars = f"errors {self.error_bars}" if self.error_bars else ""
+        if (text := "\n".join(filter(None, (height, bars)))) != self.corner.words:
+            self.corner.show(text)
 
     def _show_grids(self, skin: DrawnSkin, true: Array, times: float) -> None:
         """Draw the lines of the fitted and of the `true` (ny, nx) surface."""
@@ -279,7 +280,7 @@ class MembraneView(QWidget):
 
     def show_unit(self, unit: float) -> None:
         """Use the presenter's large letters where a unit of it is so many px; 0: the usual ones."""
-        for part in (self.sides, self._caption, self.exaggeration):
+        for part in (self.sides, self._caption, self.corner):
             part.unit = unit
         self._fit_timer.start()
 

@@ -19,14 +19,13 @@ from kappaskin_app.shell.drawn_skin import MM, DrawnSkin
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.theme import DIVERGING
+from kappaskin_app.widgets.text import ErrorBars
 
-TIMES_SD = 2.0
-"""Standard deviations from the surface to either side of the band."""
 _COLOUR = "#8fd0ff"
 
 
 class Band:
-    """Band of `TIMES_SD` standard deviations on both sides of the surface."""
+    """Band of the error bars on both sides of the surface."""
 
     def __init__(self, plotter: Any) -> None:
         self._plotter = plotter
@@ -41,7 +40,7 @@ class Band:
         for actor in self._actors:
             actor.visibility = sd is not None
         if sd is not None:
-            wide = TIMES_SD * MM * times * np.nan_to_num(sd).ravel()
+            wide = MM * times * np.nan_to_num(ErrorBars.now.of(sd)).ravel()
             for side, mesh in zip((-1, 1), self._meshes, strict=True):
                 mesh.points[:] = skin.points(height=skin.height.ravel() + side * wide)
 
@@ -140,7 +139,6 @@ class Directions:
 _LONG = 0.2  # of the skin's size
 _POINTS = 9  # of a line
 _RIM = 32  # points of the cone's rim
-_WIDE = 2.0  # standard deviations of the slopes
 _NORMAL = (31, 209, 122)  # as the contact's own mark
 _COLOURS = np.array([_NORMAL, DIVERGING[215], DIVERGING[40]], np.uint8)
 
@@ -196,7 +194,7 @@ class ContactFrame:
         self.cone.visibility = slope_sd is not None
         if slope_sd is not None:
             around = 2 * np.pi * np.arange(_RIM) / _RIM
-            off = _WIDE * slope_sd[:, None] * np.stack([np.cos(around), np.sin(around)])
+            off = ErrorBars.now.of(slope_sd)[:, None] * np.stack([np.cos(around), np.sin(around)])
             rim = normal + off[0, :, None] * x + off[1, :, None] * y
             rim *= length / np.linalg.norm(rim, axis=1, keepdims=True)
             self._cone.points[:] = np.vstack([origin, origin + rim])

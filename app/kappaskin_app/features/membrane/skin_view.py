@@ -22,6 +22,7 @@ from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings, locked_at
 from kappaskin_app.theme import current, follow_look
 from kappaskin_app.widgets.colour_bar import SkinScale
+from kappaskin_app.widgets.text import ErrorBars
 from kappaskin_app.widgets.tint import Tint
 
 _MARKS = 0.06  # s between two updates of the marks
@@ -172,6 +173,8 @@ class SkinView(QObject):
             self.membrane.show_colours(tint.colours, tint.ink)
             self.legend.show_colours(tint.colours)
         self._show_reason(name, values)
+        barred = self._settings.show_band or self._settings.show_frame
+        self.membrane.error_bars = ErrorBars.now.label if barred else ""
         self.membrane.show_estimate(estimate, values, tint.limits, times)
         self.scale.bar.show_tint(tint, beside)
         self.scale.show_what("" if tint.unit == "shape" else shade.symbol, shade.tip)

@@ -72,14 +72,14 @@ _TOGGLES = (
     ("directions", "principal &directions", "Ctrl+Alt+D"),
     ("band", "error &band", "Ctrl+Alt+B"),
     ("frame", "contact &frame", "Ctrl+Alt+F"),
-    ("object", "object f&ound", "Ctrl+Alt+O"),
-    ("pressed", "object &pressed", "Ctrl+Alt+P"),
+    ("object", "estimated &object", "Ctrl+Alt+O"),
+    ("pressed", "true ob&ject", "Ctrl+Alt+P"),
 )
 _LOCK = "Fix all colour ranges at their present values, or let them follow the data"
 _HIGHER = "Increase the vertical exaggeration by 1; colours do not change"
 _LOWER = "Decrease the vertical exaggeration by 1; colours do not change"
 _CAMERA = "View the whole skin from the initial direction"
-_MEASURE = "Measure the distance of two places that you click; Escape ends"
+_MEASURE = "Measure the distance between two places that you click; Esc ends"
 _COLOUR = "colour-"  # begins the name of an action
 _DIGITS = 9  # actions that may have a digit for a shortcut
 

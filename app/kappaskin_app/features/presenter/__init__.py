@@ -31,23 +31,13 @@ class PresenterFeature:
     def _add_actions(self, shell: MainWindow) -> None:
         add = shell.actions_by_name.add
         add("present", VIEW, "&Presenter", self.presenter.toggle, "F11", TIP)
-        self._action = add(
-            "sound", VIEW, "S&ound of the force", self._toggle_sound, "F12", SOUND_TIP
-        )
+        toggle = self._toggle_sound
+        self._action = add("sound", VIEW, "S&ound of the force", toggle, "F12", SOUND_TIP)
         self._action.setCheckable(True)
         self.presenter.sound.ended.connect(guarded(self._show_sound))
 
     def _toggle_sound(self) -> None:
-        sound, before = self.presenter.sound, self.presenter.sound.on
-        self._set_sound(not before)
-        if sound.on != before:  # else no player was found, and there is nothing to undo
-            words = "sound of the force on" if sound.on else "sound of the force off"
-            self._shell.history.step(words, self._set_sound, before, sound.on)
-
-    def _set_sound(self, on: bool) -> None:
-        sound = self.presenter.sound
-        if sound.on != on:
-            self._show_sound(sound.toggle())
+        self._show_sound(self.presenter.sound.toggle())
 
     def _show_sound(self, why_not: str) -> None:
         self._shell.notify(why_not)

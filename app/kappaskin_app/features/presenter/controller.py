@@ -23,7 +23,7 @@ from kappaskin_app.shell.loads import loads_at, object_replaceable
 from kappaskin_app.shell.selection import LoadHandle
 from kappaskin_app.shell.session import Session
 
-TIP = "Estimates in full screen, legible from three metres; Escape ends"
+TIP = "Estimates in full screen, legible from three metres; Esc ends"
 SOUND_TIP = "A tone whose pitch and loudness follow the force, while the presenter is shown"
 _FIGURES_PERIOD = 0.15  # s between two updates of the numbers: faster is illegible
 _DRAWING_PERIOD = 0.03  # s between two drawings of the force bar

@@ -7,8 +7,8 @@ import numpy as np
 
 from kappaskin.contact import NO_OBJECT, ContactObject
 from kappaskin.frames import Contact, Estimate
+from kappaskin_app.widgets.text import ERROR_BARS, ErrorBars
 
-_95 = 1.96  # standard deviations that a 95 % interval reaches
 _ROUND = ("sphere", "cylinder")  # the kinds that have a radius
 _MOST = 10.0  # largest ratio of an object's force to that of the best point load
 
@@ -37,17 +37,17 @@ class RadiusEstimate:
 
 @dataclass(frozen=True)
 class Feedback:
-    """Feedback in SI units, each number with its 95 % half-width; NaN where unknown.
+    """Feedback in SI units, each number with its error bar as all views show it; NaN if unknown.
 
     The force of a contact `near_rim` is not determined, and it has no `radius`.
     """
 
     force: float
-    force_95: float
+    force_off: float
     displacement: float
-    displacement_95: float
+    displacement_off: float
     position: tuple[float, float]
-    position_95: float
+    position_off: float
     kind: str
     length: float
     radius: RadiusEstimate | None
@@ -65,24 +65,29 @@ def feedback_of(estimate: Estimate, recognised: Recognised | None = None) -> Fee
     contact = estimate.contact
     if not contact.present:
         return None
-    force, force_95 = contact.force, contact.force_95
-    place, place_95 = contact.position, float(np.max(contact.position_95))
+    bars = ErrorBars.now
+    force, force_off = contact.force, bars.of(contact.force_sd, contact.force_95)
+    place, reach = contact.position, float(np.max(contact.position_95))
+    place_off = bars.of(float(np.max(contact.position_sd)), reach)
     if recognised is not None and 0 < recognised.what.force / recognised.contact.force < _MOST:
         more = contact.force / recognised.contact.force
-        force, force_95 = more * recognised.what.force, abs(more) * recognised.what.force_95
+        what = recognised.what
+        force, force_off = more * what.force, bars.of_half_width(abs(more) * what.force_95)
         if not contact.single:
-            place, place_95 = recognised.what.position, float(np.max(recognised.what.position_95))
+            place, reach = what.position, float(np.max(what.position_95))
+            place_off = bars.of_half_width(reach)
     elif not contact.single:
-        force_95 = place_95 = math.nan
-    displacement, displacement_95 = contact.displacement, contact.displacement_95
+        force_off = place_off = math.nan
+    displacement = contact.displacement
+    displacement_off = bars.of(contact.displacement_sd, contact.displacement_95)
     if contact.near_rim:
-        force = force_95 = math.nan
+        force = force_off = math.nan
     if not contact.single or contact.near_rim:
-        displacement, displacement_95 = float(np.nanmax(np.abs(estimate.surface))), math.nan
+        displacement, displacement_off = float(np.nanmax(np.abs(estimate.surface))), math.nan
     x, y = (float(value) for value in place)
     kind, length = (recognised.what.kind, recognised.what.length) if recognised else ("", math.nan)
     return Feedback(
-        *(force, force_95, displacement, displacement_95, (x, y), place_95),
+        *(force, force_off, displacement, displacement_off, (x, y), place_off),
         *(kind, length, _radius_estimate(estimate, recognised), contact.near_rim),
         contact.force_is_lower_bound,
     )
@@ -98,7 +103,7 @@ def _radius_estimate(estimate: Estimate, recognised: Recognised | None) -> Radiu
     geometry = estimate.geometry
     sharper = int(np.argmax(np.abs(geometry.principal)))
     k = abs(float(geometry.principal[sharper]))
-    off = _95 * float(geometry.principal_sd[sharper])
+    off = ERROR_BARS["95"].of(float(geometry.principal_sd[sharper]))
     low, high = max(k - off, 0.0), k + off
     if not high > 0:
         return None

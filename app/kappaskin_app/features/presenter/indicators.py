@@ -23,7 +23,7 @@ from kappaskin_app.widgets.lettering import (
     shrunk,
     width_of,
 )
-from kappaskin_app.widgets.text import NONE
+from kappaskin_app.widgets.text import NONE, ErrorBars
 
 
 class Indicator(QWidget):
@@ -252,7 +252,7 @@ class NumberIndicator(Indicator):
 HEIGHT = 104.0  # units
 _BAR = 46.0  # units that the bar is high
 _LEAST, _LARGEST = 0.2, 100.0  # N, shortest and longest scale: no load on a skin is larger
-_SIGMAS = 2.55  # half-widths of the 95 % interval that are five standard deviations
+_SIGMAS = 5.0  # standard deviations that the scale shows at least
 _LEAST_BAND = 3.0  # px, so that a small error bar stays visible
 
 
@@ -262,17 +262,18 @@ class ForceBar(Indicator):
     def __init__(self) -> None:
         super().__init__()
         self._range = SteadyRange(_LEAST, _LARGEST)
-        self.force = self.force_95 = math.nan
+        self.force = self.force_off = math.nan
 
     def show_unit(self, unit: float) -> None:
         super().show_unit(unit)
         self.fix_height(HEIGHT)
 
-    def show_force(self, force: float, force_95: float, now: float) -> None:
-        """Show a force in N with its 95 % half-width, at `now` in s; NaN for none."""
-        self.force, self.force_95 = abs(force), force_95
-        off = force_95 if math.isfinite(force_95) else 0.0
-        self._range.follow(max(self.force + min(off, self.force), _SIGMAS * off), now)
+    def show_force(self, force: float, force_off: float, now: float) -> None:
+        """Show a force in N with its error bar, at `now` in s; NaN for none."""
+        self.force, self.force_off = abs(force), force_off
+        off = force_off if math.isfinite(force_off) else 0.0
+        most = max(self.force + min(off, self.force), _SIGMAS / ErrorBars.now.times * off)
+        self._range.follow(most, now)
         self.update()
 
     @property
@@ -292,7 +293,7 @@ class ForceBar(Indicator):
 
     def band(self) -> tuple[float, float]:
         """Ends of the error bar in px."""
-        off = self.force_95 if math.isfinite(self.force_95) else 0.0
+        off = self.force_off if math.isfinite(self.force_off) else 0.0
         low, high = self.at(self.force - off), self.at(self.force + off)
         short = max(_LEAST_BAND - (high - low), 0.0) / 2
         return low - short, high + short

@@ -32,7 +32,7 @@ from kappaskin_app.features.presenter.indicators import (
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import current, follow_look
 from kappaskin_app.widgets.lettering import CAPTION, Words, letters, shrunk
-from kappaskin_app.widgets.text import NONE
+from kappaskin_app.widgets.text import NONE, ErrorBars
 
 _HEIGHT, _WIDTH = 1080.0, 1920.0  # px of the screen for which a unit is one px
 _SKIN, _FIGURES = 51, 49  # shares of the width
@@ -194,9 +194,7 @@ class PresenterView(QWidget):
         super().__init__()
         self.strip, self.controls, self.banner = StatusStrip(), OperatorControls(), Banner()
         self.force, self.bar = NumberIndicator("Force"), ForceBar()
-        self.displacement, self.place = map(
-            NumberIndicator, ("Displacement", "Contact at x, y in mm")
-        )
+        self.displacement, self.place = map(NumberIndicator, ("Depth", "Contact at x, y in mm"))
         self.radius, self.radius_view = NumberIndicator(_RADIUS), RadiusView()
         self.indicators: list[Indicator] = [
             *(self.strip, self.banner, self.force, self.bar),
@@ -275,15 +273,15 @@ class PresenterView(QWidget):
             self.radius.show_figure(NONE, name=_RADIUS)
             return
         least = "\N{GREATER-THAN OR EQUAL TO} " if feedback.force_is_lower_bound else ""
-        force, off = _figure("N", feedback.force_95, feedback.force)
+        force, off = _figure("N", feedback.force_off, feedback.force)
         if math.isfinite(feedback.force):
             self.force.show_figure(least + force, off)
         else:
             self.force.show_figure(NONE, NO_FORCE if feedback.near_rim else "unknown")
-        depth, off = _figure("mm", 1e3 * feedback.displacement_95, 1e3 * feedback.displacement)
+        depth, off = _figure("mm", 1e3 * feedback.displacement_off, 1e3 * feedback.displacement)
         self.displacement.show_figure(depth, off or "largest on the skin")
         x, y = (1e3 * value for value in feedback.position)
-        place, off = _figure("mm", 1e3 * feedback.position_95, x, y)
+        place, off = _figure("mm", 1e3 * feedback.position_off, x, y)
         if feedback.near_rim:
             place, off = f"\N{ALMOST EQUAL TO} {x:.0f}, {y:.0f}", "near the rim: unreliable"
         self.place.show_figure(place.removesuffix(" mm"), off, faint=feedback.near_rim)
@@ -291,7 +289,7 @@ class PresenterView(QWidget):
 
     def show_graphics(self, feedback: Feedback | None, now: float) -> None:
         """Draw the force bar and the circle of the radius."""
-        force = (feedback.force, feedback.force_95) if feedback else (math.nan, math.nan)
+        force = (feedback.force, feedback.force_off) if feedback else (math.nan, math.nan)
         self.bar.show_force(*force, now)
         self.radius_view.show_radius(
             feedback.radius if feedback else None, bool(feedback and feedback.kind), now
@@ -322,7 +320,7 @@ def _radius(estimate: RadiusEstimate, recorded: bool) -> tuple[str, str]:
     if low > 0 and high < math.inf:
         half = (high - low) / 2
         value, low, high = (rounded(r, half)[0] for r in (1e3 * estimate.value, low, high))
-        return (f"{value} mm", f"{low} to {high} mm") if low != high else (f"{value} mm", "exact")
+        return f"{value} mm", "exact" if low == high else f"95 %: {low} to {high} mm"
     if low > 0:
         return NONE, f"unknown, over {low:.3g} mm"
     hint = "pressed too lightly" if recorded else "press harder"
@@ -330,8 +328,9 @@ def _radius(estimate: RadiusEstimate, recorded: bool) -> tuple[str, str]:
 
 
 def _figure(unit: str, half: float, *values: float) -> tuple[str, str]:
-    """The values with their unit, and the half-width of their interval."""
+    """The values with their unit, and their error bar `half`, with which one that is."""
     found = [rounded(value, half, 3 if unit == "N" else 1) for value in values]
     bar = found[0][1]
     text = f"{', '.join(text for text, _ in found)} {unit}"
-    return text, f"\N{PLUS-MINUS SIGN} {bar} {unit}" if bar not in ("", "exact") else bar
+    off = f"\N{PLUS-MINUS SIGN} {bar} {unit} ({ErrorBars.now.label})"
+    return text, off if bar not in ("", "exact") else bar

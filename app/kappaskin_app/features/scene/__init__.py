@@ -46,7 +46,6 @@ class SceneFeature:
         )
         shell.docks.put_below("scene", "Scene", self.scene, "F2", _ABOUT, height=0.38)
         shell.display.centre.add_below(self.timeline)
-        shell.layouts.pages.append(self.scene)
         self._wire(shell)
         self._add_actions(shell)
 
@@ -91,7 +90,7 @@ class SceneFeature:
         mesh = {"what": "mesh", "file": str(found), "unit": _MILLIMETRE}
         self.editing.replace_object(mesh, x, y, load.force, found)
         self._shell.opening.note(file)
-        self._shell.notify(f"{file.name} is the object; its unit is taken as millimetres")
+        self._shell.notify(f"{file.name} is the object; its lengths are taken as millimetres")
 
     def _things(self) -> Iterator[FinderEntry]:
         """Finder entries of the panel's pages and of the gallery's scenes."""

@@ -15,6 +15,7 @@ from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.scene import SHAPES
 from kappaskin_app.shell.simulation import patch_of
 from kappaskin_app.widgets.parts import Label
+from kappaskin_app.widgets.text import ErrorBars
 
 _PREPARING = "Computing this skin; the previous one is shown until then."
 _NUMBERS = ("side_x", "side_y", "base_radius", "rim_radius")
@@ -218,7 +219,7 @@ def _tradeoff_text(tradeoff: ScanTradeoff, requested: float, without: float) -> 
     """Frame rate and accuracy of a region, in frames/s `requested` and `without` the region."""
     rate, full_rate = min(requested, tradeoff.rate), min(without, tradeoff.full_rate)
     gain = (
-        f"{rate:.0f} instead of {full_rate:.0f} frames/s, {rate / full_rate:.1f} times"
+        f"{rate:.0f} instead of {full_rate:.0f} frames/s, {rate / full_rate:.1f} times as many"
         if rate > 1.005 * full_rate
         else f"{full_rate:.0f} frames/s, as with all channels"
     )
@@ -228,9 +229,12 @@ def _tradeoff_text(tradeoff: ScanTradeoff, requested: float, without: float) -> 
     if not known:
         return text
     mm, full = (1e3 * max(bound[known]) for bound in (tradeoff.bound, tradeoff.full_bound))
-    accuracy = f"\N{PLUS-MINUS SIGN}{mm:.2f} mm" if math.isfinite(mm) else "undetermined"
+    bars = ErrorBars.now
+    mm, full = bars.of(mm), bars.of(full)
+    off = f"\N{PLUS-MINUS SIGN} {mm:.2f} mm ({bars.label})"
+    accuracy = off if math.isfinite(mm) else "undetermined"
     compared = (
-        f"\N{PLUS-MINUS SIGN}{full:.2f} mm with all channels"
+        f"\N{PLUS-MINUS SIGN} {full:.2f} mm with all channels"
         if not mm <= 1.005 * full
         else "as with all channels"
     )

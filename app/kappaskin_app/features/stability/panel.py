@@ -24,7 +24,7 @@ _COLUMNS = 3
 _MODE_WIDTH = 210  # px
 _GRID = 65  # points of a map along each side
 _REAL = "The hard cases need the simulated skin (Ctrl+M)."
-_TRY = "Hard cases to try; Back undoes one in one step."
+_TRY = "Hard cases to try; Back undoes the last one."
 
 
 class StabilityPanel(QWidget):

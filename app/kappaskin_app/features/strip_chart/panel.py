@@ -14,6 +14,7 @@ from kappaskin_app.features.strip_chart.history import LONG, WHOLE, Span
 from kappaskin_app.guard import guarded
 from kappaskin_app.widgets.chart import Chart, ChartAxis, ChartLine, Series
 from kappaskin_app.widgets.layout import Flow
+from kappaskin_app.widgets.text import ErrorBars
 
 MIME = "application/x-kappaskin-quantities"
 """Kind of what is dragged from a readout: names of quantities, separated by spaces."""
@@ -23,12 +24,12 @@ _MINUTES = 300.0  # s, from which on the axis is in minutes
 _EMPTY = "No contact in this time."
 _NONE = "Select a number above, or drag one here from the top of the window."
 _TIP = (
-    "{} over time; the band is \N{PLUS-MINUS SIGN} 1 standard deviation. Every frame of the last "
-    "minute is shown, before that the least and largest in each tenth of a second, for an hour."
+    "{} over time; the band is its error bar ({}). Every frame of the last minute is shown, before "
+    "that the smallest and the largest value in each tenth of a second, for an hour."
 )
 _RECORDED_TIP = (
-    "{} over the whole recording; the band is ± 1 standard deviation. Lines mark "
-    "the present time and the events. Click to go to another time; the wheel zooms, a double click "
+    "{} over the whole recording; the band is its error bar ({}). Lines mark the present time and "
+    "the events. Click to go to another time; the wheel zooms, a double click "
     "shows all."
 )
 _SPAN_TIP = "Time that is shown."
@@ -145,9 +146,10 @@ class StripChart(QWidget):
             box.setChecked(name in names)
         self.span.setCurrentIndex(self.span.findData(seconds))
         self.span.setVisible(not length)
-        if self._shown == (names, seconds, length):
+        bars = ErrorBars.now
+        if self._shown == (names, seconds, length, bars):
             return
-        self._shown, self._length = (names, seconds, length), length
+        self._shown, self._length = (names, seconds, length, bars), length
         begin, end = (0.0, length) if length else (-seconds, 0.0)
         unit, self._unit = ("min", 60.0) if end - begin >= _MINUTES else ("s", 1.0)
         when = "Time in the recording" if length else "Time from now"
@@ -163,7 +165,7 @@ class StripChart(QWidget):
                 (begin / self._unit, end / self._unit),
             )
             axis = ChartAxis(title, unit, limits=limits)
-            chart.show_axes(ChartAxis(of.label, of.unit), axis, tip.format(of.label))
+            chart.show_axes(ChartAxis(of.label, of.unit), axis, tip.format(of.label, bars.label))
         self.hint.setVisible(not names)
 
     def _chart(self, name: str) -> Chart:

@@ -4,6 +4,7 @@ from kappaskin_app.features.traces.selected_element import SelectedElement
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.window import MainWindow
 
+_DOCK = "element"
 _ELEMENT = "The element clicked: last 10 s, spectrum, calibration and health"
 
 _TRACES = (
@@ -18,10 +19,6 @@ class TracesFeature:
         self.selected_element = shown = SelectedElement(
             shell.history, shell.session, shell.display, shell.selection
         )
-        shell.docks.put_below("element", "Element", shown.panel, "Ctrl+Alt+E", _ELEMENT)
+        shell.docks.put_below(_DOCK, "Element", shown.panel, "Ctrl+Alt+E", _ELEMENT)
         shell.docks.put_below("traces", "Traces", shown.traces, "Ctrl+Alt+T", _TRACES)
-        shown.selected.connect(guarded(lambda *_: self._show_element(shell)))
-
-    def _show_element(self, shell: MainWindow) -> None:
-        shell.docks.reveal("element")
-        shell.layouts.note()  # a step of its own, before that of the element
+        shown.selected.connect(guarded(lambda *_: shell.docks.reveal(_DOCK)))

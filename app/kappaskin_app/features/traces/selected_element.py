@@ -27,6 +27,7 @@ from kappaskin_app.shell.history import History
 from kappaskin_app.shell.selection import Selection
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
+from kappaskin_app.widgets.text import ErrorBars
 
 _LEAST_PERIOD = 0.002  # s between two stored frames
 _GAP = 0.5  # s without a frame, as where a replay goes elsewhere, that a curve does not cross
@@ -104,10 +105,15 @@ def facts(element: int, sensor: Sensor, status: Status, estimate: Estimate) -> s
 
 
 def title(element: int, sensor: Sensor, displacement: float, sd: float) -> str:
-    """Number and position of an element, and the `displacement` of the skin there in mm."""
+    """Number and position of an element, and the `displacement` of the skin there in mm.
+
+    It ends with which error bars those of the element are.
+    """
     x, y = 1e3 * sensor.layout.positions[element]
-    inward = with_error(displacement, sd, "mm")
-    return f"<b>Element {element}</b> at ({x:.1f}, {y:.1f}) mm; displacement {inward}"
+    bars = ErrorBars.now
+    inward = with_error(displacement, bars.of(sd), "mm")
+    at = f"<b>Element {element}</b> at ({x:.1f}, {y:.1f}) mm"
+    return f"{at}; displacement {inward}; error bars: {bars.label}"
 
 
 def _row(channel: int, sensor: Sensor, status: Status, estimate: Estimate) -> tuple[str, ...]:
@@ -127,20 +133,20 @@ def _row(channel: int, sensor: Sensor, status: Status, estimate: Estimate) -> tu
 
 
 def _read(quantity: ReportedQuantity, reported: Reported, channel: int, scale: float) -> str:
-    """A quantity of a channel, `scale` times, with its standard deviation if it has one."""
+    """A quantity of a channel, `scale` times, with its error bar if it has one."""
     found = [of(reported) for suffix, _, of in quantity.forms if suffix != "_95"]
     each = np.broadcast_arrays(*found, math.nan)[:2]
     value, sd = (scale * float(one.flat[channel]) for one in each)
-    return with_error(value, sd, digits=quantity.shown[2], sign="+")
+    return with_error(value, ErrorBars.now.of(sd), digits=quantity.shown[2], sign="+")
 
 
 def _calibration_cells(calibration: Calibration | None, channel: int) -> tuple[str, str]:
     if calibration is None:
         return "1 (nominal)", "0 (nominal)"
-    c = calibration
+    c, off = calibration, ErrorBars.now.of
     return (
-        with_error(c.gain[channel], c.gain_sd[channel]),
-        with_error(c.offset[channel], c.offset_sd[channel], sign="+"),
+        with_error(c.gain[channel], off(c.gain_sd[channel])),
+        with_error(c.offset[channel], off(c.offset_sd[channel]), sign="+"),
     )
 
 
@@ -187,15 +193,9 @@ class SelectedElement(QObject):
         selection.chosen.connect(guarded(self._select_chosen))
 
     def select(self, element: int) -> None:
-        """Select an element, as an undoable step."""
+        """Select an element; -1 for none."""
         self.selected.emit(element)
-        if element != self.element:
-            self._history.step(f"select element {element}", self._set, self.element, element)
-
-    def _set(self, element: int) -> None:
-        """Show an element; none if the connected sensor has fewer."""
-        sensor = self._session.status.sensor
-        self.element = element if sensor is not None and element < len(sensor.layout) else -1
+        self.element = element
         self._next_plots = self._next_facts = self._next_spectrum = 0.0
         if self.element < 0:
             self.panel.show_facts("", "")

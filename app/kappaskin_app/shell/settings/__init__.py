@@ -29,9 +29,10 @@ from kappaskin_app.shell.settings.scene import Scanning as Scanning
 from kappaskin_app.shell.settings.scene import Written as Written
 from kappaskin_app.shell.settings.shown import COLOURS as COLOURS
 from kappaskin_app.shell.settings.shown import METHOD_SHORT as METHOD_SHORT
-from kappaskin_app.shell.settings.shown import Camera, TextSize, View
+from kappaskin_app.shell.settings.shown import Camera, View
 from kappaskin_app.shell.settings.shown import ComparedSettings as ComparedSettings
 from kappaskin_app.shell.settings.shown import EstimatorSettings as EstimatorSettings
+from kappaskin_app.shell.settings.shown import Look as Look
 from kappaskin_app.shell.settings.shown import locked_at as locked_at
 from kappaskin_app.shell.settings.shown import locking as locking
 
@@ -47,7 +48,7 @@ class Settings(
     EstimatorSettings,
     View,
     Camera,
-    TextSize,
+    Look,
     Scanning,
     PublishSettings,
     ComparedSettings,

@@ -25,7 +25,7 @@ def _length(label: str, tip: str) -> Range:
 
 
 def _noise(of: str, least: float, most: float, step: float, scale: float, unit: str) -> Range:
-    tip = f"Standard deviation of the noise of {of}. The error bar is proportional to all noise."
+    tip = f"Standard deviation of the noise of {of}. The error of the shape is proportional to it."
     return Range(f"Noise of {of.split()[0]}", tip, least, most, step, scale, unit, 2)
 
 
@@ -71,7 +71,7 @@ class DesignSettings:
         Several(
             "Readings",
             "What every element reads. Curvatures alone are those of strain gages, converted one "
-            "after the other; all others come at once, as numbers.",
+            "after the other; all other readings arrive together, as numbers.",
             (
                 ("xx", "Curvature xx"),
                 ("yy", "Curvature yy"),

@@ -27,9 +27,21 @@ class Camera:
 
 
 @dataclass(frozen=True)
-class TextSize:
-    """The text size of the window."""
+class Look:
+    """The look of the window: kept from one start to the next, and not part of undo."""
 
+    error_bars: str = "sigma"  # of `ERROR_BARS`
+    theme: str = setting(
+        "dark", Choice("Theme", "Colours of the window.", (("light", "Light"), ("dark", "Dark")))
+    )
+    show_start: bool = setting(
+        True,
+        Switch(
+            "Welcome",
+            "Show when the window opens how to start: with a scene, a sensor, a lesson or a "
+            "recording.",
+        ),
+    )
     letters: float = setting(
         100.0,
         Range(
@@ -215,9 +227,9 @@ class View(ColourRanges):
         False,
         Switch(
             "Error band",
-            "Two translucent surfaces, two standard deviations below and above the estimated one: "
-            "the true surface lies between them at about 95 % of the points, as far as noise is "
-            "the only error.",
+            "Two translucent surfaces, one error bar (\N{PLUS-MINUS SIGN}1 \u03c3 or 95 %, menu "
+            "View) below and above the estimated one: the true surface lies between them at "
+            "about 68 or 95 % of the points, as far as noise is the only error.",
         ),
     )
     show_frame: bool = setting(
@@ -225,8 +237,9 @@ class View(ColourRanges):
         Switch(
             "Contact frame",
             "Normal of the skin at the contact (green) and the two principal directions (orange, "
-            "blue). The cone is the 95 % confidence region of the normal, from the standard "
-            "deviations of the slopes; it has the vertical exaggeration of the skin.",
+            "blue). The cone contains the normals whose slopes differ by one error bar "
+            "(\N{PLUS-MINUS SIGN}1 \u03c3 or 95 %, menu View); it has the vertical "
+            "exaggeration of the skin.",
         ),
     )
     show_object: bool = setting(
@@ -252,17 +265,6 @@ class View(ColourRanges):
     to_y: float = setting(1.0, _cut("To", "y"))
     from_z: float = setting(0.0, _cut_level("From", "below"))
     to_z: float = setting(1.0, _cut_level("To", "above"))
-    theme: str = setting(
-        "dark", Choice("Theme", "Colours of the window.", (("light", "Light"), ("dark", "Dark")))
-    )
-    show_start: bool = setting(
-        True,
-        Switch(
-            "Welcome",
-            "Show when the window opens how to start: with a scene, a sensor, a lesson or a "
-            "recording.",
-        ),
-    )
     traced: tuple[int, ...] = ()  # elements whose last seconds are drawn
     strips: tuple[str, ...] = ("force", "displacement")  # quantities drawn over time
     strip_seconds: float = 60.0

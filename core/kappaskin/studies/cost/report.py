@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from kappaskin._files import write_whole
-from kappaskin._text import printable, with_error
+from kappaskin._text import ONE_SIGMA, printable, with_error
 from kappaskin.errors import Refusal
 from kappaskin.scenes import Scene
 from kappaskin.studies.cost import (
@@ -308,7 +308,7 @@ def described(cost: Cost) -> tuple[str, ...]:
         f"  {s.method}, {s.functions[0]} x {s.functions[1]} functions, {s.precision}, "
         f"{elements_text(cost)} elements, {scanned}",
         f"  RMS error {_mm_text(error.rms)}, {_mm_text(error.rms_exact)} without noise; at the "
-        f"load {with_error(1e3 * error.e, 1e3 * cost.e_sd, 'mm', sign='+')}",
+        f"load {with_error(1e3 * error.e, 1e3 * cost.e_sd, 'mm', sign='+')} ({ONE_SIGMA})",
         f"  an estimate after {_s(cost.total_time)}: {_s(cost.conversion_time)} of conversion, "
         f"{_s(cost.time_per_frame)} of arithmetic",
     )

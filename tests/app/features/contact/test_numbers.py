@@ -31,14 +31,14 @@ def test_the_table_has_what_the_picture_shows_and_can_be_copied(window: MainWind
 
 
 @pytest.mark.full
-def test_larger_letters_enlarge_the_window_and_are_taken_back(
+def test_larger_letters_enlarge_the_window_and_usual_ones_shrink_it_again(
     window: MainWindow, qapp: QApplication, until
 ) -> None:
     plain, badge = qapp.font().pointSizeF(), window.display.badge.width()
-    window.history.change("Letters", -1, letters=200.0)
+    window.requests.set("letters", 200.0)
     assert qapp.font().pointSizeF() == pytest.approx(2 * plain)
     until(lambda: window.basis.message.fontInfo().pixelSize() > 20)
     until(lambda: window.display.badge.width() > 1.8 * badge)
-    window.history.stack.undo()
+    window.requests.set("letters", 100.0)
     assert qapp.font().pointSizeF() == plain
     until(lambda: window.display.badge.width() == badge)

@@ -9,6 +9,7 @@ from kappaskin import Pipeline, Setup, Simulator, load_scene
 from kappaskin_app.features.contact.numbers import FACTS, csv_of, facts_of
 from kappaskin_app.features.contact.readouts import FIELDS, Readouts
 from kappaskin_app.theme import FAINT
+from kappaskin_app.widgets.text import ERROR_BARS
 
 
 @pytest.fixture
@@ -126,10 +127,10 @@ def test_an_unknown_force_is_a_dash_and_never_nan(readouts: Readouts) -> None:
 def test_the_table_near_the_rim_has_words_and_its_copy_numbers_that_programs_read() -> None:
     estimate = _centre()
     rim = replace(estimate, contact=replace(estimate.contact, near_rim=True))
-    facts = {row[0]: row[1:] for row in facts_of(rim, "")}
+    facts = {row[0]: row[1:] for row in facts_of(rim, "", ERROR_BARS["sigma"])}
     assert facts["Force"] == ("edge: no force", "", "")
     assert facts["Contact x"] == ("edge: unreliable", "", "")
     assert facts["Larger \N{GREEK SMALL LETTER KAPPA}"][0].startswith("\N{MINUS SIGN}")
-    copied = csv_of((FACTS, facts_of(rim, "")))
+    copied = csv_of((FACTS, facts_of(rim, "", ERROR_BARS["sigma"])))
     assert "\N{MINUS SIGN}" not in copied
     assert "-" in copied

@@ -34,9 +34,9 @@ def _estimate(*loads):
 def test_the_text_gives_the_principal_curvatures_with_error_bars():
     words = curvature_text(_estimate(PointLoad(0.05, 0.05, 0.15)))
 
-    assert words.startswith("principal curvatures \N{MINUS SIGN}")
-    assert words.endswith("1/m")
-    assert words.count("\N{PLUS-MINUS SIGN}") == 2
+    assert words.startswith("; principal curvatures \N{MINUS SIGN}")
+    assert words.endswith(" 1/m (\N{PLUS-MINUS SIGN}1 \u03c3)")
+    assert words.count("\N{PLUS-MINUS SIGN} ") == 2
 
 
 def test_the_text_is_empty_without_a_contact():
@@ -64,13 +64,13 @@ def test_what_fits_no_object_is_said_with_its_cause_and_what_to_do():
     estimate = _estimate(*corners)
     finder = ObjectFinder(scene.sensor().plate, scene.sensor().layout)
 
-    _, _, found, _ = recognition._recognise(finder, estimate)  # noqa: SLF001
+    _, found, _ = recognition._recognise(finder, estimate)  # noqa: SLF001
     words = object_text(found, estimate)
 
     assert not found.fits
     assert not found.kind
     assert "shape unknown: no object fits" in words
-    assert "press it straight at one place: it may bear at several or on its rim" in words
+    assert "press it straight at one place: it may touch at several or with its rim" in words
 
 
 def test_simulated_point_loads_are_those_of_the_plate_that_objects_are_recognised_on():
@@ -79,7 +79,7 @@ def test_simulated_point_loads_are_those_of_the_plate_that_objects_are_recognise
     for x, y in places:
         scene = scene_of(Settings(load_case="point", x=x, y=y, force=0.4))
         estimate = Pipeline(scene.sensor(), Setup())(Simulator(scene).frame(0, time.monotonic))
-        _, _, found, _ = recognition._recognise(  # noqa: SLF001
+        _, found, _ = recognition._recognise(  # noqa: SLF001
             ObjectFinder(scene.plate, scene.layout), estimate
         )
         described.add(re.sub(r"[\d.]+", "r", object_text(found, estimate)))
@@ -101,10 +101,10 @@ def test_no_object_and_no_curvature_is_named_near_the_rim():
     estimate = _estimate(PointLoad(0.05, 0.05, 0.15))
     rim = replace(estimate, contact=replace(estimate.contact, near_rim=True))
 
-    words, curvatures, found, _ = recognition._recognise(None, rim)  # noqa: SLF001
+    words, found, _ = recognition._recognise(None, rim)  # noqa: SLF001
 
     assert words == "shape unknown (contact at the edge)"
-    assert (curvatures, found.probability) == ("", {})
+    assert (curvature_text(rim), found.probability) == ("", {})
 
 
 def _ball(radius=0.04, **changes):
@@ -182,11 +182,11 @@ def test_the_line_does_without_what_is_spare_where_room_is_short(qapp):
 def test_no_object_is_named_while_readings_drift():
     estimate = replace(_estimate(PointLoad(0.05, 0.05, 0.15)), drift=0.5)
 
-    words, curvatures, found, _ = recognition._recognise(None, estimate)  # noqa: SLF001
+    words, found, _ = recognition._recognise(None, estimate)  # noqa: SLF001
 
     assert found.probability == {}
     assert words == "no object is named while readings drift: tare at rest"
-    assert curvatures.startswith("; principal")
+    assert curvature_text(estimate).startswith("; principal")
 
 
 @pytest.mark.full
@@ -196,7 +196,7 @@ def test_a_new_skin_shows_that_the_finder_is_being_computed(window, until, monke
     monkeypatch.setattr(recognition, "object_finder", lambda *of: seen.wait(60) and made(*of))
     window.requests.set("shape", "cylinder")
     until(
-        lambda: "computing the model readings of objects" in window.display.status_bar.object.text()
+        lambda: "Computing the model readings of objects" in window.display.status_bar.object.text()
     )
     seen.set()
     until(lambda: "curvatures" in window.display.status_bar.object.text())

@@ -51,9 +51,9 @@ def test_the_force_of_a_ball_that_lies_against_the_skin_is_the_hands(force) -> N
 
     feedback = feedback_of(estimate, _recognised(estimate))
 
-    assert feedback.force == pytest.approx(force, abs=2 * feedback.force_95)
-    assert feedback.force_95 < 0.03 * force
-    assert abs(estimate.contact.force - force) > 2 * feedback.force_95  # what a disc would tell
+    assert feedback.force == pytest.approx(force, abs=2 * feedback.force_off)
+    assert feedback.force_off < 0.03 * force
+    assert abs(estimate.contact.force - force) > 2 * feedback.force_off  # what a disc would tell
 
 
 def test_what_was_found_a_moment_ago_corrects_the_force_of_now() -> None:
@@ -67,8 +67,8 @@ def test_what_was_found_a_moment_ago_corrects_the_force_of_now() -> None:
 def test_a_contact_that_no_disc_explains_has_no_error_bar_until_an_object_does() -> None:
     feedback = feedback_of(_estimate(0.6, rigid=_LARGE))
 
-    assert math.isnan(feedback.force_95)
-    assert math.isnan(feedback.position_95)
+    assert math.isnan(feedback.force_off)
+    assert math.isnan(feedback.position_off)
 
 
 def test_the_radius_felt_is_the_balls_within_its_interval() -> None:
@@ -105,23 +105,23 @@ def test_a_small_contact_is_told_with_all_its_error_bars() -> None:
 
     feedback = feedback_of(estimate)
 
-    assert feedback.position == pytest.approx((0.04, 0.06), abs=2 * feedback.position_95)
-    assert feedback.force == pytest.approx(0.2, abs=2 * feedback.force_95)
-    assert feedback.displacement_95 > 0
+    assert feedback.position == pytest.approx((0.04, 0.06), abs=2 * feedback.position_off)
+    assert feedback.force == pytest.approx(0.2, abs=2 * feedback.force_off)
+    assert feedback.displacement_off > 0
 
 
 @pytest.mark.parametrize(
     ("interval", "radius", "words"),
     [
-        ((0.038, 0.042), 0.04, ("40.0 mm", "38.0 to 42.0 mm")),
+        ((0.038, 0.042), 0.04, ("40.0 mm", "95 %: 38.0 to 42.0 mm")),
         ((0.0, 0.0265), math.nan, ("\N{EN DASH}", "unknown, under 26.5 mm: press harder")),
         ((0.12, math.inf), math.inf, ("\N{EN DASH}", "unknown, over 120 mm")),
         ((0.0, math.inf), math.nan, ("\N{EN DASH}", "unknown")),
         ((math.inf, math.inf), math.inf, ("flat", "")),
         ((0.0, 3.8), math.nan, ("\N{EN DASH}", "unknown")),
-        ((0.01425, 0.01429), 0.01427, ("14.270 mm", "14.250 to 14.290 mm")),
-        ((0.0081, 0.0093), 0.00866, ("8.66 mm", "8.10 to 9.30 mm")),
-        ((1.1, 1.4), 1.234, ("1230 mm", "1100 to 1400 mm")),
+        ((0.01425, 0.01429), 0.01427, ("14.270 mm", "95 %: 14.250 to 14.290 mm")),
+        ((0.0081, 0.0093), 0.00866, ("8.66 mm", "95 %: 8.10 to 9.30 mm")),
+        ((1.1, 1.4), 1.234, ("1230 mm", "95 %: 1100 to 1400 mm")),
     ],
 )
 def test_a_radius_is_written_as_far_as_it_is_known(interval, radius, words) -> None:
@@ -150,7 +150,7 @@ def test_a_contact_near_the_rim_has_no_force_and_no_radius() -> None:
     feedback = feedback_of(rim)
 
     assert math.isnan(feedback.force)
-    assert math.isnan(feedback.force_95)
+    assert math.isnan(feedback.force_off)
     assert feedback.radius is None
     assert feedback.displacement == pytest.approx(np.nanmax(np.abs(estimate.surface)))
     assert math.isnan(feedback_of(rim, recognised).force)

@@ -102,23 +102,3 @@ def test_the_window_sounds_only_while_something_is_felt(window, player, until):
     window.presenter.leave()
     action.trigger()
     assert not action.isChecked()
-
-
-@pytest.mark.full
-def test_sound_that_was_switched_on_or_off_comes_back_and_none_that_never_was(
-    window, player, monkeypatch, tmp_path_factory
-):
-    sound, actions, stack = window.presenter.sound, window.actions_by_name, window.history.stack
-    actions["sound"].trigger()
-    actions["sound"].trigger()
-    assert [stack.text(n) for n in range(stack.count())] == [
-        "sound of the force on",
-        "sound of the force off",
-    ]
-    for on in (True, False):
-        actions["undo"].trigger()
-        assert (sound.on, actions["sound"].isChecked()) == (on, on)
-    stack.clear()
-    monkeypatch.setenv("PATH", str(tmp_path_factory.mktemp("empty")))
-    actions["sound"].trigger()
-    assert not actions["undo"].isEnabled()

@@ -457,6 +457,6 @@ def test_what_is_lost_is_shown_in_the_header(qtbot) -> None:
     qtbot.addWidget(badge)
     badge.show_state("SIM", RecordingStatus("x.mcap", True, 65.0, 5_000_000, 100, 7))
     assert badge.text() == "SIM\nREC 7 lost"
-    assert "5.0 MB, 7 lost by a slow disk" in badge.toolTip()
+    assert "5.0 MB, 7 lost because of a slow disk" in badge.toolTip()
     badge.show_state("SIM", RecordingStatus("x.mcap", True, 3723.0, 5_000_000, 100, 0))
     assert badge.text() == "SIM\nREC 1:02:03"

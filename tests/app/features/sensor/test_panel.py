@@ -82,8 +82,8 @@ def test_a_region_shows_its_frame_rate_and_accuracy(window, until):
     ("electronics", "gain"),
     [
         ("modern", "Frame rate: 500 frames/s, as with all channels (possible:"),
-        ("second", "Frame rate: 500 instead of 166 frames/s, 3.0 times (possible:"),
-        ("first", "Frame rate: 500 instead of 166 frames/s, 3.0 times (possible:"),
+        ("second", "Frame rate: 500 instead of 166 frames/s, 3.0 times as many (possible:"),
+        ("first", "Frame rate: 500 instead of 166 frames/s, 3.0 times as many (possible:"),
     ],
 )
 def test_the_tradeoff_is_of_the_frames_that_really_come(qapp, electronics, gain):
@@ -130,8 +130,9 @@ def test_a_strip_tells_where_the_contact_is_along_it_alone(qapp) -> None:
     panel.show_settings(Settings(region="adaptive"))
     panel.show_tradeoff(ScanTradeoff.of(sensor, region, PointLoad(0.02, 0.02, 0.5), 0.2))
     panel.show_status(Status(state="streaming", sensor=sensor, region=region), True)
-    assert "at best: \N{PLUS-MINUS SIGN}0.04 mm, " in panel.message.text()
-    assert "\N{PLUS-MINUS SIGN}0.02 mm with all channels." in panel.message.text()
+    bars = "\N{PLUS-MINUS SIGN}1 \u03c3"
+    assert f"at best: \N{PLUS-MINUS SIGN} 0.04 mm ({bars}), " in panel.message.text()
+    assert "\N{PLUS-MINUS SIGN} 0.02 mm with all channels." in panel.message.text()
 
 
 @pytest.mark.parametrize(("shape", "possible"), [("flat", False), ("cylinder", True)])
