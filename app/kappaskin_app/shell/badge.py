@@ -4,7 +4,7 @@ import math
 
 from PySide6.QtCore import QPointF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFontInfo, QMouseEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import QSizePolicy, QToolBar, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QToolBar, QVBoxLayout, QWidget
 
 from kappaskin.live import Status
 from kappaskin.recording import RecordingStatus, Replay
@@ -174,15 +174,23 @@ def in_use(status: Status) -> str:
 
 
 class Header(QToolBar):
-    """The header bar; its first widget is the `badge`."""
+    """The header bar: the `badge` and other widgets in a row, and below it the `banner`."""
 
-    def __init__(self, badge: Badge) -> None:
+    def __init__(self, badge: Badge, banner: QWidget) -> None:
         super().__init__("Header")
         self.setObjectName("header")
         self.setMovable(False)
         self.toggleViewAction().setEnabled(False)
-        self.addWidget(badge)
+        inside, self._row = QWidget(), QHBoxLayout()
+        column = QVBoxLayout(inside)
+        column.setContentsMargins(0, 0, 0, 0)
+        for layout in (self._row, column):
+            layout.setSpacing(0)
+        column.addLayout(self._row)
+        column.addWidget(banner)
+        self.addWidget(inside)
+        self.add(badge)
 
     def add(self, widget: QWidget) -> None:
-        """Show a widget after all others."""
-        self.addWidget(widget)
+        """Show a widget after all others of the row."""
+        self._row.addWidget(widget)

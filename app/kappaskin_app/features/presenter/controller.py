@@ -17,7 +17,6 @@ from kappaskin_app.features.presenter.sound import Sound
 from kappaskin_app.features.presenter.view import PresenterView
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.badge import GAP, SIM, origin
-from kappaskin_app.shell.centre import ActionBanner
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.docks import drawn_once
 from kappaskin_app.shell.loads import loads_at, object_replaceable
@@ -117,13 +116,7 @@ class PresenterController(QObject):
         window = self._window
         docks = window.findChildren(QDockWidget, options=Qt.FindChildOption.FindDirectChildrenOnly)
         bars = window.findChildren(QToolBar, options=Qt.FindChildOption.FindDirectChildrenOnly)
-        return [
-            *docks,
-            *bars,
-            *window.findChildren(ActionBanner),
-            window.menuBar(),
-            window.statusBar(),
-        ]
+        return [*docks, *bars, window.menuBar(), window.statusBar()]
 
     # Input.
 
