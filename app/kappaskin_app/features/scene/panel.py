@@ -30,7 +30,6 @@ from kappaskin_app.features.scene.gallery import GalleryPanel
 from kappaskin_app.features.scene.plan import EffectsPanel
 from kappaskin_app.features.scene.scene_form import SceneForm
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.form import for_the_window
 from kappaskin_app.theme import ALERT, current, follow_look
 from kappaskin_app.widgets.parts import Label, button, text_label
@@ -250,9 +249,9 @@ class ScenePanel(QTabWidget):
 
     plan_visible = Signal(bool)
 
-    def __init__(self, tasks: Tasks) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self.gallery = GalleryPanel(tasks)
+        self.gallery = GalleryPanel()
         self.editor, self.effects = SceneEditor(), EffectsPanel()
         for page, title in (
             (self.gallery, "&Gallery"),
