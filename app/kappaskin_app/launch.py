@@ -72,6 +72,7 @@ def opened(
     _stand_behind()
     try:
         from kappaskin_app.features import all_features
+        from kappaskin_app.shell.background import collect_garbage_here
         from kappaskin_app.shell.window import MainWindow
 
         if splash is not None:
@@ -80,6 +81,8 @@ def opened(
     except BaseException:
         engine.close()
         raise
+    collect_garbage_here(window)
+    window.closed.connect(gc.enable)
     window.show()
     for plug_in in found_plug_ins():
         if plug_in.trouble:

@@ -96,20 +96,21 @@ class Badge(Label):
     def paintEvent(self, event: QPaintEvent) -> None:
         if not self.state:
             return
-        painter, font = QPainter(self), self.font()
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(colour_of(self.state, current())))
-        painter.drawRoundedRect(self.rect(), _ROUND, _ROUND)
-        one = QFontInfo(font).pixelSize()
-        font.setPixelSize(one if "\n" in self.text() else round(_LARGE * one))
-        font.setBold(True)
-        painter.setFont(font)
-        painter.setPen(QColor("white"))
-        painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self.text())
-        if self.recorded.active:
-            painter.setBrush(QColor(current().bad))
-            painter.drawEllipse(QPointF(2.5 * _DOT, 2.5 * _DOT), _DOT, _DOT)
+        font = self.font()
+        with QPainter(self) as painter:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(colour_of(self.state, current())))
+            painter.drawRoundedRect(self.rect(), _ROUND, _ROUND)
+            one = QFontInfo(font).pixelSize()
+            font.setPixelSize(one if "\n" in self.text() else round(_LARGE * one))
+            font.setBold(True)
+            painter.setFont(font)
+            painter.setPen(QColor("white"))
+            painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self.text())
+            if self.recorded.active:
+                painter.setBrush(QColor(current().bad))
+                painter.drawEllipse(QPointF(2.5 * _DOT, 2.5 * _DOT), _DOT, _DOT)
 
 
 def colour_of(state: str, theme: Theme) -> str:

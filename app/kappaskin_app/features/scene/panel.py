@@ -168,20 +168,21 @@ class SceneText(QPlainTextEdit):
 
     def paint_numbers(self, where: QWidget, event: QPaintEvent) -> None:
         """Paint the numbers of the visible lines, for the line number widget only."""
-        painter, theme = QPainter(where), current()
-        painter.fillRect(event.rect(), QColor(theme.window))
-        painter.setFont(self.font())
-        block, offset = self.firstVisibleBlock(), self.contentOffset()
-        height = self.fontMetrics().height()
-        while block.isValid():
-            top = round(self.blockBoundingGeometry(block).translated(offset).top())
-            if top > event.rect().bottom():
-                break
-            number = block.blockNumber() + 1
-            painter.setPen(QColor(theme.alert if number == self._error_line else theme.faint))
-            area = QRect(0, top, where.width() - _NUMBER_MARGIN, height)
-            painter.drawText(area, Qt.AlignmentFlag.AlignRight, str(number))
-            block = block.next()
+        theme = current()
+        with QPainter(where) as painter:
+            painter.fillRect(event.rect(), QColor(theme.window))
+            painter.setFont(self.font())
+            block, offset = self.firstVisibleBlock(), self.contentOffset()
+            height = self.fontMetrics().height()
+            while block.isValid():
+                top = round(self.blockBoundingGeometry(block).translated(offset).top())
+                if top > event.rect().bottom():
+                    break
+                number = block.blockNumber() + 1
+                painter.setPen(QColor(theme.alert if number == self._error_line else theme.faint))
+                area = QRect(0, top, where.width() - _NUMBER_MARGIN, height)
+                painter.drawText(area, Qt.AlignmentFlag.AlignRight, str(number))
+                block = block.next()
 
 
 _LINE = re.compile(r"\bline (\d+)")
