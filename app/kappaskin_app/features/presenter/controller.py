@@ -25,7 +25,6 @@ from kappaskin_app.shell.session import Session
 
 TIP = "Estimates in full screen, legible from three metres; Escape ends"
 SOUND_TIP = "A tone whose pitch and loudness follow the force, while the presenter is shown"
-_FIGURES_PERIOD = 0.15  # s between two updates of the numbers: faster is illegible
 _DRAWING_PERIOD = 0.03  # s between two drawings of the force bar
 _OLD = 1.0  # s after which a recognised object is discarded
 
@@ -58,7 +57,7 @@ class PresenterController(QObject):
         self.sound = Sound(self)
         self._recognised: Recognised | None = None
         self._recognised_at = -math.inf
-        self._next_figures = self._next_drawing = 0.0
+        self._next_drawing = 0.0
         pad = view.controls.pad
         pad.grabbed.connect(load.grabbed)
         pad.dragged.connect(load.dragged)
@@ -88,6 +87,7 @@ class PresenterController(QObject):
             self.view.present(True)
             self._show_hand()
             window.showFullScreen()
+        self._display.show_numbers_soon()
         self.view.controls.pad.setFocus()
 
     def leave(self) -> None:
@@ -138,8 +138,11 @@ class PresenterController(QObject):
         self.feedback = None if estimate is None else feedback_of(estimate, recognised)
         self.view.show_graphics(self.feedback, now)
         self.sound.set_level(self.view.bar.share)
-        if now >= self._next_figures:
-            self._next_figures = now + _FIGURES_PERIOD
+
+    def show_numbers(self, estimate: Estimate | None) -> None:
+        """Write the estimate whose numbers are shown elsewhere, too."""
+        if self.on:
+            self._show_estimate(time.monotonic())
             why_none = "no reading" if estimate is None else "no contact"
             self.view.show_feedback(self.feedback, why_none, self._session.replaying)
 
