@@ -196,6 +196,19 @@ def test_labels_show_markup_as_it_is() -> None:
     assert len(found["kappaskin_app.widgets.parts"]) == 1
 
 
+def test_every_painter_ends_with_its_block() -> None:
+    """One that an exception keeps alive paints on a device that Qt has deleted."""
+    calls, blocks = set[tuple[str, int]](), set[tuple[str, int]]()
+    for name, tree in modules().items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "QPainter":
+                calls.add((name, node.lineno))
+            elif isinstance(node, ast.With):
+                blocks |= {(name, item.context_expr.lineno) for item in node.items}
+    assert calls
+    assert calls <= blocks
+
+
 def test_core_is_sixteen_rooms() -> None:
     folders = {file.parent.name for file in PACKAGES["kappaskin"].glob("*/__init__.py")}
     assert folders == set(ROOMS)

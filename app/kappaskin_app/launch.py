@@ -40,6 +40,7 @@ _LOADED = {
 }
 """Modules that take long to import, in this order, with the texts of the splash screen."""
 
+_IDLE = 1500  # ms from the window's start until what only charts need is loaded
 _BEHIND = 5  # of 19 steps that drawing stands behind the engine when both want a core
 
 
@@ -71,8 +72,12 @@ def opened(
         engine = starting.result()
     _stand_behind()
     try:
+        from PySide6.QtCore import QTimer
+
         from kappaskin_app.features import all_features
+        from kappaskin_app.shell.background import BackgroundTask, collect_garbage_here
         from kappaskin_app.shell.window import MainWindow
+        from kappaskin_app.widgets.chart import load_charts
 
         if splash is not None:
             splash.say("Building the window")
@@ -80,6 +85,10 @@ def opened(
     except BaseException:
         engine.close()
         raise
+    collect_garbage_here(window)
+    window.closed.connect(gc.enable)
+    charts = BackgroundTask(window.tasks, "", lambda _: None)
+    QTimer.singleShot(_IDLE, window, lambda: charts.run(load_charts))
     window.show()
     for plug_in in found_plug_ins():
         if plug_in.trouble:

@@ -121,3 +121,42 @@ def test_a_demonstration_that_cannot_be_is_refused(bad: tuple[str, ...]) -> None
     assert done.returncode == 2
     assert done.stderr.startswith("kappaskin: ")
     assert "Traceback" not in done.stderr
+
+
+_OPENED = """
+import gc, sys, threading, time
+from kappaskin_app.launch import opened
+
+class Noted:
+    thread = None
+    def find_spec(self, name, path=None, target=None):
+        if name == "pyqtgraph":
+            Noted.thread = threading.current_thread()
+
+def main():
+    application, window = opened("sim:")
+    sys.meta_path.insert(0, Noted())
+    assert "pyqtgraph" not in sys.modules
+    assert not gc.isenabled()
+    end = time.monotonic() + 60
+    while Noted.thread is None or Noted.thread.is_alive():
+        application.processEvents()
+        assert time.monotonic() < end
+    assert Noted.thread is not threading.main_thread()
+    assert "pyqtgraph" in sys.modules
+    window.close()
+    assert gc.isenabled()
+
+if __name__ == "__main__":
+    main()
+"""
+
+
+@pytest.mark.full
+def test_a_window_loads_what_charts_need_in_another_thread_and_collects_garbage_in_its_own(
+    tmp_path: Path,
+) -> None:
+    program = tmp_path / "opened.py"
+    program.write_text(_OPENED)
+    done = subprocess.run([sys.executable, str(program)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

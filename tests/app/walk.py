@@ -154,7 +154,7 @@ def layouts(window: MainWindow, seconds: float) -> Iterator[Screen]:
     window.menus.welcome.offer()
     wait(seconds)
     yield "welcome", window
-    window.display.centre.banner.hide()
+    window.display.banner.hide()
 
 
 def reading(window: MainWindow, seconds: float) -> Iterator[Screen]:

@@ -2,7 +2,8 @@
 
 A watchdog takes the time of the action itself and, in processor time, of every turn of the event
 loop after it: without a graphics card a turn waits for software to draw, action or not. What an
-action opens is closed again after it.
+action opens is closed again after it. A click on the list of devices, and a dock whose chart gets
+its points, are used as actions are.
 `python blocking.py TURNS`
 """
 
@@ -10,12 +11,16 @@ import json
 import sys
 import time
 
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QDialog, QFileDialog
 
+from kappaskin_app.features.connection.panel import SourceBox
 from kappaskin_app.launch import opened
 from kappaskin_app.shell.window import MainWindow
 
 _SPARED = ("quit",)
+_DEVICES = "list of devices"
 _AFTER = 0.3  # s that are watched after an action: what it opens is drawn by then
 
 
@@ -30,14 +35,21 @@ def _longest_turn(application: QApplication, seconds: float) -> float:
     return longest
 
 
+def _list_devices(window: MainWindow) -> None:
+    box = window.findChild(SourceBox)
+    QTest.mouseClick(box.line, Qt.MouseButton.LeftButton)
+
+
 def _held(application: QApplication, window: MainWindow, name: str) -> tuple[float, float]:
     """How long in ms an action takes itself, and the longest turn after it; then all is closed."""
     start = time.perf_counter()
-    window.actions_by_name[name].trigger()
+    _list_devices(window) if name == _DEVICES else window.actions_by_name[name].trigger()
     taken = time.perf_counter() - start
     after = _longest_turn(application, _AFTER)
     for dialog in window.findChildren(QDialog):
         dialog.reject()
+    if (popup := QApplication.activePopupWidget()) is not None:
+        popup.close()
     return 1e3 * taken, 1e3 * after
 
 
@@ -48,6 +60,7 @@ def main(turns: int) -> None:
     _longest_turn(application, 4.0)
     idle = 1e3 * _longest_turn(application, 4.0)
     names = [name for name in window.actions_by_name.entries if name not in _SPARED]
+    names.append(_DEVICES)
     uses: dict[str, list[tuple[float, float]]] = {name: [] for name in names}
     for _ in range(turns):
         for name in names:

@@ -345,11 +345,11 @@ def test_killed_with_its_engine_it_loses_half_a_second_and_the_next_window_offer
     _until(lambda: not any(block.exists() for block in blocks))
     with _opened(display, home) as app:
         app.connected()
-        texts = app.ask("[b.text().replace('&', '') for b in window.display.centre.banner.buttons]")
+        texts = app.ask("[b.text().replace('&', '') for b in window.display.banner.buttons]")
         assert texts[:2] == ["Its settings", "Its recording"]
         assert "x.mcap.part is unfinished" in app.ask("recorder.message")
         assert app.ask("str(recorder.damaged)") == str(part_of(path))
-        app.ask("window.display.centre.banner.buttons[0].click()")
+        app.ask("window.display.banner.buttons[0].click()")
         assert app.ask("window.history.settings.functions_x") == 6
         assert app.end() == 0
 

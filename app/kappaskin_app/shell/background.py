@@ -1,5 +1,6 @@
 """Background tasks: computing in threads and processes, with progress and cancelling."""
 
+import gc
 import threading
 import time
 from collections import deque
@@ -18,12 +19,32 @@ from kappaskin_app.guard import failed, guarded
 
 _MOMENT = 0.3  # s before a task is shown
 _LOOK = 20  # ms between two polls of running tasks
+_GARBAGE = 100  # ms between two collections of garbage
 _GRACE = 1.0  # s that threads have to end in when the window closes
 _ENGINE = "Computing the new settings; Ctrl+Z undoes them"
 _EXPECTED = Refusal, MemoryError, np.linalg.LinAlgError
 """Errors of a computation that are no failures of the program."""
 
 _Item = TypeVar("_Item")
+
+
+def collect_garbage_here(parent: QObject) -> None:
+    """Collect garbage in this thread alone, until `gc.enable()`.
+
+    Otherwise it is collected in any thread that allocates, and an object of Qt that is deleted
+    outside the GUI thread crashes the program later.
+    """
+    gc.disable()
+    timer = QTimer(parent, interval=_GARBAGE)  # pyright: ignore[reportCallIssue]
+    timer.timeout.connect(guarded(_collect))
+    timer.start()
+
+
+def _collect() -> None:
+    counts, thresholds = gc.get_count(), gc.get_threshold()
+    due = [n for n in range(3) if counts[n] > thresholds[n]]
+    if due:
+        gc.collect(due[-1])
 
 
 class Cancelled(Refusal):

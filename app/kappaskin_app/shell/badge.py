@@ -4,7 +4,7 @@ import math
 
 from PySide6.QtCore import QPointF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFontInfo, QMouseEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import QSizePolicy, QToolBar, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QToolBar, QVBoxLayout, QWidget
 
 from kappaskin.live import Status
 from kappaskin.recording import RecordingStatus, Replay
@@ -96,20 +96,21 @@ class Badge(Label):
     def paintEvent(self, event: QPaintEvent) -> None:
         if not self.state:
             return
-        painter, font = QPainter(self), self.font()
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(colour_of(self.state, current())))
-        painter.drawRoundedRect(self.rect(), _ROUND, _ROUND)
-        one = QFontInfo(font).pixelSize()
-        font.setPixelSize(one if "\n" in self.text() else round(_LARGE * one))
-        font.setBold(True)
-        painter.setFont(font)
-        painter.setPen(QColor("white"))
-        painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self.text())
-        if self.recorded.active:
-            painter.setBrush(QColor(current().bad))
-            painter.drawEllipse(QPointF(2.5 * _DOT, 2.5 * _DOT), _DOT, _DOT)
+        font = self.font()
+        with QPainter(self) as painter:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(colour_of(self.state, current())))
+            painter.drawRoundedRect(self.rect(), _ROUND, _ROUND)
+            one = QFontInfo(font).pixelSize()
+            font.setPixelSize(one if "\n" in self.text() else round(_LARGE * one))
+            font.setBold(True)
+            painter.setFont(font)
+            painter.setPen(QColor("white"))
+            painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self.text())
+            if self.recorded.active:
+                painter.setBrush(QColor(current().bad))
+                painter.drawEllipse(QPointF(2.5 * _DOT, 2.5 * _DOT), _DOT, _DOT)
 
 
 def colour_of(state: str, theme: Theme) -> str:
@@ -174,15 +175,23 @@ def in_use(status: Status) -> str:
 
 
 class Header(QToolBar):
-    """The header bar; its first widget is the `badge`."""
+    """The header bar: the `badge` and other widgets in a row, and below it the `banner`."""
 
-    def __init__(self, badge: Badge) -> None:
+    def __init__(self, badge: Badge, banner: QWidget) -> None:
         super().__init__("Header")
         self.setObjectName("header")
         self.setMovable(False)
         self.toggleViewAction().setEnabled(False)
-        self.addWidget(badge)
+        inside, self._row = QWidget(), QHBoxLayout()
+        column = QVBoxLayout(inside)
+        column.setContentsMargins(0, 0, 0, 0)
+        for layout in (self._row, column):
+            layout.setSpacing(0)
+        column.addLayout(self._row)
+        column.addWidget(banner)
+        self.addWidget(inside)
+        self.add(badge)
 
     def add(self, widget: QWidget) -> None:
-        """Show a widget after all others."""
-        self.addWidget(widget)
+        """Show a widget after all others of the row."""
+        self._row.addWidget(widget)

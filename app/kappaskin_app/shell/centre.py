@@ -1,11 +1,11 @@
-"""The centre of the window: the main view, with a banner above it."""
+"""The main view in the centre of the window, and the banner of actions above it."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from PySide6.QtCore import QEvent, Qt, QTimer, Signal
-from PySide6.QtGui import QCursor, QResizeEvent
+from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QMenu,
@@ -54,14 +54,10 @@ class ActionBanner(QWidget):
         row.addLayout(self._flow, 1)
         row.addWidget(self.away, 0, Qt.AlignmentFlag.AlignTop)
         self._flow.addWidget(self.words)
-        self._ending = QTimer(self, singleShot=True)  # pyright: ignore[reportCallIssue]
-        self._ending.timeout.connect(guarded(self._end))
         self.hide()
 
-    def show_actions(
-        self, words: str, tip: str, offered: Sequence[BannerAction], seconds: float = 0.0
-    ) -> None:
-        """Show `words` with a tooltip and these actions, for so many seconds; 0: until closed."""
+    def show_actions(self, words: str, tip: str, offered: Sequence[BannerAction]) -> None:
+        """Show `words` with a tooltip and these actions."""
         for button in self.buttons:
             self._flow.removeWidget(button)
             button.hide()  # at once, or its key would be that of two buttons
@@ -71,10 +67,6 @@ class ActionBanner(QWidget):
         self.buttons = [self._button(each) for each in offered]
         for before, after in pairwise([self, *self.buttons, self.away]):
             QWidget.setTabOrder(before, after)
-        self._ending.stop()  # that of the last one, which may have been put away
-        self._ending.setInterval(round(1e3 * seconds))
-        if seconds:
-            self._ending.start()
         self.show()
         self._heighten()
         self.shown.emit()
@@ -103,28 +95,17 @@ class ActionBanner(QWidget):
         self._flow.addWidget(button)
         return button
 
-    def _end(self) -> None:
-        """Hide after its time, unless it has the focus or the mouse is over it."""
-        focused = self.focusWidget()
-        at_it = focused is not None and focused.hasFocus()
-        if at_it or self.rect().contains(self.mapFromGlobal(QCursor.pos())):
-            self._ending.start()
-        else:
-            self.hide()
-
 
 class Centre(QWidget):
     """Holds the main `view`, once a feature sets one."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.banner = ActionBanner()
         self.view: QWidget | None = None
         self._row, self._column = QHBoxLayout(), QVBoxLayout(self)
         self._column.setContentsMargins(0, 0, 0, 0)
         for layout in (self._row, self._column):
             layout.setSpacing(0)
-        self._column.addWidget(self.banner)
         self._column.addLayout(self._row, 1)
 
     def show_view(self, view: QWidget) -> None:

@@ -19,7 +19,7 @@ from kappaskin.sensing import SensorLayout
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.badge import GAP, LOST, OFF, STALE, WAITING, Badge, Header
-from kappaskin_app.shell.centre import Centre
+from kappaskin_app.shell.centre import ActionBanner, Centre
 from kappaskin_app.shell.colouring import Colouring, Ranges
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
@@ -75,11 +75,9 @@ class Display(QObject):
         super().__init__(parent)
         self._session = session
         self.badge, self.notice = Badge(), Notice(_HINT)
-        self.header, self.centre, self.status_bar = (
-            Header(self.badge),
-            Centre(),
-            StatusBar(self.notice),
-        )
+        self.banner, self.centre = ActionBanner(), Centre()
+        self.header = Header(self.badge, self.banner)
+        self.status_bar = StatusBar(self.notice)
         self.colouring, self.ranges = Colouring(tasks), Ranges()
         self.settings = Settings()
         self.old = True

@@ -77,7 +77,7 @@ class Menus(QObject):
         self._window = window
         self.entry_sources: list[EntrySource] = []
         self.welcome = Welcome(
-            window.display.centre.banner,
+            window.display.banner,
             window.history,
             window.session,
             window.requests,

@@ -232,7 +232,7 @@ class Recovery(QObject):
         if (report := window.actions_by_name.entries.get("report")) is not None:
             words, act = report.action.text(), report.action.trigger
             offered.append(BannerAction(words, report.action.toolTip(), act))
-        window.display.centre.banner.show_actions(
+        window.display.banner.show_actions(
             "The last session ended unexpectedly. Restore:", _TIP, offered
         )
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QMenu
+from PySide6.QtWidgets import QMenu, QPushButton
 
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.centre import ActionBanner, BannerAction
@@ -11,7 +11,6 @@ from kappaskin_app.shell.history import History
 from kappaskin_app.shell.requests import Requests
 from kappaskin_app.shell.session import Session
 
-_LASTS = 60.0  # s, unless it is in use
 _TIP = (
     "The skin below is simulated: press on it with the mouse. These actions are in the menus too; "
     "Help > Welcome shows this again."
@@ -19,7 +18,7 @@ _TIP = (
 
 
 class Welcome(QObject):
-    """Shows the actions that features added in a banner, until one is used."""
+    """Shows the actions that features added in a banner, until one is used or a source opens."""
 
     def __init__(
         self,
@@ -32,7 +31,7 @@ class Welcome(QObject):
     ) -> None:
         super().__init__(parent)
         self._offer, self._history, self._session = offer, history, session
-        self._offering = False
+        self._buttons = list[QPushButton]()
         self._ways: dict[int, BannerAction] = {}
         self._last = [
             BannerAction("Recentl&y opened", "Files opened or recorded last.", recent),
@@ -43,26 +42,23 @@ class Welcome(QObject):
             ),
         ]
         session.source_changed.connect(guarded(lambda *_: self._end()))
-        history.stack.indexChanged.connect(guarded(lambda *_: self._end()))
 
     def add(self, place: int, words: str, tip: str, act: Callable[[], object]) -> None:
         """Add an action at this `place` in the order."""
         self._ways[place] = BannerAction(words, tip, act)
 
     def begin(self) -> None:
-        """Show it where the settings ask for it and nothing else is open."""
+        """Show it where the settings ask for it, no source is open and the banner is free."""
         begun = not self._session.inside or self._session.engine.resumed is not None
-        if self._history.settings.show_start and not begun:
+        if self._history.settings.show_start and not (begun or self._offer.isVisible()):
             self.offer()
 
     def offer(self) -> None:
-        """Show it, unless the banner shows something else."""
-        if not self._offer.isVisible():
-            self._offering = True
-            ways = [self._ways[place] for place in sorted(self._ways)]
-            self._offer.show_actions("Start with:", _TIP, [*ways, *self._last], _LASTS)
+        """Show it."""
+        ways = [self._ways[place] for place in sorted(self._ways)]
+        self._offer.show_actions("Start with:", _TIP, [*ways, *self._last])
+        self._buttons = self._offer.buttons
 
     def _end(self) -> None:
-        if self._offering:
-            self._offering = False
+        if self._offer.buttons is self._buttons:  # else it shows something else
             self._offer.hide()

@@ -90,7 +90,7 @@ class MainWindow(Parts):
         )
         self.panels.build()
         self.menus.finish()
-        self.display.centre.banner.shown.connect(guarded(self.actions_by_name.update_tips))
+        self.display.banner.shown.connect(guarded(self.actions_by_name.update_tips))
         self._show_settings(self.history.settings, anew=True)
         self.resize(1280, 800)
         if handed:
@@ -120,7 +120,7 @@ class MainWindow(Parts):
         write_png(self.grab().toImage(), path, _PACKED)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        banner = self.display.centre.banner
+        banner = self.display.banner
         if event.key() == Qt.Key.Key_Escape and self.layouts.filled:
             self.layouts.leave_full_screen()
         elif event.key() == Qt.Key.Key_Escape and banner.isVisible():

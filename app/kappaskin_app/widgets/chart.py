@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from html import escape
+from importlib import import_module
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any, Literal
@@ -359,8 +360,8 @@ class Chart(QWidget):
             at = event.position(), event.globalPosition().toPoint()
             self._mouse = None if event.buttons() else at
             self._point()
-        elif event.type() == kinds.Leave:
-            self._mouse = None
+        elif event.type() in (kinds.Leave, kinds.Hide, kinds.WindowDeactivate):
+            self._mouse = None  # else the next values would show the tip of a point again
             self._point()
         elif isinstance(event, QMouseEvent) and event.button() == left:
             if event.type() == kinds.MouseButtonDblClick:
@@ -543,10 +544,16 @@ def _enclosed(x: Array, low: Array, high: Array) -> tuple[Array, Array, NDArray[
     return around, edge, joined
 
 
+def load_charts() -> None:
+    """Load what charts draw with, in 0.3 s of any thread: it makes no objects of Qt meanwhile."""
+    os.environ.setdefault("PYQTGRAPH_QT_LIB", "PySide6")
+    import_module("pyqtgraph")
+
+
 @cache
 def _axis_class() -> type:
-    """The class of the axes; pyqtgraph, which takes 0.3 s to load, is loaded with the first."""
-    os.environ.setdefault("PYQTGRAPH_QT_LIB", "PySide6")
+    """The class of the axes, made with the first chart that has points."""
+    load_charts()
     from pyqtgraph import AxisItem
 
     class _Axis(AxisItem):

@@ -94,7 +94,10 @@ class ColourBar(QWidget):
             self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
+        with QPainter(self) as painter:
+            self._paint(painter)
+
+    def _paint(self, painter: QPainter) -> None:
         painter.setPen(self.palette().windowText().color())
         line = painter.fontMetrics().height()
         bottom = float(self.height())
@@ -156,7 +159,10 @@ class LockButton(QToolButton):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
-        painter = QPainter(self)
+        with QPainter(self) as painter:
+            self._paint(painter)
+
+    def _paint(self, painter: QPainter) -> None:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         ink, scale = self.palette().buttonText().color(), self.fontMetrics().height() / 16
         painter.translate(QRectF(self.rect()).center())

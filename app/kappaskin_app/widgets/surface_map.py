@@ -63,7 +63,10 @@ class _Map(QWidget):
         return QRectF((self.width() - width) / 2, (self.height() - height) / 2, width, height)
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        painter, area = QPainter(self), self.area()
+        with QPainter(self) as painter:
+            self._paint(painter, self.area())
+
+    def _paint(self, painter: QPainter, area: QRectF) -> None:
         if self._image is not None:
             painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
             painter.setOpacity(0.3 if self._faded else 1.0)

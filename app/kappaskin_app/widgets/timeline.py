@@ -114,14 +114,15 @@ class Course(QAbstractSlider):
         return (x - area.left()) / max(area.width(), 1.0) * self.duration
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        painter, theme, area = QPainter(self), current(), self.area
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(QPen(QColor(theme.text if self.hasFocus() else theme.line), 1))
-        painter.setBrush(QColor(theme.base))
-        painter.drawRoundedRect(area.adjusted(-2.5, -2.5, 2.5, 2.5), 4, 4)
-        handle = self.at(self.time)
-        self.paint_course(painter, area, handle)
-        self._paint_handle(painter, area, handle)
+        theme, area = current(), self.area
+        with QPainter(self) as painter:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            painter.setPen(QPen(QColor(theme.text if self.hasFocus() else theme.line), 1))
+            painter.setBrush(QColor(theme.base))
+            painter.drawRoundedRect(area.adjusted(-2.5, -2.5, 2.5, 2.5), 4, 4)
+            handle = self.at(self.time)
+            self.paint_course(painter, area, handle)
+            self._paint_handle(painter, area, handle)
 
     def paint_course(self, painter: QPainter, area: QRectF, handle: float) -> None:
         """Draw what happens meanwhile into `area`; the handle is `handle` px from the left."""
@@ -218,12 +219,11 @@ def icon(name: str) -> QIcon:
     for mode, colour in modes:
         picture = QPixmap(_SIDE, _SIDE)
         picture.fill(Qt.GlobalColor.transparent)
-        painter = QPainter(picture)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(colour))
-        GLYPHS[name](painter)
-        painter.end()
+        with QPainter(picture) as painter:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(colour))
+            GLYPHS[name](painter)
         made.addPixmap(picture, mode)
     return made
 
@@ -281,14 +281,16 @@ class Clock(QWidget):
         return [digit if c.isdigit() else metrics.horizontalAdvance(c) for c in text]
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setPen(self.palette().windowText().color())
-        text = (
-            self.text if self._wide(self.text) <= self.width() else self.text.partition(" of ")[0]
-        )
-        widths = self._widths(text)
-        x = self.width() - sum(widths)
-        for character, width in zip(text, widths, strict=True):
-            place = QRectF(x - 1, 0, width + 2, self.height())
-            painter.drawText(place, Qt.AlignmentFlag.AlignCenter, character)
-            x += width
+        with QPainter(self) as painter:
+            painter.setPen(self.palette().windowText().color())
+            text = (
+                self.text
+                if self._wide(self.text) <= self.width()
+                else self.text.partition(" of ")[0]
+            )
+            widths = self._widths(text)
+            x = self.width() - sum(widths)
+            for character, width in zip(text, widths, strict=True):
+                place = QRectF(x - 1, 0, width + 2, self.height())
+                painter.drawText(place, Qt.AlignmentFlag.AlignCenter, character)
+                x += width

@@ -1,5 +1,6 @@
 """Background tasks: each ends however it goes, and what it computes comes to the GUI's thread."""
 
+import gc
 import math
 import multiprocessing
 import threading
@@ -7,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 
 import pytest
+from PySide6.QtCore import QObject
 
 from kappaskin import Refusal, Status
 from kappaskin_app import guard
@@ -16,6 +18,7 @@ from kappaskin_app.shell.background import (
     BackgroundThread,
     Cancelled,
     Tasks,
+    collect_garbage_here,
 )
 from kappaskin_app.shell.window import MainWindow
 
@@ -342,3 +345,34 @@ def test_of_what_is_saved_on_a_slow_disk_the_newest_is_last_and_nobody_waits(
     saving(9)
     saving.finish()
     assert said == ["no room", "no room"]
+
+
+class _Cycle:
+    """Garbage that only the collector finds, which notes the thread that deletes it."""
+
+    def __init__(self, deleted_in: list[int]) -> None:
+        self.itself, self._deleted_in = self, deleted_in
+
+    def __del__(self) -> None:
+        self._deleted_in.append(threading.get_ident())
+
+
+@pytest.mark.parametrize("here", [True, False])
+def test_garbage_of_the_window_is_not_deleted_in_another_thread(qapp, until, here: bool) -> None:
+    parent, deleted_in = QObject(), list[int]()
+    gc.collect()
+    if here:
+        collect_garbage_here(parent)
+    try:
+        _Cycle(deleted_in)
+        allocating = threading.Thread(target=lambda: [[] for _ in range(100_000)])
+        allocating.start()
+        allocating.join()
+        if here:
+            assert deleted_in == []
+            until(lambda: len(deleted_in) == 1 or not [_Cycle([]) for _ in range(1000)])
+            assert deleted_in == [threading.get_ident()]
+        else:  # the hazard
+            assert deleted_in == [allocating.ident]
+    finally:
+        gc.enable()

@@ -59,11 +59,11 @@ def test_after_a_crash_its_settings_are_offered_and_can_be_undone(
 ) -> None:
     leave(tmp_path)
     recovering = Recovery(window, tmp_path)
-    assert window.display.centre.banner.isVisible()
-    texts = [button.text().replace("&", "") for button in window.display.centre.banner.buttons]
+    assert window.display.banner.isVisible()
+    texts = [button.text().replace("&", "") for button in window.display.banner.buttons]
     assert texts == ["Its settings", "Report\N{HORIZONTAL ELLIPSIS}"]  # the recording is gone
-    window.display.centre.banner.buttons[0].click()
-    assert not window.display.centre.banner.isVisible()
+    window.display.banner.buttons[0].click()
+    assert not window.display.banner.isVisible()
     assert window.history.settings.functions_x == 5
     window.history.stack.undo()
     assert window.history.settings.functions_x == 8
@@ -74,7 +74,7 @@ def test_after_a_crash_its_settings_are_offered_and_can_be_undone(
 @pytest.mark.full
 def test_after_an_orderly_end_nothing_is_offered(window: MainWindow, tmp_path: Path) -> None:
     recovering = Recovery(window, tmp_path)
-    assert not window.display.centre.banner.isVisible()
+    assert not window.display.banner.isVisible()
     recovering.close()
 
 
@@ -88,7 +88,7 @@ def test_a_recording_that_is_left_is_offered(
     leave(tmp_path / "open", LastSession(Settings(), "", str(there)))
     recovering = Recovery(window, tmp_path / "open")
     take = next(
-        b for b in window.display.centre.banner.buttons if "recording" in b.text().replace("&", "")
+        b for b in window.display.banner.buttons if "recording" in b.text().replace("&", "")
     )
     take.click()
     until(lambda: window.display.badge.state.startswith("REPLAY"))

@@ -3,7 +3,6 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtGui import QCursor
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu, QVBoxLayout, QWidget
 
@@ -27,11 +26,11 @@ class Bench(QWidget):
         self.resize(900, 300)
         self.show()
 
-    def show_actions(self, seconds: float = 0.0) -> None:
+    def show_actions(self) -> None:
         one = BannerAction("&Open a scene", "Simulate it", lambda: self.taken.append("scene"))
         two = BannerAction("Begin a &lesson", "Learn it", lambda: self.taken.append("lesson"))
         three = BannerAction("&Recently opened", "The last ones", self.menu)
-        self.offer.show_actions("To begin:", "What moves is simulated", [one, two, three], seconds)
+        self.offer.show_actions("To begin:", "What moves is simulated", [one, two, three])
 
 
 @pytest.fixture
@@ -79,74 +78,80 @@ def test_what_is_chosen_from_its_menu_puts_it_away(bench: Bench) -> None:
     assert not bench.offer.isVisible()
 
 
-def test_it_goes_by_itself_but_not_while_somebody_is_at_it(bench: Bench, until) -> None:
-    QCursor.setPos(bench.mapToGlobal(bench.rect().bottomRight()))
-    bench.activateWindow()
-    until(bench.isActiveWindow)
-    bench.show_actions(0.05)
-    bench.offer.buttons[0].setFocus()
-    assert bench.offer.buttons[0].hasFocus()
-    QTest.qWait(120)
-    assert bench.offer.isVisible()
-    bench.offer.buttons[0].clearFocus()
-    until(lambda: not bench.offer.isVisible())
-
-
 @pytest.mark.full
 def test_ways_to_begin_never_cover_the_skin_and_are_not_shown_again_where_unwanted(
     window: MainWindow, tmp_path: Path, until, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     window.menus.welcome.begin()
-    until(lambda: window.display.centre.banner.height() > 20)
+    until(lambda: window.display.banner.height() > 20)
     QApplication.processEvents()
-    assert len(window.display.centre.banner.buttons) == 6
-    above = window.display.centre.banner.mapTo(
-        window, QPoint(0, window.display.centre.banner.height())
-    ).y()
+    assert len(window.display.banner.buttons) == 6
+    above = window.display.banner.mapTo(window, QPoint(0, window.display.banner.height())).y()
     assert above <= window.membrane.mapTo(window, QPoint(0, 0)).y()
-    QTest.keyClick(window.display.centre.banner.buttons[0], Qt.Key.Key_Escape)
-    assert not window.display.centre.banner.isVisible()
+    QTest.keyClick(window.display.banner.buttons[0], Qt.Key.Key_Escape)
+    assert not window.display.banner.isVisible()
     window.saver.begin(tmp_path / "window.toml")
     window.menus.welcome.begin()
-    window.display.centre.banner.buttons[-1].click()
+    window.display.banner.buttons[-1].click()
     window.saver.finish()
     assert not WindowFile(tmp_path / "window.toml").read()[0].start
     window.menus.welcome.begin()
-    assert not window.display.centre.banner.isVisible()
+    assert not window.display.banner.isVisible()
     window.requests.set("show_start", True)
     with monkeypatch.context() as patch:
         patch.setattr(window.session, "source", "/dev/ttyACM0")  # as the command may say
         window.menus.welcome.begin()
-    assert not window.display.centre.banner.isVisible()
+    assert not window.display.banner.isVisible()
     window.menus.welcome.begin()
-    assert window.display.centre.banner.isVisible()
-    window.display.centre.banner.buttons[2].click()
+    assert window.display.banner.isVisible()
+    window.display.banner.buttons[2].click()
     until(lambda: window.lesson.isVisible())
 
 
-@pytest.mark.full
-def test_ways_to_begin_go_when_something_is_begun_and_give_way_to_what_a_crash_left(
-    window: MainWindow, tmp_path: Path
+@pytest.mark.parametrize("width", [1024, 1280])
+def test_the_welcome_is_one_row_that_help_and_the_palette_bring_back(
+    window: MainWindow, until, width: int
 ) -> None:
+    banner, finder = window.display.banner, window.menus.finder
+    window.resize(width, 700)
+    QTest.keyClick(window, Qt.Key.Key_K, Qt.KeyboardModifier.ControlModifier)
+    QTest.keyClicks(finder.line, "welcome")
+    QTest.keyClick(finder.line, Qt.Key.Key_Return)
+    until(lambda: banner.height() > 20)
+    QApplication.processEvents()
+    assert window.width() == width
+    assert len({button.y() for button in banner.buttons}) == 1
+    assert not [b for b in banner.buttons if b.width() < b.sizeHint().width()]
+    assert banner.buttons[-1].geometry().right() < banner.away.x()
+
+
+@pytest.mark.full
+def test_the_welcome_stays_through_other_work_and_the_presenter_until_a_source_opens(
+    window: MainWindow, until
+) -> None:
+    banner = window.display.banner
     window.menus.welcome.begin()
     window.requests.set("functions_x", 5)
-    assert not window.display.centre.banner.isVisible()
+    window.actions_by_name["dock-cost"].trigger()
+    QTest.keyClick(window, Qt.Key.Key_F11)
+    until(lambda: not banner.isVisible())
+    QTest.keyClick(window, Qt.Key.Key_Escape)
+    until(banner.isVisible)
+    window.session.request_source("sim:sphere")
+    until(lambda: not banner.isVisible())
+    banner.show_actions("Recorded", "", [BannerAction("Play", "", lambda: None)])
+    window.session.request_source("sim:")
+    until(lambda: window.session.status.source == "sim:")
+    assert banner.isVisible()
+    window.actions_by_name["begin"].trigger()
+    assert banner.words.text() == "Start with:"
+
+
+@pytest.mark.full
+def test_the_welcome_gives_way_to_what_a_crash_left(window: MainWindow, tmp_path: Path) -> None:
     (tmp_path / "window-1.json").write_text("{}")
     recovering = Recovery(window, tmp_path)
     recovering.offer(LastSession(window.history.settings))
     window.menus.welcome.begin()
-    assert window.display.centre.banner.words.text().startswith("The last session")
-    window.requests.set("functions_x", 6)
-    assert window.display.centre.banner.isVisible()
+    assert window.display.banner.words.text().startswith("The last session")
     recovering.close()
-
-
-def test_what_is_offered_for_good_stays_though_the_last_offer_was_to_end(
-    bench: Bench, qtbot
-) -> None:
-    QCursor.setPos(bench.mapToGlobal(bench.rect().bottomRight()))
-    bench.show_actions(60.0)
-    bench.offer.away.click()
-    bench.show_actions()
-    qtbot.wait(50)
-    assert bench.offer.isVisible()

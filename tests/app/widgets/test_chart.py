@@ -195,6 +195,58 @@ def test_the_cursor_follows_values_that_move_under_the_mouse(chart, points_at, u
     QApplication.sendEvent(chart.canvas, QEvent(QEvent.Type.Leave))
 
 
+@pytest.mark.parametrize("how", ["dock closed", "window switched"])
+def test_no_tip_of_a_point_comes_again_with_new_values(
+    chart, points_at, until, qtbot, how: str
+) -> None:
+    other = QWidget()
+    qtbot.addWidget(other)
+    other.setGeometry(900, 600, 100, 100)
+    chart.activateWindow()
+    until(chart.isActiveWindow)
+    points_at(chart.canvas, chart.place_of(3.0, 1.0).toPoint())
+    until(lambda: QToolTip.isVisible())
+
+    if how == "dock closed":
+        chart.hide()
+        QToolTip.hideText()
+        chart.show()
+    else:
+        other.show()
+        other.activateWindow()
+        until(other.isActiveWindow)
+    until(lambda: not QToolTip.isVisible())
+    chart.show_series([*chart.series])
+
+    assert not QToolTip.isVisible()
+
+
+def test_charts_are_loaded_beside_the_window_and_no_object_of_qt_is_made_there() -> None:
+    program = """
+import gc, sys, threading
+from PySide6.QtCore import QObject
+from PySide6.QtWidgets import QApplication
+from kappaskin_app.widgets.chart import Chart, ChartAxis, Series, load_charts
+application = QApplication([])
+before = {id(each) for each in gc.get_objects() if isinstance(each, QObject)}
+assert "pyqtgraph" not in sys.modules
+loading = threading.Thread(target=load_charts)
+loading.start()
+loading.join()
+made = [each for each in gc.get_objects() if isinstance(each, QObject) and id(each) not in before]
+parts = [part for name, module in sys.modules.items() if name.startswith("pyqtgraph")
+         for part in vars(module).values() if isinstance(part, QObject)]
+assert "pyqtgraph" in sys.modules
+assert not made and all(part is application for part in parts), (made, parts)
+chart = Chart(ChartAxis("Force", "N"), ChartAxis("Time", "s"), "")
+chart.show_series([Series("one", *2 * [__import__("numpy").arange(3.0)])])
+chart.show()
+application.processEvents()
+assert chart.place_of(2.0, 2.0).x() > 0
+"""
+    subprocess.run([sys.executable, "-c", program], check=True)
+
+
 def test_a_click_chooses_a_point_and_a_drag_none(chart, qtbot) -> None:
     clicked = []
     chart.clicked.connect(clicked.append)

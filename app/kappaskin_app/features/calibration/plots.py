@@ -60,14 +60,14 @@ class CylinderView(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         if self._step is None:
             return
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        height = float(self.height())
-        above = QRectF(self.width() - height + 4, 4, height - 8, height - 8)
-        self._paint_side(painter, QRectF(2, 2, above.left() - 14, height - 4), self._step)
-        metrics = painter.fontMetrics()
-        beside, below = metrics.horizontalAdvance("y") + 5, metrics.height() - 3
-        self._paint_above(painter, above.adjusted(beside, 4, -4, -below), self._step)
+        with QPainter(self) as painter:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            height = float(self.height())
+            above = QRectF(self.width() - height + 4, 4, height - 8, height - 8)
+            self._paint_side(painter, QRectF(2, 2, above.left() - 14, height - 4), self._step)
+            metrics = painter.fontMetrics()
+            beside, below = metrics.horizontalAdvance("y") + 5, metrics.height() - 3
+            self._paint_above(painter, above.adjusted(beside, 4, -4, -below), self._step)
 
     # From the side.
 
@@ -292,21 +292,21 @@ class PassMap(QWidget):
         layout, theme = self._layout, current()
         if layout is None:
             return
-        painter = QPainter(self)
-        width, elements = (self.width() - 2 * _GAP) / 3, len(layout)
-        for c, name in enumerate(COMPONENTS):
-            painter.setPen(QColor(theme.text))
-            title = QRectF(c * (width + _GAP), 0, width, self._title - 2)
-            failed = sum(1 for channel in self._failures if channel // elements == c)
-            passed = f"{name}: {elements - failed} pass" if failed else f"{name}: all pass"
-            painter.drawText(title, Qt.AlignmentFlag.AlignCenter, passed)
-            for element, square in enumerate(self._squares(c)):
-                self._paint_channel(painter, square, c * elements + element)
-        if self._channel < 3 * elements:
-            component, element = divmod(self._channel, elements)
-            painter.setPen(QPen(QColor(theme.text), 3 if self.hasFocus() else 2))
-            painter.setBrush(Qt.BrushStyle.NoBrush)
-            painter.drawRect(self._squares(component)[element].adjusted(-1, -1, 1, 1))
+        with QPainter(self) as painter:
+            width, elements = (self.width() - 2 * _GAP) / 3, len(layout)
+            for c, name in enumerate(COMPONENTS):
+                painter.setPen(QColor(theme.text))
+                title = QRectF(c * (width + _GAP), 0, width, self._title - 2)
+                failed = sum(1 for channel in self._failures if channel // elements == c)
+                passed = f"{name}: {elements - failed} pass" if failed else f"{name}: all pass"
+                painter.drawText(title, Qt.AlignmentFlag.AlignCenter, passed)
+                for element, square in enumerate(self._squares(c)):
+                    self._paint_channel(painter, square, c * elements + element)
+            if self._channel < 3 * elements:
+                component, element = divmod(self._channel, elements)
+                painter.setPen(QPen(QColor(theme.text), 3 if self.hasFocus() else 2))
+                painter.setBrush(Qt.BrushStyle.NoBrush)
+                painter.drawRect(self._squares(component)[element].adjusted(-1, -1, 1, 1))
 
     def _paint_channel(self, painter: QPainter, square: QRectF, channel: int) -> None:
         """Draw a plain square if passed, a crossed one if failed, for the colour-blind too."""

@@ -48,7 +48,6 @@ class ContactFeature:
         if now >= self._next:
             self._next = now + (_FULL_SCREEN_PERIOD if shell.layouts.filled else _PERIOD)
             self.recognition.start(status, shown)
-        self.numbers.show_estimate(shown, status.sensor, shell.display.status_bar.object.text())
 
     def _show(self, estimate: Estimate | None) -> None:
         display, status = self._shell.display, self._shell.session.status
@@ -64,3 +63,4 @@ class ContactFeature:
             skipped=status.skipped,
         )
         self.readouts.show_estimate(estimate)
+        self.numbers.show_estimate(estimate, status.sensor, display.status_bar.object.text())

@@ -3,7 +3,6 @@
 import csv
 import io
 import math
-import time
 from collections.abc import Collection, Sequence
 
 from PySide6.QtGui import QGuiApplication
@@ -85,7 +84,6 @@ def csv_of(*tables: tuple[Sequence[str], Rows]) -> str:
 
 _MARGIN = 14  # px, margins of a column's head
 _LINES = 6  # visible of a table at least
-_PERIOD = 0.5  # s between two updates: faster is illegible
 
 
 class NumbersPanel(QWidget):
@@ -100,7 +98,6 @@ class NumbersPanel(QWidget):
         self.copy.setToolTip("Copy both tables, for a spreadsheet.")
         self.copy.clicked.connect(guarded(lambda *_: self._copy()))
         self._facts, self._elements, self._head = Rows(), Rows(), ELEMENTS
-        self._next = 0.0
         left, around = QVBoxLayout(), QHBoxLayout(self)
         left.addWidget(self.facts)
         left.addWidget(self.copy)
@@ -108,11 +105,9 @@ class NumbersPanel(QWidget):
         around.addWidget(self.elements, 3)
 
     def show_estimate(self, estimate: Estimate | None, sensor: Sensor | None, what: str) -> None:
-        """Update the tables at a legible rate; empty without an estimate."""
-        now = time.monotonic()
-        if not self.isVisible() or now < self._next:
+        """Show an estimate; empty tables without one."""
+        if not self.isVisible():
             return
-        self._next = now + _PERIOD
         self._facts, self._elements = [], []
         if estimate is not None and sensor is not None:
             self._facts = facts_of(estimate, what, ERROR_BARS["sigma"])

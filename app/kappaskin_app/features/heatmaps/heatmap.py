@@ -119,35 +119,38 @@ class CellGrid(QWidget):
         return QPointF(area.left() + x / a * area.width(), area.bottom() - y / b * area.height())
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        painter, line = QPainter(self), QPen(QColor(current().line), 1)
-        area = self.area_of_patch()
-        layout = self._layout
-        if layout is None or len(self._colours) != len(layout):
-            return
-        painter.setOpacity(0.3 if self._faded else 1.0)
-        if layout.shape:
-            m, n = layout.shape
-            # y points up on the skin, down in an image.
-            rgb = np.ascontiguousarray(self._colours.reshape(n, m, 3)[::-1])
-            painter.drawImage(area, QImage(rgb.tobytes(), m, n, 3 * m, QImage.Format.Format_RGB888))
-        else:
-            painter.setPen(line)  # or values near zero vanish on a light background
-            for square, rgb in zip(self._squares(area), self._colours, strict=True):
-                painter.setBrush(QColor(*(int(v) for v in rgb)))
-                painter.drawRect(square)
-            painter.setBrush(Qt.BrushStyle.NoBrush)
-        painter.setOpacity(1.0)
-        painter.setPen(line)
-        painter.drawRect(area)
-        self._paint_marks(painter, area)
-        self._paint_faults(painter, area)
-        if self._target >= 0:
-            self._paint_target(painter, self._cell(area, self._target))
-        if self._hovered >= 0:
-            cell = self._cell(area, self._hovered)
-            for colour, width in (("#16191d", 4), ("#ffffff", 2)):  # visible on every colour
-                painter.setPen(QPen(QColor(colour), width))
-                painter.drawRect(cell)
+        line = QPen(QColor(current().line), 1)
+        with QPainter(self) as painter:
+            area = self.area_of_patch()
+            layout = self._layout
+            if layout is None or len(self._colours) != len(layout):
+                return
+            painter.setOpacity(0.3 if self._faded else 1.0)
+            if layout.shape:
+                m, n = layout.shape
+                # y points up on the skin, down in an image.
+                rgb = np.ascontiguousarray(self._colours.reshape(n, m, 3)[::-1])
+                painter.drawImage(
+                    area, QImage(rgb.tobytes(), m, n, 3 * m, QImage.Format.Format_RGB888)
+                )
+            else:
+                painter.setPen(line)  # or values near zero vanish on a light background
+                for square, rgb in zip(self._squares(area), self._colours, strict=True):
+                    painter.setBrush(QColor(*(int(v) for v in rgb)))
+                    painter.drawRect(square)
+                painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.setOpacity(1.0)
+            painter.setPen(line)
+            painter.drawRect(area)
+            self._paint_marks(painter, area)
+            self._paint_faults(painter, area)
+            if self._target >= 0:
+                self._paint_target(painter, self._cell(area, self._target))
+            if self._hovered >= 0:
+                cell = self._cell(area, self._hovered)
+                for colour, width in (("#16191d", 4), ("#ffffff", 2)):  # visible on every colour
+                    painter.setPen(QPen(QColor(colour), width))
+                    painter.drawRect(cell)
 
     def _paint_target(self, painter: QPainter, cell: QRectF) -> None:
         """Draw a frame wider than the cell around the element to press."""

@@ -42,11 +42,11 @@ class _Ring(QWidget):
         self.raise_()
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(QPen(QColor(current().accent), _THICK))
-        inner = QRectF(self.rect()).adjusted(1, 1, -1, -1)
-        painter.drawRoundedRect(inner, 2 * _AROUND, 2 * _AROUND)
+        with QPainter(self) as painter:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            painter.setPen(QPen(QColor(current().accent), _THICK))
+            inner = QRectF(self.rect()).adjusted(1, 1, -1, -1)
+            painter.drawRoundedRect(inner, 2 * _AROUND, 2 * _AROUND)
 
 
 class ControlPointer(QObject):

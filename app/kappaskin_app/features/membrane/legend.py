@@ -98,7 +98,12 @@ class Legend(QWidget):
         picture = QPixmap(round(side * ratio), round(side * ratio))
         picture.setDevicePixelRatio(ratio)
         picture.fill(Qt.GlobalColor.transparent)
-        painter, colour = QPainter(picture), QColor(entry.colour or current().text)
+        with QPainter(picture) as painter:
+            self._draw(painter, entry, side)
+        return picture
+
+    def _draw(self, painter: QPainter, entry: _Entry, side: int) -> None:
+        colour = QColor(entry.colour or current().text)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         middle, place = side / 2, QRectF(0, 0, side, side)
         if entry.sign == "cross":
@@ -115,5 +120,3 @@ class Legend(QWidget):
         elif self._colours is not None:
             image = QImage(self._colours.tobytes(), 256, 1, 768, QImage.Format.Format_RGB888)
             painter.drawImage(place, image)
-        painter.end()
-        return picture

@@ -23,6 +23,7 @@ class PresenterFeature:
         shell.layouts.add("Presenter", _LAYOUT, full=self.presenter)
         shell.session.estimated.connect(guarded(self.presenter.receive))
         shell.display.status_shown.connect(guarded(self.presenter.follow))
+        shell.display.numbers.connect(guarded(self.presenter.show_numbers))
         shell.display.object_found.connect(guarded(self.presenter.set_object))
         self.presenter_view.fitted.connect(shell.display.unit_changed)
         self._add_actions(shell)

@@ -16,7 +16,6 @@ from kappaskin_app.features.presenter.sound import Sound
 from kappaskin_app.features.presenter.view import DEMO_OBJECTS, Hand, PresenterView
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.badge import GAP, SIM, origin
-from kappaskin_app.shell.centre import ActionBanner
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.docks import drawn_once
 from kappaskin_app.shell.loads import loads_at, object_replaceable
@@ -25,7 +24,6 @@ from kappaskin_app.shell.session import Session
 
 TIP = "Estimates in full screen, legible from three metres; Esc ends"
 SOUND_TIP = "A tone whose pitch and loudness follow the force, while the presenter is shown"
-_FIGURES_PERIOD = 0.15  # s between two updates of the numbers: faster is illegible
 _DRAWING_PERIOD = 0.03  # s between two drawings of the force bar
 _OLD = 1.0  # s after which a recognised object is discarded
 
@@ -58,7 +56,7 @@ class PresenterController(QObject):
         self.sound = Sound(self)
         self._recognised: Recognised | None = None
         self._recognised_at = -math.inf
-        self._next_figures = self._next_drawing = 0.0
+        self._next_drawing = 0.0
         view.controls.chosen.connect(guarded(self._select_object))
 
     @property
@@ -82,6 +80,7 @@ class PresenterController(QObject):
             self.view.present(True)
             self._show_hand()
             window.showFullScreen()
+        self._display.show_numbers_soon()
         self._display.centre.setFocus()  # for the keys that move and press
 
     def leave(self) -> None:
@@ -108,13 +107,7 @@ class PresenterController(QObject):
         window = self._window
         docks = window.findChildren(QDockWidget, options=Qt.FindChildOption.FindDirectChildrenOnly)
         bars = window.findChildren(QToolBar, options=Qt.FindChildOption.FindDirectChildrenOnly)
-        return [
-            *docks,
-            *bars,
-            *window.findChildren(ActionBanner),
-            window.menuBar(),
-            window.statusBar(),
-        ]
+        return [*docks, *bars, window.menuBar(), window.statusBar()]
 
     # Input.
 
@@ -136,8 +129,11 @@ class PresenterController(QObject):
         self.feedback = None if estimate is None else feedback_of(estimate, recognised)
         self.view.show_graphics(self.feedback, now)
         self.sound.set_level(self.view.bar.share)
-        if now >= self._next_figures:
-            self._next_figures = now + _FIGURES_PERIOD
+
+    def show_numbers(self, estimate: Estimate | None) -> None:
+        """Write the estimate whose numbers are shown elsewhere, too."""
+        if self.on:
+            self._show_estimate(time.monotonic())
             why_none = "no reading" if estimate is None else "no contact"
             self.view.show_feedback(self.feedback, why_none, self._session.replaying)
 

@@ -66,12 +66,12 @@ class Indicator(QWidget):
         return shrunk(Words(text, font, QRectF(x, top, width, height), align=align))
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        self.draw(painter)
-        for words in self.words():
-            painter.setPen(QColor(self.ink(words)))
-            words.paint(painter)
+        with QPainter(self) as painter:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            self.draw(painter)
+            for words in self.words():
+                painter.setPen(QColor(self.ink(words)))
+                words.paint(painter)
 
     def ink(self, words: Words) -> str:
         """Colour of the words."""
@@ -328,6 +328,7 @@ class ForceBar(Indicator):
 _LEAST_RADIUS, _MOST = 0.02, 0.2  # m, range of the radius that fills the view
 _MARGIN = 0.04  # of the view's height
 _SCALE_BAR = 0.3  # of the view's width at most
+_STRAIGHT = 1e6  # px: the outline of a larger circle is not painted as one
 _EDGE_HEIGHT = 0.6  # of the view's height
 
 
@@ -368,8 +369,8 @@ class RadiusView(Indicator):
         return QPointF(self.width() / 2, self.height() * (1 - _MARGIN))
 
     def circle(self, radius: float) -> QRectF:
-        """Place of a circle of `radius` in m."""
-        r, contact_point = radius * self.per_metre, self.contact_point
+        """Place of a circle of `radius` in m; one far larger than the view is straight in it."""
+        r, contact_point = min(radius * self.per_metre, _STRAIGHT), self.contact_point
         return QRectF(contact_point.x() - r, contact_point.y() - 2 * r, 2 * r, 2 * r)
 
     def draw(self, painter: QPainter) -> None:
@@ -392,13 +393,10 @@ class RadiusView(Indicator):
 
     def _draw_round(self, painter: QPainter, estimate: RadiusEstimate) -> None:
         theme, (low, high) = current(), estimate.interval
-        band = QPainterPath()
-        band.addRect(QRectF(0, 0, self.width(), self.contact_point.y())) if high == math.inf else (
-            band.addEllipse(self.circle(high))
-        )
-        inner = QPainterPath()
-        inner.addEllipse(self.circle(low))
-        painter.fillPath(band.subtracted(inner), self.clear(theme.accent, 0.45))
+        band = QPainterPath()  # filled between both: the inner one lies in the outer one
+        band.addEllipse(self.circle(high))
+        band.addEllipse(self.circle(low))
+        painter.fillPath(band, self.clear(theme.accent, 0.45))
         painter.setBrush(Qt.BrushStyle.NoBrush)
         width = max(2.0, 4 * self.unit)
         if math.isfinite(estimate.value):

@@ -24,7 +24,7 @@ class RecordingFeature:
     def install(self, shell: MainWindow) -> None:
         self._shell, session = shell, shell.session
         self.recording = shell.panels.add(LIVE, RecordingPanel())
-        self.transport, banner = Transport(), shell.display.centre.banner
+        self.transport, banner = Transport(), shell.display.banner
         self.recorder = RecordingControl(session.engine, shell.tasks, banner, shell)
         self.playback = PlaybackControl(shell.history, session, self.transport, shell.tasks, shell)
         shell.display.centre.add_below(self.transport)

@@ -37,7 +37,7 @@ class SceneFeature:
         self._shell, session = shell, shell.session
         self.load = shell.panels.add(LIVE, LoadPanel())
         self.noise = shell.panels.add(LIVE, NoisePanel())
-        self.scene, self.timeline = ScenePanel(shell.tasks), Timeline()
+        self.scene, self.timeline = ScenePanel(), Timeline()
         self.planner = EffectPlanner(session, shell.tasks, shell)
         self.editing = SceneEditing(shell.history, session, shell.selection.load)
         self.scene_control = SceneControl(

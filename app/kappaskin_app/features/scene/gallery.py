@@ -1,6 +1,7 @@
 """Gallery of the built-in scenes, and of recordings of what others measured."""
 
-from functools import partial
+import tomllib
+from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
 
@@ -17,9 +18,8 @@ from PySide6.QtCore import (
 from PySide6.QtGui import (
     QColor,
     QFontMetricsF,
-    QHideEvent,
-    QImage,
     QKeyEvent,
+    QLinearGradient,
     QPainter,
     QPen,
     QPixmap,
@@ -39,23 +39,27 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin.scenes import SCENES, Scene
-from kappaskin_app.features.scene.thumbnails import Thumbnails, ThumbnailStyle
+from kappaskin.scenes import SCENES, read_scene_text, scene_file
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.background import Tasks
 from kappaskin_app.theme import FAINT, current, follow_look, grown
 from kappaskin_app.widgets.layout import Flow, scrolled
 from kappaskin_app.widgets.lettering import RIGHT
 from kappaskin_app.widgets.parts import ELLIPSIS, Label, button, in_a_row, text_label
 
 PICTURE, PLAYING = int(Qt.ItemDataRole.UserRole), int(Qt.ItemDataRole.UserRole) + 1
-"""Roles of an item: its QPixmap, and whether it is simulated."""
+"""Roles of an item: the path of its picture, and whether it is simulated."""
 
 _GAP, _PAD = 4, 6  # px outside and inside a card
 _FLAT = 0.63  # height of a picture over its width
 _LINES = 2  # of a title
 
 _Index = QModelIndex | QPersistentModelIndex
+
+
+@cache
+def _picture(path: str) -> QPixmap:
+    """A picture, read when it is first painted."""
+    return QPixmap(path)
 
 
 def picture_size(cell: int) -> QSize:
@@ -106,15 +110,15 @@ class CardPainter(QStyledItemDelegate):
         half = width / 2
         painter.drawRoundedRect(card.adjusted(half, half, -half, -half), 7, 7)
 
-    def _paint_picture(self, painter: QPainter, place: QRectF, picture: QPixmap | None) -> None:
-        if picture is not None:
-            painter.drawPixmap(place, picture, QRectF(picture.rect()))
-            return
+    def _paint_picture(self, painter: QPainter, place: QRectF, path: str) -> None:
+        ground = QLinearGradient(place.topLeft(), place.bottomLeft())
+        ground.setColorAt(0, QColor(current().scene_top))
+        ground.setColorAt(1, QColor(current().scene))
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(current().scene))
+        painter.setBrush(ground)
         painter.drawRoundedRect(place, 5, 5)
-        painter.setPen(QColor(current().faint))
-        painter.drawText(place, Qt.AlignmentFlag.AlignCenter, "\N{HORIZONTAL ELLIPSIS}")
+        picture = _picture(path)
+        painter.drawPixmap(place, picture, QRectF(picture.rect()))
 
     def _paint_playing(self, painter: QPainter, place: QRectF) -> None:
         theme, words = current(), "Simulated"
@@ -156,11 +160,12 @@ _EFFECTS = "failing-elements creep-hold steep saturation long-gages on-foam stre
 _READINGS = "camera tilts"
 ORDER = tuple(f"{_DEMONSTRATIONS} {_PAPER} {_EFFECTS} {_READINGS}".split())
 
-_FOLDER = Path(str(files("kappaskin_resources"))) / "measured"
+_FOLDER = Path(str(files("kappaskin_resources")))
+_THUMBNAILS, _MEASURED = _FOLDER / "scenes" / "thumbnails", _FOLDER / "measured"
 MEASURED = {
-    "&Ball in a gel": _FOLDER / "ball" / "ball.mcap",
-    "C&lamped plate": _FOLDER / "plate" / "slopes.mcap",
-    "Fibre": _FOLDER / "fibre" / "fibre.mcap",
+    "&Ball in a gel": _MEASURED / "ball" / "ball.mcap",
+    "C&lamped plate": _MEASURED / "plate" / "slopes.mcap",
+    "Fibre": _MEASURED / "fibre" / "fibre.mcap",
 }
 """Recordings of what others measured, by their titles."""
 _SOURCES = (
@@ -169,7 +174,6 @@ _SOURCES = (
     "Replay the shapes of a fibre held at one end, by the heights of 15 markers (motion capture).",
 )
 
-_RESIZE_DELAY = 200  # ms after the last change of size until pictures are painted
 _CARD = 176  # px, approximate width of a cell: the columns fill the width
 _TEXT_WIDTH = (190, 340)  # px of the text next to the cards, least and most
 
@@ -180,16 +184,17 @@ def in_order(names: tuple[str, ...]) -> list[str]:
     return known + [name for name in names if name not in ORDER]
 
 
-def _titled(name: str) -> str:
-    """The title of a scene until its file is read."""
-    return name.replace("-", " ").capitalize()
+@cache
+def _words(name: str) -> tuple[str, str]:
+    """The title and the text of a built-in scene."""
+    read = tomllib.loads(read_scene_text(scene_file(name)))
+    return read["title"], read["text"].strip()
 
 
 class _Cards(QListWidget):
-    """Cards in as many columns as fit; `played` requests a scene, `resized` reports a new size."""
+    """Cards in as many columns as fit; `played` requests a scene."""
 
     played = Signal()
-    resized = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -211,7 +216,6 @@ class _Cards(QListWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         self._fit()
         super().resizeEvent(event)
-        self.resized.emit()
 
     def changeEvent(self, event: QEvent) -> None:
         super().changeEvent(event)
@@ -243,11 +247,12 @@ class GalleryPanel(QWidget):
     replay_wanted = Signal(Path)
     open_wanted = Signal()
 
-    def __init__(self, tasks: Tasks) -> None:
+    def __init__(self) -> None:
         super().__init__()
         self.cards = _Cards()
-        self.items = {name: QListWidgetItem(_titled(name)) for name in in_order(SCENES)}
-        for item in self.items.values():
+        self.items = {name: QListWidgetItem() for name in in_order(SCENES)}
+        for name, item in self.items.items():
+            item.setData(PICTURE, str(_THUMBNAILS / f"{name}.png"))
             self.cards.addItem(item)
         self.title, self.text, self.file = text_label(), text_label(), text_label()
         self.play = button(
@@ -259,12 +264,7 @@ class GalleryPanel(QWidget):
             for number, (title, tip) in enumerate(zip(MEASURED, _SOURCES, strict=True))
         ]
         self._lay_out()
-        self._scenes: dict[str, Scene | str] = {}
         self._playing = ""
-        self._thumbnails = Thumbnails(list(self.items), tasks, self)
-        self._thumbnails.read.connect(guarded(self._take_scene))
-        self._thumbnails.painted.connect(guarded(self._take_picture))
-        self.cards.resized.connect(guarded(lambda: self._begin(_RESIZE_DELAY)))
         self.cards.currentItemChanged.connect(guarded(self._show_words))
         self.cards.played.connect(guarded(self._play))
         self.play.clicked.connect(guarded(self._play))
@@ -317,6 +317,11 @@ class GalleryPanel(QWidget):
 
     # State
 
+    def showEvent(self, event: QShowEvent) -> None:
+        for name, item in self.items.items():  # not before: all files are read in 25 ms
+            item.setText(_words(name)[0])
+        super().showEvent(event)
+
     def show_playing(self, name: str) -> None:
         """Mark the built-in scene `name` as simulated; none for another name."""
         if name != self._playing:
@@ -328,46 +333,12 @@ class GalleryPanel(QWidget):
     def _fit(self) -> None:
         self._details.setMinimumWidth(grown(_TEXT_WIDTH[0]))
         self._details.setMaximumWidth(grown(_TEXT_WIDTH[1]))
-        self._begin()
 
     def _show_words(self, *_: object) -> None:
         name = self.selected
         if not name:
             return
-        scene = self._scenes.get(name)
-        self.title.setText(self.items[name].text())
-        text = scene.text.strip() if isinstance(scene, Scene) else scene or ""
-        self.text.setText(text)
+        for label, text in zip((self.title, self.text), _words(name), strict=True):
+            label.setText(text)
         playing = ", simulated now" if name == self._playing else ""
         self.file.setText(f"{name}.toml{playing}")
-
-    # Thumbnails in the background
-
-    def showEvent(self, event: QShowEvent) -> None:
-        super().showEvent(event)
-        self._begin()
-
-    def hideEvent(self, event: QHideEvent) -> None:
-        self._thumbnails.stop()
-        super().hideEvent(event)
-
-    def event(self, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.DevicePixelRatioChange:
-            self._begin()
-        return super().event(event)
-
-    def _begin(self, after: int = 0) -> None:
-        """Request the missing thumbnails if the panel is visible, `after` so many ms."""
-        if self.isVisible():
-            size, ratio = picture_size(self.cards.painter.cell), self.devicePixelRatioF()
-            style = ThumbnailStyle(current(), size.width(), size.height(), ratio)
-            self._thumbnails.paint(style, after)
-
-    def _take_scene(self, name: str, scene: Scene | str) -> None:
-        self._scenes[name] = scene
-        if isinstance(scene, Scene):
-            self.items[name].setText(scene.title or _titled(name))
-        self._show_words()
-
-    def _take_picture(self, name: str, image: QImage) -> None:
-        self.items[name].setData(PICTURE, QPixmap.fromImage(image))

@@ -30,7 +30,6 @@ from kappaskin_app.features.scene.gallery import GalleryPanel
 from kappaskin_app.features.scene.plan import EffectsPanel
 from kappaskin_app.features.scene.scene_form import SceneForm
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.background import Tasks
 from kappaskin_app.shell.form import for_the_window
 from kappaskin_app.theme import ALERT, current, follow_look
 from kappaskin_app.widgets.parts import Label, button, text_label
@@ -169,20 +168,21 @@ class SceneText(QPlainTextEdit):
 
     def paint_numbers(self, where: QWidget, event: QPaintEvent) -> None:
         """Paint the numbers of the visible lines, for the line number widget only."""
-        painter, theme = QPainter(where), current()
-        painter.fillRect(event.rect(), QColor(theme.window))
-        painter.setFont(self.font())
-        block, offset = self.firstVisibleBlock(), self.contentOffset()
-        height = self.fontMetrics().height()
-        while block.isValid():
-            top = round(self.blockBoundingGeometry(block).translated(offset).top())
-            if top > event.rect().bottom():
-                break
-            number = block.blockNumber() + 1
-            painter.setPen(QColor(theme.alert if number == self._error_line else theme.faint))
-            area = QRect(0, top, where.width() - _NUMBER_MARGIN, height)
-            painter.drawText(area, Qt.AlignmentFlag.AlignRight, str(number))
-            block = block.next()
+        theme = current()
+        with QPainter(where) as painter:
+            painter.fillRect(event.rect(), QColor(theme.window))
+            painter.setFont(self.font())
+            block, offset = self.firstVisibleBlock(), self.contentOffset()
+            height = self.fontMetrics().height()
+            while block.isValid():
+                top = round(self.blockBoundingGeometry(block).translated(offset).top())
+                if top > event.rect().bottom():
+                    break
+                number = block.blockNumber() + 1
+                painter.setPen(QColor(theme.alert if number == self._error_line else theme.faint))
+                area = QRect(0, top, where.width() - _NUMBER_MARGIN, height)
+                painter.drawText(area, Qt.AlignmentFlag.AlignRight, str(number))
+                block = block.next()
 
 
 _LINE = re.compile(r"\bline (\d+)")
@@ -250,9 +250,9 @@ class ScenePanel(QTabWidget):
 
     plan_visible = Signal(bool)
 
-    def __init__(self, tasks: Tasks) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self.gallery = GalleryPanel(tasks)
+        self.gallery = GalleryPanel()
         self.editor, self.effects = SceneEditor(), EffectsPanel()
         for page, title in (
             (self.gallery, "&Gallery"),

@@ -38,22 +38,24 @@ class ModeMap(QWidget):
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        if self._surface is None or self._layout is None:
-            return
-        painter = QPainter(self)
+        if self._surface is not None and self._layout is not None:
+            with QPainter(self) as painter:
+                self._paint(painter, self._surface, self._layout)
+
+    def _paint(self, painter: QPainter, surface: Array, layout: SensorLayout) -> None:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-        area = self._area(self._layout)
+        area = self._area(layout)
         # y points up on the skin, down in an image.
-        rgb = Tint("diverging", (-1.0, 1.0), "").rgb(self._surface[::-1], current().window)
-        ny, nx = self._surface.shape
+        rgb = Tint("diverging", (-1.0, 1.0), "").rgb(surface[::-1], current().window)
+        ny, nx = surface.shape
         image = QImage(
             np.ascontiguousarray(rgb).tobytes(), nx, ny, 3 * nx, QImage.Format.Format_RGB888
         )
         painter.drawImage(area, image)
         painter.setPen(QPen(QColor(current().line), 1))
         painter.drawRect(area)
-        self._paint_elements(painter, area, self._layout)
+        self._paint_elements(painter, area, layout)
 
     def _area(self, layout: SensorLayout) -> QRectF:
         ratio = min(max(layout.patch.a / layout.patch.b, _THINNEST), 1 / _THINNEST)

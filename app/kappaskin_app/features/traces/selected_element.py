@@ -157,7 +157,6 @@ def _wire_channel(sensor: Sensor, channel: int) -> int:
 
 
 _PLOT_PERIOD = 0.1  # s between two drawings of the plots
-_FACTS_PERIOD = 0.25  # s between two readings of the facts
 _SPECTRUM_PERIOD = 1.0  # s between two spectra of the last ten
 _FEWEST = 32  # readings for a spectrum
 _MOST_LINES = 160  # of it at most
@@ -181,9 +180,10 @@ class SelectedElement(QObject):
         self.element = -1
         self._buffer, self._connection = ReadingBuffer(), 0
         self._key, self._last_number = (0, 0), 0
-        self._next_plots = self._next_facts = self._next_spectrum = 0.0
+        self._next_plots = self._next_spectrum = 0.0
         session.estimated.connect(guarded(self.receive))
         session.source_changed.connect(guarded(lambda *_: self._begin_anew()))
+        display.numbers.connect(guarded(self._show_facts))
         history.changed.connect(guarded(self._show_settings))
         selection.over.connect(guarded(self._point))
         selection.clicked.connect(guarded(self._click))
@@ -196,7 +196,8 @@ class SelectedElement(QObject):
         """Select an element; -1 for none."""
         self.selected.emit(element)
         self.element = element
-        self._next_plots = self._next_facts = self._next_spectrum = 0.0
+        self._next_plots = self._next_spectrum = 0.0
+        self._display.show_numbers_soon()
         if self.element < 0:
             self.panel.show_facts("", "")
         self._update_button()
@@ -245,7 +246,7 @@ class SelectedElement(QObject):
         if traced and status.sensor is not None:
             self._buffer.append(times, _by_kind(traced, status.sensor.layout))
         if self.panel.isVisible() and self.element >= 0:
-            self._show_panel(estimate, now)
+            self._show_panel(now)
         if now >= self._next_plots:
             self._next_plots = now + _PLOT_PERIOD
             if self.traces.isVisible():
@@ -259,19 +260,19 @@ class SelectedElement(QObject):
         for plot in (*self.panel.histories, self.panel.spectrum, *self.traces.plots):
             plot.show_series(())
 
-    def _show_panel(self, estimate: Estimate, now: float) -> None:
+    def _show_panel(self, now: float) -> None:
         if now >= self._next_plots:
             times, values = self._buffer.of([self.element])
             self.panel.show_history(times, values[:, :, 0])
-        if now >= self._next_facts:
-            self._next_facts = now + _FACTS_PERIOD
-            self._show_facts(estimate)
         if now >= self._next_spectrum:
             self._next_spectrum = now + _SPECTRUM_PERIOD
             self._show_spectrum()
 
-    def _show_facts(self, estimate: Estimate) -> None:
+    def _show_facts(self, estimate: Estimate | None) -> None:
+        """Write the facts of the frame of all other numbers."""
         status, colouring = self._session.status, self._display.colouring
+        if estimate is None or self.element < 0 or not self.panel.isVisible():
+            return
         if status.sensor is None or self.element >= len(status.sensor.layout):
             return
         displacement, sd = (

@@ -227,7 +227,7 @@ def test_it_is_recorded_and_exported_by_mouse_alone(window, until, folder, qtbot
     qtbot.mouseClick(window.recording.record, LEFT)
     until(lambda: window.recorder.written.messages > 0)
     qtbot.mouseClick(window.recording.record, LEFT)
-    until(lambda: window.display.centre.banner.isVisible())
+    until(lambda: window.display.banner.isVisible())
     [last] = folder.iterdir()
 
     clicked_entry(window, qtbot, "Export", "Recording")

@@ -251,6 +251,17 @@ def test_the_circle_is_to_the_scale_of_its_scale_bar(qtbot) -> None:
     assert radius_view.bar * radius_view.per_metre <= 0.3 * radius_view.width()
     assert radius_view.circle(0.042).top() >= 0
     assert radius_view.circle(0.042).bottom() == pytest.approx(radius_view.contact_point.y())
+
+
+@pytest.mark.parametrize("high", [0.06, 1e3, 1e12, 1e300, math.inf])
+def test_the_band_lies_between_both_ends_of_the_interval_however_large(qtbot, high: float) -> None:
+    view = view_of((1280, 720), qtbot)
+    circles = view.radius_view
+    circles.show_radius(RadiusEstimate("", math.nan, (0.03, high)), False, 0.0)
+    seen, inner = circles.grab().toImage(), circles.circle(0.03)
+    inside = seen.pixelColor(inner.center().toPoint())
+    assert seen.pixelColor(round(inner.center().x()), round(inner.top()) - 5) != inside
+    assert (seen.pixelColor(3, seen.height() // 2) == inside) == (high == 0.06)
     view.close()
 
 

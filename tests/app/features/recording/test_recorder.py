@@ -59,22 +59,23 @@ ALT = Qt.KeyboardModifier.AltModifier
 
 def _banner(window: MainWindow) -> tuple[str, list[str]]:
     """The words of the banner and of its buttons, while it is shown."""
-    banner = window.display.centre.banner
+    banner = window.display.banner
     if not banner.isVisible():
         return "", []
     return banner.words.text(), [button.text().replace("&", "") for button in banner.buttons]
 
 
 def _button(window: MainWindow, text: str) -> QPushButton:
-    buttons = window.display.centre.banner.buttons
+    buttons = window.display.banner.buttons
     return next(button for button in buttons if text in button.text().replace("&", ""))
 
 
 def _places(window: MainWindow) -> list[tuple[QPoint, int, int]]:
-    """Where everything in the header is, and the header itself."""
-    header = window.display.header
-    widgets = [header, *header.findChildren(QWidget)]
-    return [(w.mapTo(window, QPoint()), w.height(), w.x()) for w in widgets if w.isVisible()]
+    """Where everything in the header is, above its banner."""
+    display = window.display
+    parts = display.badge.parentWidget().findChildren(QWidget)
+    above = [w for w in parts if w is not display.banner and not display.banner.isAncestorOf(w)]
+    return [(w.mapTo(window, QPoint()), w.height(), w.x()) for w in above if w.isVisible()]
 
 
 @pytest.fixture
@@ -284,7 +285,7 @@ def test_where_the_folder_cannot_be_made_another_place_is_offered(
     folder.parent.write_bytes(b"a file")
     qtbot.keyClick(window, Qt.Key.Key_R, CTRL)
     until(lambda: "cannot be written (Not a directory); choose" in _banner(window)[0])
-    [elsewhere] = window.display.centre.banner.buttons
+    [elsewhere] = window.display.banner.buttons
     qtbot.mouseClick(elsewhere, Qt.MouseButton.LeftButton)
     assert re.fullmatch(r"kappaskin-\d{8}-\d{6}\.mcap", Path(no_dialog[0]).name)
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(tmp_path / "other"), ""))

@@ -1,22 +1,44 @@
-"""Thumbnails of scenes, painted as a background task."""
+"""The gallery's thumbnails of the ready scenes, on a transparent ground for both themes.
 
+Run `python tests/scene_thumbnails.py` when a scene changes: a thumbnail holds the digest of its
+scene as text, which `tests/app/features/scene/test_thumbnails.py` compares.
+"""
+
+import hashlib
+import io
 import math
-from collections.abc import Generator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
-from PySide6.QtCore import QObject, QPointF, QRectF, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QColor, QImage, QLinearGradient, QPainter, QPen, QPolygonF
+from PIL import Image, PngImagePlugin
+from PySide6.QtCore import QPointF, QSize, Qt
+from PySide6.QtGui import QColor, QImage, QPainter, QPen, QPolygonF
+from scipy.ndimage import map_coordinates
 
-from kappaskin.errors import Refusal
+import kappaskin_resources
 from kappaskin.frames import Array, Indices, Mask
 from kappaskin.mechanics import shapes_under
-from kappaskin.scenes import AppliedLoads, Indenter, LoadingHistory, Scene, Stimulus, load_scene
-from kappaskin_app.guard import guarded
-from kappaskin_app.shell.background import BackgroundTask, Tasks
+from kappaskin.scenes import (
+    SCENES,
+    AppliedLoads,
+    Indenter,
+    LoadingHistory,
+    Scene,
+    Stimulus,
+    load_scene,
+    scene_file,
+)
 from kappaskin_app.shell.drawn_skin import FROM_THE_LEFT, DrawnSkin
 from kappaskin_app.shell.loads import footprint
-from kappaskin_app.theme import DARK_INK, LIGHT_INK, SEQUENTIAL, Colours, Theme
+from kappaskin_app.theme import DARK_INK, LIGHT_INK, SEQUENTIAL, Colours
+
+THUMBNAILS = Path(kappaskin_resources.__file__).parent / "scenes" / "thumbnails"
+SIZE, RATIO = QSize(160, 101), 2
+"""Size of a thumbnail in px, and its dots per px."""
+DIGEST = "scene"
+"""The text of a picture that is the digest of its scene."""
+_COLOURS = 128
 
 _POINTS = 49  # of the surface along each side
 _OF_A_STRIP = (97, 25)  # along x and y: nothing changes along y
@@ -97,8 +119,6 @@ def _drawn(skin: DrawnSkin, surface: Array) -> tuple[Array, Array]:
 
 
 def _marks(skin: DrawnSkin, positions: Array) -> ReliefMarks:
-    from scipy.ndimage import map_coordinates  # a tenth of a second that the first picture has not
-
     rest, out = skin.at_rest(positions)
     ny, nx = skin.height.shape
     x, y = (positions / (skin.patch.a, skin.patch.b) * (nx - 1, ny - 1)).T
@@ -153,121 +173,27 @@ def _path(stimulus: Stimulus, duration: float) -> list[Array]:
     return [place + piece for piece in pieces if np.ptp(piece, axis=0).max() > _STILL]
 
 
-@dataclass(frozen=True)
-class ThumbnailStyle:
-    """Theme and size of thumbnails: `width` by `height` in px of `ratio` dots each."""
-
-    theme: Theme
-    width: int
-    height: int
-    ratio: float
-
-
-_Made = tuple[str, ThumbnailStyle, Scene | str | QImage]
-
-
-class Thumbnails(QObject):
-    """Reads the scenes with these `names` once, and paints each for every new style.
-
-    `read` brings each scene by its name, or in words why it cannot be; `painted` a name and the
-    image for it.
-    """
-
-    read = Signal(str, object)
-    painted = Signal(str, QImage)
-
-    def __init__(self, names: list[str], tasks: Tasks, parent: QObject | None = None) -> None:
-        super().__init__(parent)
-        self._names = names
-        self._scenes: dict[str, Scene | str] = {}
-        self._reliefs: dict[str, Relief] = {}
-        self._styles: dict[str, ThumbnailStyle] = {}
-        self._style: ThumbnailStyle | None = None
-        self._task = BackgroundTask(
-            tasks,
-            "Painting the thumbnails",
-            self._take,
-            cancelled="Cancelled; missing thumbnails are painted when shown again.",
-        )
-        self._timer = QTimer(self, singleShot=True)  # pyright: ignore[reportCallIssue]
-        self._timer.timeout.connect(guarded(self._begin))
-
-    def paint(self, style: ThumbnailStyle, after: int) -> None:
-        """Paint the thumbnails that do not have this style, `after` so many ms."""
-        self._style = style
-        self._timer.start(after)
-
-    def stop(self) -> None:
-        """Stop painting until the next request."""
-        self._timer.stop()
-        self._task.stop()
-
-    def _begin(self) -> None:
-        missing = [name for name in self._names if self._styles.get(name) != self._style]
-        if missing:
-            self._task.run(self._made, self._style, missing)
-
-    def _made(self, style: ThumbnailStyle, names: list[str]) -> Generator[_Made]:
-        """Each unread scene, or the message of its refusal, then a thumbnail of each."""
-        for name in self._names:
-            if name not in self._scenes:
-                self._scenes[name] = _loaded(name)
-                yield name, style, self._scenes[name]
-        for name in names:
-            scene = self._scenes[name]
-            if isinstance(scene, Scene):
-                yield name, style, self._painted(name, scene, style)
-
-    def _take(self, made: _Made) -> None:
-        name, style, what = made
-        if isinstance(what, QImage):
-            self._styles[name] = style
-            self.painted.emit(name, what)
-        else:
-            self.read.emit(name, what)
-
-    def _painted(self, name: str, scene: Scene, style: ThumbnailStyle) -> QImage:
-        if name not in self._reliefs:
-            self._reliefs[name] = relief(scene)
-        size = QSize(style.width, style.height)
-        return picture(self._reliefs[name], style.theme, size, style.ratio)
-
-
-def _loaded(name: str) -> Scene | str:
-    """A built-in scene, or the message of its refusal."""
-    try:
-        return load_scene(name)
-    except Refusal as refusal:
-        return str(refusal)
-
-
 _FAR = 3.0  # times the skin's extent from its middle to the camera
 _LAMP = (-1.0, 0.4, 0.75)  # as in the view of the skin
 _FINER = 2  # the skin is drawn so many times larger, and shrunk to smooth its edges
-_RIM = 1.2  # px: width of the line along the rim
-_ROUND = 5.0  # px: radius of the picture's corners
+_RIM, _RIM_COLOUR = 1.2, (126, 135, 146)  # px: width of the line along the rim; on either ground
 _MARGIN = 0.06  # of the picture's width
 _TOUCH = "#e8543f"  # as in the view of the skin
 _HEAD = 6.5  # px: length of an arrow's head
 
 
-def picture(relief: Relief, theme: Theme, size: QSize, ratio: float) -> QImage:
-    """`relief` on the ground of the theme's scene, `size` in px of which each is `ratio` dots.
-
-    It may be painted in any thread.
-    """
+def picture(relief: Relief, size: QSize = SIZE, ratio: float = RATIO) -> QImage:
+    """`relief`, `size` in px of which each is `ratio` dots."""
     image = QImage(size * ratio, QImage.Format.Format_ARGB32_Premultiplied)
     image.fill(Qt.GlobalColor.transparent)
     camera = _Camera(relief, size)
-    skin = _skin(relief, theme, camera, image.width(), image.height())
+    skin = _skin(relief, camera, image.width(), image.height())
     image.setDevicePixelRatio(ratio)
     skin.setDevicePixelRatio(ratio)
-    painter = QPainter(image)
-    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    _paint_ground(painter, theme, size)
-    painter.drawImage(QPointF(0, 0), skin)
-    _paint_marks(painter, relief, camera)
-    painter.end()
+    with QPainter(image) as painter:
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.drawImage(QPointF(0, 0), skin)
+        _paint_marks(painter, relief, camera)
     return image
 
 
@@ -310,7 +236,7 @@ def _points(places: Array) -> list[QPointF]:
     return [QPointF(x, y) for x, y in places.tolist()]
 
 
-def _skin(relief: Relief, theme: Theme, camera: _Camera, width: int, height: int) -> QImage:
+def _skin(relief: Relief, camera: _Camera, width: int, height: int) -> QImage:
     """The faces and the rim, the farthest first, in a picture of `width` by `height` dots."""
     finer = _FINER * width / camera.size.width()
     points, faces = finer * camera.project(relief.points), relief.faces
@@ -319,8 +245,7 @@ def _skin(relief: Relief, theme: Theme, camera: _Camera, width: int, height: int
     rim = _widened(points[faces[face, side]], points[faces[face, (side + 1) % 4]], _RIM * finer)
     turned = np.roll(rim, 1, axis=1)
     rim = np.where((side % 2 == 1)[:, None, None], turned, rim)  # long the way that its face is
-    ink = QColor(theme.faint)
-    faint = np.array([ink.red(), ink.green(), ink.blue()], np.uint8)
+    faint = np.array(_RIM_COLOUR, np.uint8)
     colours = np.concatenate([_colours(relief, camera.towards), np.tile(faint, (len(rim), 1))])
     # A face nearer, or its neighbours would lie over half of it.
     nearer = np.linalg.norm(np.ptp(relief.points[faces[face]], axis=1), axis=1)
@@ -346,8 +271,7 @@ def _widened(begin: Array, end: Array, width: float) -> Array:
 def _filled(corners: Array, colours: Colours, width: int, height: int) -> Colours:
     """Dots (height, width, 4) of faces with `corners` (k, 4, 2) in `colours` (k, 3).
 
-    Later ones lie over earlier ones. Each is filled by as many samples as the longest ones need:
-    one call of Qt's for each face would take seconds in a thread that has to wait for its turn.
+    Later ones lie over earlier ones. Each is filled by as many samples as the longest ones need.
     """
     sides = np.hypot(*np.moveaxis(np.roll(corners, -1, axis=1) - corners, -1, 0))
     across, along = (math.ceil(1.2 * sides[:, k::2].max()) + 1 for k in (0, 1))
@@ -380,15 +304,6 @@ def _colours(relief: Relief, towards: Array) -> Colours:
     light = 0.5 + 0.7 * np.maximum(normals @ lamp, 0) + 0.16 * np.maximum(normals @ towards, 0)
     rgb = SEQUENTIAL[np.rint(255 * share).astype(int)] * light[:, None]
     return np.minimum(rgb, 255).astype(np.uint8)
-
-
-def _paint_ground(painter: QPainter, theme: Theme, size: QSize) -> None:
-    ground = QLinearGradient(0, 0, 0, size.height())
-    ground.setColorAt(0, QColor(theme.scene_top))
-    ground.setColorAt(1, QColor(theme.scene))
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(ground)
-    painter.drawRoundedRect(QRectF(0, 0, size.width(), size.height()), _ROUND, _ROUND)
 
 
 def _paint_marks(painter: QPainter, relief: Relief, camera: _Camera) -> None:
@@ -435,3 +350,38 @@ def _paint_arrow(painter: QPainter, places: Array) -> None:
     painter.setPen(QPen(_faded(DARK_INK, 0.45), 0.7))
     painter.setBrush(QColor(_TOUCH))
     painter.drawConvexPolygon(_points(np.array([tip, neck + aside, neck - aside])))
+
+
+def digest(name: str) -> str:
+    """Of the file of a ready scene, and of the files beside it that it names."""
+    file = scene_file(name)
+    text, made = file.read_text("utf-8"), hashlib.sha256()
+    for part in [file, *sorted(file.parent.iterdir())]:
+        if part == file or f'"{part.name}"' in text:
+            made.update(part.read_bytes().replace(b"\r\n", b"\n"))
+    return made.hexdigest()
+
+
+def packed(image: QImage, of_scene: str) -> bytes:
+    """A PNG of few colours, with the digest of the scene."""
+    straight = image.convertToFormat(QImage.Format.Format_RGBA8888)
+    size = straight.width(), straight.height()
+    colours = Image.frombytes("RGBA", size, bytes(straight.constBits()))
+    few = colours.quantize(_COLOURS, Image.Quantize.FASTOCTREE)
+    note, file = PngImagePlugin.PngInfo(), io.BytesIO()
+    note.add_text(DIGEST, of_scene)
+    few.save(file, "PNG", optimize=True, pnginfo=note)
+    return file.getvalue()
+
+
+def main() -> None:
+    THUMBNAILS.mkdir(exist_ok=True)
+    for orphan in {*THUMBNAILS.iterdir()} - {THUMBNAILS / f"{name}.png" for name in SCENES}:
+        orphan.unlink()
+    for name in SCENES:
+        made = packed(picture(relief(load_scene(name))), digest(name))
+        (THUMBNAILS / f"{name}.png").write_bytes(made)
+
+
+if __name__ == "__main__":
+    main()
