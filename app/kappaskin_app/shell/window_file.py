@@ -38,7 +38,8 @@ class WindowState:
 
     `place` is (x, y, width, height) in px, `keys` are the changed shortcuts, `done` and `files`
     the recent commands and files, `own` the saved layouts, `now` the present one, `start` whether
-    the welcome banner is shown, and `letters` the size of the font in percent.
+    the welcome banner is shown, `letters` the size of the font in percent, and `folded` the
+    collapsed panels of settings.
     """
 
     theme: str = ""
@@ -51,6 +52,7 @@ class WindowState:
     own: Mapping[str, Layout] = field(default_factory=dict)
     start: bool = True
     letters: float = 100.0
+    folded: tuple[str, ...] = ()
 
 
 def merged(mine: WindowState, before: WindowState, theirs: WindowState) -> WindowState:
@@ -94,7 +96,7 @@ def to_text(state: WindowState) -> str:
 def _window(state: WindowState) -> dict[str, Any]:
     table: dict[str, Any] = {"theme": state.theme, "start": state.start, "full": state.full}
     table["letters"] = state.letters
-    table |= {"done": list(state.done), "files": list(state.files)}
+    table |= {name: list(getattr(state, name)) for name in ("done", "files", "folded")}
     return table | ({"place": list(state.place)} if state.place else {})
 
 
@@ -138,6 +140,7 @@ def from_text(text: str) -> WindowState:
         _layouts(document),
         _part(window, "start", bool, True),
         _letters(window),
+        _names(window, "folded"),
     )
 
 
@@ -330,6 +333,7 @@ class WindowSaver(QObject):
         window.opening.recent = [Path(file) for file in state.files]
         self._menus.finder.recent = list(state.done)
         window.layouts.own = dict(state.own)
+        window.panels.fold(state.folded)
         window.layouts.apply(state.now or window.layouts.ready())
         return window.actions_by_name.take_keys(dict(state.keys))
 
@@ -347,6 +351,7 @@ class WindowSaver(QObject):
             files=tuple(str(file) for file in window.opening.recent),
             now=layout,
             own=dict(window.layouts.own),
+            folded=window.panels.folded,
         )
 
 
