@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
-from PySide6.QtGui import QCursor, QResizeEvent
+from PySide6.QtGui import QCursor, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QMenu,
@@ -73,15 +73,20 @@ class ActionBanner(QWidget):
             QWidget.setTabOrder(before, after)
         self._ending.stop()  # that of the last one, which may have been put away
         self._ending.setInterval(round(1e3 * seconds))
-        if seconds:
-            self._ending.start()
         self.show()
+        if seconds:  # where it was shown already
+            self._ending.start()
         self._heighten()
         self.shown.emit()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._heighten()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        if self._ending.interval():  # it may have ended while a full-screen view hid the banner
+            self._ending.start()
 
     def _heighten(self) -> None:
         """Set the height of all lines: a main window asks for no height for a width."""
