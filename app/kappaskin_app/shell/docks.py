@@ -309,7 +309,7 @@ class Docks(QObject):
         dock.show()
         self._place_corners()
         if dock in self.below and not dock.isFloating():
-            least = self._needed(name) + dock.height() - dock.widget().height()
+            least = self._needed(name) + dock.titleBarWidget().sizeHint().height()
             heighten(self._window, dock, self._heights[name], least)
         self._share_columns()
         dock.raise_()

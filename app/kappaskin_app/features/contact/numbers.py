@@ -15,6 +15,7 @@ from kappaskin.frames import Estimate
 from kappaskin.pipeline import REPORTED, Reported, readouts
 from kappaskin.sensing import Sensor
 from kappaskin_app.guard import guarded
+from kappaskin_app.theme import grown
 from kappaskin_app.widgets.lettering import LEFT
 from kappaskin_app.widgets.table import Table
 
@@ -83,6 +84,7 @@ def csv_of(*tables: tuple[Sequence[str], Rows]) -> str:
 
 
 _MARGIN = 14  # px, margins of a column's head
+_WIDEST = 480  # px of a table that is not scrolled sideways
 _LINES = 6  # visible of a table at least
 _PERIOD = 0.5  # s between two updates: faster is illegible
 
@@ -103,8 +105,8 @@ class NumbersPanel(QWidget):
         left, around = QVBoxLayout(), QHBoxLayout(self)
         left.addWidget(self.facts)
         left.addWidget(self.copy)
-        around.addLayout(left, 2)
-        around.addWidget(self.elements, 3)
+        around.addLayout(left, 1)
+        around.addWidget(self.elements, 1)
 
     def show_estimate(self, estimate: Estimate | None, sensor: Sensor | None, what: str) -> None:
         """Update the tables at a legible rate; empty without an estimate."""
@@ -142,4 +144,6 @@ def _fill(table: Table, head: Sequence[str], rows: Rows) -> None:
     table.show_rows(rows)
     widest = max(map(table.fontMetrics().horizontalAdvance, head))
     table.horizontalHeader().setMinimumSectionSize(widest + _MARGIN)
+    wide = len(head) * (widest + _MARGIN) + table.verticalScrollBar().sizeHint().width()
+    table.setMinimumWidth(min(wide, grown(_WIDEST)))
     table.setMinimumHeight((_LINES + 1) * table.verticalHeader().defaultSectionSize())

@@ -71,12 +71,20 @@ class GuidePanel(QWidget):
         super().__init__()
         self.contents, self.text = QComboBox(), _Text()
         self.contents.setPlaceholderText("Another page")
+        self.contents.setSizeAdjustPolicy(
+            QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+        )
         self.contents.setAccessibleName("Pages of the guide")
         self.contents.setToolTip("The pages of the guide; Ctrl+K finds every heading in them.")
-        self.back = button("\N{LEFTWARDS ARROW} &Back", "guide-back", "Previous page (Alt+Left).")
-        self.forward = button(
-            "&Forward \N{RIGHTWARDS ARROW}", "guide-forward", "Next page, after Back (Alt+Right)."
+        back, forward = (
+            "Previous page (Alt+Left).",
+            "Next page, after the previous one (Alt+Right).",
         )
+        self.back = button("\N{LEFTWARDS ARROW}", "guide-back", back)
+        self.forward = button("\N{RIGHTWARDS ARROW}", "guide-forward", forward)
+        for way, name in ((self.back, "Back"), (self.forward, "Forward")):
+            way.setAccessibleName(name)
+            way.setFixedWidth(2 * way.sizeHint().height())
         for page in pages():
             self.contents.addItem(page.title)
         self._lay_out()
@@ -93,7 +101,9 @@ class GuidePanel(QWidget):
     def _lay_out(self) -> None:
         column = QVBoxLayout(self)
         column.setContentsMargins(6, 2, 6, 6)
-        column.addLayout(in_a_row(self.contents, self.back, self.forward))
+        row = in_a_row(self.contents, self.back, self.forward)
+        row.setStretch(0, 1)
+        column.addLayout(row)
         column.addWidget(self.text, 1)
 
     def read(self, page: Page, heading: str = "") -> None:
