@@ -21,6 +21,14 @@ def pixels(plotter: Any, size: float) -> float:
     return size * plotter.devicePixelRatioF()
 
 
+_USUAL = 600  # px of the shorter side of a view
+
+
+def magnified(plotter: Any) -> float:
+    """How many times larger letters and points are in a view larger than usual."""
+    return max(1.0, min(plotter.width(), plotter.height()) / _USUAL) ** 0.5
+
+
 _LETTER = 0.55  # average width of a letter, of its height
 _MARGIN = 0.015  # of the view's width, on both sides
 _LEAST = 12  # characters in a line
@@ -96,9 +104,10 @@ class Sides:
         for axis, label in enumerate(self.labels[1:]):
             label.SetVisibility(direction is None or direction.sees(axis))
 
-    def fit(self, wide: float) -> float:
-        """Fit the letters to a view of `wide` px; the share of it that a label takes."""
-        size = max(1, min(grown(_SIDE_LETTERS), int(_MOST_WIDTH * wide / _LABEL_WIDTH)))
+    def fit(self, plotter: Any) -> float:
+        """Fit the letters to the view; the share of its width that a label takes."""
+        wide, large = plotter.width(), round(grown(_SIDE_LETTERS) * magnified(plotter))
+        size = max(1, min(large, int(_MOST_WIDTH * wide / _LABEL_WIDTH)))
         for label in self.labels:
             label.size = size
         return _LABEL_WIDTH * size / wide
