@@ -110,7 +110,7 @@ class Docks(QObject):
         self._also: dict[str, str] = {}
         self._heights: dict[str, float] = {}
         self._areas: dict[str, Qt.DockWidgetArea] = {}
-        self._fits = True
+        self._across = 0  # px, of what is below
         self._layouts: dict[str, Mapping[str, float]] = {}
 
     def __getitem__(self, name: str) -> Dock:
@@ -209,9 +209,12 @@ class Docks(QObject):
         """Let the columns have the lower corners, if what is below fits between them."""
         shown = [d for d in self.below if not (d.isHidden() or d.isFloating())]
         wide = [self.widget(d.objectName()).minimumSizeHint().width() for d in shown]
-        self._fits = max([_NARROWEST, *wide]) <= self._window.centralWidget().width()
+        central = self._window.centralWidget()
+        between = central.width() if central is not None else 0
+        fits = max([_NARROWEST, *wide]) <= between
+        self._across = between if fits else self._window.width()
         for corner, area in _CORNERS.items():
-            self._window.setCorner(corner, area if self._fits else _BELOW)
+            self._window.setCorner(corner, area if fits else _BELOW)
 
     def put_below(
         self,
@@ -271,7 +274,8 @@ class Docks(QObject):
 
     def add_actions(self, actions: Actions, menu: str) -> None:
         """Register the actions that show and hide docks, once there is a central widget."""
-        self._window.centralWidget().installEventFilter(self)
+        if (central := self._window.centralWidget()) is not None:
+            central.installEventFilter(self)
         for dock in self._docks.values():
             dock.visibilityChanged.connect(guarded(lambda *_: self._placing.start(0)))
         for name, dock in self._docks.items():
@@ -319,8 +323,7 @@ class Docks(QObject):
         shown = self.widget(name)
         layout = shown.layout()
         if layout is not None and layout.hasHeightForWidth():
-            across = self._window.centralWidget() if self._fits else self._window
-            return layout.totalMinimumHeightForWidth(across.width())
+            return layout.totalMinimumHeightForWidth(self._across)
         return shown.minimumSizeHint().height()
 
     def _share_columns(self) -> None:

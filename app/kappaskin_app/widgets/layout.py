@@ -191,5 +191,6 @@ class BesideOrBelow(QBoxLayout):
         way = ways.LeftToRight if fits else ways.TopToBottom
         if way != self.direction():
             self.setDirection(way)
-            self.parentWidget().updateGeometry()
+            if (parent := self.parentWidget()) is not None:
+                parent.updateGeometry()  # it is of another height
         super().setGeometry(place)
