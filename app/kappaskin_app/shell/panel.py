@@ -117,7 +117,7 @@ class Panel(QGroupBox):
         self.corner.setGeometry(self.width() - size.width(), 0, size.width(), size.height())
         group, title = QStyle.ComplexControl.CC_GroupBox, QStyle.SubControl.SC_GroupBoxLabel
         place = self.style().subControlRect(group, self._option(), title, self)
-        self.fold.setGeometry(place.adjusted(-3, 0, 3, 0))
+        self.fold.setGeometry(place.adjusted(0, 0, 3, 0))
 
     def _option(self) -> QStyleOptionGroupBox:
         """How the box is drawn: its title has an arrow where it can be collapsed."""
