@@ -130,6 +130,11 @@ class Docks(QObject):
         return [self._docks[name] for name in self._keys if name not in beside]
 
     @property
+    def beside(self) -> list[QDockWidget]:
+        """The docks that are shown in front of those right of the skin."""
+        return [self._docks[name] for name in self._shares]
+
+    @property
     def right(self) -> list[Dock]:
         """The docks that are right of the skin by default."""
         return [self._docks[name] for name in self._right]

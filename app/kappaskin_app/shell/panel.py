@@ -47,6 +47,10 @@ class Panel(QGroupBox):
 
     def __init__(self, title: str, parent: QWidget | None = None) -> None:
         super().__init__(title, parent)
+        self.fold = QToolButton(self, checkable=True, visible=False)  # pyright: ignore[reportCallIssue]
+        self.fold.setObjectName("fold")
+        self.fold.setAccessibleName(f"Collapse {title}")
+        self.fold.setToolTip("Collapse or expand this group.")
         self.message = Label(wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
         how = Qt.TextInteractionFlag
         self.message.setTextInteractionFlags(
@@ -68,10 +72,6 @@ class Panel(QGroupBox):
         self._corner = QHBoxLayout(self.corner)
         self._corner.setContentsMargins(0, 0, 0, 0)
         self._corner.addWidget(self.help)
-        self.fold = QToolButton(self, checkable=True, visible=False)  # pyright: ignore[reportCallIssue]
-        self.fold.setObjectName("fold")
-        self.fold.setAccessibleName(f"Collapse {title}")
-        self.fold.setToolTip("Collapse or expand this group.")
         inside = QWidget()
         self.body = QVBoxLayout(inside)
         self.body.setContentsMargins(0, 0, 0, 0)

@@ -11,20 +11,20 @@ from kappaskin_app.shell.pages import SENSOR, SKIN
 LEFT = Qt.MouseButton.LeftButton
 
 
-def test_a_click_on_a_title_collapses_a_group_and_the_next_one_expands_it(window, qtbot) -> None:
+def test_a_click_on_a_title_collapses_a_group_and_the_next_one_expands_it(
+    window, until, qtbot
+) -> None:
     panel, box = window.noise, window.noise.editor("noise_rms")
     assert box.isVisible()
     high = panel.height()
 
     qtbot.mouseClick(panel.fold, LEFT)
-    qtbot.wait(50)
     assert not box.isVisible()
-    assert panel.height() < high / 2
+    until(lambda: panel.height() < high / 2)
 
     qtbot.mouseClick(panel.fold, LEFT)
-    qtbot.wait(50)
     assert box.isVisible()
-    assert panel.height() == high
+    until(lambda: panel.height() == high)
 
 
 def test_the_keyboard_collapses_a_group(window, qtbot) -> None:
