@@ -360,7 +360,7 @@ def test_no_module_is_in_a_circle() -> None:
     TopologicalSorter(graph).prepare()
 
 
-_PUT = ("put_left", "put_right", "put_below", "put_above")
+_PUT = ("put_left", "put_right", "put_beside", "put_below", "put_above")
 _OTHER_MEANINGS = {"health", "scene", "element"}  # a colouring, what is simulated, a plain word
 
 

@@ -62,11 +62,11 @@ def ready_layout(docks: Docks, name: str, page: int) -> Layout:
         (dock, Place(_called(area), shown=share > 0, share=share))
         for dock, area, share in docks.at_first(name)
     ]
-    # As `layout_of` lists them: in a column a hidden one before the others, else after them.
-    placed.sort(
-        key=lambda each: (AREAS.index(each[1].area), each[1].area == BOTTOM and not each[1].shown)
-    )
-    return Layout(page, tuple(placed))
+    # As `layout_of` lists them: hidden ones of columns before all others, those below after them.
+    above = [(d, p) for d, p in placed if p.area in _BESIDE and not p.shown]
+    rest = [each for each in placed if each not in above]
+    rest.sort(key=lambda each: (AREAS.index(each[1].area), not each[1].shown))
+    return Layout(page, (*above, *rest))
 
 
 def layout_of(window: QMainWindow, docks: Named, panels: QTabWidget) -> Layout:

@@ -16,7 +16,7 @@ from kappaskin_app.widgets.text import elapsed, file_size
 LIVE, SIM, WAITING = "LIVE", "SIM", "WAITING"
 STALE, LOST, OFF = "STALE", "LOST", "OFF"
 _BESIDE = " \N{MIDDLE DOT} "  # between a source and its condition
-_GAP, _SATURATED, _PAUSED = "gap", "saturated", "paused"
+_GAP, _NOISY, _SATURATED, _PAUSED = "gap", "NOISE ADDED", "saturated", "paused"
 REPLAY = "REPLAY"
 GAP = f"{REPLAY}{_BESIDE}{_GAP}"
 
@@ -29,6 +29,7 @@ _TIPS = {
     OFF: "Nothing is connected.",
     REPLAY: "A recording is played.",
     _GAP: "Nothing was recorded here: the values shown are old.",
+    _NOISY: "Noise is added to the readings of what is shown; none of it is recorded or published.",
     _SATURATED: "Elements are beyond the range of their electronics: the skin may be bent more "
     "than shown.",
     _PAUSED: "Paused; Ctrl+P continues.",
@@ -39,13 +40,20 @@ _ROUND, _DOT = 6, 4  # px: radius of its corners, and of the dot of a recording
 _MORE = "Click, or F4: event log."
 
 
-def is_now(word: str, *, gap: bool = False, saturated: bool = False, paused: bool = False) -> str:
+def is_now(
+    word: str,
+    *,
+    gap: bool = False,
+    noisy: bool = False,
+    saturated: bool = False,
+    paused: bool = False,
+) -> str:
     """The state: the source `word` and its most severe condition.
 
     The source is always part of it: a simulation must not be taken for a sensor. A gap precedes
-    saturation, and saturation precedes a pause.
+    added noise, that precedes saturation, and saturation precedes a pause.
     """
-    true = ((_GAP, gap), (_SATURATED, saturated), (_PAUSED, paused))
+    true = ((_GAP, gap), (_NOISY, noisy), (_SATURATED, saturated), (_PAUSED, paused))
     return _BESIDE.join([word, *[below for below, holds in true if holds][:1]])
 
 
@@ -116,7 +124,7 @@ class Badge(Label):
 def colour_of(state: str, theme: Theme) -> str:
     """The background colour of a state, which is written in white."""
     word, _, below = state.partition(_BESIDE)
-    if below in (_GAP, _SATURATED):
+    if below in (_GAP, _NOISY, _SATURATED):
         return theme.warning
     return {
         LIVE: theme.good,
@@ -153,7 +161,7 @@ def state_of(status: Status, computed: float | None, now: float, paused: bool) -
     if status.sensor is None or now - last > _STALE_AFTER:
         return WAITING if status.computing or last == -math.inf else STALE
     word = SIM if status.sensor.simulated else LIVE
-    return is_now(word, saturated=saturated, paused=paused)
+    return is_now(word, noisy=status.added_noise > 0, saturated=saturated, paused=paused)
 
 
 def _replayed(replay: Replay, saturated: bool) -> str:

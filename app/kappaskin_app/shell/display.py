@@ -23,7 +23,7 @@ from kappaskin_app.shell.centre import ActionBanner, Centre
 from kappaskin_app.shell.colouring import Colouring, Ranges
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.shell.status_bar import Notice, StatusBar, SteadySlope, warnings
+from kappaskin_app.shell.status_bar import Notice, StatusBar, SteadyWarning, warnings
 from kappaskin_app.widgets.parts import capital
 from kappaskin_app.widgets.tint import Tint
 
@@ -90,7 +90,7 @@ class Display(QObject):
         self.places: dict[str, list[QWidget]] = {}
         self.figures: dict[str, Callable[[], float]] = {}
         self._connection, self._next_numbers = 0, 0.0
-        self._slope = SteadySlope()
+        self._slope, self._delay = SteadyWarning(0.1, 2.0), SteadyWarning(0.5, 10.0)
         session.estimated.connect(guarded(self.show_estimate))
         session.reported.connect(guarded(self._show_status))
 
@@ -134,16 +134,21 @@ class Display(QObject):
         return (float(np.median(recent)) if recent else math.nan), not known
 
     def _warn(self, estimate: Estimate | None) -> None:
+        now = time.monotonic()
         there = self._session.inside and estimate is not None and self._session.scene.stimuli
         self.notice.show_hint(_HINT if there else _NO_LOAD_HINT)
         texts = [self._session.other_device()]
         if estimate is not None:
             crossed, _ = self.marks(estimate.curvature)
-            slope = self._slope(self._session.status.slope, time.monotonic())
+            slope = self._slope(self._session.status.slope, now)
             method = self._session.engine.requested.setup.method
             texts.append(warnings(estimate, int(crossed.sum()), method, slope))
-        if (pace := self._session.status.pace) < _SLOW:
-            texts.append(f"simulated at {pace:.1f} x real time: this computer is not fast enough")
+        pace = self._session.status.pace
+        delay = self._delay(1.0 - pace if pace < _SLOW else 0.0, now)
+        if delay and self._session.inside:
+            texts.append(
+                f"simulated at {1.0 - delay:.1f} x real time: this computer is not fast enough"
+            )
         self.notice.show_warning(capital("; ".join(filter(None, texts))))
 
     def estimate_shown(self) -> Estimate | None:

@@ -1,10 +1,13 @@
-"""Docks beside and below the skin."""
+"""Docks beside and below the skin.
+
+The columns beside it own the corners, unless what is below it does not fit between them.
+"""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import (
     QDockWidget,
@@ -71,7 +74,12 @@ _HEIGHT = 0.28  # of the window's, of a dock below the skin that is shown
 _NONE: Mapping[str, float] = {}
 _UPPER = (0.58, 0.28)  # of it, of a dock above another in a column and of that one
 _LEAST = 40  # px of a dock that is scrolled, without its title
+_NARROWEST = 560  # px, of docks below the skin that are between the columns
 _BELOW = Qt.DockWidgetArea.BottomDockWidgetArea
+_CORNERS = {
+    Qt.Corner.BottomLeftCorner: Qt.DockWidgetArea.LeftDockWidgetArea,
+    Qt.Corner.BottomRightCorner: Qt.DockWidgetArea.RightDockWidgetArea,
+}
 
 
 class Dock(QDockWidget):
@@ -84,19 +92,25 @@ class Dock(QDockWidget):
         self.closed.emit()
 
 
-class Docks:
+class Docks(QObject):
     """The docks of a `window`, by name."""
 
     def __init__(self, window: QMainWindow) -> None:
+        super().__init__(window)
         self._window = window
+        self._placing = QTimer(self, singleShot=True)  # pyright: ignore[reportCallIssue]
+        self._placing.timeout.connect(guarded(self._place_corners))
         self._docks: dict[str, Dock] = {}
         self._shown: dict[str, QWidget] = {}
         self._keys: dict[str, str] = {}
         self._above: dict[str, str] = {}
         self._right: list[str] = []
+        self._shares: dict[str, float] = {}
+        self._narrow: dict[str, float] = {}
         self._also: dict[str, str] = {}
         self._heights: dict[str, float] = {}
         self._areas: dict[str, Qt.DockWidgetArea] = {}
+        self._across = 0  # px, of what is below
         self._layouts: dict[str, Mapping[str, float]] = {}
 
     def __getitem__(self, name: str) -> Dock:
@@ -112,7 +126,13 @@ class Docks:
     @property
     def below(self) -> list[QDockWidget]:
         """The docks below the skin."""
-        return [self._docks[name] for name in self._keys if name not in self._above]
+        beside = self._above.keys() | self._shares.keys()
+        return [self._docks[name] for name in self._keys if name not in beside]
+
+    @property
+    def beside(self) -> list[QDockWidget]:
+        """The docks that are shown in front of those right of the skin."""
+        return [self._docks[name] for name in self._shares]
 
     @property
     def right(self) -> list[Dock]:
@@ -151,6 +171,55 @@ class Docks:
         dock.setTitleBarWidget(Title(dock))
         dock.setWidget(widget)
         self._window.addDockWidget(area, dock)
+
+    def put_beside(
+        self, name: str, title: str, widget: QWidget, key: str, tip: str, menu: str, share: float
+    ) -> None:
+        """Put a widget right of the skin, hidden until shown with `key` in front of what is there.
+
+        Its action is also in a `menu`. The column has at least this `share` of the window's width
+        while it is shown.
+        """
+        self._put(name, title, widget, _CORNERS[Qt.Corner.BottomRightCorner], tip, {})
+        self._keys[name], self._also[name], self._shares[name] = key, menu, share
+        dock = self[name]
+        dock.hide()
+        dock.closed.connect(guarded(partial(self._narrow_again, name)))
+
+    def _show_beside(self, name: str) -> None:
+        """Show a dock in front of the others right of the skin, in a column that is wide enough."""
+        dock, window = self[name], self._window
+        others = [d for d in self.right if not (d.isHidden() or d.isFloating())]
+        others = [d for d in others if window.dockWidgetArea(d) == window.dockWidgetArea(dock)]
+        if others and not dock.isFloating():
+            if dock.isHidden():
+                self._narrow[name] = others[0].width() / window.width()
+            window.tabifyDockWidget(others[0], dock)
+        dock.show()
+        wide = max(dock.width(), round(self._shares[name] * window.width()))
+        window.resizeDocks([dock], [wide], Qt.Orientation.Horizontal)
+
+    def _narrow_again(self, name: str) -> None:
+        """Give the column right of the skin its width back once the dock in it is closed."""
+        wide = round(self._narrow.pop(name, 0.0) * self._window.width())
+        if wide:
+            self._window.resizeDocks(self.right[:1], [wide], Qt.Orientation.Horizontal)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.Resize:  # of what is between the columns
+            self._placing.start(0)
+        return False
+
+    def _place_corners(self) -> None:
+        """Let the columns have the lower corners, if what is below fits between them."""
+        shown = [d for d in self.below if not (d.isHidden() or d.isFloating())]
+        wide = [self.widget(d.objectName()).minimumSizeHint().width() for d in shown]
+        central = self._window.centralWidget()
+        between = central.width() if central is not None else 0
+        fits = max([_NARROWEST, *wide]) <= between
+        self._across = between if fits else self._window.width()
+        for corner, area in _CORNERS.items():
+            self._window.setCorner(corner, area if fits else _BELOW)
 
     def put_below(
         self,
@@ -209,7 +278,11 @@ class Docks:
         self[name].hide()
 
     def add_actions(self, actions: Actions, menu: str) -> None:
-        """Register the actions that show and hide docks."""
+        """Register the actions that show and hide docks, once there is a central widget."""
+        if (central := self._window.centralWidget()) is not None:
+            central.installEventFilter(self)
+        for dock in self._docks.values():
+            dock.visibilityChanged.connect(guarded(lambda *_: self._placing.start(0)))
         for name, dock in self._docks.items():
             if name not in self._keys:
                 action = dock.toggleViewAction()
@@ -233,25 +306,29 @@ class Docks:
             self.reveal(name)
         else:
             self[name].hide()
+            self._narrow_again(name)
 
     def reveal(self, name: str) -> None:
         """Show a dock in front of its tabs."""
         dock = self[name]
         if not dock.visibleRegion().isEmpty():
             return
+        if name in self._shares:
+            self._show_beside(name)
         dock.show()
+        self._place_corners()
         if dock in self.below and not dock.isFloating():
-            least = self._needed(name) + dock.height() - dock.widget().height()
+            least = self._needed(name) + dock.titleBarWidget().sizeHint().height()
             heighten(self._window, dock, self._heights[name], least)
         self._share_columns()
         dock.raise_()
 
     def _needed(self, name: str) -> int:
-        """The height in px that the widget of a dock needs at the width of the window."""
+        """The height in px that the widget of a dock needs at the width that it has."""
         shown = self.widget(name)
         layout = shown.layout()
         if layout is not None and layout.hasHeightForWidth():
-            return layout.totalMinimumHeightForWidth(self._window.width())
+            return layout.totalMinimumHeightForWidth(self._across)
         return shown.minimumSizeHint().height()
 
     def _share_columns(self) -> None:

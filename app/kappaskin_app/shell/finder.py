@@ -68,6 +68,8 @@ def reveal(widget: QWidget) -> None:
     for around in _around(widget):
         if isinstance(around, QTabWidget):
             around.setCurrentIndex(_page(around, widget))
+        elif isinstance(around, Panel):
+            around.fold.setChecked(False)
         else:
             around.show()
             around.raise_()
@@ -75,11 +77,11 @@ def reveal(widget: QWidget) -> None:
     widget.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
 
-def _around(widget: QWidget) -> Iterator[QTabWidget | QDockWidget]:
-    """The pages and docks that a widget is in, the nearest first."""
+def _around(widget: QWidget) -> Iterator[QTabWidget | QDockWidget | Panel]:
+    """The panel, pages and docks that a widget is in, the nearest first."""
     around = widget.parentWidget()
     while around is not None:
-        if isinstance(around, QTabWidget | QDockWidget):
+        if isinstance(around, QTabWidget | QDockWidget | Panel):
             yield around
         around = around.parentWidget()
 
@@ -116,7 +118,13 @@ def _actions(window: Parts) -> Iterator[FinderEntry]:
 def _panels(window: Parts) -> Iterator[FinderEntry]:
     for panel in window.findChildren(Panel):
         title = panel.title()
-        yield FinderEntry(f"panel:{title}", f"{title} panel", _where(panel), partial(enter, panel))
+        show, why_not = partial(enter, panel), _why_hidden(panel)
+        yield FinderEntry(f"panel:{title}", f"{title} panel", _where(panel), show, "", why_not)
+
+
+def _why_hidden(panel: Panel) -> str:
+    """Why a panel is hidden; empty where it is not."""
+    return panel.message.text() or _NOT_NOW if panel.isHidden() else ""
 
 
 def enter(panel: QWidget) -> None:
@@ -138,7 +146,7 @@ def _setting(window: Parts, form: Form, editor: QWidget, place: str) -> Iterator
     """The setting of `editor`, and each value of a choice."""
     name = editor.objectName()
     how = form_field(name)
-    why_not = "" if form.has_row(name) else _NOT_NOW
+    why_not = _why_hidden(form) or ("" if form.has_row(name) else _NOT_NOW)
     if not editor.isEnabled():
         why_not = form.message.text() or _NOT_NOW
     title = how.label if how.label == form.title() else f"{form.title()}: {how.label}"

@@ -139,7 +139,6 @@ class _OpenMenu(QMenu):
 _AT_FIRST = Settings()
 _BEGUN = re.compile(r"[+-]?\d*\.?(\d*|\d+e[+-]?)", re.IGNORECASE)  # the beginning of a number
 _LONG, _SEEN = 22, 12  # characters: of a long choice, and at least visible
-_OTHER = "Available only for the simulated skin (Ctrl+M)."
 
 
 class WholeBox(QSpinBox):
@@ -424,16 +423,15 @@ class Form(Panel):
             box.setToolTip(_tip_of(how, most))
 
 
+_OTHER = "Available only for the simulated skin (Ctrl+M)"
+
+
 class SimulationForm(Form):
-    """A form of the simulation, disabled while another source is in use."""
+    """A form of the simulation, hidden while another source is in use."""
 
     def show_status(self, status: Status, simulating: bool) -> None:
-        for editor in self.editors():
-            editor.setEnabled(simulating)
-        if simulating:
-            self.show_message(self.alarm(status))
-        else:
-            self.show_message(_OTHER, hint=True)
+        self.setVisible(simulating)
+        self.show_message(self.alarm(status) if simulating else _OTHER)
 
     def alarm(self, status: Status) -> str:
         """An error of these settings, while they are simulated; empty without one."""

@@ -1,5 +1,6 @@
 """The pages of settings, to which features add panels."""
 
+from collections.abc import Collection
 from typing import TypeVar
 
 from PySide6.QtCore import Qt, Signal
@@ -35,6 +36,7 @@ class Pages(QTabWidget):
     def add(self, page: str, panel: _Some) -> _Some:
         """Add a panel at the end of the page with this title."""
         self._pages.setdefault(page, []).append(panel)
+        panel.fold.show()
         self.join(panel)
         return panel
 
@@ -58,7 +60,9 @@ class Pages(QTabWidget):
 
     def turn(self, pages: int) -> None:
         """Show the page so many further on, cyclically."""
-        self.setCurrentIndex((self.currentIndex() + pages) % self.count())
+        there = [index for index in range(self.count()) if self.isTabVisible(index)]
+        now = there.index(self.currentIndex())
+        self.setCurrentIndex(there[(now + pages) % len(there)])
         self.tabBar().setFocus(Qt.FocusReason.TabFocusReason)
 
     def place(self, title: str) -> int:
@@ -69,6 +73,7 @@ class Pages(QTabWidget):
         """Show the page of a panel, scrolled to it."""
         [of] = [title for title, panels in self._pages.items() if panel in panels]
         self.setCurrentIndex(self.place(of))
+        panel.fold.setChecked(False)
         page = self.currentWidget()
         if isinstance(page, QScrollArea):
             page.ensureWidgetVisible(panel)
@@ -78,5 +83,20 @@ class Pages(QTabWidget):
             panel.show_settings(settings)
 
     def show_status(self, status: Status, simulating: bool) -> None:
+        """Show the status; a page of which no panel applies to the source is hidden."""
         for panel in self.all():
             panel.show_status(status, simulating)
+        for index, page in enumerate(page for page in _PAGES if page in self._pages):
+            applies = any(not panel.isHidden() for panel in self._pages[page])
+            if applies != self.isTabVisible(index):
+                self.setTabVisible(index, applies)
+
+    @property
+    def folded(self) -> tuple[str, ...]:
+        """The titles of the collapsed panels."""
+        return tuple(panel.title() for panel in self.all() if panel.fold.isChecked())
+
+    def fold(self, titles: Collection[str]) -> None:
+        """Collapse the panels of these titles, and no others."""
+        for panel in self.all():
+            panel.fold.setChecked(panel.title() in titles)

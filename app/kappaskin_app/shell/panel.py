@@ -1,11 +1,14 @@
 """Panels: titled boxes that show a state and request changes of settings."""
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QGuiApplication, QResizeEvent
+from PySide6.QtGui import QGuiApplication, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
     QGroupBox,
     QHBoxLayout,
+    QStyle,
+    QStyleOptionGroupBox,
+    QStylePainter,
     QToolButton,
     QVBoxLayout,
     QWidget,
@@ -20,6 +23,10 @@ from kappaskin_app.widgets.layout import scroll_to
 from kappaskin_app.widgets.parts import ELLIPSIS, Label
 from kappaskin_app.widgets.text import COMMAND
 
+_FOLDED, _UNFOLDED = (
+    "\N{BLACK RIGHT-POINTING SMALL TRIANGLE}",
+    "\N{BLACK DOWN-POINTING SMALL TRIANGLE}",
+)
 _GROWN = 20  # ms after which the page of a panel that grew has grown too
 _LONGEST, _BEGINNING = 800, 500  # characters of a message, and how many from its beginning
 
@@ -28,7 +35,7 @@ class Panel(QGroupBox):
     """A titled box with a message below; `requested` brings the name and value of a setting.
 
     A button in its corner shows its purpose; `guide_requested` brings the name of a page of the
-    guide.
+    guide. One on a page of settings is collapsed by a click on its title, `fold`.
     """
 
     purpose = ""
@@ -41,6 +48,10 @@ class Panel(QGroupBox):
 
     def __init__(self, title: str, parent: QWidget | None = None) -> None:
         super().__init__(title, parent)
+        self.fold = QToolButton(self, checkable=True, visible=False)  # pyright: ignore[reportCallIssue]
+        self.fold.setObjectName("fold")
+        self.fold.setAccessibleName(f"Collapse {title}")
+        self.fold.setToolTip("Collapse or expand this group.")
         self.message = Label(wordWrap=True, visible=False)  # pyright: ignore[reportCallIssue]
         how = Qt.TextInteractionFlag
         self.message.setTextInteractionFlags(
@@ -62,12 +73,16 @@ class Panel(QGroupBox):
         self._corner = QHBoxLayout(self.corner)
         self._corner.setContentsMargins(0, 0, 0, 0)
         self._corner.addWidget(self.help)
-        self.body = QVBoxLayout()
+        inside = QWidget()
+        self.body = QVBoxLayout(inside)
+        self.body.setContentsMargins(0, 0, 0, 0)
         self._around = QVBoxLayout(self)
         self._around.setContentsMargins(8, 6, 8, 8)
         self._around.addWidget(self.about)
-        self._around.addLayout(self.body)
+        self._around.addWidget(inside)
         self._around.addWidget(self.message)
+        self.fold.toggled.connect(inside.setHidden)
+        self.fold.toggled.connect(self.update)
         follow_look(self, self._dress)
 
     def show_settings(self, settings: Settings) -> None:
@@ -96,12 +111,28 @@ class Panel(QGroupBox):
         self.about.setText(
             f'{self.purpose} <a href="{self.guide_page}" {style}>More in the guide</a>'
         )
-        self.corner.setStyleSheet(_corner_style())
+        for widget in (self.corner, self.fold):
+            widget.setStyleSheet(_corner_style())
 
     def place_corner(self) -> None:
         """Put the corner's buttons beside the title."""
         size = self.corner.sizeHint().boundedTo(QSize(self.width(), self.fontMetrics().height()))
         self.corner.setGeometry(self.width() - size.width(), 0, size.width(), size.height())
+        group, title = QStyle.ComplexControl.CC_GroupBox, QStyle.SubControl.SC_GroupBoxLabel
+        place = self.style().subControlRect(group, self._option(), title, self)
+        self.fold.setGeometry(place.adjusted(0, 0, 3, 0))
+
+    def _option(self) -> QStyleOptionGroupBox:
+        """How the box is drawn: its title has an arrow where it can be collapsed."""
+        option = QStyleOptionGroupBox()
+        self.initStyleOption(option)
+        if not self.fold.isHidden():
+            arrow = _FOLDED if self.fold.isChecked() else _UNFOLDED
+            option.text = f"{arrow} {option.text}"  # pyright: ignore[reportAttributeAccessIssue]
+        return option
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        QStylePainter(self).drawComplexControl(QStyle.ComplexControl.CC_GroupBox, self._option())
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

@@ -202,6 +202,7 @@ class Session(QObject):
             engine.set_up(_setup_of(history.settings))
             engine.scan(region_of(history.settings))
         self._cylinder: CylinderStep | None = None
+        self._calibrating = False
         self.status = Status()
         self._lost_since, self._turned_at = math.inf, 0.0
         self.estimate: Estimate | None = None
@@ -271,6 +272,7 @@ class Session(QObject):
         self.source_changing.emit()
         self.connecting, self.source, self.estimate = "", source, None
         self._turned_at, self._lost_since = time.monotonic(), math.inf
+        self._add_noise()
         self.source_changed.emit(source)
         trust = self._trusts(source)
         if not already:
@@ -332,6 +334,19 @@ class Session(QObject):
             self._play()
         if part(settings, PublishSettings) != part(was, PublishSettings):
             self._publish()
+        self._add_noise()
+
+    def set_calibrating(self, calibrating: bool) -> None:
+        """Add no noise to what is shown while a calibration captures it."""
+        self._calibrating = calibrating
+        self._add_noise()
+
+    def _add_noise(self) -> None:
+        """Request the noise that is added to what is shown of a device."""
+        none = self.inside or self.replaying or self._calibrating
+        rms = 0.0 if none else self._settings.added_noise
+        if rms != self.engine.requested.added_noise:
+            self.engine.add_noise(rms)
 
     def _set_up(self) -> None:
         """Request the setup of the settings, if it has changed."""

@@ -89,21 +89,22 @@ def warnings(estimate: Estimate, strained: int, method: str, slope: float = 0.0)
     return words[:1].upper() + words[1:]
 
 
-_STEADY, _KEPT = 0.1, 2.0  # share by which a slope may change, and s it may be gone, unshown
+class SteadyWarning:
+    """The number of a warning as it is shown: it changes if by much, and goes after a while.
 
+    A change below `share` of it is not shown, nor that it is 0 for less than `kept` in s.
+    """
 
-class SteadySlope:
-    """The neglected slope as it is shown: it changes if by much, and goes after a while."""
-
-    def __init__(self) -> None:
+    def __init__(self, share: float, kept: float) -> None:
+        self._share, self._kept = share, kept
         self._shown, self._until = 0.0, 0.0
 
-    def __call__(self, slope: float, now: float) -> float:
-        """What is shown of a `slope` at the time `now` in s."""
-        if slope:
-            self._until = now + _KEPT
-            steady = abs(slope - self._shown) < _STEADY * self._shown
-            self._shown = self._shown if steady else slope
+    def __call__(self, number: float, now: float) -> float:
+        """What is shown of a `number` at the time `now` in s; 0 without a warning."""
+        if number:
+            self._until = now + self._kept
+            steady = abs(number - self._shown) < self._share * self._shown
+            self._shown = self._shown if steady else number
         elif now > self._until:
             self._shown = 0.0
         return self._shown

@@ -111,7 +111,7 @@ class MainWindow(Parts):
             apply_look(THEMES[settings.theme], settings.letters, settings.colour_map)
 
     def _show_status(self, status: Status) -> None:
-        self.panels.show_status(status, self.session.simulating and status.state == "streaming")
+        self.panels.show_status(status, self.session.simulating)
 
     # Called by features.
 

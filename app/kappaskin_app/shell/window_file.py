@@ -39,8 +39,8 @@ class WindowState:
 
     `place` is (x, y, width, height) in px, `keys` are the changed shortcuts, `done` and `files`
     the recent commands and files, `own` the saved layouts, `now` the present one, `start` whether
-    the welcome banner is shown, `letters` the size of the font in percent, and `error_bars` those
-    that are shown.
+    the welcome banner is shown, `letters` the size of the font in percent, `error_bars` those that
+    are shown, and `folded` the collapsed panels of settings.
     """
 
     theme: str = ""
@@ -54,6 +54,7 @@ class WindowState:
     start: bool = True
     letters: float = 100.0
     error_bars: str = "sigma"
+    folded: tuple[str, ...] = ()
 
 
 def merged(mine: WindowState, before: WindowState, theirs: WindowState) -> WindowState:
@@ -97,7 +98,7 @@ def to_text(state: WindowState) -> str:
 def _window(state: WindowState) -> dict[str, Any]:
     table: dict[str, Any] = {"theme": state.theme, "start": state.start, "full": state.full}
     table |= {"letters": state.letters, "error_bars": state.error_bars}
-    table |= {"done": list(state.done), "files": list(state.files)}
+    table |= {name: list(getattr(state, name)) for name in ("done", "files", "folded")}
     return table | ({"place": list(state.place)} if state.place else {})
 
 
@@ -142,6 +143,7 @@ def from_text(text: str) -> WindowState:
         _part(window, "start", bool, True),
         _letters(window),
         _one_of(_part(window, "error_bars", str, "sigma"), tuple(ERROR_BARS)),
+        _names(window, "folded"),
     )
 
 
@@ -335,6 +337,7 @@ class WindowSaver(QObject):
         window.opening.recent = [Path(file) for file in state.files]
         self._menus.finder.recent = list(state.done)
         window.layouts.own = dict(state.own)
+        window.panels.fold(state.folded)
         window.layouts.apply(state.now or window.layouts.ready())
         return window.actions_by_name.take_keys(dict(state.keys))
 
@@ -353,6 +356,7 @@ class WindowSaver(QObject):
             files=tuple(str(file) for file in window.opening.recent),
             now=layout,
             own=dict(window.layouts.own),
+            folded=window.panels.folded,
         )
 
 

@@ -3,6 +3,7 @@
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QSize, Qt
 from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
+    QBoxLayout,
     QDockWidget,
     QHBoxLayout,
     QLayout,
@@ -173,3 +174,28 @@ def _put(line: list[QLayoutItem], at: QPoint, high: int) -> None:
         size = item.sizeHint()
         item.setGeometry(QRect(QPoint(x, at.y() + (high - size.height()) // 2), size))
         x += size.width() + _GAP
+
+
+class BesideOrBelow(QBoxLayout):
+    """Items beside each other, or where they do not fit below each other."""
+
+    def __init__(self) -> None:
+        super().__init__(QBoxLayout.Direction.LeftToRight)
+
+    def _widths(self) -> list[int]:
+        items = [self.itemAt(index) for index in range(self.count())]
+        return [item.minimumSize().width() for item in items if item is not None]
+
+    def minimumSize(self) -> QSize:
+        return QSize(max(self._widths(), default=0), super().minimumSize().height())
+
+    def setGeometry(self, place: QRect) -> None:
+        widths = self._widths()
+        fits = sum(widths) + self.spacing() * (len(widths) - 1) <= place.width()
+        ways = QBoxLayout.Direction
+        way = ways.LeftToRight if fits else ways.TopToBottom
+        if way != self.direction():
+            self.setDirection(way)
+            if (parent := self.parentWidget()) is not None:
+                parent.updateGeometry()  # it is of another height
+        super().setGeometry(place)

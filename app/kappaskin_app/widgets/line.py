@@ -1,17 +1,20 @@
 """A line of text that changes many times a second."""
 
-from PySide6.QtCore import QEvent, QSize, Qt
+from PySide6.QtCore import QEvent, QRect, QSize, Qt
 from PySide6.QtGui import QFontMetrics, QHelpEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
 from kappaskin_app.widgets.lettering import LEFT
 
+_NARROW = 0.9  # width of letters where room is short
+
 
 class Line(QWidget):
     """A line of text drawn in place; a QLabel would lay out the whole window again.
 
-    Where the text does not fit, spare beginnings or ends are left out, the first ones first; where
-    the rest does not fit either, the tooltip begins with the text.
+    Where the text does not fit, spare beginnings or ends are left out, the first ones first, and
+    the letters are narrower by at most a tenth; where the rest does not fit either, the tooltip
+    begins with the text.
     """
 
     def __init__(self, text: str = "", parent: QWidget | None = None) -> None:
@@ -36,7 +39,7 @@ class Line(QWidget):
             self.update()
 
     def _fits(self, text: str) -> bool:
-        return self.fontMetrics().horizontalAdvance(text) <= self.contentsRect().width()
+        return self.fontMetrics().horizontalAdvance(text) * _NARROW <= self.contentsRect().width()
 
     @property
     def shown(self) -> str:
@@ -65,8 +68,17 @@ class Line(QWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         with QPainter(self) as painter:
-            painter.setPen(self.palette().color(self.foregroundRole()))
-            text = painter.fontMetrics().elidedText(
-                self.shown, Qt.TextElideMode.ElideRight, self.contentsRect().width()
-            )
-            painter.drawText(self.contentsRect(), LEFT, text)
+            self._paint(painter)
+
+    def _paint(self, painter: QPainter) -> None:
+        painter.setPen(self.palette().color(self.foregroundRole()))
+        text, place = self.shown, self.contentsRect()
+        wide = painter.fontMetrics().horizontalAdvance(text)
+        if self.whole and wide > place.width():
+            painter.translate(place.x(), 0)
+            painter.scale(place.width() / wide, 1.0)
+            place = QRect(0, place.y(), wide, place.height())
+        elif not self.whole:
+            right = Qt.TextElideMode.ElideRight
+            text = painter.fontMetrics().elidedText(text, right, place.width())
+        painter.drawText(place, LEFT, text)

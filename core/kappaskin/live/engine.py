@@ -1,5 +1,6 @@
 """Engine: starts the engine process, sends requests, reads status and estimates."""
 
+import math
 import multiprocessing
 import time
 from collections.abc import Sequence
@@ -240,6 +241,15 @@ class Engine:
     def recompute(self, on: bool) -> None:
         """Show of a recording what is computed again of its readings, or what was recorded."""
         self._requests.change(recomputes=on)
+
+    def add_noise(self, rms: float) -> None:
+        """Add normal noise of `rms` in 1/m to the readings of `latest`, `recent` and `compared`.
+
+        What is recorded or published has none of it. Raises a `Refusal` below zero.
+        """
+        if not 0 <= rms < math.inf:
+            raise Refusal(f"expected a noise of at least 0 1/m, got {rms}; use 0 for none")
+        self._requests.change(added_noise=rms)
 
     def step(self, frames: int) -> None:
         """Pause a recording, so many `frames` further on, or back if negative."""

@@ -22,6 +22,7 @@ from kappaskin.live.pipelines import (
     ComparedPipeline,
     LiveHealthMonitor,
     NoiseCheck,
+    NoisyPipeline,
     PipelineHost,
     PipelineStatus,
 )
@@ -67,6 +68,7 @@ class EngineLoop:
         self._compared = ComparedPipeline(
             compared, self._builder, status.compared or PipelineStatus()
         )
+        self._noisy = NoisyPipeline(self._builder)
         self._tare = TareCapture(self._builder, self._status.tare)
         self._publishing, self._reported_events = Publishing(), self._status.event_count
         self._haste = ProcessPriority()
@@ -130,6 +132,8 @@ class EngineLoop:
                 self._play(requested.scene)
             case "recomputes":
                 self._recompute()
+            case "added_noise":
+                self._noisy.rms = requested.added_noise
             case "recording":
                 self._recorder.begin(requested.recording, self._source, self._main)
             case Seek() | StepFrames():
@@ -321,6 +325,7 @@ class EngineLoop:
             self._status = replace(self._status, skipped=self._status.skipped + late)
         for frame in frames[:late]:
             pipeline.pass_over(frame)
+            self._noisy.pass_over(frame)
             self._compared.pass_over(frame)
             self._arrivals.used(frame)
         pipeline.wanted = self._wanted(pipeline.setup)
@@ -333,14 +338,15 @@ class EngineLoop:
             estimated = time.monotonic()
             self._publishing.send(estimate, pipeline, begun)
             published = time.monotonic()
-            self._main.ring.write(estimate)
+            seen, shown = self._noisy(frame, estimate, pipeline)
+            self._main.ring.write(shown)
             self._tare.take(estimate)
             self._arrivals.used(frame)
             self._place = estimate.contact.position
             if self._tracking is not None:
                 self._tracking(estimate.contact, pipeline.fit)
             self._recorder.take(frame, estimate)
-            self._compared.take(frame, paused)
+            self._compared.take(seen, paused)
             kept = time.monotonic() - published
             self._computing.add(estimated - begun, published - estimated, kept)
         self._rate_limit.spend(len(frames) - late, time.monotonic() - began)
@@ -425,6 +431,7 @@ class EngineLoop:
                 health=self._health.health(pipeline, self._place),
                 replay=source.replay if isinstance(source, ReplayedSource) else None,
                 slope=fit.neglected_slope if fit else 0.0,
+                added_noise=self._noisy.added,
             )
         self._publishing.report(status.source_status(self._reported_events))
         self._reported_events = status.event_count

@@ -9,7 +9,7 @@ import numpy as np
 
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Fit, sigma_warning
-from kappaskin.frames import Array, Frame
+from kappaskin.frames import Array, Estimate, Frame
 from kappaskin.health import FaultCodes, Health, HealthMonitor
 from kappaskin.live.ring import Ring, slot_type
 from kappaskin.pipeline import Pipeline, Setup, pipeline_for
@@ -208,6 +208,52 @@ class ComparedPipeline:
             self.host.ring.write(pipeline(frame))
         else:
             pipeline.pass_over(frame)
+
+
+class NoisyPipeline:
+    """Computes what the window shows while noise of `rms` in 1/m is added to the readings.
+
+    It has a state of its own, so that what is recorded and published has none of the noise; `added`
+    is the RMS of the noise in the last estimate.
+    """
+
+    def __init__(self, builder: Executor) -> None:
+        self._builder, self._random = builder, np.random.default_rng()
+        self._of: Pipeline | None = None
+        self._made: Future[Pipeline] | None = None
+        self.rms = self.added = 0.0
+
+    def pass_over(self, frame: Frame) -> None:
+        """Leave out a frame for which there is no time."""
+        if self._made is not None and self.added:
+            self._made.result().pass_over(frame)
+
+    def __call__(
+        self, frame: Frame, estimate: Estimate, pipeline: Pipeline
+    ) -> tuple[Frame, Estimate]:
+        """The frame and the estimate to show, of an `estimate` by the `pipeline` without noise."""
+        if pipeline is not self._of or not self.rms:
+            self._of, self._made, self.added = pipeline, None, 0.0
+        if not self.rms:
+            return frame, estimate
+        if self._made is None:
+            job = (Pipeline, pipeline.sensor, pipeline.setup, pipeline.generation)
+            self._made = self._builder.submit(*job)
+        if not self._made.done() or self._made.exception() is not None:  # of too little memory
+            return frame, estimate
+        noisy = self._made.result()
+        if not self.added:
+            noisy.restore(pipeline.state())
+        self.added, noisy.wanted, noisy.left_out = self.rms, pipeline.wanted, pipeline.left_out
+        seen = self._with_noise(frame, pipeline.sensor)
+        return seen, noisy(seen)
+
+    def _with_noise(self, frame: Frame, sensor: Sensor) -> Frame:
+        """A frame with noise; a reading on a rail, or none, stays there."""
+        chain, counts = sensor.transduction, frame.counts
+        noise = self._random.normal(0.0, self.rms / chain.resolution, counts.shape)
+        noisy = np.clip(np.rint(counts + noise), *chain.limits).astype(counts.dtype)
+        return replace(frame, counts=np.where(chain.saturated(counts), counts, noisy))
 
 
 class LiveHealthMonitor:

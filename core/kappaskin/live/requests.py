@@ -23,6 +23,7 @@ _RESEND = 0.5  # s after which an engine that reports, but not of what was sent,
 
 SETTINGS = (
     *("setup", "compared", "region", "targets", "source", "scene", "recording", "recomputes"),
+    "added_noise",
 )
 """The fields of `Requested` that the engine reacts to when they change."""
 
@@ -79,10 +80,11 @@ class Requested:
 
     Lasting settings come first: `targets` that are servers have `access`, with `trust` the scene
     that `source` names may name files outside its folder, a scene or recording plays at `speed`,
-    `looped` or not, a recording shows recorded estimates unless it `recomputes` them, and
-    `window_state` is stored for a window that resumes the engine. `actions`
-    are the last ones, each with the `number` of the value that added it; `changed` has the number
-    with which each setting was last requested. `over` ends the engine.
+    `looped` or not, a recording shows recorded estimates unless it `recomputes` them, `added_noise`
+    in 1/m is added to the readings of shown estimates, and `window_state` is stored for a window
+    that resumes the engine. `actions` are the last ones, each with the `number` of the value that
+    added it; `changed` has the number with which each setting was last requested. `over` ends the
+    engine.
     """
 
     setup: Setup = field(default_factory=Setup)
@@ -97,6 +99,7 @@ class Requested:
     speed: float = 1.0
     looped: bool = False
     recomputes: bool = False
+    added_noise: float = 0.0
     window_state: bytes = b""
     actions: tuple[tuple[int, Action], ...] = ()
     over: bool = False

@@ -45,8 +45,9 @@ class Status:
     each target, `recording` that of the file being written, `replay` the position in a recording
     (None for any other source), `compared` the state of the second pipeline (None without one).
     `slope` is the largest of the newest shape, if the method neglects it though it matters
-    (`Fit.neglected_slope`), else 0. `requested` is the number of the newest request that the engine
-    has received.
+    (`Fit.neglected_slope`), else 0. `added_noise` is the standard deviation in 1/m of what is added
+    to the readings of shown estimates, and only of these. `requested` is the number of the newest
+    request that the engine has received.
     """
 
     state: str = OFF
@@ -85,6 +86,7 @@ class Status:
     replay: Replay | None = None
     compared: PipelineStatus | None = None
     slope: float = 0.0
+    added_noise: float = 0.0
     requested: int = 0
 
     def after(self, events: Sequence[Event]) -> "Status":
@@ -118,6 +120,7 @@ class Status:
             health=Health(),
             replay=None,
             slope=0.0,
+            added_noise=0.0,
         )
 
     @property

@@ -8,7 +8,7 @@ import pytest
 from kappaskin import Pipeline, Setup, Simulator, load_scene
 from kappaskin.estimation import FAULTS
 from kappaskin.frames import Contact
-from kappaskin_app.shell.status_bar import Notice, StatusBar, SteadySlope, warnings
+from kappaskin_app.shell.status_bar import Notice, StatusBar, SteadyWarning, warnings
 from kappaskin_app.theme import DARK, LIGHT, apply_look
 
 INSIDE = Contact(np.full(2, 0.05), np.full(2, 1e-4), 0.1, 1e-3, 4e-3, 1e-5, 297, True, False)
@@ -94,9 +94,16 @@ def test_another_hint_waits_for_the_warning_to_go(qapp) -> None:
 
 
 def test_a_slope_that_wavers_is_shown_as_one() -> None:
-    shown = SteadySlope()
+    shown = SteadyWarning(share=0.1, kept=2.0)
     slopes = [(0.12, 0.0), (0.125, 0.2), (0.2, 0.4), (0.0, 0.6), (0.2, 0.8), (0.0, 2.7), (0.0, 2.9)]
     assert [shown(*one) for one in slopes] == [0.12, 0.12, 0.2, 0.2, 0.2, 0.2, 0.0]
+
+
+def test_a_busy_machine_is_warned_of_without_flicker() -> None:
+    shown = SteadyWarning(share=0.5, kept=10.0)
+    delays = [0.06 if tenth % 7 < 3 else 0.0 for tenth in range(300)]
+    assert {shown(delay, 0.1 * tenth) for tenth, delay in enumerate(delays)} == {0.06}
+    assert shown(0.0, 41.0) == 0.0
 
 
 def test_a_message_is_alone_even_where_the_bar_grows_meanwhile(qapp) -> None:

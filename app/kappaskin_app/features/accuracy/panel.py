@@ -24,12 +24,14 @@ from kappaskin_app.features.accuracy.measurement import (
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.effects import EffectsTable
 from kappaskin_app.theme import ALERT, FAINT, follow_look, grown, slider_style
+from kappaskin_app.widgets.layout import BesideOrBelow
 from kappaskin_app.widgets.line import Line
 from kappaskin_app.widgets.parts import ELLIPSIS, Label, button, sentence, text_label
 from kappaskin_app.widgets.text import NONE, duration, length
 
 _STEPS = 200  # of the slider
 _WORDS, _EFFECTS = 350, 376  # px wide
+_ROWS = 90  # px of the table of effects
 
 
 class CostPanel(QWidget):
@@ -133,13 +135,15 @@ class CostPanel(QWidget):
         words.setLayout(right)
         right.setContentsMargins(0, 0, 0, 0)
         self._words = words
-        around = QHBoxLayout(self)
+        around, beside = QHBoxLayout(self), BesideOrBelow()
         around.setContentsMargins(8, 4, 8, 6)
         around.setSpacing(12)
+        beside.setSpacing(12)
         around.addWidget(self.plot, 1)
-        around.addWidget(words)
         self._effects_box = self._make_effects()
-        around.addWidget(self._effects_box)
+        for widget in (words, self._effects_box):
+            beside.addWidget(widget)
+        around.addLayout(beside)
 
     def _make_effects(self) -> QWidget:
         """The table of effects, with its title."""
@@ -169,6 +173,7 @@ class CostPanel(QWidget):
     def _dress(self) -> None:
         self._words.setFixedWidth(grown(_WORDS))
         self._effects_box.setFixedWidth(grown(_EFFECTS))
+        self.effects.setMinimumHeight(grown(_ROWS))
         wide = self.required_text.fontMetrics().horizontalAdvance("0.000 mm")
         self.required_text.setMinimumWidth(wide)
         self.required.setStyleSheet(slider_style())

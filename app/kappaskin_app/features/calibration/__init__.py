@@ -91,7 +91,9 @@ class CalibrationFeature:
 
     def _note_calibrating(self) -> None:
         procedures = self.calibration.procedure, self.weighing.procedure
-        self.tare_controller.set_calibrating(any(each is not None for each in procedures))
+        calibrating = any(each is not None for each in procedures)
+        self.tare_controller.set_calibrating(calibrating)
+        self._shell.session.set_calibrating(calibrating)
 
     def _add_actions(self, shell: MainWindow) -> None:
         add = shell.actions_by_name.add

@@ -17,7 +17,7 @@ from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.shown import METHOD_SHORT
 from kappaskin_app.theme import follow_look, grown
-from kappaskin_app.widgets.layout import scrolled
+from kappaskin_app.widgets.layout import BesideOrBelow, scrolled
 from kappaskin_app.widgets.parts import button, sentence
 from kappaskin_app.widgets.surface_map import SurfaceMap
 from kappaskin_app.widgets.table import Table
@@ -32,7 +32,7 @@ _SETTINGS = (
     "other_tared",
 )
 _COLUMNS = ("", "A", "B", "B \N{MINUS SIGN} A")
-_TABLE_WIDTH = 460  # px
+_TABLE_WIDTH, _TABLE_HEIGHT = 460, 160  # px
 _MILLIMETRES = 1e3
 _SURFACE = "Displacement of the skin, on a common scale of A and B; the cross is the contact."
 _DIFFERENCE = (
@@ -92,11 +92,17 @@ class ComparePanel(QWidget):
         around.setContentsMargins(8, 4, 8, 6)
         around.setSpacing(10)
         around.addWidget(scrolled(self.form))
+        beside, maps = BesideOrBelow(), QHBoxLayout()
         for view in self.maps.values():
-            around.addWidget(view, 3)
-        around.addWidget(self.table, 3)
+            maps.addWidget(view)
+        beside.addLayout(maps, 3)
+        beside.addWidget(self.table, 1)
+        around.addLayout(beside, 1)
         self._empty()
-        follow_look(self, lambda: self.table.setMinimumWidth(grown(_TABLE_WIDTH)))
+        follow_look(self, self._dress)
+
+    def _dress(self) -> None:
+        self.table.setMinimumSize(grown(_TABLE_WIDTH), grown(_TABLE_HEIGHT))
 
     def connect_to(self, comparison: SetupComparison) -> None:
         """Show the pairs of `comparison`, and pass on the requests of the user."""

@@ -14,6 +14,7 @@ from kappaskin.frames import Estimate
 from kappaskin.pipeline import REPORTED, Reported, readouts
 from kappaskin.sensing import Sensor
 from kappaskin_app.guard import guarded
+from kappaskin_app.theme import grown
 from kappaskin_app.widgets.lettering import LEFT
 from kappaskin_app.widgets.table import Table
 from kappaskin_app.widgets.text import ERROR_BARS, ErrorBars
@@ -83,6 +84,7 @@ def csv_of(*tables: tuple[Sequence[str], Rows]) -> str:
 
 
 _MARGIN = 14  # px, margins of a column's head
+_WIDEST = 480  # px of a table that is not scrolled sideways
 _LINES = 6  # visible of a table at least
 
 
@@ -101,8 +103,8 @@ class NumbersPanel(QWidget):
         left, around = QVBoxLayout(), QHBoxLayout(self)
         left.addWidget(self.facts)
         left.addWidget(self.copy)
-        around.addLayout(left, 2)
-        around.addWidget(self.elements, 3)
+        around.addLayout(left, 1)
+        around.addWidget(self.elements, 1)
 
     def show_estimate(self, estimate: Estimate | None, sensor: Sensor | None, what: str) -> None:
         """Show an estimate; empty tables without one."""
@@ -143,4 +145,6 @@ def _fill(table: Table, head: Sequence[str], rows: Rows) -> None:
     table.show_rows(rows)
     widest = max(map(table.fontMetrics().horizontalAdvance, head))
     table.horizontalHeader().setMinimumSectionSize(widest + _MARGIN)
+    wide = len(head) * (widest + _MARGIN) + table.verticalScrollBar().sizeHint().width()
+    table.setMinimumWidth(min(wide, grown(_WIDEST)))
     table.setMinimumHeight((_LINES + 1) * table.verticalHeader().defaultSectionSize())

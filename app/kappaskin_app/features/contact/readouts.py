@@ -36,14 +36,14 @@ FIELDS = {
         "close to a held edge to be reliable.",
     ),
 }
-_WIDTHS = {"contact": 26, "rate": 15, "lost": 19, "age": 10}
+_WIDTHS = {"contact": 26, "rate": 15, "lost": 19, "age": 15}
 """Usual number of characters of each."""
 _NUMBERS = [(each, each.header) for each in REPORTED if each.header is not None]
 _BARRED = ["contact", *(header.key for of, header in _NUMBERS if of.sd is not None)]
 FIELDS |= {header.key: (of.labels_shown[0], header.tip) for of, header in _NUMBERS}
 _WIDTHS |= {header.key: header.width for _, header in _NUMBERS}
 
-_DIGITS = 1.14  # average width of a character in digits, with the space between two fields
+_DIGITS = 1.08  # average width of a character in digits, with the space between two fields
 _SMALL = 0.85  # size of a name's letters, of those of its number
 
 

@@ -53,7 +53,8 @@ class ExportFeature:
         """Register pictures of all views and docks."""
         solid = {"the window": shell, "the skin": shell.centralWidget()}
         docks = {
-            dock.windowTitle(): shell.docks.widget(dock.objectName()) for dock in shell.docks.below
+            dock.windowTitle(): shell.docks.widget(dock.objectName())
+            for dock in (*shell.docks.below, *shell.docks.beside)
         }
         flat = shell.display.views | {"Picture of a &panel": docks}
         self.exports.register(shell.actions_by_name, solid, flat)

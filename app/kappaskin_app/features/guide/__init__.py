@@ -17,9 +17,7 @@ class GuideFeature:
 
     def install(self, shell: MainWindow) -> None:
         self._shell, self.guide = shell, GuidePanel()
-        shell.docks.put_below(
-            "guide", "Guide", self.guide, "Ctrl+F1", _ABOUT, menu=HELP, height=0.5
-        )
+        shell.docks.put_beside("guide", "Guide", self.guide, "Ctrl+F1", _ABOUT, HELP, share=0.34)
         shell.guide_requested.connect(guarded(lambda name: self.read(page_called(name))))
         shell.menus.entry_sources.append(self._entries)
 

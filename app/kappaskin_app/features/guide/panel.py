@@ -6,7 +6,7 @@ from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
-from PySide6.QtCore import QEvent, QSignalBlocker, Qt, QTimer, QUrl
+from PySide6.QtCore import QSignalBlocker, Qt, QUrl
 from PySide6.QtGui import (
     QBrush,
     QColor,
@@ -23,7 +23,7 @@ from PySide6.QtGui import (
     QTextFrameFormat,
     QTextTable,
 )
-from PySide6.QtWidgets import QHBoxLayout, QListWidget, QTextBrowser, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QTextBrowser, QVBoxLayout, QWidget
 
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import Theme, current, follow_look
@@ -69,17 +69,26 @@ class GuidePanel(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.contents, self.text = QListWidget(), _Text()
+        self.contents, self.text = QComboBox(), _Text()
+        self.contents.setPlaceholderText("Another page")
+        self.contents.setSizeAdjustPolicy(
+            QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+        )
         self.contents.setAccessibleName("Pages of the guide")
         self.contents.setToolTip("The pages of the guide; Ctrl+K finds every heading in them.")
-        self.back = button("\N{LEFTWARDS ARROW} &Back", "guide-back", "Previous page (Alt+Left).")
-        self.forward = button(
-            "&Forward \N{RIGHTWARDS ARROW}", "guide-forward", "Next page, after Back (Alt+Right)."
+        back, forward = (
+            "Previous page (Alt+Left).",
+            "Next page, after the previous one (Alt+Right).",
         )
+        self.back = button("\N{LEFTWARDS ARROW}", "guide-back", back)
+        self.forward = button("\N{RIGHTWARDS ARROW}", "guide-forward", forward)
+        for way, name in ((self.back, "Back"), (self.forward, "Forward")):
+            way.setAccessibleName(name)
+            way.setFixedWidth(2 * way.sizeHint().height())
         for page in pages():
             self.contents.addItem(page.title)
         self._lay_out()
-        self.contents.currentRowChanged.connect(guarded(self._choose))
+        self.contents.currentIndexChanged.connect(guarded(self._choose))
         self.text.sourceChanged.connect(guarded(self._show_where))
         for way, available, go in (
             (self.back, self.text.backwardAvailable, self.text.backward),
@@ -90,11 +99,12 @@ class GuidePanel(QWidget):
             way.clicked.connect(guarded(lambda *_, go=go: go()))
 
     def _lay_out(self) -> None:
-        beside, left = QHBoxLayout(self), QVBoxLayout()
-        left.addLayout(in_a_row(self.back, self.forward))
-        left.addWidget(self.contents, 1)
-        beside.addLayout(left)
-        beside.addWidget(self.text, 1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(6, 2, 6, 6)
+        row = in_a_row(self.contents, self.back, self.forward)
+        row.setStretch(0, 1)
+        column.addLayout(row)
+        column.addWidget(self.text, 1)
 
     def read(self, page: Page, heading: str = "") -> None:
         """Show a page, from a heading in it on."""
@@ -110,21 +120,12 @@ class GuidePanel(QWidget):
         listed = [str(page.file) for page in pages()]
         row = listed.index(url.toLocalFile()) if url.toLocalFile() in listed else -1
         with QSignalBlocker(self.contents):
-            self.contents.setCurrentRow(row)
+            self.contents.setCurrentIndex(row)
         self.text.dress()
         self.text.scroll_to(url.fragment())
 
-    def _fit(self) -> None:
-        self.contents.setFixedWidth(self.contents.sizeHintForColumn(0) + 4 * _CELL)
-
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.FontChange:
-            QTimer.singleShot(0, self, guarded(self._fit))  # once the list has its letters
-
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
-        self._fit()
         if self.text.source().isEmpty():
             self.read(pages()[0])
 

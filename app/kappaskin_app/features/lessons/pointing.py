@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QDockWidget, QScrollArea, QTabWidget, QWidget
 
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import Form
+from kappaskin_app.shell.panel import Panel
 from kappaskin_app.theme import current
 
 _AROUND, _THICK, _ABOUT = 3, 2, 60  # px: of a ring, and of what is seen around it
@@ -110,6 +111,8 @@ class ControlPointer(QObject):
             if isinstance(area, QTabWidget):
                 pages = [area.widget(index) for index in range(area.count())]
                 area.setCurrentIndex([page in around for page in pages].index(True))
+            if isinstance(area, Panel):
+                area.fold.setChecked(False)
             if isinstance(area, QDockWidget):
                 if area.isHidden():
                     self._shown.append(area)

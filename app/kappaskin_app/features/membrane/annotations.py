@@ -22,6 +22,14 @@ def pixels(plotter: Any, size: float) -> float:
     return size * plotter.devicePixelRatioF()
 
 
+_USUAL = 600  # px of the shorter side of a view
+
+
+def magnified(plotter: Any) -> float:
+    """How many times larger letters and points are in a view larger than usual."""
+    return max(1.0, min(plotter.width(), plotter.height()) / _USUAL) ** 0.5
+
+
 _LETTER = 0.55  # average width of a letter, of its height
 _MARGIN = 0.015  # of the view's width, on both sides
 _LEAST = 12  # characters in a line
@@ -30,9 +38,9 @@ _LEAST = 12  # characters in a line
 _CAPITAL = 0.72  # height of a capital, of that of the letters
 
 
-def letters_of(px: float, unit: float) -> int:
+def letters_of(plotter: Any, px: float, unit: float) -> int:
     """Height in px of letters of `px`; of the presenter's captions where its unit is not 0."""
-    return round(CAPTION * unit / _CAPITAL) if unit else grown(px)
+    return round(CAPTION * unit / _CAPITAL if unit else grown(px) * magnified(plotter))
 
 
 def room_for(plotter: Any, letters: float) -> int:
@@ -71,7 +79,7 @@ class Caption:
     def fit(self) -> None:
         """Wrap the text at the present size of letters and view."""
         whole = self.words.replace(" mm", "\N{NO-BREAK SPACE}mm")
-        letters = letters_of(self._px, self.unit)
+        letters = letters_of(self._plotter, self._px, self.unit)
         room = max(room_for(self._plotter, letters) - self._spared, _LEAST)
         lines = [line for part in whole.split("\n") for line in textwrap.wrap(part, room)]
         self.text.prop.font_size, self.text.prop.color = letters, current().text
@@ -118,11 +126,10 @@ class Sides:
         for axis, label in enumerate(self.labels[1:]):
             label.SetVisibility(direction is None or direction.sees(axis))
 
-    def fit(self, wide: float) -> float:
-        """Fit the letters to a view of `wide` px; the share of it that a label takes."""
-        size = max(
-            1, min(letters_of(_SIDE_LETTERS, self.unit), int(_MOST_WIDTH * wide / _LABEL_WIDTH))
-        )
+    def fit(self, plotter: Any) -> float:
+        """Fit the letters to the view; the share of its width that a label takes."""
+        wide, large = plotter.width(), letters_of(plotter, _SIDE_LETTERS, self.unit)
+        size = max(1, min(large, int(_MOST_WIDTH * wide / _LABEL_WIDTH)))
         for label in self.labels:
             label.size = size
         return _LABEL_WIDTH * size / wide

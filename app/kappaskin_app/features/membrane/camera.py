@@ -172,14 +172,14 @@ class CameraControl(QObject):
     def fit(self) -> None:
         """Fit the skin to the view after a change of size, unless the user moved the camera."""
         if self._camera:
-            self._sides.fit(self._plotter.width())
+            self._sides.fit(self._plotter)
         else:
             self.place()
 
     def place(self) -> None:
         """Place the camera as requested, for the present skin."""
         renderer, direction = self._plotter.renderer, DIRECTIONS.get(self._look, FROM_THE_LEFT)
-        label = self._sides.fit(self._plotter.width())
+        label = self._sides.fit(self._plotter)
         if self._camera:
             place_camera(renderer, self.skin, self._camera)
         else:

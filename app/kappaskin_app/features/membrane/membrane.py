@@ -17,7 +17,15 @@ from pyvistaqt import QtInteractor
 from kappaskin.frames import Array, Estimate, Indices
 from kappaskin.mechanics import Load
 from kappaskin.sensing import Sensor
-from kappaskin_app.features.membrane.annotations import UNLIT, Alarm, Caption, Marks, Sides, pixels
+from kappaskin_app.features.membrane.annotations import (
+    UNLIT,
+    Alarm,
+    Caption,
+    Marks,
+    Sides,
+    magnified,
+    pixels,
+)
 from kappaskin_app.features.membrane.camera import CameraControl
 from kappaskin_app.features.membrane.loads import LOAD, DrawnLoads, put_upright
 from kappaskin_app.features.membrane.mouse import LoadDrag, SurfacePointer
@@ -168,12 +176,15 @@ class MembraneView(QWidget):
         self._of_elements = self.skin.nearest(positions)
         points, out = self._elements_at_rest
         self._elements_actor.visibility = self._shown["elements"]
-        size = min(_POINT, _POINTS / max(len(positions), 1) ** 0.5)
-        self._elements_actor.prop.point_size = pixels(self.plotter, size)
+        self._size_elements()
         self._elements.points = points + self.lift * out
         self._elements.verts = np.column_stack(
             [np.ones(len(points), int), np.arange(len(points))]
         ).ravel()
+
+    def _size_elements(self) -> None:
+        size = min(_POINT, _POINTS / max(len(self._positions), 1) ** 0.5) * magnified(self.plotter)
+        self._elements_actor.prop.point_size = pixels(self.plotter, size)
 
     def show_marked(self, excluded: Indices, target: int) -> None:
         """Mark elements that are left `out`, and the one that is `target` to be pressed, if any."""
@@ -206,6 +217,7 @@ class MembraneView(QWidget):
     def _fit(self) -> None:
         """Fit camera and texts to the size of the view."""
         self.camera_control.fit()
+        self._size_elements()
         for caption in (self._caption, self.corner):
             caption.fit()
         self.alarm.fit()

@@ -4,8 +4,9 @@ import math
 import time
 from dataclasses import dataclass
 
-from PySide6.QtCore import QByteArray, QObject, QRect, Qt
-from PySide6.QtWidgets import QDockWidget, QMainWindow, QToolBar, QWidget
+from PySide6.QtCore import QByteArray, QEvent, QObject, QRect, Qt, QTimer
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollBar, QToolBar, QWidget
+from shiboken6 import isValid
 
 from kappaskin.contact import ContactObject
 from kappaskin.frames import Estimate
@@ -25,6 +26,7 @@ from kappaskin_app.shell.session import Session
 TIP = "Estimates in full screen, legible from three metres; Esc ends"
 SOUND_TIP = "A tone whose pitch and loudness follow the force, while the presenter is shown"
 _DRAWING_PERIOD = 0.03  # s between two drawings of the force bar
+_SETTLES = 1.0  # s in which a window that left full screen gets its size back
 _OLD = 1.0  # s after which a recognised object is discarded
 
 
@@ -35,6 +37,8 @@ class _WindowState:
     layout: QByteArray
     place: QRect
     state: Qt.WindowState
+    shown: list[QWidget]
+    scrolled: list[tuple[QScrollBar, int]]
 
 
 class PresenterController(QObject):
@@ -52,6 +56,11 @@ class PresenterController(QObject):
         self._window, self.view, self._session = window, view, session
         self._display, self._load = display, load
         self._before: _WindowState | None = None
+        self._left: _WindowState | None = None
+        self._left_at = -math.inf
+        self._restoring = QTimer(self, singleShot=True)  # pyright: ignore[reportCallIssue]
+        self._restoring.timeout.connect(guarded(self._restore))
+        window.installEventFilter(self)
         self.feedback: Feedback | None = None
         self.sound = Sound(self)
         self._recognised: Recognised | None = None
@@ -73,9 +82,13 @@ class PresenterController(QObject):
         if self.on:
             return
         window = self._window
-        self._before = _WindowState(window.saveState(), window.geometry(), window.windowState())
+        shown = [part for part in self._surroundings() if part.isVisible()]
+        self._before = _WindowState(
+            *(window.saveState(), window.geometry(), window.windowState(), shown),
+            [(bar, bar.value()) for dock in shown for bar in dock.findChildren(QScrollBar)],
+        )
         with drawn_once(window):
-            for part in self._surroundings():
+            for part in shown:
                 part.hide()
             self.view.present(True)
             self._show_hand()
@@ -95,9 +108,25 @@ class PresenterController(QObject):
             window.setWindowState(before.state)
             if before.state == Qt.WindowState.WindowNoState:
                 window.setGeometry(before.place)
-            window.menuBar().show()
-            window.statusBar().show()
+            for part in before.shown:
+                part.show()
             window.restoreState(before.layout)
+        self._left, self._left_at = before, time.monotonic()
+        self._restoring.start(0)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        # A window manager may resize the window a while after it was asked to.
+        if event.type() == QEvent.Type.Resize and time.monotonic() - self._left_at < _SETTLES:
+            self._restoring.start(0)
+        return False
+
+    def _restore(self) -> None:
+        """Restore the sizes of docks and the scrolled positions in a window of its old size."""
+        if self._left is not None and not self.on:
+            self._window.restoreState(self._left.layout)
+            for bar, value in self._left.scrolled:
+                if isValid(bar):
+                    bar.setValue(value)
 
     def close(self) -> None:
         """Stop the sound before the window closes."""

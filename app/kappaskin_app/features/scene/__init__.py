@@ -9,7 +9,7 @@ from kappaskin.scenes import scene_file
 from kappaskin_app.features.scene.control import SceneControl
 from kappaskin_app.features.scene.editing import SceneEditing
 from kappaskin_app.features.scene.gallery import MEASURED
-from kappaskin_app.features.scene.load_panel import LoadPanel, NoisePanel
+from kappaskin_app.features.scene.load_panel import AddedNoisePanel, LoadPanel, NoisePanel
 from kappaskin_app.features.scene.panel import ScenePanel
 from kappaskin_app.features.scene.plan import EffectPlanner
 from kappaskin_app.features.scene.timeline import Timeline
@@ -37,6 +37,7 @@ class SceneFeature:
         self._shell, session = shell, shell.session
         self.load = shell.panels.add(LIVE, LoadPanel())
         self.noise = shell.panels.add(LIVE, NoisePanel())
+        self.added_noise = shell.panels.add(LIVE, AddedNoisePanel())
         self.scene, self.timeline = ScenePanel(), Timeline()
         self.planner = EffectPlanner(session, shell.tasks, shell)
         self.editing = SceneEditing(shell.history, session, shell.selection.load)

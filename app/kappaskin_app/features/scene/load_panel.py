@@ -1,9 +1,9 @@
-"""Forms of the load on the simulated skin, and of the noise."""
+"""Forms of the load on the simulated skin, and of noise."""
 
 from PySide6.QtWidgets import QComboBox, QLabel
 
 from kappaskin.live import Status
-from kappaskin_app.shell.form import SimulationForm
+from kappaskin_app.shell.form import Form, SimulationForm
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.scene import (
     FREE_CASES,
@@ -81,3 +81,21 @@ class NoisePanel(SimulationForm):
         super().show_settings(settings)
         noisy = settings.noise_kind != "none"
         self.show_rows({"noise_kind"} | ({"noise_rms", "noise_seed"} if noisy else set()))
+
+
+class AddedNoisePanel(Form):
+    """The form of the noise added to what is shown of a device."""
+
+    purpose = (
+        "Noise added to the readings of the shown estimate, to see what it does: normal, of zero "
+        "mean and of this RMS. Recordings, published estimates, tares and calibrations have none "
+        "of it."
+    )
+    guide_page = "accuracy"
+
+    def __init__(self) -> None:
+        super().__init__("Added noise", ("added_noise",))
+
+    def show_status(self, status: Status, simulating: bool) -> None:
+        sensor, played = status.sensor, status.source.startswith("sim:") or status.replay
+        self.setVisible(not played and sensor is not None and sensor.layout.senses_curvature_only)

@@ -13,7 +13,7 @@ class StripChartFeature:
     def install(self, shell: MainWindow) -> None:
         self.strips = Strips(shell.history, shell.session, shell.display, shell.tasks)
         shell.docks.put_below(
-            "strip_chart", "Strip chart", self.strips.panel, "Ctrl+Alt+C", _ABOUT, height=0.34
+            "strip_chart", "Strip chart", self.strips.panel, "Ctrl+Alt+C", _ABOUT, height=0.38
         )
         shell.display.object_found.connect(guarded(self.strips.take_object))
         shell.settings_shown.connect(guarded(self.strips.show_settings))

@@ -22,9 +22,9 @@ from kappaskin_app.shell.settings.scene import SIZES as SIZES
 from kappaskin_app.shell.settings.scene import SPREAD_CASES as SPREAD_CASES
 from kappaskin_app.shell.settings.scene import TABLE_1_CASES as TABLE_1_CASES
 from kappaskin_app.shell.settings.scene import TWO_ENDED as TWO_ENDED
+from kappaskin_app.shell.settings.scene import AddedNoise, LoadSettings, Noise, OwnScene, Skin
 from kappaskin_app.shell.settings.scene import Electronics as Electronics
 from kappaskin_app.shell.settings.scene import GageEffects as GageEffects
-from kappaskin_app.shell.settings.scene import LoadSettings, Noise, OwnScene, Skin
 from kappaskin_app.shell.settings.scene import Scanning as Scanning
 from kappaskin_app.shell.settings.scene import Written as Written
 from kappaskin_app.shell.settings.shown import COLOURS as COLOURS
@@ -45,6 +45,7 @@ class SceneSettings(Skin, LoadSettings, Noise, Electronics, GageEffects, OwnScen
 @dataclass(frozen=True)
 class Settings(
     SceneSettings,
+    AddedNoise,
     EstimatorSettings,
     View,
     Camera,
@@ -67,6 +68,7 @@ _ARROW = "\N{RIGHTWARDS ARROW}"
 _PANELS = {
     LoadSettings: "load",
     Noise: "noise",
+    AddedNoise: "added noise",
     Scanning: "scan",
     PublishSettings: "publish",
     ComparedSettings: "B",

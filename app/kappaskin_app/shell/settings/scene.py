@@ -270,6 +270,25 @@ class Noise:
     )
 
 
+@dataclass(frozen=True)
+class AddedNoise:
+    """The noise added to what is shown of a device."""
+
+    added_noise: float = setting(
+        0.0,
+        Range(
+            "RMS",
+            "Root mean square of the noise added to each reading of the shown estimate. None of it "
+            "is recorded or published.",
+            0.0,
+            20.0,
+            0.05,
+            *PER_METRE,
+            decimals=3,
+        ),
+    )
+
+
 _CONVERTER = PARTS["converter"]
 PER_CENT = (1e2, "%")
 

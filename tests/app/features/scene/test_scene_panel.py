@@ -26,12 +26,12 @@ def test_a_scene_of_the_gallery_plays_from_its_beginning_until_it_is_undone(
     panel.gallery.chosen.emit("fingertip")
     until(lambda: plays(window, "fingertip"))
     until(lambda: window.session.status.sensor.layout.patch.strip)
-    assert not window.load.editor("load_case").isEnabled()
+    until(lambda: window.load.isHidden())
     until(lambda: window.display.badge.text() == "SIM")
     window.history.stack.undo()
     until(lambda: plays(window, "circle"))
     until(lambda: not window.session.status.sensor.layout.patch.strip)
-    until(lambda: window.load.editor("load_case").isEnabled())
+    until(lambda: not window.load.isHidden())
 
 
 @pytest.mark.full
