@@ -38,9 +38,10 @@ _SURFACE = "Displacement of the skin, on a common scale of A and B; the cross is
 _DIFFERENCE = "B minus A, on its own scale."
 _TABLE = (
     "Position, force and depth of the contact, and the principal curvatures of the skin there, "
-    "each with its standard deviation. Place and force are the same where the settings do not "
-    "change them: they follow from the readings without the functions. A and B use the same "
-    "readings, so that the errors of a difference do not follow from those of A and B."
+    "each with its standard deviation. Position and force are the same where the settings do not "
+    "change them: they follow from the readings without the functions. A and B share the noise of "
+    "the readings, so that a difference is mostly known better than both. Its standard deviation "
+    "is computed about once a second, by noise added to the readings."
 )
 _SAME = "same"
 
@@ -163,23 +164,28 @@ class ComparePanel(QWidget):
     def _show_figures(self, pair: Pair) -> None:
         figures = pair.figures()
         self.table.fit_rows(len(figures))
-        for row, (a, b) in enumerate(figures):
+        for row, (a, b, sd) in enumerate(figures):
             texts = (
                 f"{a.label}, {a.unit}",
                 *(e.words or with_error(e.value, e.sd, digits=e.digits) for e in (a, b)),
-                difference_text(a, b),
+                difference_text(a, b, sd),
             )
             for column, text in enumerate(texts):
                 self.table.write(row, column, text)
 
 
-def difference_text(a: Readout, b: Readout) -> str:
-    """B minus A, in as many digits as the smaller error has; a dash where one is not determined."""
+def difference_text(a: Readout, b: Readout, sd: float) -> str:
+    """B minus A with its `sd`; without one, in as many digits as the smaller error of both has.
+
+    A dash where one is not determined.
+    """
     if a.words or b.words:
         return NONE
     if (a.value, a.sd) == (b.value, b.sd):
         return _SAME
-    return rounded(b.value - a.value, min(a.sd, b.sd), a.digits, "+")[0]
+    if math.isnan(sd):
+        return rounded(b.value - a.value, min(a.sd, b.sd), a.digits, "+")[0]
+    return with_error(b.value - a.value, sd, digits=a.digits, sign="+")
 
 
 def _largest(values: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> float:
