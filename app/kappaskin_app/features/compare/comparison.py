@@ -20,7 +20,7 @@ from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import ComparedSettings, EstimatorSettings, Settings
 from kappaskin_app.shell.settings.form_fields import settings_from, setup_values
 
-_RECENT = 5.0  # s of the device's clock, for which the errors of differences are shown
+_RECENT = 30.0  # s of the device's clock, for which the errors of differences are shown
 
 
 @dataclass(frozen=True, eq=False)
