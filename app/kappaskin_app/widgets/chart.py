@@ -76,7 +76,7 @@ class ChartAxis:
     """What an axis shows, in what unit; `log` for a logarithmic axis.
 
     `text` writes a value with its unit. Within `limits` the axis shows its values at first; without
-    them it shows all.
+    them it shows all. A `bare` one has neither numbers nor title: that of the chart below is meant.
     """
 
     title: str
@@ -84,6 +84,7 @@ class ChartAxis:
     log: bool = False
     text: Callable[[float], str] | None = None
     limits: tuple[float, float] | None = None
+    bare: bool = False
 
     @property
     def label(self) -> str:
@@ -205,17 +206,21 @@ class ChartPoint:
 class Chart(QWidget):
     """Series over two axes; an empty chart says what to do.
 
-    The wheel zooms, dragging pans, a double click shows all. `pointed` emits the `ChartPoint` next
-    to the mouse, or None; `clicked` the one that is clicked, `clicked_at` the x of any click.
+    The wheel zooms, dragging pans, a double click shows all. Where it `brushes`, dragging with the
+    left button selects a part of the x axis to be shown, and the middle one pans. `pointed` emits
+    the `ChartPoint` next to the mouse, or None; `clicked` the one that is clicked, `clicked_at` the
+    x of any click, `zoomed` both ends of the x axis when the user has changed them, None for all.
     """
 
     pointed = Signal(object)
     clicked = Signal(object)
     clicked_at = Signal(float)
+    zoomed = Signal(object)
 
-    def __init__(self, y: ChartAxis, x: ChartAxis, tip: str) -> None:
+    def __init__(self, y: ChartAxis, x: ChartAxis, tip: str, brushes: bool = False) -> None:
         super().__init__()
-        self.x_axis, self.y_axis = x, y
+        self.x_axis, self.y_axis, self._brushes = x, y, brushes
+        self._part: tuple[float, float] | None = None
         self._lines: tuple[ChartLine, ...] = ()
         self._key: object = None
         self._view: _View | None = None
@@ -240,11 +245,11 @@ class Chart(QWidget):
         return QSize(18, 12) * self.fontMetrics().height()
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(9, 7) * self.fontMetrics().height()
+        return QSize(9, 5 if self.x_axis.bare else 7) * self.fontMetrics().height()
 
     def show_axes(self, y: ChartAxis, x: ChartAxis, tip: str) -> None:
         """Show other quantities from now on."""
-        self.x_axis, self.y_axis, self.series, self._fits = x, y, (), True
+        self.x_axis, self.y_axis, self.series, self._fits, self._part = x, y, (), True, None
         self.setAccessibleName(y.title)
         self.setToolTip(tip)
         self._dress()
@@ -296,7 +301,7 @@ class Chart(QWidget):
             self.heading.setText(heading)
         self.message.setVisible(self.is_empty)
         if self.isVisible() and self._view is None and not self.is_empty:
-            self._view = _View(self, self._hold)
+            self._view = _View(self, self._hold, self._brush if self._brushes else None)
             self._around.addWidget(self._view.widget, 1)
             self.canvas.installEventFilter(self)
             self._view.dress(self.x_axis, self.y_axis)
@@ -318,13 +323,15 @@ class Chart(QWidget):
         return entries
 
     def _ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """The ends of both axes at which all is shown."""
+        """The ends of both axes at which all is shown, or all of a part of the x axis."""
         marked = any(each.mark for each in self.series)
         x = np.concatenate([each.x for each in self.series] or [np.empty(0)])
-        bands = [(each.y, 0.0 if each.band is None else each.band) for each in self.series]
+        low, high = self._part or (-np.inf, np.inf)
+        shown = [(each, (each.x >= low) & (each.x <= high)) for each in self.series]
+        bands = [(each.y[on], 0.0 if each.band is None else each.band[on]) for each, on in shown]
         y = [part for y, band in bands for part in (y - band, y + band)]
         y += [np.array([line.value]) for line in self._lines if not line.upright]
-        return self.x_axis.ends(x, marked, False), self.y_axis.ends(
+        return self._part or self.x_axis.ends(x, marked, False), self.y_axis.ends(
             np.concatenate(y or [np.empty(0)]), marked, True
         )
 
@@ -370,11 +377,22 @@ class Chart(QWidget):
         """Leave the ranges as the user has set them."""
         self._fits = False
         self._point()
+        if self._view is not None:
+            self.zoomed.emit(self._view.x_range)
+
+    def _brush(self, low: float, high: float) -> None:
+        self.show_part((low, high))
+        self.zoomed.emit((low, high))
+
+    def show_part(self, part: tuple[float, float] | None) -> None:
+        """Show a part of the x axis between two positions along it, or all (None)."""
+        self._fits, self._part = True, part
+        self._draw()
 
     def fit(self) -> None:
         """Show all, also of what comes."""
-        self._fits = True
-        self._draw()
+        self.show_part(None)
+        self.zoomed.emit(None)
 
     def nearest(self, at: QPointF) -> ChartPoint | None:
         """The point next to a position on the canvas, in px, if one is near: a mark, or a curve."""
@@ -546,10 +564,46 @@ def _axis_class() -> type:
     return _Axis
 
 
-class _View:
-    """The axes and curves of a chart; `moved` is called when the user zooms or pans."""
+@cache
+def _box_class() -> type:
+    """The class of what lies between the axes."""
+    from pyqtgraph import LinearRegionItem, ViewBox
 
-    def __init__(self, chart: QWidget, moved: Callable[[], None]) -> None:
+    class _Box(ViewBox):
+        """Calls `brushed` with both ends of the part that is selected with the left button."""
+
+        brushed: Callable[[float, float], None] | None = None
+        region: Any = None
+
+        def mouseDragEvent(self, event: Any, axis: int | None = None) -> None:
+            if self.brushed is None or axis is not None or event.button().value != 1:
+                super().mouseDragEvent(event, axis)
+                return
+            event.accept()
+            ends = sorted(self.mapToView(at).x() for at in (event.buttonDownPos(), event.pos()))
+            if self.region is None:
+                self.region = LinearRegionItem(movable=False)
+                self.addItem(self.region, ignoreBounds=True)
+            self.region.setRegion(ends)
+            self.region.setVisible(not event.isFinish())
+            if event.isFinish() and ends[0] < ends[1]:
+                self.brushed(*ends)
+
+    return _Box
+
+
+class _View:
+    """The axes and curves of a chart; `moved` is called when the user zooms or pans.
+
+    With `brushed`, that is called when the user has selected a part of the x axis.
+    """
+
+    def __init__(
+        self,
+        chart: QWidget,
+        moved: Callable[[], None],
+        brushed: Callable[[float, float], None] | None,
+    ) -> None:
         self._chart = chart
         axis_class = _axis_class()
         import pyqtgraph
@@ -564,7 +618,8 @@ class _View:
         self.widget.setCentralItem(inside)
         self._grid = inside.layout
         # No menus: pyqtgraph's crash when they are deleted, once in a while.
-        self._box = pyqtgraph.ViewBox(enableMenu=False)
+        self._box = _box_class()(enableMenu=False)
+        self._box.brushed = brushed and guarded(brushed)
         self._left, self._bottom = (axis_class(side) for side in ("left", "bottom"))
         for item, row, column in ((self._left, 0, 0), (self._box, 0, 1), (self._bottom, 1, 1)):
             inside.addItem(item, row, column)
@@ -610,7 +665,8 @@ class _View:
         self._left.textWidth = letters.horizontalAdvance(_WIDEST)
         self._left.setWidth(None)
         self._bottom.setLabel(escape(x.label))
-        self._bottom.showLabel(bool(x.title))
+        self._bottom.showLabel(bool(x.title) and not x.bare)
+        self._bottom.setStyle(showValues=not x.bare)
 
     def draw(self, shown: Sequence[Series], lines: Sequence[ChartLine], key: object) -> None:
         """Draw the series, boldly what has the `key`, and the lines."""
@@ -664,6 +720,12 @@ class _View:
     def show_ranges(self, x: tuple[float, float], y: tuple[float, float]) -> None:
         """Show this much along each axis."""
         self._box.setRange(xRange=x, yRange=y, padding=0.0)
+
+    @property
+    def x_range(self) -> tuple[float, float]:
+        """Both ends of the x axis."""
+        low, high = self._box.viewRange()[0]
+        return low, high
 
     @property
     def spans(self) -> tuple[float, float]:
