@@ -76,7 +76,7 @@ class ChartAxis:
     """What an axis shows, in what unit; `log` for a logarithmic axis.
 
     `text` writes a value with its unit. Within `limits` the axis shows its values at first; without
-    them it shows all. A `bare` one has neither numbers nor title: that of the chart below is meant.
+    them it shows all. It `shows` its title too, or the numbers alone, or nothing of both.
     """
 
     title: str
@@ -84,7 +84,7 @@ class ChartAxis:
     log: bool = False
     text: Callable[[float], str] | None = None
     limits: tuple[float, float] | None = None
-    bare: bool = False
+    shows: Literal["title", "numbers", ""] = "title"
 
     @property
     def label(self) -> str:
@@ -245,7 +245,8 @@ class Chart(QWidget):
         return QSize(18, 12) * self.fontMetrics().height()
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(9, 5 if self.x_axis.bare else 7) * self.fontMetrics().height()
+        lines = {"title": 7, "numbers": 5, "": 4}[self.x_axis.shows]
+        return QSize(9, lines) * self.fontMetrics().height()
 
     def show_axes(self, y: ChartAxis, x: ChartAxis, tip: str) -> None:
         """Show other quantities from now on."""
@@ -654,7 +655,7 @@ class _View:
         self.widget.setBackground(_role("base"))
         bold = self._pg.mkPen(_role("accent"), width=_BOLD)
         self._box.setBorder(bold if self._chart.hasFocus() else pen)
-        self._grid.setContentsMargins(0, line / 2, line, line / 4)
+        self._grid.setContentsMargins(0, line / 2, line, line / 4 if x.shows else line / 2)
         for axis, item in ((x, self._bottom), (y, self._left)):
             item.shown, item.line = axis, line
             item.setTickFont(font)
@@ -665,8 +666,8 @@ class _View:
         self._left.textWidth = letters.horizontalAdvance(_WIDEST)
         self._left.setWidth(None)
         self._bottom.setLabel(escape(x.label))
-        self._bottom.showLabel(bool(x.title) and not x.bare)
-        self._bottom.setStyle(showValues=not x.bare)
+        self._bottom.showLabel(bool(x.title) and x.shows == "title")
+        self._bottom.setStyle(showValues=bool(x.shows))
 
     def draw(self, shown: Sequence[Series], lines: Sequence[ChartLine], key: object) -> None:
         """Draw the series, boldly what has the `key`, and the lines."""

@@ -14,6 +14,7 @@ from kappaskin_app.features.strip_chart.history import LONG, WHOLE, Span
 from kappaskin_app.guard import guarded
 from kappaskin_app.widgets.chart import Chart, ChartAxis, ChartLine, Series
 from kappaskin_app.widgets.layout import Flow
+from kappaskin_app.widgets.parts import Label
 
 MIME = "application/x-kappaskin-quantities"
 """Kind of what is dragged from a readout: names of quantities, separated by spaces."""
@@ -163,6 +164,8 @@ class StripChart(QWidget):
         self.span.activated.connect(
             guarded(lambda n: self.spanned.emit(float(self.span.itemData(n))))
         )
+        self.when = Label()
+        self._above.addWidget(self.when)
         self._above.addWidget(self.span)
         for name in QUANTITIES:
             self._add_box(name)
@@ -209,6 +212,7 @@ class StripChart(QWidget):
         begin, end = (0.0, length) if length else (-seconds, 0.0)
         unit, self._unit = ("min", 60.0) if end - begin >= _MINUTES else ("s", 1.0)
         when = "Time in the recording" if length else "Time from now"
+        self.when.setText(f"{when}, {unit}")
         for name in [name for name in self.charts if name not in names]:
             self.charts.pop(name).deleteLater()
         self.charts = {name: self.charts.get(name) or self._chart() for name in names}
@@ -216,7 +220,8 @@ class StripChart(QWidget):
         for name, chart in self.charts.items():
             self._around.removeWidget(chart)
             self._around.addWidget(chart, 1)
-            axis = ChartAxis(when, unit, limits=limits, bare=name != names[-1])
+            shows = "numbers" if name == names[-1] else ""
+            axis = ChartAxis(when, unit, limits=limits, shows=shows)
             label = label_of(name)
             of = self._unit_read if name not in QUANTITIES else QUANTITIES[name].unit
             chart.show_axes(ChartAxis(label, of), axis, tip.format(label))

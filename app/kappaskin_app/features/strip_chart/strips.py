@@ -78,18 +78,19 @@ def _bins(width: float) -> Bins:
 
 
 class Dragging(QObject):
-    """Lets the user drag what is called `names()` at that time from a `widget`."""
+    """Lets the user drag quantities from a `widget`: `names()` when the mouse is pressed."""
 
     def __init__(self, widget: QWidget, names: Callable[[], Sequence[str]]) -> None:
         super().__init__(widget)
         self._widget, self._names = widget, names
+        self._dragged: Sequence[str] = ()
         self._pressed: QPoint | None = None
         widget.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         kinds = QEvent.Type
         if isinstance(event, QMouseEvent) and event.type() == kinds.MouseButtonPress:
-            self._pressed = event.position().toPoint()
+            self._pressed, self._dragged = event.position().toPoint(), self._names()
         elif event.type() == kinds.MouseButtonRelease:
             self._pressed = None
         elif isinstance(event, QMouseEvent) and event.buttons() & Qt.MouseButton.LeftButton:
@@ -102,7 +103,7 @@ class Dragging(QObject):
 
     def _drag(self) -> None:
         drag, what = QDrag(self._widget), QMimeData()
-        what.setData(MIME, " ".join(self._names()).encode())
+        what.setData(MIME, " ".join(self._dragged).encode())
         drag.setMimeData(what)
         drag.setPixmap(self._widget.grab())
         drag.exec(Qt.DropAction.CopyAction)
@@ -137,6 +138,7 @@ class Strips(QObject):
         self.panel.toggled.connect(guarded(self._toggle))
         self.panel.added.connect(guarded(self._add))
         self.panel.spanned.connect(guarded(self._set_span))
+        self._selection = selection
         selection.chosen.connect(guarded(self._select))
         selection.clicked.connect(guarded(self._select_at))
         display.restarted.connect(guarded(self._restart))
@@ -146,10 +148,10 @@ class Strips(QObject):
         self._drag_elements()
 
     def _drag_elements(self) -> None:
-        """Let the user drag the element that is clicked from every heatmap."""
+        """Let the user drag the element under the mouse from every heatmap."""
         for widget in self._display.places.get("heatmaps", []):
             if widget.findChild(Dragging) is None:
-                Dragging(widget, lambda: [element_name(self._element)])
+                Dragging(widget, lambda: [element_name(self._selection.element)])
 
     # Requests
 

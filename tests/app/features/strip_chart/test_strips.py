@@ -38,10 +38,10 @@ def test_each_selected_number_has_a_chart_in_its_unit(panel) -> None:
     assert panel.hint.isVisible()
 
 
-def test_the_lowest_chart_alone_names_the_time_in_minutes_where_it_is_long(panel) -> None:
+def test_the_lowest_chart_alone_has_times_which_are_in_minutes_where_it_is_long(panel) -> None:
     axes = [chart.x_axis for chart in panel.charts.values()]
-    assert [axis.bare for axis in axes] == [True, False]
-    assert {axis.label for axis in axes} == {"Time from now, s"}
+    assert [axis.shows for axis in axes] == ["", "numbers"]
+    assert {axis.label for axis in axes} == {"Time from now, s"} == {panel.when.text()}
     panel.show_choice(("position_x",), 3600.0)
     axis = panel.charts["position_x"].x_axis
     assert (axis.label, axis.limits) == ("Time from now, min", (-60.0, 0.0))
