@@ -79,7 +79,7 @@ class ChartAxis:
     """What an axis shows, in what unit; `log` for a logarithmic axis.
 
     `text` writes a value with its unit. Within `limits` the axis shows its values at first; without
-    them it shows all.
+    them it shows all. It `shows` its title too, or the numbers alone, or nothing of both.
     """
 
     title: str
@@ -87,6 +87,7 @@ class ChartAxis:
     log: bool = False
     text: Callable[[float], str] | None = None
     limits: tuple[float, float] | None = None
+    shows: Literal["title", "numbers", ""] = "title"
 
     @property
     def label(self) -> str:
@@ -215,17 +216,21 @@ class Chart(QWidget):
     """Series over two axes; an empty chart says what to do.
 
     The wheel zooms, dragging pans, a double click shows all. On a page that scrolls the wheel
-    scrolls it, and zooms with Ctrl. `pointed` emits the `ChartPoint` next
-    to the mouse, or None; `clicked` the one that is clicked, `clicked_at` the x of any click.
+    scrolls it, and zooms with Ctrl. Where it `brushes`, dragging with the left button selects a
+    part of the x axis to be shown, and the middle one pans. `pointed` emits the `ChartPoint` next
+    to the mouse, or None; `clicked` the one that is clicked, `clicked_at` the x of any click,
+    `zoomed` both ends of the x axis when the user has changed them, None for all.
     """
 
     pointed = Signal(object)
     clicked = Signal(object)
     clicked_at = Signal(float)
+    zoomed = Signal(object)
 
-    def __init__(self, y: ChartAxis, x: ChartAxis, tip: str) -> None:
+    def __init__(self, y: ChartAxis, x: ChartAxis, tip: str, brushes: bool = False) -> None:
         super().__init__()
-        self.x_axis, self.y_axis = x, y
+        self.x_axis, self.y_axis, self._brushes = x, y, brushes
+        self._part: tuple[float, float] | None = None
         self._lines: tuple[ChartLine, ...] = ()
         self._key: object = None
         self._view: _View | None = None
@@ -250,11 +255,12 @@ class Chart(QWidget):
         return QSize(18, 12) * self.fontMetrics().height()
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(9, 7) * self.fontMetrics().height()
+        lines = {"title": 7, "numbers": 5, "": 4}[self.x_axis.shows]
+        return QSize(9, lines) * self.fontMetrics().height()
 
     def show_axes(self, y: ChartAxis, x: ChartAxis, tip: str) -> None:
         """Show other quantities from now on."""
-        self.x_axis, self.y_axis, self.series, self._fits = x, y, (), True
+        self.x_axis, self.y_axis, self.series, self._fits, self._part = x, y, (), True, None
         self.setAccessibleName(y.title)
         self.setToolTip(tip)
         self._dress()
@@ -306,7 +312,7 @@ class Chart(QWidget):
             self.heading.setText(heading)
         self.message.setVisible(self.is_empty)
         if self.isVisible() and self._view is None and not self.is_empty:
-            self._view = _View(self, self._hold)
+            self._view = _View(self, self._hold, self._brush if self._brushes else None)
             self._around.addWidget(self._view.widget, 1)
             for watched in (self.canvas, self._view.widget):
                 watched.installEventFilter(self)
@@ -329,12 +335,15 @@ class Chart(QWidget):
         return entries
 
     def _ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """The ends of both axes at which all is shown."""
+        """The ends of both axes at which all is shown, or all of a part of the x axis."""
         marked = any(each.mark for each in self.series)
         x = np.concatenate([each.x for each in self.series] or [np.empty(0)])
-        y = [part for each in self.series for part in (each.y - each.off, each.y + each.off)]
+        low, high = self._part or (-np.inf, np.inf)
+        shown = [(each, (each.x >= low) & (each.x <= high)) for each in self.series]
+        bands = [(each.y[on], np.broadcast_to(each.off, each.y.shape)[on]) for each, on in shown]
+        y = [part for y, off in bands for part in (y - off, y + off)]
         y += [np.array([line.value]) for line in self._lines if not line.upright]
-        return self.x_axis.ends(x, marked, False), self.y_axis.ends(
+        return self._part or self.x_axis.ends(x, marked, False), self.y_axis.ends(
             np.concatenate(y or [np.empty(0)]), marked, True
         )
 
@@ -392,11 +401,22 @@ class Chart(QWidget):
         """Leave the ranges as the user has set them."""
         self._fits = False
         self._point()
+        if self._view is not None:
+            self.zoomed.emit(self._view.x_range)
+
+    def _brush(self, low: float, high: float) -> None:
+        self.show_part((low, high))
+        self.zoomed.emit((low, high))
+
+    def show_part(self, part: tuple[float, float] | None) -> None:
+        """Show a part of the x axis between two positions along it, or all (None)."""
+        self._fits, self._part = True, part
+        self._draw()
 
     def fit(self) -> None:
         """Show all, also of what comes."""
-        self._fits = True
-        self._draw()
+        self.show_part(None)
+        self.zoomed.emit(None)
 
     def nearest(self, at: QPointF) -> ChartPoint | None:
         """The point next to a position on the canvas, in px, if one is near: a mark, or a curve."""
@@ -575,10 +595,46 @@ def _axis_class() -> type:
     return _Axis
 
 
-class _View:
-    """The axes and curves of a chart; `moved` is called when the user zooms or pans."""
+@cache
+def _box_class() -> type:
+    """The class of what lies between the axes."""
+    from pyqtgraph import LinearRegionItem, ViewBox
 
-    def __init__(self, chart: QWidget, moved: Callable[[], None]) -> None:
+    class _Box(ViewBox):
+        """Calls `brushed` with both ends of the part that is selected with the left button."""
+
+        brushed: Callable[[float, float], None] | None = None
+        region: Any = None
+
+        def mouseDragEvent(self, event: Any, axis: int | None = None) -> None:
+            if self.brushed is None or axis is not None or event.button().value != 1:
+                super().mouseDragEvent(event, axis)
+                return
+            event.accept()
+            ends = sorted(self.mapToView(at).x() for at in (event.buttonDownPos(), event.pos()))
+            if self.region is None:
+                self.region = LinearRegionItem(movable=False)
+                self.addItem(self.region, ignoreBounds=True)
+            self.region.setRegion(ends)
+            self.region.setVisible(not event.isFinish())
+            if event.isFinish() and ends[0] < ends[1]:
+                self.brushed(*ends)
+
+    return _Box
+
+
+class _View:
+    """The axes and curves of a chart; `moved` is called when the user zooms or pans.
+
+    With `brushed`, that is called when the user has selected a part of the x axis.
+    """
+
+    def __init__(
+        self,
+        chart: QWidget,
+        moved: Callable[[], None],
+        brushed: Callable[[float, float], None] | None,
+    ) -> None:
         self._chart = chart
         axis_class = _axis_class()
         import pyqtgraph
@@ -593,7 +649,8 @@ class _View:
         self.widget.setCentralItem(inside)
         self._grid = inside.layout
         # No menus: pyqtgraph's crash when they are deleted, once in a while.
-        self._box = pyqtgraph.ViewBox(enableMenu=False)
+        self._box = _box_class()(enableMenu=False)
+        self._box.brushed = brushed and guarded(brushed)
         self._left, self._bottom = (axis_class(side) for side in ("left", "bottom"))
         for item, row, column in ((self._left, 0, 0), (self._box, 0, 1), (self._bottom, 1, 1)):
             inside.addItem(item, row, column)
@@ -628,7 +685,7 @@ class _View:
         self.widget.setBackground(_role("base"))
         bold = self._pg.mkPen(_role("accent"), width=_BOLD)
         self._box.setBorder(bold if self._chart.hasFocus() else pen)
-        self._grid.setContentsMargins(0, line / 2, line, line / 4)
+        self._grid.setContentsMargins(0, line / 2, line, line / 4 if x.shows else line / 2)
         for axis, item in ((x, self._bottom), (y, self._left)):
             item.shown, item.line = axis, line
             item.setTickFont(font)
@@ -639,7 +696,8 @@ class _View:
         self._left.textWidth = letters.horizontalAdvance(_WIDEST)
         self._left.setWidth(None)
         self._bottom.setLabel(escape(x.label))
-        self._bottom.showLabel(bool(x.title))
+        self._bottom.showLabel(bool(x.title) and x.shows == "title")
+        self._bottom.setStyle(showValues=bool(x.shows))
 
     def draw(self, shown: Sequence[Series], lines: Sequence[ChartLine], key: object) -> None:
         """Draw the series, boldly what has the `key`, and the lines."""
@@ -693,6 +751,12 @@ class _View:
     def show_ranges(self, x: tuple[float, float], y: tuple[float, float]) -> None:
         """Show this much along each axis."""
         self._box.setRange(xRange=x, yRange=y, padding=0.0)
+
+    @property
+    def x_range(self) -> tuple[float, float]:
+        """Both ends of the x axis."""
+        low, high = self._box.viewRange()[0]
+        return low, high
 
     @property
     def spans(self) -> tuple[float, float]:

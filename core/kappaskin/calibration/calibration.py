@@ -267,6 +267,14 @@ class Calibration:
         """Whether the readings are taken as they are, because no gain was measured."""
         return not (self.gain_sd > 0).any()
 
+    @property
+    def noise_gain(self) -> Array:
+        """Noise (C,) of a corrected reading over that of the reading; NaN for those that failed.
+
+        Of noise that is small against the loops, which it does not go through.
+        """
+        return 1 / (self.gain if self.hysteresis is None else self.gain * self.hysteresis.linear)
+
     def with_weights(self, weights: KnownWeights, now: datetime) -> "Calibration":
         """The same with known weights, laid on `now`; measured gains do not get younger by that."""
         return replace(self, weights=weights, date=now if self.is_nominal else self.date)

@@ -144,6 +144,10 @@ class Estimator(ABC):
     def _set_up(self) -> None:
         """Compute once what no frame changes; raises a `Refusal` when no shape is determined."""
 
+    def restart(self) -> None:
+        """Forget every frame, where there is a memory."""
+        return
+
     def _check_readings(self, sigma_known: bool) -> None:
         """Raise a `Refusal` for readings that this estimator cannot take."""
         basis, layout, name = self.basis, self.layout, type(self).__name__

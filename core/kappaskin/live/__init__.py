@@ -1,5 +1,10 @@
 """The engine: the process that reads, records, computes and publishes."""
 
+from kappaskin.live.differences import DifferenceErrors as DifferenceErrors
+from kappaskin.live.differences import PairErrors as PairErrors
+from kappaskin.live.differences import compared_readouts as compared_readouts
+from kappaskin.live.differences import difference_errors as difference_errors
+from kappaskin.live.differences import reading_noise as reading_noise
 from kappaskin.live.engine import LONGEST_NOTE as LONGEST_NOTE
 from kappaskin.live.engine import Engine as Engine
 from kappaskin.live.pipelines import PipelineStatus as PipelineStatus

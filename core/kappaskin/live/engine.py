@@ -3,7 +3,7 @@
 import math
 import multiprocessing
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -16,6 +16,7 @@ from kappaskin._processes import starting_process
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Region
 from kappaskin.frames import Array, Estimate, Event
+from kappaskin.live.differences import newest_pair
 from kappaskin.live.loop import serve
 from kappaskin.live.requests import (
     Note,
@@ -328,11 +329,15 @@ class Engine:
             return np.empty(0), [], 0
         return self._ring.recent(status.generation, status.slot, after, paths)
 
-    def compared(self, status: Status) -> Estimate | None:
-        """The newest estimate with the setup that is compared with."""
-        if status.compared is None or status.compared.slot is None:
-            return None
-        return self._compared_ring.read(status.compared.generation, status.compared.slot)
+    def pair(self, status: Status) -> tuple[Estimate, Estimate] | None:
+        """The newest frame that was computed with both setups, None where none is available."""
+        return newest_pair(self._ring, self._compared_ring, status)
+
+    @property
+    def rings(self) -> tuple[Callable[[str], Ring], str, str]:
+        """For `difference_errors`: how a process opens the memory of both, and its names."""
+        opened = Ring.attach if self.resumed is None else Ring.borrow
+        return opened, self._ring.name, self._compared_ring.name
 
     def __enter__(self) -> "Engine":
         return self

@@ -90,8 +90,9 @@ class EngineLoop:
             if self._next is not None:
                 self._try_next(self._next)
             self._swap()
-            if self._main.pipeline is not None and self._source is not None:
-                self._tare.update(self._main.pipeline, self._source)
+            pipeline, source = self._main.pipeline, self._source
+            if pipeline is not None and source and self._tare.update(pipeline, source):
+                self._add_event(Event(time.monotonic(), "tare", "Tare taken"))
             if time.monotonic() - self._status.reported >= _REPORT:
                 self._report()
         self._drop_next()

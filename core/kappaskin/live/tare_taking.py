@@ -57,21 +57,23 @@ class TareCapture:
             except Refusal as refusal:
                 self._end(str(refusal))
 
-    def update(self, pipeline: Pipeline, source: Source) -> None:
-        """Compute the tare once there are enough estimates; `status` has the result."""
+    def update(self, pipeline: Pipeline, source: Source) -> bool:
+        """Compute the tare once there are enough estimates; whether `status` has it now."""
         if self._found is not None and self._found.done():
             try:
                 self._end("", self._found.result())
             except Refusal as refusal:
                 self._end(str(refusal))
+            return self.status.tare is not None
         taring = self._taring
         if taring is None or self._found is not None or not taring.done(time.monotonic()):
-            return
+            return False
         edge, temperature = pipeline.setup.edge, source.temperature
         rest, now = pipeline.rest(), datetime.now().astimezone()
         self._found = self._worker.submit(
             lambda: taring.tare(LoadDetector(taring.sensor, edge), rest, now, temperature)
         )
+        return False
 
     def cancel(self, why: str) -> None:
         """End the tare that is being taken, if one is."""

@@ -246,7 +246,19 @@ class Pipeline:
         nominal = self.sensor.nominal(frame)
         scanned = self._corrected(nominal, frame.device_time)
         self._catch_up(frame)
-        curvature, fresh = self.past.hold(frame, scanned)
+        return self._estimate(frame, nominal, scanned, *self.past.hold(frame, scanned))
+
+    def again(self, curvature: Array, time: float = 0.0) -> Estimate:
+        """The estimate of corrected readings `curvature` (3, P) in 1/m, all scanned at `time` in s.
+
+        NaN where missing. To be used by itself: an estimator with a memory gets them as the next.
+        """
+        frame = Frame(0, time, time, np.arange(self.sensor.channels), np.empty(0, np.int32))
+        return self._estimate(frame, curvature, curvature, curvature, np.isfinite(curvature))
+
+    def _estimate(
+        self, frame: Frame, nominal: Array, scanned: Array, curvature: Array, fresh: Mask
+    ) -> Estimate:
         out = self.left_out
         began = time.perf_counter()
         found = self._fitted(frame, out(scanned), out(curvature))

@@ -502,7 +502,7 @@ def test_a_file_that_cannot_be_written_is_reported(chart, qtbot, chosen, until) 
 def test_nothing_of_a_deleted_chart_is_left(chart, qapp) -> None:
     def views() -> int:
         gc.collect()
-        return sum(type(each).__name__ == "ViewBox" for each in gc.get_objects())
+        return sum(type(each).__name__ == "_Box" for each in gc.get_objects())
 
     before = views()
     assert before >= 1

@@ -175,12 +175,12 @@ def test_another_setup_is_seen_of_a_recording_that_stands(engine: Engine) -> Non
 
     def shown() -> bool:
         status = engine.status()
-        a, b = engine.latest(status), engine.compared(status)
+        a, b = engine.pair(status) or (None, None)
         return a is not None and b is not None and a.coefficients.shape == (5, 4)
 
     until(shown)
     status = engine.status()
-    a, b = engine.latest(status), engine.compared(status)
+    a, b = engine.pair(status) or (None, None)
     assert a is not None
     assert b is not None
     assert a.sequence == b.sequence == sequence

@@ -13,7 +13,7 @@ class CompareFeature:
 
     def install(self, shell: MainWindow) -> None:
         session, display = shell.session, shell.display
-        self.comparison = SetupComparison(shell.history, session, shell)
+        self.comparison = SetupComparison(shell.history, session, shell.tasks, shell)
         self.compare = ComparePanel(display.colouring)
         shell.docks.put_below(
             "compare", "Compare A and B", self.compare, "Ctrl+B", _ABOUT, height=0.36

@@ -2,23 +2,34 @@
 
 from dataclasses import dataclass, replace
 
+import numpy as np
 from PySide6.QtCore import QObject, Signal
 
 from kappaskin.frames import Array, Estimate
-from kappaskin.live import PipelineStatus, Status
-from kappaskin.pipeline import REPORTED, Readout, Setup, readouts
+from kappaskin.live import (
+    PairErrors,
+    PipelineStatus,
+    Status,
+    compared_readouts,
+    difference_errors,
+)
+from kappaskin.pipeline import Readout, Setup
+from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.history import History
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import ComparedSettings, EstimatorSettings, Settings
 from kappaskin_app.shell.settings.form_fields import settings_from, setup_values
 
+_RECENT = 30.0  # s of the device's clock, for which the errors of differences are shown
+
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """One frame computed with both setups."""
+    """One frame computed with both setups; `errors` (n,) are those of the differences, or NaN."""
 
     a: Estimate
     b: Estimate
+    errors: Array
 
     @property
     def difference(self) -> Array | None:
@@ -27,14 +38,10 @@ class Pair:
             return None
         return self.b.surface - self.a.surface
 
-    def figures(self) -> list[tuple[Readout, Readout]]:
-        """The contact readouts that have an error bar, of A and of B."""
-        pairs = zip(readouts(self.a), readouts(self.b), strict=True)
-        return [(a, b) for a, b in pairs if a.label in _COMPARED]
-
-
-_COMPARED = {label for each in REPORTED if each.sd is not None for label in each.labels_shown}
-"""Readouts that have a standard deviation, against which a difference is judged."""
+    def figures(self) -> list[tuple[Readout, Readout, float]]:
+        """The contact readouts that have an error bar, of A and of B, and that of B - A."""
+        each = map(compared_readouts, (self.a, self.b))
+        return list(zip(*each, self.errors.tolist(), strict=True))
 
 
 def other_setup(settings: Settings, setup: Setup) -> Setup:
@@ -50,22 +57,29 @@ def other_setup(settings: Settings, setup: Setup) -> Setup:
 class SetupComparison(QObject):
     """Computes with A and B while the panel is visible; `compared` sends each new pair.
 
-    `status` is the pipeline status of B, None while the panel is hidden.
+    `status` is the pipeline status of B, None while the panel is hidden. The errors of differences
+    are computed about once a second, in a process of low priority.
     """
 
     compared = Signal(Pair)
 
-    def __init__(self, history: History, session: Session, parent: QObject | None = None) -> None:
+    def __init__(
+        self, history: History, session: Session, tasks: Tasks, parent: QObject | None = None
+    ) -> None:
         super().__init__(parent)
         self._history, self._session = history, session
         self._active = False
         self._shown: tuple[int, ...] = ()
+        self._task = BackgroundTask(tasks, "", self._take_errors)
+        self._rings: tuple[object, ...] = ()
+        self._errors: PairErrors | None = None
 
     def set_active(self, active: bool) -> None:
         """Start or stop computing with B."""
         if active != self._active and not self._session.closed:
             self._active = active
-            self._shown = ()
+            self._shown, self._rings = (), ()
+            self._task.stop()
             self._request()
 
     def swap(self) -> None:
@@ -85,18 +99,28 @@ class SetupComparison(QObject):
     def follow(self, status: Status) -> None:
         """Request the present setups, and send a new pair."""
         self._request()
-        if self._active and (pair := self._read(status)) is not None:
-            shown = pair.a.generation, pair.b.generation, pair.a.sequence
+        engine = self._session.engine
+        if self._active and self._rings != engine.rings:
+            self._rings = engine.rings
+            self._task.compute(difference_errors, *engine.rings)
+        if self._active and (pair := engine.pair(status)) is not None:
+            a, b = pair
+            shown = a.generation, b.generation, a.sequence
             if shown != self._shown:
                 self._shown = shown
-                self.compared.emit(pair)
+                self.compared.emit(Pair(a, b, self._errors_of(a, b)))
 
-    def _read(self, status: Status) -> Pair | None:
-        """The newest frame that was computed with both setups."""
-        engine = self._session.engine
-        b = engine.compared(status)
-        a = None if b is None else engine.latest(status, b.sequence)
-        return None if a is None or b is None else Pair(a, b)
+    def _take_errors(self, errors: PairErrors) -> None:
+        """Show the errors with the next pair, or with the one that is shown."""
+        self._errors, self._shown = errors, ()
+
+    def _errors_of(self, a: Estimate, b: Estimate) -> Array:
+        """The newest errors, if they are of these setups and not of another time."""
+        errors, generations = self._errors, (a.generation, b.generation)
+        if errors is None or errors.generations != generations:
+            return np.full(len(compared_readouts(a)), np.nan)
+        recent = abs(errors.device_time - a.device_time) <= _RECENT
+        return np.where(recent, errors.sd, np.nan)
 
     @property
     def status(self) -> PipelineStatus | None:

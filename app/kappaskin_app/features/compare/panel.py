@@ -41,9 +41,10 @@ _DIFFERENCE = (
 )
 _TABLE = (
     "Position, force and depth of the contact, and the principal curvatures of the skin there, "
-    "each with its error bar. Place and force are the same where the settings do not "
-    "change them: they follow from the readings without the functions. A and B use the same "
-    "readings, so that the errors of a difference do not follow from those of A and B."
+    "each with its error bar. Position and force are the same where the settings do not "
+    "change them: they follow from the readings without the functions. A and B share the noise of "
+    "the readings, so that a difference is mostly known better than both. Its error bar is "
+    "computed about once a second, by noise added to the readings."
 )
 _SAME = "same"
 
@@ -176,23 +177,28 @@ class ComparePanel(QWidget):
     def _show_figures(self, pair: Pair) -> None:
         figures = pair.figures()
         self.table.fit_rows(len(figures))
-        for row, (a, b) in enumerate(figures):
+        for row, (a, b, sd) in enumerate(figures):
             texts = (
                 f"{a.label}, {a.unit}",
                 *(e.words or with_error(e.value, _off(e), digits=e.digits) for e in (a, b)),
-                difference_text(a, b),
+                difference_text(a, b, ErrorBars.now.of(sd)),
             )
             for column, text in enumerate(texts):
                 self.table.write(row, column, text)
 
 
-def difference_text(a: Readout, b: Readout) -> str:
-    """B minus A, in as many digits as the smaller error has; a dash where one is not determined."""
+def difference_text(a: Readout, b: Readout, off: float) -> str:
+    """B minus A with its error bar `off`; without one, in as many digits as the smaller error of both has.
+
+    A dash where one is not determined.
+    """
     if a.words or b.words:
         return NONE
     if (a.value, a.sd) == (b.value, b.sd):
         return _SAME
-    return rounded(b.value - a.value, min(_off(a), _off(b)), a.digits, "+")[0]
+    if math.isnan(off):
+        return rounded(b.value - a.value, min(_off(a), _off(b)), a.digits, "+")[0]
+    return with_error(b.value - a.value, off, digits=a.digits, sign="+")
 
 
 def _off(of: Readout) -> float:

@@ -50,6 +50,7 @@ class HeatmapsFeature:
 
     def _connect(self, heatmap: Heatmap) -> None:
         selection, display = self._selection, self._display
+        display.places.setdefault("heatmaps", []).append(heatmap.cells)
         heatmap.lock_wanted.connect(guarded(partial(self._requests.lock, heatmap.name)))
         heatmap.pointed.connect(guarded(selection.point))
         heatmap.pointed.connect(guarded(lambda *_: display.show_numbers_soon()))

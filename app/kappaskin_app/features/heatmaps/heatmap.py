@@ -48,7 +48,7 @@ class CellGrid(QWidget):
         super().__init__()
         self._layout: SensorLayout | None = None
         self._colours: Colours = np.empty((0, 3), np.uint8)
-        self._hovered, self._faded = -1, False
+        self._hovered, self._pressed, self._faded = -1, -1, False
         self._marks: tuple[list[int], ...] = ([], [])
         self._faults: dict[int, str] = {}
         self._target = -1
@@ -208,8 +208,12 @@ class CellGrid(QWidget):
         return int(np.argmin(np.linalg.norm(layout.positions - position, axis=1)))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
+        self._pressed = self._element_at(event.position())
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        # Not when the button is pressed: the element may be dragged to a chart.
         element = self._element_at(event.position())
-        if element >= 0 and event.button() == Qt.MouseButton.LeftButton:
+        if element == self._pressed >= 0 and event.button() == Qt.MouseButton.LeftButton:
             self.chosen.emit(element)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:

@@ -11,7 +11,9 @@ class StripChartFeature:
     name = "strip_chart"
 
     def install(self, shell: MainWindow) -> None:
-        self.strips = Strips(shell.history, shell.session, shell.display, shell.tasks)
+        self.strips = Strips(
+            shell.history, shell.session, shell.display, shell.tasks, shell.selection
+        )
         shell.docks.put_below(
             "strip_chart", "Strip chart", self.strips.panel, "Ctrl+Alt+C", _ABOUT, height=0.38
         )

@@ -79,6 +79,10 @@ class Bins:
             first = np.flatnonzero(np.diff(number[:whole], prepend=-np.inf))
             self._rows.append(*_combined(times[:whole], np.stack([values[:, :whole]] * 3), first))
 
+    def span(self, column: int, begin: float, end: float, parts: int) -> Span:
+        """A column between two times in s, in about so many `parts`."""
+        return _in_parts(*self.between(column, begin, end), begin, parts)
+
     def between(self, column: int, begin: float, end: float) -> tuple[Array, Array]:
         """Times (n,) in s from `begin` until before `end`, and least, mean and largest (3, n)."""
         part = slice(*np.searchsorted(self._rows.times, [begin, end]))
@@ -93,12 +97,12 @@ class StripHistory:
     """
 
     def __init__(self, columns: int) -> None:
-        self._columns = columns
+        self.columns = columns
         self.clear()
 
     def clear(self) -> None:
-        self._rows = _Rows(_MOST, self._columns)
-        self._bins = Bins(self._columns, _BIN, round(LONG / _BIN))
+        self._rows = _Rows(_MOST, self.columns)
+        self._bins = Bins(self.columns, _BIN, round(LONG / _BIN))
         self.last = -np.inf
 
     def append(self, times: Array, values: Array) -> None:
@@ -125,13 +129,18 @@ class StripHistory:
         times = np.concatenate([early, rows.times[late]])
         recent = np.broadcast_to(rows.values[column, late], (3, len(rows.times[late])))
         extremes = np.concatenate([before, recent], axis=1).astype(float)
-        if len(times) <= parts:
-            return Span(times, extremes)
-        part = max((times[-1] - begin) / parts, 1e-9)
-        # By the clock, not by the window: what is drawn does not flicker as it moves on.
-        first = np.flatnonzero(np.diff(np.floor(times / part), prepend=-np.inf))
-        times, combined = _combined(times, extremes[:, None], first)
-        return Span(times, combined[:, 0])
+        return _in_parts(times, extremes, begin, parts)
+
+
+def _in_parts(times: Array, extremes: Array, begin: float, parts: int) -> Span:
+    """What was at `times` (T,) in s since `begin`, in about so many `parts`."""
+    if len(times) <= parts:
+        return Span(times, extremes)
+    part = max((times[-1] - max(begin, times[0])) / parts, 1e-9)
+    # By the clock, not by the window: what is drawn does not flicker as it moves on.
+    first = np.flatnonzero(np.diff(np.floor(times / part), prepend=-np.inf))
+    times, combined = _combined(times, extremes[:, None], first)
+    return Span(times, combined[:, 0])
 
 
 def broken(times: Array, values: Array, last: float) -> tuple[Array, Array]:

@@ -14,6 +14,7 @@ from kappaskin_app.features.strip_chart.history import LONG, WHOLE, Span
 from kappaskin_app.guard import guarded
 from kappaskin_app.widgets.chart import Chart, ChartAxis, ChartLine, Series
 from kappaskin_app.widgets.layout import Flow
+from kappaskin_app.widgets.parts import Label
 from kappaskin_app.widgets.text import ErrorBars
 
 MIME = "application/x-kappaskin-quantities"
@@ -22,16 +23,18 @@ SPANS = {10.0: "10 s", WHOLE: "1 min", 600.0: "10 min", LONG: "1 h"}
 """What may be shown, in s."""
 _MINUTES = 300.0  # s, from which on the axis is in minutes
 _EMPTY = "No contact in this time."
-_NONE = "Select a number above, or drag one here from the top of the window."
+_NONE = "Select a number above, or drag one here from the top of the window or from a heatmap."
 _TIP = (
     "{} over time; the band is its error bar ({}). Every frame of the last minute is shown, before "
-    "that the smallest and the largest value in each tenth of a second, for an hour."
+    "that the smallest and the largest value in each tenth of a second, for an hour. "
+    "Drag over a part to zoom into all charts; a double click shows all."
 )
 _RECORDED_TIP = (
     "{} over the whole recording; the band is its error bar ({}). Lines mark the present time and "
-    "the events. Click to go to another time; the wheel zooms, a double click "
-    "shows all."
+    "the events. Click to go to another time. Drag over a part to zoom into all charts; a double "
+    "click shows all."
 )
+_ELEMENT, _DIGITS = "element-", 6
 _SPAN_TIP = "Time that is shown."
 
 
@@ -93,8 +96,45 @@ QUANTITIES: Mapping[str, StripQuantity] = {
 """What can be drawn, by name."""
 
 
+def element_name(element: int) -> str:
+    """Name of the readings of an element."""
+    return f"{_ELEMENT}{element}"
+
+
+def element_of(name: str) -> int:
+    """The element whose readings are called `name`; -1 for any other name."""
+    number = name.removeprefix(_ELEMENT)
+    known = name.startswith(_ELEMENT) and number.isascii() and number.isdigit()
+    return int(number[:_DIGITS]) if known else -1
+
+
+def label_of(name: str) -> str:
+    """The label of a quantity, or of the readings of an element."""
+    element = element_of(name)
+    return QUANTITIES[name].label if element < 0 else f"Element {element}"
+
+
+@dataclass(frozen=True)
+class StripMark:
+    """A line at a `time` in s, in the colour of its `kind`, a key of `MARKS`, with a text."""
+
+    time: float
+    kind: str
+    text: str = ""
+
+
+NOW = "now"
+MARKS = {
+    NOW: ("", "accent"),
+    "note": ("Note", "text"),
+    "tare": ("Tare", "good"),
+    "event": ("Loss or other event", "warning"),
+}
+"""Name and colour of each kind of mark."""
+
+
 class StripChart(QWidget):
-    """Charts of the selected quantities, and check boxes that select them.
+    """Charts of the selected quantities and elements, and check boxes that select them.
 
     `toggled` asks for a quantity to be shown or hidden, `added` for those dragged here, `spanned`
     for another span in s, `sought` for another time in s in a recording.
@@ -112,13 +152,11 @@ class StripChart(QWidget):
         self.boxes: dict[str, QCheckBox] = {}
         self._shown: tuple[object, ...] = ()
         self._length, self._unit = 0.0, 1.0
-        top, above = QWidget(), Flow()
-        top.setLayout(above)
-        for name, quantity in QUANTITIES.items():
-            box = self.boxes[name] = QCheckBox(quantity.label)
-            box.setToolTip(f"Show {quantity.label.lower()} over time.")
-            box.clicked.connect(guarded(lambda *_, name=name: self.toggled.emit(name)))
-            above.addWidget(box)
+        self._kinds, self._scales, self._unit_read = ("",), np.ones(1), ""
+        self.part: tuple[float, float] | None = None
+        """The part of the time that is shown in s, None for all of it."""
+        top, self._above = QWidget(), Flow()
+        top.setLayout(self._above)
         self.span = QComboBox()
         self.span.setToolTip(_SPAN_TIP)
         self.span.setAccessibleName("Time shown")
@@ -127,7 +165,11 @@ class StripChart(QWidget):
         self.span.activated.connect(
             guarded(lambda n: self.spanned.emit(float(self.span.itemData(n))))
         )
-        above.addWidget(self.span)
+        self.when = Label()
+        self._above.addWidget(self.when)
+        self._above.addWidget(self.span)
+        for name in QUANTITIES:
+            self._add_box(name)
         self._around = QVBoxLayout(self)
         self._around.setContentsMargins(8, 4, 8, 6)
         self._around.setSpacing(2)
@@ -136,12 +178,31 @@ class StripChart(QWidget):
         self.hint.show_series((), _NONE)
         self._around.addWidget(self.hint, 1)
 
-    def show_choice(self, names: Sequence[str], seconds: float, length: float = 0.0) -> None:
+    def _add_box(self, name: str) -> None:
+        box = self.boxes[name] = QCheckBox(label_of(name))
+        box.setToolTip(f"Show {label_of(name)} over time.")
+        box.clicked.connect(guarded(lambda *_: self.toggled.emit(name)))
+        self._above.addWidget(box)
+
+    def show_readings(self, kinds: Sequence[str], scales: Array, unit: str) -> None:
+        """Name and scale (k,) what each element reads, in a `unit`."""
+        self._kinds, self._scales, self._unit_read = tuple(kinds), scales, unit
+        self._shown = ()
+
+    def show_choice(
+        self, names: Sequence[str], seconds: float, length: float = 0.0, element: int = -1
+    ) -> None:
         """Show charts of these quantities over so many s up to now, or over a recording's length.
 
-        That is in s too; without one the chart is live.
+        That is in s too; without one the chart is live. The readings of `element` can be selected.
         """
-        names = [name for name in QUANTITIES if name in names]
+        elements = [name for name in names if element_of(name) >= 0]
+        names = [*(name for name in QUANTITIES if name in names), *elements]
+        offered = [*QUANTITIES, *elements, *[element_name(element)] * (element >= 0)]
+        for name in [name for name in self.boxes if name not in offered]:
+            self.boxes.pop(name).deleteLater()
+        for name in [name for name in offered if name not in self.boxes]:
+            self._add_box(name)
         for name, box in self.boxes.items():
             box.setChecked(name in names)
         self.span.setCurrentIndex(self.span.findData(seconds))
@@ -149,50 +210,80 @@ class StripChart(QWidget):
         bars = ErrorBars.now
         if self._shown == (names, seconds, length, bars):
             return
-        self._shown, self._length = (names, seconds, length, bars), length
+        self._shown, self._length, self.part = (names, seconds, length, bars), length, None
         begin, end = (0.0, length) if length else (-seconds, 0.0)
         unit, self._unit = ("min", 60.0) if end - begin >= _MINUTES else ("s", 1.0)
         when = "Time in the recording" if length else "Time from now"
+        self.when.setText(f"{when}, {unit}")
         for name in [name for name in self.charts if name not in names]:
             self.charts.pop(name).deleteLater()
-        self.charts = {name: self.charts.get(name) or self._chart(name) for name in names}
+        self.charts = {name: self.charts.get(name) or self._chart() for name in names}
+        limits, tip = (begin / self._unit, end / self._unit), _RECORDED_TIP if length else _TIP
         for name, chart in self.charts.items():
             self._around.removeWidget(chart)
             self._around.addWidget(chart, 1)
-            of, tip = QUANTITIES[name], _RECORDED_TIP if length else _TIP
-            title, limits = (
-                when if name == names[-1] else "",
-                (begin / self._unit, end / self._unit),
-            )
-            axis = ChartAxis(title, unit, limits=limits)
-            chart.show_axes(ChartAxis(of.label, of.unit), axis, tip.format(of.label, bars.label))
+            shows = "numbers" if name == names[-1] else ""
+            axis = ChartAxis(when, unit, limits=limits, shows=shows)
+            label = label_of(name)
+            of = self._unit_read if name not in QUANTITIES else QUANTITIES[name].unit
+            chart.show_axes(ChartAxis(label, of), axis, tip.format(label, bars.label))
         self.hint.setVisible(not names)
 
-    def _chart(self, name: str) -> Chart:
-        of = QUANTITIES[name]
-        chart = Chart(ChartAxis(of.label, of.unit), ChartAxis(""), "")
+    def _chart(self) -> Chart:
+        chart = Chart(ChartAxis(""), ChartAxis(""), "", brushes=True)
         chart.clicked_at.connect(guarded(self._seek))
+        chart.zoomed.connect(guarded(lambda part: self._zoom(chart, part)))
         return chart
+
+    def _zoom(self, zoomed: Chart, part: tuple[float, float] | None) -> None:
+        """Show the same part of the time in every chart."""
+        for chart in self.charts.values():
+            if chart is not zoomed:
+                chart.show_part(part)
+        self.part = part and (self._unit * part[0], self._unit * part[1])
 
     def _seek(self, at: float) -> None:
         if self._length:
             self.sought.emit(min(max(at * self._unit, 0.0), self._length))
 
     def show_span(
-        self, name: str, span: Span, sd: Span | None, zero: float, marks: Mapping[float, str]
+        self, name: str, span: Span, sd: Span | None, zero: float, marks: Sequence[StripMark]
     ) -> None:
         """Draw a quantity and its standard deviation, in SI units.
 
-        The times are from `zero` in s on; `marks` are times in s with the colours of lines there.
+        The times are from `zero` in s on.
         """
-        scale, chart, each = QUANTITIES[name].scale, self.charts[name], self._unit
+        scale, each = QUANTITIES[name].scale, self._unit
         times, values = span.outline
         shown = [Series("", (times - zero) / each, scale * values)]
         if sd is not None:
             ago, mean = (span.times - zero) / each, scale * span.mean
             shown.append(Series("", ago, mean, line="", band=scale * sd.mean))
-        lines = [ChartLine((at - zero) / each, ink, upright=True) for at, ink in marks.items()]
-        chart.show_series(shown, _EMPTY, lines)
+        self._draw(name, shown, zero, marks)
+
+    def show_element(
+        self, name: str, spans: Sequence[Span], zero: float, marks: Sequence[StripMark]
+    ) -> None:
+        """Draw what an element reads, each in SI units, at times from `zero` in s on."""
+        shown: list[Series] = []
+        for n, (kind, scale) in enumerate(zip(self._kinds, self._scales.tolist(), strict=True)):
+            times, values = spans[n].outline
+            shown.append(Series(kind, (times - zero) / self._unit, scale * values, n))
+        self._draw(name, shown, zero, marks)
+
+    def _draw(
+        self, name: str, shown: list[Series], zero: float, marks: Sequence[StripMark]
+    ) -> None:
+        """Draw series and marks; the texts of marks are at the bottom of their lines."""
+        lines: list[ChartLine] = []
+        for kind, (label, colour) in MARKS.items():
+            of = [mark for mark in marks if mark.kind == kind]
+            at = np.array([(mark.time - zero) / self._unit for mark in of])
+            lines += [ChartLine(x, colour, upright=True) for x in at.tolist()]
+            texts = [mark.text for mark in of]
+            if any(texts):
+                shown.append(Series(label, at, 0 * at, colour, "", "t1", tips=texts))
+        self.charts[name].show_series(shown, _EMPTY, lines)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         if event.mimeData().hasFormat(MIME):
@@ -200,6 +291,6 @@ class StripChart(QWidget):
 
     def dropEvent(self, event: QDropEvent) -> None:
         names = bytes(event.mimeData().data(MIME).data()).decode(errors="replace").split()
-        self.added.emit([name for name in names if name in QUANTITIES])
+        self.added.emit([n for n in names if n in QUANTITIES or element_of(n) >= 0])
         event.setDropAction(Qt.DropAction.CopyAction)
         event.accept()

@@ -2,7 +2,9 @@
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,20 +13,37 @@ from PySide6.QtGui import QDrag, QMouseEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
 from kappaskin.contact import ContactObject
-from kappaskin.frames import Array, Estimate
+from kappaskin.estimation import Region
+from kappaskin.frames import Array, Estimate, Event
 from kappaskin.live import Status
 from kappaskin.recording import Replay, contacts_in
+from kappaskin.sensing import SHOWN_UNITS
 from kappaskin_app.features.strip_chart.history import Bins, Span, StripHistory, broken
-from kappaskin_app.features.strip_chart.panel import MIME, QUANTITIES, RADIUS, StripChart
+from kappaskin_app.features.strip_chart.panel import (
+    MARKS,
+    MIME,
+    NOW,
+    QUANTITIES,
+    RADIUS,
+    StripChart,
+    StripMark,
+    element_name,
+    element_of,
+    label_of,
+)
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.display import Display
 from kappaskin_app.shell.history import History
+from kappaskin_app.shell.selection import Selection
 from kappaskin_app.shell.session import RECORDED, Session
 from kappaskin_app.shell.settings import Settings
 
 _PERIOD = 0.1  # s between two drawings
+_UNREAD = 32  # estimates that may wait to be read, of the 64 that the engine keeps
 _PARTS = 600  # of the span shown: as many as a chart has pixels
+_FINEST = 20_000  # parts of a recording that are kept, to zoom in
+_NEARLY = 0.2  # s between the time of an estimate and that reported by the engine
 _SHORTEST = 1e-3  # s of a recording
 _MOST_EVENTS = 50  # of a recording that are marked
 _OF_FRAMES = {name: of for name, of in QUANTITIES.items() if of.path}
@@ -55,22 +74,23 @@ def _columns(fields: Mapping[str, Array]) -> Array:
 
 def _bins(width: float) -> Bins:
     """What is kept of a recording, in parts of `width` s."""
-    return Bins(len(_COLUMNS), width, 2 * _PARTS)
+    return Bins(len(_COLUMNS), width, 2 * _FINEST)
 
 
 class Dragging(QObject):
-    """Lets the user drag `names` of quantities from a `widget`."""
+    """Lets the user drag quantities from a `widget`: `names()` when the mouse is pressed."""
 
-    def __init__(self, widget: QWidget, names: tuple[str, ...]) -> None:
+    def __init__(self, widget: QWidget, names: Callable[[], Sequence[str]]) -> None:
         super().__init__(widget)
         self._widget, self._names = widget, names
+        self._dragged: Sequence[str] = ()
         self._pressed: QPoint | None = None
         widget.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         kinds = QEvent.Type
         if isinstance(event, QMouseEvent) and event.type() == kinds.MouseButtonPress:
-            self._pressed = event.position().toPoint()
+            self._pressed, self._dragged = event.position().toPoint(), self._names()
         elif event.type() == kinds.MouseButtonRelease:
             self._pressed = None
         elif isinstance(event, QMouseEvent) and event.buttons() & Qt.MouseButton.LeftButton:
@@ -83,7 +103,7 @@ class Dragging(QObject):
 
     def _drag(self) -> None:
         drag, what = QDrag(self._widget), QMimeData()
-        what.setData(MIME, " ".join(self._names).encode())
+        what.setData(MIME, " ".join(self._dragged).encode())
         drag.setMimeData(what)
         drag.setPixmap(self._widget.grab())
         drag.exec(Qt.DropAction.CopyAction)
@@ -92,12 +112,23 @@ class Dragging(QObject):
 class Strips(QObject):
     """Keeps the numbers of every estimate, and draws those selected in its `panel`."""
 
-    def __init__(self, history: History, session: Session, display: Display, tasks: Tasks) -> None:
+    def __init__(
+        self,
+        history: History,
+        session: Session,
+        display: Display,
+        tasks: Tasks,
+        selection: Selection,
+    ) -> None:
         super().__init__(display)
-        self._history, self._session = history, session
+        self._history, self._session, self._display = history, session, display
         self.panel = StripChart()
         self._frames, self._objects = StripHistory(len(_COLUMNS)), StripHistory(1)
-        self._key, self._last_number, self._next = (0, 0), 0, 0.0
+        self._elements: dict[str, StripHistory] = {}
+        self._element = -1
+        self._ahead = self._zero = math.nan
+        """Device's clock minus that of this machine, and minus the time in a recording, in s."""
+        self._key, self._last_number, self._next, self._next_read = (0, 0), 0, 0.0, 0.0
         self._recorded, self._length, self._last = _bins(1.0), 0.0, 0.0
         self._reading = BackgroundTask(tasks, "Reading the contacts", self._take_recorded)
         session.estimated.connect(guarded(self.receive))
@@ -107,11 +138,34 @@ class Strips(QObject):
         self.panel.toggled.connect(guarded(self._toggle))
         self.panel.added.connect(guarded(self._add))
         self.panel.spanned.connect(guarded(self._set_span))
+        self._selection = selection
+        selection.chosen.connect(guarded(self._select))
+        selection.clicked.connect(guarded(self._select_at))
+        display.restarted.connect(guarded(self._restart))
         for readout, names in _READOUTS.items():
             for widget in display.places.get(f"readout-{readout}", []):
-                Dragging(widget, names)
+                Dragging(widget, partial(tuple[str, ...], names))
+        self._drag_elements()
+
+    def _drag_elements(self) -> None:
+        """Let the user drag the element under the mouse from every heatmap."""
+        for widget in self._display.places.get("heatmaps", []):
+            if widget.findChild(Dragging) is None:
+                Dragging(widget, lambda: [element_name(self._selection.element)])
 
     # Requests
+
+    def _select(self, element: int) -> None:
+        """Offer the readings of an element."""
+        if self._history.settings.region != Region.ELEMENTS:  # else a click selects what is scanned
+            self._element = element
+            self.show_settings(self._history.settings)
+
+    def _select_at(self, x: float, y: float) -> None:
+        sensor = self._session.status.sensor
+        if sensor is not None:
+            away = np.linalg.norm(sensor.layout.positions - (x, y), axis=1)
+            self._select(int(np.argmin(away)))
 
     def _toggle(self, name: str) -> None:
         shown = self._history.settings.strips
@@ -119,41 +173,82 @@ class Strips(QObject):
             self._add([name])
             return
         others = tuple(one for one in shown if one != name)
-        self._history.change(f"Hide {QUANTITIES[name].label} over time", -1, strips=others)
+        self._history.change(f"Hide {label_of(name)} over time", -1, strips=others)
 
     def _add(self, names: list[str]) -> None:
         shown = self._history.settings.strips
         if new := [name for name in names if name not in shown]:
-            text = f"Show {QUANTITIES[new[0]].label} over time"
+            text = f"Show {label_of(new[0])} over time"
             self._history.change(text, -1, strips=(*shown, *new))
 
     def _set_span(self, seconds: float) -> None:
         self._history.change("Time of the strip chart", -1, strip_seconds=seconds)
 
     def show_settings(self, settings: Settings) -> None:
-        self.panel.show_choice(settings.strips, settings.strip_seconds, self._length)
+        self.panel.show_choice(
+            self._shown(settings), settings.strip_seconds, self._length, self._element
+        )
+        for name in self.panel.charts:
+            if element_of(name) >= 0 and name not in self._elements:
+                self._elements[name] = StripHistory(self._kinds)
         self._next = 0.0
+
+    def _shown(self, settings: Settings) -> list[str]:
+        """What is selected, without elements that the sensor does not have."""
+        sensor = self._session.status.sensor
+        count = len(sensor.layout) if sensor else 0
+        return [name for name in settings.strips if element_of(name) < count]
+
+    @property
+    def _kinds(self) -> int:
+        sensor = self._session.status.sensor
+        return len(sensor.layout.kind_names) if sensor else 1
+
+    def _restart(self, status: Status) -> None:
+        """Begin with another sensor."""
+        self._elements, self._element = {}, -1
+        if status.sensor is not None:
+            layout = status.sensor.layout
+            shown = [SHOWN_UNITS[unit] for unit in layout.kind_units]
+            units = dict.fromkeys(unit for _, unit in shown)
+            unit = ", ".join(units) if layout.reads else "1/m"
+            scales = np.array([scale for scale, _ in shown])
+            self.panel.show_readings(layout.kind_names, scales, unit)
+            self.show_settings(self._history.settings)
+        self._drag_elements()
 
     # Input
 
     def receive(self, estimate: Estimate) -> None:
-        """Store the numbers of new estimates."""
-        status = self._session.status
+        """Store the numbers of new estimates, before the engine drops them."""
+        status, now = self._session.status, time.monotonic()
         key = status.connections, estimate.generation
+        if now < self._next_read and key == self._key:
+            return
+        self._next_read = now + min(_PERIOD, _UNREAD / max(status.rate, 1.0))
         if key != self._key:
             if key[0] != self._key[0]:
-                self._frames.clear()
-                self._objects.clear()
+                for history in (self._frames, self._objects, *self._elements.values()):
+                    history.clear()
             self._key, self._last_number = key, 0
+        elements = list(self._elements) if status.sensor is not None else []
+        paths = [*_PATHS, *["curvature"] * bool(elements)]
         engine = self._session.engine
-        times, values, self._last_number = engine.recent(status, self._last_number, _PATHS)
-        if len(times):
-            self._frames.append(times, _columns(dict(zip(_PATHS, values, strict=True))))
+        times, values, self._last_number = engine.recent(status, self._last_number, paths)
+        if not len(times):
+            return
+        self._frames.append(times, _columns(dict(zip(paths, values, strict=True))))
+        self._ahead = estimate.device_time - estimate.host_time
+        if elements and status.sensor is not None:
+            read = values[-1]
+            read = read if read.ndim == 3 else status.sensor.layout.by_kind(read)
+            for name in elements:
+                self._elements[name].append(times, read[:, :, element_of(name)])
 
     def _open(self, source: str) -> None:
         """Begin with another source: read the contacts of a recording."""
         self._reading.stop()
-        self._length = 0.0
+        self._length, self._zero = 0.0, math.nan
         if self._session.replaying:
             self._reading.compute(contacts_in, Path(source.removeprefix(RECORDED)))
         self.show_settings(self._history.settings)
@@ -163,7 +258,7 @@ class Strips(QObject):
         length, times, fields = found
         if not self._length:
             self._length, self._last = max(length, _SHORTEST), 0.0
-            self._recorded = _bins(self._length / _PARTS)
+            self._recorded = _bins(self._length / _FINEST)
             self.show_settings(self._history.settings)
         if len(times):
             unknown = np.full(len(times), np.nan)
@@ -191,28 +286,54 @@ class Strips(QObject):
         until, seconds = self._frames.last, self._history.settings.strip_seconds
         if not math.isfinite(until):
             return
-        begin = until - seconds
+        begin = until + (self.panel.part[0] if self.panel.part else -seconds)
+        marks = _marks(self._session.status.events, self._ahead)
         for name in self.panel.charts:
             sd = None
+            if name in self._elements:
+                self._draw_element(name, begin, until, marks)
+                continue
             if name == RADIUS:
                 span = self._objects.span(0, begin, _PARTS)
             else:
                 span = self._frames.span(_COLUMNS[name, False], begin, _PARTS)
                 if (name, True) in _COLUMNS:
                     sd = self._frames.span(_COLUMNS[name, True], begin, _PARTS)
-            self.panel.show_span(name, span, sd, until, {})
+            self.panel.show_span(name, span, sd, until, marks)
+
+    def _draw_element(self, name: str, begin: float, zero: float, marks: list[StripMark]) -> None:
+        history = self._elements[name]
+        spans = [history.span(column, begin, _PARTS) for column in range(history.columns)]
+        self.panel.show_element(name, spans, zero, marks)
 
     def _draw_recorded(self, replay: Replay | None) -> None:
-        events = replay.events[:_MOST_EVENTS] if replay else ()
-        marks = {event.time: "faint" for event in events}
+        marks = _marks(replay.events[:_MOST_EVENTS] if replay else (), 0.0)
+        estimate = self._session.estimate
         if replay:
-            marks[replay.at] = "accent"
+            marks.append(StripMark(replay.at, NOW))
+        if replay and estimate is not None:
+            zero = estimate.device_time - replay.at
+            # Both are of nearly the same time: the curve is not to tremble.
+            self._zero = self._zero if abs(zero - self._zero) < _NEARLY else zero
+        begin, end = self.panel.part or (0.0, math.inf)
 
         def span(column: int) -> Span:
-            return Span(*self._recorded.between(column, 0.0, math.inf))
+            return self._recorded.span(column, begin, end, _PARTS)
 
         for name in self.panel.charts:
+            if name in self._elements:
+                each = [replace(mark, time=mark.time + self._zero) for mark in marks]
+                self._draw_element(name, begin + self._zero, self._zero, each)
+                continue
             of = _COLUMNS.get((name, False))
             sd = _COLUMNS.get((name, True))
             shown = Span(np.empty(0), np.empty((3, 0))) if of is None else span(of)
             self.panel.show_span(name, shown, None if sd is None else span(sd), 0.0, marks)
+
+
+def _marks(events: Sequence[Event], ahead: float) -> list[StripMark]:
+    """Marks of `events` on a clock that is so many s `ahead` of theirs."""
+    return [
+        StripMark(event.time + ahead, event.kind if event.kind in MARKS else "event", event.text)
+        for event in events
+    ]

@@ -97,15 +97,6 @@ def _reach(fit: Fit) -> Array:
     return np.asarray(scipy.special.stdtrit(np.where(spare > 0, spare, np.nan), 0.975), float)
 
 
-@runtime_checkable
-class Restartable(Protocol):
-    """An estimator whose answers depend on earlier frames, until it is restarted."""
-
-    def restart(self) -> None:
-        """Restart without earlier frames."""
-        ...
-
-
 class _WithoutDrift:
     """Fits by an estimator, to readings from which an estimated drift is subtracted."""
 
@@ -131,7 +122,7 @@ def answer_of(case: HardCase, make: Callable[[], Estimator]) -> MethodAnswer | R
     """
     try:
         estimator = make()
-        if isinstance(estimator, Restartable) and case.kind is not CaseKind.SEQUENCE:
+        if estimator.has_memory and case.kind is not CaseKind.SEQUENCE:
             return _joined(list(_after_another(case, estimator, estimator.restart)))
         fitted = _WithoutDrift(estimator) if case.kind is CaseKind.DRIFT else estimator
         return _joined(list(_in_blocks(case, fitted)))

@@ -7,9 +7,16 @@ from PySide6.QtGui import QDropEvent, QMouseEvent
 from PySide6.QtWidgets import QApplication
 
 from kappaskin_app.features.strip_chart.history import Span, StripHistory
-from kappaskin_app.features.strip_chart.panel import MIME, QUANTITIES, RADIUS, StripChart
+from kappaskin_app.features.strip_chart.panel import (
+    MIME,
+    NOW,
+    QUANTITIES,
+    RADIUS,
+    StripChart,
+    StripMark,
+)
 
-LEFT = Qt.MouseButton.LeftButton
+LEFT, MIDDLE = Qt.MouseButton.LeftButton, Qt.MouseButton.MiddleButton
 
 
 @pytest.fixture
@@ -31,9 +38,10 @@ def test_each_selected_number_has_a_chart_in_its_unit(panel) -> None:
     assert panel.hint.isVisible()
 
 
-def test_the_lowest_chart_alone_names_the_time_in_minutes_where_it_is_long(panel) -> None:
-    titles = [chart.x_axis.label for chart in panel.charts.values()]
-    assert titles == [", s", "Time from now, s"]
+def test_the_lowest_chart_alone_has_times_which_are_in_minutes_where_it_is_long(panel) -> None:
+    axes = [chart.x_axis for chart in panel.charts.values()]
+    assert [axis.shows for axis in axes] == ["", "numbers"]
+    assert {axis.label for axis in axes} == {"Time from now, s"} == {panel.when.text()}
     panel.show_choice(("position_x",), 3600.0)
     axis = panel.charts["position_x"].x_axis
     assert (axis.label, axis.limits) == ("Time from now, min", (-60.0, 0.0))
@@ -66,12 +74,12 @@ def test_a_curve_is_in_the_unit_of_the_screen_up_to_now_with_its_error_band(pane
     history = StripHistory(2)
     history.append(times, np.stack([0.1 + 0.01 * times, np.full(len(times), 0.002)], axis=1))
     spans = [history.span(column, 0.0, 600) for column in (0, 1)]
-    panel.show_span("force", *spans, 20.0, {})
+    panel.show_span("force", *spans, 20.0, ())
     curve, band = panel.charts["force"].series
     assert curve.x[0] == pytest.approx(-20, abs=0.05)
     assert curve.y[-1] == pytest.approx(0.3, abs=0.5e-3)
     np.testing.assert_allclose(band.band, 0.002, rtol=1e-4)
-    panel.show_span("force", spans[0], None, 20.0, {})
+    panel.show_span("force", spans[0], None, 20.0, ())
     assert len(panel.charts["force"].series) == 1
 
 
@@ -80,7 +88,7 @@ def test_a_click_on_the_chart_of_a_recording_goes_there(panel, qtbot, until) -> 
     panel.sought.connect(sought.append)
     panel.show_choice(("force",), 60.0, 600.0)
     times = np.linspace(0, 600, 500)
-    panel.show_span("force", Span(times, np.ones((3, 500))), None, 0.0, {300.0: "accent"})
+    panel.show_span("force", Span(times, np.ones((3, 500))), None, 0.0, [StripMark(300.0, NOW)])
     chart = panel.charts["force"]
     assert (chart.x_axis.label, chart.x_axis.limits) == ("Time in the recording, min", (0.0, 10.0))
     assert not panel.span.isVisible()
@@ -88,9 +96,88 @@ def test_a_click_on_the_chart_of_a_recording_goes_there(panel, qtbot, until) -> 
     qtbot.mouseClick(chart.canvas, LEFT, pos=chart.place_of(7.5, 0.5).toPoint())
     assert sought == [pytest.approx(450, abs=2)]
     panel.show_choice(("force",), 60.0)
-    panel.show_span("force", Span(times - 600, np.ones((3, 500))), None, 0.0, {})
+    panel.show_span("force", Span(times - 600, np.ones((3, 500))), None, 0.0, ())
     qtbot.mouseClick(chart.canvas, LEFT, pos=chart.place_of(-30.0, 0.5).toPoint())
     assert len(sought) == 1  # live there is no other time to go to
+
+
+def drag(qtbot, widget, begin: QPointF, end: QPointF, button=LEFT) -> None:
+    """Drag with the mouse, over places between."""
+    start, by = begin.toPoint(), end.toPoint() - begin.toPoint()
+    qtbot.mouseMove(widget, start)
+    qtbot.mousePress(widget, button, pos=start)
+    for share in (0.3, 0.6, 1.0):
+        qtbot.wait(15)
+        qtbot.mouseMove(widget, start + by * share)
+    qtbot.mouseRelease(widget, button, pos=start + by)
+
+
+def test_a_drag_over_a_part_zooms_into_all_charts_and_a_double_click_shows_all(
+    panel, qtbot, until
+) -> None:
+    panel.show_choice(("force", "displacement"), 60.0, 60.0)
+    times = np.linspace(0, 60, 500)
+    values = np.where(times < 30, 1.0, 5.0)
+
+    def show() -> None:
+        for name in panel.charts:
+            panel.show_span(name, Span(times, np.stack([values] * 3)), None, 0.0, ())
+
+    show()
+    one, other = panel.charts.values()
+    until(lambda: one.place_of(10.0, 0.0).x() > 100)
+    sought: list[float] = []
+    panel.sought.connect(sought.append)
+    drag(qtbot, one.canvas, one.place_of(10, 2), one.place_of(20, 2))
+    assert panel.part == (pytest.approx(10, abs=0.3), pytest.approx(20, abs=0.3))
+    show()
+    for name, chart in panel.charts.items():
+        left, right = chart.place_of(10, 0).x(), chart.place_of(20, 0).x()
+        assert right - left > 0.7 * chart.canvas.width()
+        # The height is that of this part too.
+        foot, top = (chart.place_of(15, y * QUANTITIES[name].scale).y() for y in (0.0, 1.0))
+        assert foot - top > 0.4 * chart.canvas.height()
+    drag(qtbot, one.canvas, one.place_of(15, 0.5), one.place_of(12, 0.5), MIDDLE)
+    assert panel.part == (pytest.approx(13, abs=0.4), pytest.approx(23, abs=0.4))
+    assert other.place_of(13, 0).x() == pytest.approx(left, abs=8)
+    at = other.place_of(15, 0.5).toPoint()
+    qtbot.mouseDClick(other.canvas, LEFT, pos=at)
+    qtbot.mouseRelease(other.canvas, LEFT, pos=at)  # Qt's own ends with the second press
+    assert panel.part is None
+    show()
+    assert one.place_of(60, 0).x() - one.place_of(0, 0).x() > 0.7 * one.canvas.width()
+    assert not sought
+
+
+def test_marks_are_lines_whose_texts_are_shown_at_their_foot(panel, until) -> None:
+    times = np.linspace(-60, 0, 300)
+    marks = [StripMark(-30.0, "note", "lifted"), StripMark(-20.0, "event", "5 messages lost")]
+    panel.show_span("force", Span(times, np.ones((3, 300))), None, 0.0, marks)
+    chart = panel.charts["force"]
+    until(lambda: chart.place_of(-30.0, 0.0).x() > 100)
+    tips = [chart.point_text(chart.nearest(chart.place_of(at, 0.0))) for at in (-30.0, -20.0)]
+    assert tips == ["lifted", "5 messages lost"]
+
+
+def test_an_element_is_drawn_in_the_units_and_with_the_names_of_what_it_reads(
+    panel, qtbot, until
+) -> None:
+    toggled: list[str] = []
+    panel.toggled.connect(toggled.append)
+    panel.show_readings(("height", "slope"), np.array([1e3, 1.0]), "mm, 1")
+    panel.show_choice(("force",), 60.0, element=7)
+    until(lambda: panel.boxes["element-7"].isVisible() and panel.boxes["element-7"].x() > 0)
+    qtbot.mouseClick(panel.boxes["element-7"], LEFT)
+    assert toggled == ["element-7"]
+    panel.show_choice(("force", "element-7"), 60.0)
+    assert panel.boxes["element-7"].isChecked()
+    times = np.linspace(-60, 0, 300)
+    panel.show_element("element-7", [Span(times, np.full((3, 300), 2.0))] * 2, 0.0, ())
+    chart = panel.charts["element-7"]
+    assert chart.y_axis.label == "Element 7, mm, 1"
+    assert [(each.name, each.y[0]) for each in chart.series] == [("height", 2000.0), ("slope", 2.0)]
+    panel.show_choice(("force",), 60.0)
+    assert "element-7" not in panel.boxes
 
 
 def test_every_number_follows_from_what_an_estimate_stores() -> None:
@@ -151,7 +238,7 @@ def test_a_recording_is_drawn_whole_and_a_click_goes_there(opened, recording, un
     window = opened(f"replay:{recording}")
     window.actions_by_name["dock-strip_chart"].trigger()
     chart = window.features["strip_chart"].strips.panel.charts["force"]
-    until(lambda: chart.x_axis.title == "" and chart.x_axis.limits[0] == 0)
+    until(lambda: chart.x_axis.title == "Time in the recording")
     length = window.session.status.replay.length
     until(lambda: chart.series and len(chart.series[0].x))
     until(lambda: chart.series[0].x.max() > 0.9 * length)
@@ -160,3 +247,36 @@ def test_a_recording_is_drawn_whole_and_a_click_goes_there(opened, recording, un
     place = chart.place_of(length / 2, float(np.nanmax(chart.series[0].y)) / 2)
     qtbot.mouseClick(chart.canvas, LEFT, pos=place.toPoint())
     until(lambda: window.session.status.replay.at == pytest.approx(length / 2, rel=0.05))
+
+
+@pytest.mark.slow
+def test_an_element_clicked_in_a_heatmap_is_drawn_and_notes_are_marked(
+    window, until, qtbot
+) -> None:
+    window.actions_by_name["dock-strip_chart"].trigger()
+    strips = window.features["strip_chart"].strips
+    until(lambda: window.session.status.sensor is not None and window.session.estimate is not None)
+    cells = window.heatmaps["xx"].cells
+    until(lambda: cells.area_of_patch().width() > 20)
+    qtbot.mouseClick(cells, LEFT, pos=cells.area_of_patch().center().toPoint())
+    until(lambda: any(name.startswith("element-") for name in strips.panel.boxes))
+    (name,) = (each for each in strips.panel.boxes if each.startswith("element-"))
+    element = int(name.removeprefix("element-"))
+    until(lambda: strips.panel.boxes[name].x() > 0)
+    qtbot.mouseClick(strips.panel.boxes[name], LEFT)
+    until(lambda: name in strips.panel.charts)
+    chart = strips.panel.charts[name]
+    until(lambda: len(chart.series) == 3 and np.isfinite(chart.series[0].y).sum() > 20)
+    read = window.session.estimate.curvature[:, element]
+    noise = window.session.estimate.noise
+    for each, value in zip(chart.series, read, strict=True):
+        assert np.nanmedian(each.y) == pytest.approx(value, abs=8 * noise)
+    assert [each.name for each in chart.series] == ["xx", "yy", "xy"]
+
+    window.session.engine.note("pressed harder")
+    until(lambda: any("pressed harder" in each.tips for each in chart.series))
+    (marked,) = (each for each in chart.series if "pressed harder" in each.tips)
+    assert marked.name == "Note"
+    assert -30 < marked.x[marked.tips.index("pressed harder")] <= 1
+    window.actions_by_name["undo"].trigger()
+    until(lambda: name not in strips.panel.charts)
