@@ -188,7 +188,7 @@ class ComparePanel(QWidget):
 
 
 def difference_text(a: Readout, b: Readout, off: float) -> str:
-    """B minus A with its error bar `off`; without one, in as many digits as the smaller error of both has.
+    """B minus A with its error bar `off`; without one, in as many digits as the smaller error.
 
     A dash where one is not determined.
     """
