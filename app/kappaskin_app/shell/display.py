@@ -90,7 +90,7 @@ class Display(QObject):
         self.places: dict[str, list[QWidget]] = {}
         self.figures: dict[str, Callable[[], float]] = {}
         self._connection, self._next_numbers = 0, 0.0
-        self._slope, self._delay = SteadyWarning(0.1, 2.0), SteadyWarning(0.5, 10.0)
+        self._slope, self.delay = SteadyWarning(0.1, 2.0), SteadyWarning(0.5, 10.0)
         session.estimated.connect(guarded(self.show_estimate))
         session.reported.connect(guarded(self._show_status))
 
@@ -144,7 +144,7 @@ class Display(QObject):
             method = self._session.engine.requested.setup.method
             texts.append(warnings(estimate, int(crossed.sum()), method, slope))
         pace = self._session.status.pace
-        delay = self._delay(1.0 - pace if pace < _SLOW else 0.0, now)
+        delay = self.delay(1.0 - pace if pace < _SLOW else 0.0, now)
         if delay and self._session.inside:
             texts.append(
                 f"simulated at {1.0 - delay:.1f} x real time: this computer is not fast enough"

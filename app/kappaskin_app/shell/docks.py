@@ -74,6 +74,8 @@ _HEIGHT = 0.28  # of the window's, of a dock below the skin that is shown
 _NONE: Mapping[str, float] = {}
 _UPPER = (0.58, 0.28)  # of it, of a dock above another in a column and of that one
 _LEAST = 40  # px of a dock that is scrolled, without its title
+# Of what is between the columns; of what is below, which needs another width.
+_PLACED = QEvent.Type.Resize, QEvent.Type.LayoutRequest
 _NARROWEST = 560  # px, of docks below the skin that are between the columns
 _BELOW = Qt.DockWidgetArea.BottomDockWidgetArea
 _CORNERS = {
@@ -206,7 +208,7 @@ class Docks(QObject):
             self._window.resizeDocks(self.right[:1], [wide], Qt.Orientation.Horizontal)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.Resize:  # of what is between the columns
+        if event.type() in _PLACED:
             self._placing.start(0)
         return False
 
@@ -247,6 +249,7 @@ class Docks(QObject):
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # else an invisible stop of Tab
         area.setMinimumHeight(_LEAST)
         area.setWidget(widget)
+        widget.installEventFilter(self)
         self._put(name, title, area, _BELOW, tip, layouts)
         self._shown[name] = widget
         self._keys[name] = key

@@ -65,7 +65,7 @@ def test_the_presenter_gives_back_docks_sizes_banner_and_scrolled_positions(
 ) -> None:
     window.docks.reveal(name)
     window.docks.reveal("strip_chart")
-    window.display.centre.banner.show_actions("A banner", "", [])
+    window.display.banner.show_actions("A banner", "", [])
     bar = window.panels.currentWidget().verticalScrollBar()
     qtbot.wait(300)
     bar.setValue(bar.maximum() // 2)
@@ -79,4 +79,4 @@ def test_the_presenter_gives_back_docks_sizes_banner_and_scrolled_positions(
     qtbot.keyClick(window, Qt.Key.Key_Escape)
 
     until(lambda: (window.geometry(), _places(window), bar.value()) == (place, was, at))
-    assert window.display.centre.banner.isVisible()
+    assert window.display.banner.isVisible()

@@ -9,6 +9,7 @@ from PySide6.QtCore import QPoint, Qt
 from kappaskin import Disk, Patch
 from kappaskin.bases import edges_of
 from kappaskin.scenes.cylinders import CylinderStep
+from kappaskin_app.shell.status_bar import SteadyWarning
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import current
 from kappaskin_app.widgets.lettering import CAPTION
@@ -69,7 +70,7 @@ def test_a_load_cannot_be_dragged_when_nothing_comes_in(window: MainWindow, unti
     until(lambda: len(window.membrane.drag.handles) == 1)
     window.actions_by_name["disconnect"].trigger()
     until(lambda: not len(window.membrane.drag.handles))
-    assert not window.load.editor("load_case").isEnabled()
+    until(lambda: not window.load.isVisible())
 
 
 @pytest.mark.full
@@ -106,6 +107,7 @@ def test_a_load_too_near_the_rim_is_warned_of_and_no_more_further_inside(
 
 def test_a_simulation_slower_than_real_time_is_marked(window: MainWindow) -> None:
     session, notice = window.session, window.display.notice
+    window.display.delay = SteadyWarning(0.5, 0.0)
     session.status = replace(session.status, pace=0.64)
     window.display.show_numbers_soon()
     session.reported.emit(session.status)

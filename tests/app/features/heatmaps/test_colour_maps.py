@@ -45,6 +45,7 @@ def test_a_map_selected_from_the_list_colours_skin_heatmaps_and_scales(
         until(lambda made=made, inside=inside: away(xx.cells, inside, made.diverging) < 12)
         lookup = window.membrane.surface.actor.mapper.lookup_table
         assert np.array_equal(lookup.values[:, :3], made.sequential)
+        qtbot.wait(1100)  # changes that follow each other sooner are one step to undo
     window.history.stack.undo()
     assert window.history.settings.colour_map == "viridis"
 

@@ -127,7 +127,7 @@ def test_the_selected_lesson_is_saved_while_the_window_goes_on(
 def test_the_teachers_page_opens_from_the_lessons_and_from_help(window: MainWindow, qtbot) -> None:
     window.actions_by_name["dock-lesson"].trigger()
     qtbot.mouseClick(window.lesson.list.teacher, Qt.MouseButton.LeftButton)
-    assert window.guide.contents.currentItem().text() == "Teach with the lessons"
+    assert window.guide.contents.currentText() == "Teach with the lessons"
     (menu,) = [a.menu() for a in window.menuBar().actions() if a.text() == "&Help"]
     assert window.actions_by_name["teacher"] in menu.actions()
 

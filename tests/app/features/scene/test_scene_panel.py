@@ -223,7 +223,7 @@ def test_the_pages_have_their_keys_and_nothing_is_clipped(window, panel, until) 
         panel.setCurrentIndex(index)
         until(lambda: panel.currentWidget().isVisible())
         page = panel.currentWidget()
-        assert page.minimumSizeHint().width() <= panel.width()
+        until(lambda page=page: page.minimumSizeHint().width() <= panel.width())
         assert panel.mapTo(window, QPoint(0, 0)).x() + panel.width() <= window.width()
 
 
@@ -246,12 +246,14 @@ def test_a_scene_that_is_chosen_while_one_types_is_played_as_it_is_written(
 
 
 @pytest.mark.full
-def test_on_another_source_only_the_gallery_leads_back(window, panel, until) -> None:
+def test_on_another_source_only_the_gallery_leads_back(
+    window, panel, until, recording: Path
+) -> None:
     panel.gallery.chosen.emit("tapping")
     until(lambda: plays(window, "tapping"))
     until(lambda: panel.gallery.items["tapping"].data(PLAYING))
     panel.setCurrentIndex(EFFECTS_PAGE)
-    window.connection.connect_requested.emit("socket://127.0.0.1:9")
+    window.session.request_source(f"replay:{recording}")
     until(lambda: panel.currentIndex() == GALLERY)
     assert not panel.isTabEnabled(EDIT)
     assert not panel.isTabEnabled(EFFECTS_PAGE)
