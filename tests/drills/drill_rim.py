@@ -15,7 +15,9 @@ _SECONDS = 600.0
 
 _DRAGGED = """
 import json, math, sys, time
+import numpy as np
 from kappaskin_app import guard
+from kappaskin_app.features.membrane.camera import Projection
 from kappaskin_app.launch import opened
 from PySide6.QtCore import QPoint, QPointF, QTimer, Qt
 from PySide6.QtGui import QWheelEvent
@@ -25,9 +27,19 @@ from PySide6.QtWidgets import QApplication
 LEFT = Qt.MouseButton.LeftButton
 
 
-def drag(application, window, seconds):
+def wait_for_object(window, number):
+    presenter, end = window.features["presenter"].presenter, time.monotonic() + 60
+    objects = presenter.view.controls.objects
+    while window.session.making or presenter.feedback is None or objects.checkedId() != number:
+        assert time.monotonic() < end, "expected the object, prepared within 60 s"
+        QTest.qWait(50)
+
+
+def drag(window, seconds):
     presenter = window.features["presenter"].presenter
-    view, pad = presenter.view, presenter.view.controls.pad
+    view, skin = presenter.view, window.features["membrane"].membrane
+    plotter, patch = skin.plotter, skin.skin.patch
+    sides = np.array([patch.a, patch.b])
     end, moves, rim, painted = time.monotonic() + seconds, 0, 0, [0]
     draw = view.radius_view.draw
     view.radius_view.draw = lambda painter: (draw(painter), painted.append(painted.pop() + 1))
@@ -35,29 +47,32 @@ def drag(application, window, seconds):
         for button in view.controls.objects.buttons():
             QTest.mouseClick(button, LEFT)
             QTest.qWait(300)
-            corner = pad.skin
-            corners = [corner.topLeft(), corner.topRight(), corner.bottomRight()]
-            corners += [corner.bottomLeft(), corner.topLeft()]
-            QTest.mousePress(pad, LEFT, pos=corner.topLeft().toPoint())
+            wait_for_object(window, view.controls.objects.id(button))
+            shares = np.array([(0, 0), (1, 0), (1, 1), (0, 1), (0, 0)])
+            points, _ = skin.skin.at_rest(sides * (0.01 + 0.98 * shares))
+            screen = Projection(plotter).to_screen
+            corners = [QPointF(*screen(point)) for point in points]
+            QTest.mousePress(plotter, LEFT, pos=corners[0].toPoint())
+            assert skin.drag.holding, "expected the object at the mouse"
             for begin, stop in zip(corners, corners[1:]):
                 for step in range(41):
                     at = begin + step / 40 * (stop - begin)
                     # Half a wave across the rim: on it, outside, and a little inside.
                     at += QPointF(1, 1) * 8 * math.sin(moves / 3)
-                    QTest.mouseMove(pad, at.toPoint())
+                    QTest.mouseMove(plotter, at.toPoint())
                     QTest.qWait(15)
                     moves += 1
                     found = presenter.feedback
                     rim += found is not None and found.near_rim
                     if moves % 50 == 0:
                         notch = QPoint(0, 120 if moves % 100 else -120)
-                        there = QPointF(pad.mapToGlobal(at.toPoint()))
+                        there = QPointF(plotter.mapToGlobal(at.toPoint()))
                         turned = QWheelEvent(
                             at, there, QPoint(), notch, LEFT, Qt.KeyboardModifier.NoModifier,
                             Qt.ScrollPhase.NoScrollPhase, False,
                         )
-                        QApplication.sendEvent(pad, turned)
-            QTest.mouseRelease(pad, LEFT, pos=corner.topLeft().toPoint())
+                        QApplication.sendEvent(plotter, turned)
+            QTest.mouseRelease(plotter, LEFT, pos=corners[-1].toPoint())
             if time.monotonic() > end:
                 break
         QTest.keyClick(window, Qt.Key.Key_T, Qt.KeyboardModifier.ControlModifier)
@@ -68,9 +83,10 @@ def main():
     errors = []
     guard.on_failure(errors.append)
     application, window = opened("sim:demo")
-    window.features["presenter"].presenter.enter()
-    QTest.qWait(3000)
-    found = drag(application, window, float(sys.argv[1]))
+    presenter = window.features["presenter"].presenter
+    presenter.enter()
+    wait_for_object(window, 0)
+    found = drag(window, float(sys.argv[1]))
     window.close()
     print(json.dumps([*found, errors]))
 

@@ -387,7 +387,11 @@ def test_another_decoder_goes_on_from_the_bytes_held():
             r"got 0\.2 of xx, 0\.1 of xy, 0\.2 of twist",
         ),
         ('"xx:0..5"', '"height:0..5"', "noise of readings that differ in unit"),
-        ("grid = [3, 2]", 'grid = [3, 2]\nreads = ["height"]', "the columns tell what is read"),
+        (
+            "grid = [3, 2]",
+            'grid = [3, 2]\nreads = ["height"]',
+            "the columns determine what is read",
+        ),
         ('columns = ["time_ms", "", "xx:0..5", "xy:2"]', "", "columns"),
         ("[line]", "[line]\nbaud = 12.5", "whole number"),
         ("[line]", "[lines]", "kind"),

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import QByteArray, QEvent, QObject, QRect, Qt, QTimer
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollBar, QToolBar, QWidget
-from shiboken6 import isValid
 
 from kappaskin.contact import ContactObject
 from kappaskin.frames import Estimate
@@ -38,7 +37,7 @@ class _WindowState:
     place: QRect
     state: Qt.WindowState
     shown: list[QWidget]
-    scrolled: list[tuple[QScrollBar, int]]
+    scrolled: dict[QScrollBar, int]
 
 
 class PresenterController(QObject):
@@ -85,7 +84,7 @@ class PresenterController(QObject):
         shown = [part for part in self._surroundings() if part.isVisible()]
         self._before = _WindowState(
             *(window.saveState(), window.geometry(), window.windowState(), shown),
-            [(bar, bar.value()) for dock in shown for bar in dock.findChildren(QScrollBar)],
+            {bar: bar.value() for dock in shown for bar in dock.findChildren(QScrollBar)},
         )
         with drawn_once(window):
             for part in shown:
@@ -124,9 +123,8 @@ class PresenterController(QObject):
         """Restore the sizes of docks and the scrolled positions in a window of its old size."""
         if self._left is not None and not self.on:
             self._window.restoreState(self._left.layout)
-            for bar, value in self._left.scrolled:
-                if isValid(bar):
-                    bar.setValue(value)
+            for bar in self._window.findChildren(QScrollBar):  # without those deleted since
+                bar.setValue(self._left.scrolled.get(bar, bar.value()))
 
     def close(self) -> None:
         """Stop the sound before the window closes."""
