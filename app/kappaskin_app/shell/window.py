@@ -7,7 +7,7 @@ from typing import Protocol
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent
 
-from kappaskin.live import OFF, Engine, ResumeInfo, Status
+from kappaskin.live import Engine, ResumeInfo, Status
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.menus import Menus
 from kappaskin_app.shell.parts import Parts
@@ -111,7 +111,7 @@ class MainWindow(Parts):
             apply_look(THEMES[settings.theme], settings.letters, settings.colour_map)
 
     def _show_status(self, status: Status) -> None:
-        self.panels.show_status(status, self.session.simulating and status.state != OFF)
+        self.panels.show_status(status, self.session.simulating and status.state != "off")
 
     # Called by features.
 
