@@ -275,6 +275,7 @@ def show_much(window: MainWindow, status: Status, estimate: Estimate) -> None:
     window.session.reported.emit(status)
     window.display.show_estimate(estimate)
     window.session.blockSignals(True)  # so that nothing else is shown
+    window.session.engine.status = lambda: status  # nor the loads of a later time
     window.timeline.show_time(1.0, True)
     say_much(window)
 
