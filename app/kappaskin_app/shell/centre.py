@@ -119,4 +119,4 @@ class Centre(QWidget):
 
     def add_below(self, widget: QWidget) -> None:
         """Put a widget between the main view and those put there before."""
-        self._column.insertWidget(2, widget)
+        self._column.insertWidget(1, widget)
