@@ -381,7 +381,7 @@ class Finder(QDialog):
         )
         corner = window.mapToGlobal(window.rect().topLeft())
         self.setGeometry(corner.x() + (window.width() - wide) // 2, corner.y() + 60, wide, high)
-        self.list.header().resizeSection(1, round(0.3 * wide))
+        self.list.header().resizeSection(1, round(0.36 * wide))
         self.line.clear()
         self._list()
         self.show()
@@ -390,7 +390,7 @@ class Finder(QDialog):
         self.line.setFocus()
 
     def found(self) -> list[FinderEntry]:
-        """The entries that match the text typed, the best first."""
+        """The entries that match the text typed, the best first, and disabled ones last."""
         query = self.line.text()
         if not query.strip():
             return self._last_first()
@@ -399,7 +399,8 @@ class Finder(QDialog):
             if points.get(name, 0.0) > 0:
                 points[name] += _RECENT * (1 - age / _KEPT)
         entries = {entry.name: entry for entry in self._entries}
-        return [entries[name] for name in best(points)]
+        found = [entries[name] for name in best(points)]
+        return sorted(found, key=lambda entry: bool(entry.why_not))
 
     def _last_first(self) -> list[FinderEntry]:
         ages = {name: age for age, name in enumerate(self.recent)}

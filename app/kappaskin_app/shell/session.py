@@ -460,7 +460,7 @@ class Session(QObject):
         if self.closed:
             return  # called by a picture drawn while closing
         now = time.monotonic()
-        if now >= self._next_status:
+        if reports := now >= self._next_status:
             self._next_status = now + _STATUS
             self.engine.revive()
             was, self.status = self.status, self.engine.status()
@@ -472,11 +472,15 @@ class Session(QObject):
             if arrived or self._seek_target == self.status.playing.at:
                 self._seek_target = None
             self._follow_source()
-            self.reported.emit(self.status)
         estimate = self.engine.latest(self.status)
-        if estimate is not None and (estimate.generation, estimate.sequence) != self._shown:
+        if estimate is not None and (estimate.generation, estimate.sequence) == self._shown:
+            estimate = None
+        if estimate is not None:
             self._shown = estimate.generation, estimate.sequence
             self.estimate = estimate
+        if reports:  # with the estimate that is drawn now, not the one before
+            self.reported.emit(self.status)
+        if estimate is not None and estimate is self.estimate:
             self.estimated.emit(estimate)
 
     @property

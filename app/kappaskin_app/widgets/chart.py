@@ -129,7 +129,10 @@ class ChartAxis:
         if not self.log:
             (step, first), *finer = linear(low, high, size)
             every = math.ceil(gap * (high - low) / (size * step))
-            return [(step, [v for v in first if not round(v / step) % every]), *finer]
+            kept = [v for v in first if not round(v / step) % every]
+            # Those left out are the next level: finer ones alone would be in their place.
+            left = [(step, [v for v in first if round(v / step) % every])] * (every > 1)
+            return [(every * step, kept), *left, *finer]
         if high - low < _FEW:
             found = linear(10.0**low, 10.0**high, size)
             return [(step, np.log10([v for v in each if v > 0]).tolist()) for step, each in found]

@@ -266,8 +266,9 @@ class Clock(QWidget):
         self._fit()
 
     def _fit(self) -> None:
-        self.setMinimumSize(self._wide(self._longest.partition(" of ")[0]), HEIGHT)
-        self.setMaximumSize(self._wide(self._longest), HEIGHT)
+        high = max(HEIGHT, self.fontMetrics().height())
+        self.setMinimumSize(self._wide(self._longest.partition(" of ")[0]), high)
+        self.setMaximumSize(self._wide(self._longest), high)
 
     def sizeHint(self) -> QSize:
         return self.maximumSize()

@@ -89,13 +89,13 @@ STEEP = 0.3
 # derivative of p / sqrt(1 + p^2) = sin(t). A linear method integrates that to the slope s = sin(t),
 # too flat by 1 - s/p = 1 - sqrt(1 - s^2): 8 % at s = 0.4. A dent loses 0.4 to 1 times that of its
 # height.
-def slope_warning(slope: float) -> str:
-    """What a linear method should say of the largest `slope` of its shape; nothing of 0."""
+def slope_warning(slope: float, remedy: str = "use finite-slope") -> str:
+    """Warning of a linear method about the largest `slope` of its shape; empty for 0."""
     if not slope:
         return ""
     share = 100 * (1 - math.sqrt(max(1 - slope**2, 0.0)))
     flat = f"{share:.0f}" if share >= 1 else f"{share:.1g}"
-    return f"slopes reach {slope:.2g}: up to {flat} % too flat; use finite-slope"
+    return f"slopes reach {slope:.2g}: up to {flat} % too flat; {remedy}"
 
 
 _ALARM = 1e-3

@@ -285,7 +285,7 @@ def test_ticks_of_a_linear_axis_keep_their_distance() -> None:
 
     axis = ChartAxis("")
     assert axis.ticks(-5.0, 5.0, 100.0, 20.0, linear) == linear()
-    thinned = [(2.0, [-4.0, 0.0, 4.0]), (1.0, [-3.0])]
+    thinned = [(4.0, [-4.0, 0.0, 4.0]), (2.0, [-2.0, 2.0]), (1.0, [-3.0])]
     assert axis.ticks(-5.0, 5.0, 100.0, 21.0, linear) == thinned
 
 

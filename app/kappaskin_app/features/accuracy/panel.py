@@ -233,7 +233,8 @@ class CostPanel(QWidget):
         if now.refusal:
             return sentence(now.refusal)
         difference = now.difference()
-        return f"Measured {difference}: measure again." if difference else ""
+        stale = difference and not now.running
+        return f"Measured {difference}: measure again." if stale else ""
 
     def _show_message(self, now: CostMeasurement, text: str) -> None:
         hint = not text

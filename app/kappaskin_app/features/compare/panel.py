@@ -32,7 +32,7 @@ _SETTINGS = (
     "other_tared",
 )
 _COLUMNS = ("", "A", "B", "B \N{MINUS SIGN} A")
-_TABLE_WIDTH, _TABLE_HEIGHT = 460, 160  # px
+_TABLE_WIDTH, _TABLE_HEIGHT = 560, 160  # px
 _MILLIMETRES = 1e3
 _SURFACE = "Displacement of the skin, on a common scale of A and B; the cross is the contact."
 _DIFFERENCE = (

@@ -26,6 +26,7 @@ from kappaskin_app.widgets.layout import scrolled
 from kappaskin_app.widgets.parts import ELLIPSIS, Heading, Label, button, in_a_row, text_label
 
 _ENTER = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
+_PER_METRE = "\N{NO-BREAK SPACE}1/\N{WORD JOINER}m"  # with its number, and in one piece
 _LARGER = 1.15  # times the letters: the title of a step
 _RIGHT, _DARKER = 3, 110  # of the series: green, told apart from the colour of alarms; by so much %
 
@@ -243,7 +244,7 @@ class LessonStepPage(QWidget):
     def _make(self, progress: Progress) -> None:
         step = progress.lesson.steps[progress.step]
         self.title.setText(step.title)
-        self.text.setText(step.text)
+        self.text.setText(step.text.replace(" 1/m", _PER_METRE))
         _empty(self._below)
         self.question_view = None
         for number, one in enumerate(step.buttons):

@@ -116,7 +116,7 @@ class _HandText(Indicator):
             return []
         place, third = self.rect().toRectF(), self.height() / 3
         x, y, force = 1e3 * self.hand.x, 1e3 * self.hand.y, self.hand.force
-        hand_text = f"Your hand: {force:.2f} N at {x:.0f}, {y:.0f} mm"
+        hand_text = f"Simulated load: {force:.2f} N at x {x:.0f} mm, y {y:.0f} mm"
         above = place.adjusted(0, 0, 0, -2 * third)
         below = place.adjusted(0, third, 0, 0)
         hint = f"{self.refusal}. {_UNDO_HINT}" if self.refusal else _HINT

@@ -214,7 +214,8 @@ class StripChart(QWidget):
         begin, end = (0.0, length) if length else (-seconds, 0.0)
         unit, self._unit = ("min", 60.0) if end - begin >= _MINUTES else ("s", 1.0)
         when = "Time in the recording" if length else "Time from now"
-        self.when.setText(f"{when}, {unit}")
+        last = "" if length else "; the last"
+        self.when.setText(f"{when} in {unit}{last}")
         for name in [name for name in self.charts if name not in names]:
             self.charts.pop(name).deleteLater()
         self.charts = {name: self.charts.get(name) or self._chart() for name in names}
