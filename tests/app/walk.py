@@ -354,7 +354,7 @@ def _lowest(widget: QWidget) -> int:
         if widget.wordWrap():
             return widget.heightForWidth(widget.width())
         return widget.minimumSizeHint().height()
-    if isinstance(widget, QAbstractButton) and not widget.text():
+    if isinstance(widget, QLabel | QAbstractButton) and not widget.text():
         return 0
     return widget.fontMetrics().height() if _has_text(widget) else 0
 
