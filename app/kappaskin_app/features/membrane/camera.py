@@ -46,7 +46,7 @@ def fit_camera(renderer: Any, skin: DrawnSkin, direction: Direction, label: floa
     least, most = seen.min(axis=0), seen.max(axis=0)
     across = [_in_view(renderer, *point)[0] for point in body]
     before = label * (2.0 if skin.patch.base_curvature else 1.2)
-    after = 2.0 * label
+    after = 2.2 * label
     beside = (2.0 - before - after) / float(np.ptp(across))
     zoom = min(1.94 / float(np.max(most - least)), beside)
     least, most = zoom * least, zoom * most
