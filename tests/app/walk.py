@@ -106,7 +106,7 @@ def docks(window: MainWindow, seconds: float) -> Iterator[Screen]:
 def pages(window: MainWindow, seconds: float) -> Iterator[Screen]:
     """Each page of settings, and its lower end, with the purposes of all panels shown."""
     panels = window.panels
-    for page in range(panels.count()):
+    for page in filter(panels.isTabVisible, range(panels.count())):
         panels.setCurrentIndex(page)
         area = panels.currentWidget()
         wait(seconds)
@@ -174,7 +174,7 @@ def reading(window: MainWindow, seconds: float) -> Iterator[Screen]:
         window.features["guide"].read(page)
         wait(seconds)
         yield f"guide-{page.file.stem}", window
-    window.docks["guide"].hide()
+    window.docks["guide"].close()
     _connect(window, "sim:")
 
 
@@ -187,7 +187,10 @@ def _source(window: MainWindow, source: str, name: str, seconds: float) -> Itera
 
 def _connect(window: MainWindow, source: str) -> None:
     """Connect a source, and wait until its readings come."""
-    window.session.request_source(source)
+    if source == "sim:":  # alone, this continues the last scene
+        window.session.simulate()
+    else:
+        window.session.request_source(source)
     end = time.monotonic() + _PATIENCE
     while time.monotonic() < end:
         status = window.session.status
@@ -308,15 +311,15 @@ def _need(widget: QWidget) -> tuple[int, int]:
             0 if widget.whole or widget.tip() else metrics.horizontalAdvance(widget.text())
         ), wide
     if isinstance(widget, QTabBar):
-        texts = [
-            metrics.size(Qt.TextFlag.TextShowMnemonic, widget.tabText(n)).width()
+        texts = {
+            n: metrics.size(Qt.TextFlag.TextShowMnemonic, widget.tabText(n)).width()
             for n in range(widget.count())
             if widget.isTabVisible(n)
-        ]
+        }
         # A bar with arrows shows those tabs that have room.
         lacks = [
             (t, widget.tabRect(n).width())
-            for n, t in enumerate(texts)
+            for n, t in texts.items()
             if t + 8 > widget.tabRect(n).width() and not widget.tabToolTip(n)
         ]
         last = widget.tabRect(widget.count() - 1).right() + 1 if widget.count() else 0
@@ -351,7 +354,7 @@ def _lowest(widget: QWidget) -> int:
         if widget.wordWrap():
             return widget.heightForWidth(widget.width())
         return widget.minimumSizeHint().height()
-    if isinstance(widget, QAbstractButton) and not widget.text():
+    if isinstance(widget, QLabel | QAbstractButton) and not widget.text():
         return 0
     return widget.fontMetrics().height() if _has_text(widget) else 0
 

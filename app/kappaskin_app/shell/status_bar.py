@@ -84,7 +84,7 @@ def warnings(estimate: Estimate, strained: int, method: str, slope: float = 0.0)
     if estimate.contact.near_rim:
         parts.append("contact near the rim: unreliable")
     if slope:
-        parts.append(slope_warning(slope, "select the estimator Finite slope"))
+        parts.append(slope_warning(slope, "select Finite slope"))
     words = "; ".join(parts)
     return words[:1].upper() + words[1:]
 

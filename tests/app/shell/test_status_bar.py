@@ -64,7 +64,7 @@ def test_a_method_that_gave_up_says_why(method: str, words: str) -> None:
 
 
 def test_slopes_that_a_method_neglects_are_told_after_the_rest() -> None:
-    words = "slopes reach 0.4: up to 8 % too flat; select the estimator Finite slope"
+    words = "slopes reach 0.4: up to 8 % too flat; select Finite slope"
     assert warnings(ESTIMATE, 0, METHOD, 0.4) == words[0].upper() + words[1:]
     assert warnings(ESTIMATE, 1, METHOD, 0.4) == f"1 element over 1 % strain; {words}"
 
@@ -130,7 +130,7 @@ def test_a_warning_that_lacks_room_is_whole_in_the_tooltip(qapp) -> None:
     bar.resize(400, 30)
     bar.show()
     words = (
-        "Slopes reach 0.14: up to 1 % too flat; select the estimator Finite slope; "
+        "Slopes reach 0.14: up to 1 % too flat; select Finite slope; "
         "this computer is not fast enough"
     )
     notice.show_warning(words)

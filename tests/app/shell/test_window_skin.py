@@ -272,7 +272,9 @@ def test_no_height_leaves_the_picture_and_the_true_one_is_written(
     until(lambda: written.words not in ("", "height \N{MULTIPLICATION SIGN} 6"))
     until(lambda: -view.skin.height.min() > 20)
     assert -view.skin.height.min() <= view.skin.deepest * (1 + 1e-9)
-    times = float(written.words.split()[-1])
+    height, reason = written.words.split("\n")
+    assert reason == "most that fits"
+    times = float(height.split()[-1])
     assert times == pytest.approx(view.skin.deepest / window.display.ranges.deepest(), rel=5e-3)
     assert written.text.input == written.words
     window.requests.set("exaggeration", 1.0)

@@ -356,7 +356,7 @@ class Heatmap(QWidget):
 
 
 _COLUMN = 3  # heatmaps at most in a single column
-_NARROWEST = (270, 360)  # px, minimum width of one column and of two
+_NARROWEST = (210, 360)  # px, minimum width of one column and of two
 
 
 class HeatmapGrid(QScrollArea):

@@ -29,7 +29,8 @@ _NUMBERS = 12  # of a camera
 def fit_camera(renderer: Any, skin: DrawnSkin, direction: Direction, label: float) -> None:
     """View the whole `skin` from `direction`.
 
-    With room on both sides for a label, which takes the share `label` of the width.
+    With room for a label right of it and, around a corner or before a curved side, left of it; a
+    label takes the share `label` of the width.
     """
     camera = renderer.GetActiveCamera()
     body = _around(skin, 0.0)
@@ -43,11 +44,16 @@ def fit_camera(renderer: Any, skin: DrawnSkin, direction: Direction, label: floa
     camera.SetWindowCenter(0.0, 0.0)
     seen = np.array([_in_view(renderer, *point) for point in _around(skin, _MARGIN)])
     least, most = seen.min(axis=0), seen.max(axis=0)
-    skin_alone = np.ptp([_in_view(renderer, *point)[0] for point in body])
-    beside = (2.0 - 4.0 * label) / float(skin_alone)
+    across = [_in_view(renderer, *point)[0] for point in body]
+    before = label * (2.0 if skin.patch.base_curvature else 1.2)
+    after = 2.2 * label
+    beside = (2.0 - before - after) / float(np.ptp(across))
     zoom = min(1.94 / float(np.max(most - least)), beside)
+    least, most = zoom * least, zoom * most
+    least[0] = min(least[0], zoom * min(across) - before)
+    most[0] = max(most[0], zoom * max(across) + after)
     camera.Zoom(zoom)
-    camera.SetWindowCenter(*(zoom * (least + most) / 2))
+    camera.SetWindowCenter(*((least + most) / 2))
     renderer.ResetCameraClippingRange()
 
 

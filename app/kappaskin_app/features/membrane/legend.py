@@ -45,6 +45,7 @@ class Legend(QWidget):
         super().__init__()
         self.setAccessibleName("Legend")
         self._colours: Colours | None = None
+        self._ink = ""
         self.buttons: dict[str, QToolButton] = {}
         flow = Flow()
         flow.setContentsMargins(6, 2, 6, 2)
@@ -70,9 +71,9 @@ class Legend(QWidget):
         for name, shown in there.items():
             self.buttons[name].setVisible(shown)
 
-    def show_colours(self, colours: Colours) -> None:
-        """Show the colour map (256, 3) of the fit."""
-        self._colours = colours
+    def show_colours(self, colours: Colours, ink: str) -> None:
+        """Show the colour map (256, 3) of the fit, and the colour `ink` of the elements on it."""
+        self._colours, self._ink = colours, ink
         self._draw_signs()
 
     def show_unit(self, unit: float) -> None:
@@ -103,7 +104,7 @@ class Legend(QWidget):
         return picture
 
     def _draw(self, painter: QPainter, entry: _Entry, side: int) -> None:
-        colour = QColor(entry.colour or current().text)
+        colour = QColor(entry.colour or self._ink or current().text)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         middle, place = side / 2, QRectF(0, 0, side, side)
         if entry.sign == "cross":
@@ -111,7 +112,8 @@ class Legend(QWidget):
             painter.drawLine(QPointF(middle, 0), QPointF(middle, side))
             painter.drawLine(QPointF(0, middle), QPointF(side, middle))
         elif entry.sign == "dot":
-            painter.setPen(Qt.PenStyle.NoPen)
+            # The ink may be the colour of the ground.
+            painter.setPen(colour if entry.colour else QColor(current().text))
             painter.setBrush(colour)
             painter.drawEllipse(place.center(), side / 4, side / 4)
         elif entry.colour:

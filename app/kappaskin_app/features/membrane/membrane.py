@@ -35,7 +35,7 @@ from kappaskin_app.shell.drawn_skin import MM, DrawnSkin
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, current, follow_look
 
 _LETTERS = 14  # px, of the caption
-_CORNER = 14  # letters at its right: the vertical exaggeration, and which error bars are drawn
+_CORNER = 15  # letters at its right: the vertical exaggeration, and which error bars are drawn
 _LIFT = 0.006  # of the skin's size above the surface, which would hide half of a line
 _POINT, _POINTS = 5, 80  # px of an element, and of many in a row: or they would hide the skin
 CONTACT = "#1fd17a"
@@ -110,8 +110,10 @@ class MembraneView(QWidget):
         self._elements_actor = plotter.add_mesh(
             self._elements, style="points", point_size=pixels(plotter, _POINT), **UNLIT
         )
-        self.excluded, self.target = Marks(plotter, 11, OUT), Marks(plotter, 18, WANTED)
+        self.excluded = Marks(plotter, 11, OUT)
         # Visible on every colour.
+        self._around_target = Marks(plotter, 26, DARK_INK)
+        self.target = Marks(plotter, 18, WANTED)
         self.pointed = Marks(plotter, 17, DARK_INK), Marks(plotter, 12, LIGHT_INK)
         self._loads = DrawnLoads(plotter)
         # A pin, whose upper end is seen where its head lies deep in a dent.
@@ -127,6 +129,8 @@ class MembraneView(QWidget):
         self._caption = Caption(plotter, _LETTERS, 0.98, "top", spared=_CORNER)
         self.caption: Any = self._caption.text
         self.corner, self.error_bars = Caption(plotter, _LETTERS, 0.98, "top", "right"), ""
+        self.limited = False
+        """Whether the requested exaggeration is too large to be drawn."""
         self.alarm = Alarm(plotter)
 
     def _make_lights(self) -> None:
@@ -192,7 +196,8 @@ class MembraneView(QWidget):
         if marked != self._marked:
             self._marked = marked
             self.excluded.place(self.skin, self._positions[excluded])
-            self.target.place(self.skin, self._positions[[target] if target >= 0 else []])
+            for marks in (self._around_target, self.target):
+                marks.place(self.skin, self._positions[[target] if target >= 0 else []])
             self.plotter.update()
 
     def point(self, element: int) -> None:
@@ -244,8 +249,9 @@ class MembraneView(QWidget):
             points, out = self._elements_at_rest
             height = skin.height.ravel()[self._of_elements] + self.lift
             self._arrays["elements"][:] = points + out * height[:, None]
-        for marks in (self.excluded, self.target):
+        for marks in (self.excluded, self._around_target):
             marks.follow(skin, self.lift)
+        self.target.follow(skin, 1.5 * self.lift)  # above its rim
         self._follow_pointed()
         for ball, contact in zip(self._contacts, (estimate.contact, estimate.second), strict=True):
             put_upright(ball, skin, contact.position)
@@ -260,8 +266,12 @@ class MembraneView(QWidget):
         self._request()
 
     def _show_corner(self, times: float) -> None:
-        """State the vertical exaggeration, unless there is none, and which error bars are drawn."""
+        """State the vertical exaggeration, unless there is none, and which error bars are drawn.
+
+        An exaggeration below the requested one is explained.
+        """
         height = f"height \N{MULTIPLICATION SIGN} {times:.3g}" if times != 1 else ""
+        height += "\nmost that fits" * self.limited
         bars = f"errors {self.error_bars}" if self.error_bars else ""
         if (text := "\n".join(filter(None, (height, bars)))) != self.corner.words:
             self.corner.show(text)

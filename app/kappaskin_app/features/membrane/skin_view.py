@@ -171,10 +171,11 @@ class SkinView(QObject):
         if tint.colours is not self._colours:
             self._colours = tint.colours
             self.membrane.show_colours(tint.colours, tint.ink)
-            self.legend.show_colours(tint.colours)
+            self.legend.show_colours(tint.colours, tint.ink)
         self._show_reason(name, values)
         barred = self._settings.show_band or self._settings.show_frame
         self.membrane.error_bars = ErrorBars.now.label if barred else ""
+        self.membrane.limited = times < self._settings.exaggeration
         self.membrane.show_estimate(estimate, values, tint.limits, times)
         self.scale.bar.show_tint(tint, beside)
         self.scale.show_what("" if tint.unit == "shape" else shade.symbol, shade.tip)
