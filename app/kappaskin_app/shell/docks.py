@@ -249,7 +249,6 @@ class Docks(QObject):
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # else an invisible stop of Tab
         area.setMinimumHeight(_LEAST)
         area.setWidget(widget)
-        widget.installEventFilter(self)
         self._put(name, title, area, _BELOW, tip, layouts)
         self._shown[name] = widget
         self._keys[name] = key
@@ -284,6 +283,8 @@ class Docks(QObject):
         """Register the actions that show and hide docks, once there is a central widget."""
         if (central := self._window.centralWidget()) is not None:
             central.installEventFilter(self)
+        for dock in self.below:
+            self.widget(dock.objectName()).installEventFilter(self)
         for dock in self._docks.values():
             dock.visibilityChanged.connect(guarded(lambda *_: self._placing.start(0)))
         for name, dock in self._docks.items():
