@@ -8,12 +8,17 @@ from kappaskin.frames import Estimate
 from kappaskin.live import Status
 from kappaskin_app.features.contact.numbers import NumbersPanel
 from kappaskin_app.features.contact.readouts import Readouts
-from kappaskin_app.features.contact.recognition import ObjectRecognition
+from kappaskin_app.features.contact.recognition import (
+    ObjectRecognition,
+    age_text,
+    curvature_text,
+)
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.window import MainWindow
+from kappaskin_app.widgets.parts import capital
 from kappaskin_app.widgets.text import ErrorBars
 
-_FULL_SCREEN_PERIOD, _PERIOD = 0.25, 1.0  # s between two recognitions: in full screen, and else
+_FULL_SCREEN_PERIOD, _PERIOD = 0.25, 0.5  # s between two recognitions: in full screen, and else
 _OBJECT = (
     "The object recognised from the readings, the 95 % interval of its radius and the probability "
     "of the second guess; the principal curvatures of the skin at the contact with error bars."
@@ -27,6 +32,7 @@ class ContactFeature:
 
     def install(self, shell: MainWindow) -> None:
         self._shell, self._next = shell, 0.0
+        self._described: tuple[str, str, Estimate | None] = ("", "", None)
         display = shell.display
         self.readouts, self.numbers = Readouts(), NumbersPanel()
         self.recognition = ObjectRecognition(shell.tasks, shell)
@@ -39,7 +45,7 @@ class ContactFeature:
         display.numbers.connect(guarded(self._show))
         shell.settings_shown.connect(guarded(lambda _: self.readouts.show_bars(ErrorBars.now)))
         display.status_shown.connect(guarded(self._follow))
-        self.recognition.described.connect(guarded(display.status_bar.object.show_text))
+        self.recognition.described.connect(guarded(self._describe))
         self.recognition.found.connect(display.object_found)
 
     def _follow(self, status: Status) -> None:
@@ -63,4 +69,19 @@ class ContactFeature:
             skipped=status.skipped,
         )
         self.readouts.show_estimate(estimate)
+        self._show_object(estimate)
         self.numbers.show_estimate(estimate, status.sensor, display.status_bar.object.text())
+
+    def _describe(self, words: str, more: str, recognised: Estimate | None) -> None:
+        self._described = words, more, recognised
+        self._show_object(self._shell.display.estimate_shown())
+
+    def _show_object(self, estimate: Estimate | None) -> None:
+        """Show the object, and the curvatures of the skin in the `estimate` shown."""
+        words, more, recognised = self._described
+        curvatures = "" if estimate is None else curvature_text(estimate)
+        age = "" if estimate is None else age_text(recognised, estimate)
+        if age is None:
+            words, more, age = "", "", ""
+        text = f"{words.removesuffix(more)}{age}{more}{curvatures}".removeprefix("; ")
+        self._shell.display.status_bar.object.show_text(capital(text), curvatures, more)

@@ -48,6 +48,17 @@ def object_text(found: ContactObject, estimate: Estimate) -> str:
     return f"{as_one}{found.describe()}{'' if found.fits else _UNFIT}"
 
 
+def age_text(recognised: Estimate | None, shown: Estimate) -> str | None:
+    """How much older what was recognised is than the estimate shown; None if of another contact."""
+    if recognised is None:
+        return ""
+    age = shown.host_time - recognised.host_time
+    if recognised.contact.present != shown.contact.present or not 0 <= age < _OLD:
+        return None
+    return f" ({age:.1f} s ago)" if age > _LATE else ""
+
+
+_LATE, _OLD = 0.7, 5.0  # s from which an age is shown, and nothing any more
 _SETTLED, _KEPT = 0.9, 2.0  # s that a kind must be sure to be named, and may be unsure while named
 _OF_NOW = ("position", "position_95", "force", "force_95")  # fields that are never of an older one
 
@@ -78,11 +89,12 @@ class SteadyObject:
 class ObjectRecognition(QObject):
     """Recognises the object in contact in the background, one estimate at a time.
 
-    `described` emits the text, and the two ends of it that it may do without; `found` the object
-    and the estimate that it was recognised in. Estimates that arrive meanwhile are skipped.
+    `described` emits the text, its end that it may do without, and the estimate that it is of, None
+    for a text that is not of one; `found` the object and the estimate that it was recognised in.
+    Estimates that arrive meanwhile are skipped.
     """
 
-    described = Signal(str, str, str)
+    described = Signal(str, str, object)
     found = Signal(ContactObject, Estimate)
 
     def __init__(self, tasks: Tasks, parent: QObject | None = None) -> None:
@@ -99,12 +111,12 @@ class ObjectRecognition(QObject):
         sensor = status.sensor
         if estimate is None or sensor is None:
             self._recognition.stop()
-            self.described.emit("", "", "")
+            self.described.emit("", "", None)
         elif self._key != (key := (status.connections, *_skin(sensor, status.setup))):
             self._key = key
             self._preparation.run(_finder, sensor, *key[1:])
         elif self._preparation.running:
-            self.described.emit(_PREPARING, "", "")
+            self.described.emit(_PREPARING, "", None)
         elif estimate.generation == status.generation and not self._recognition.running:
             self._recognition.run(_recognise, self._finder, estimate)
 
@@ -116,9 +128,8 @@ class ObjectRecognition(QObject):
         what, found, estimate = recognised
         found = self._steady(found, time.monotonic())
         what = what or object_text(found, estimate)
-        curvatures = curvature_text(estimate)
         more = "".join(what.partition("; ")[1:])  # the second guess, or a cause
-        self.described.emit(f"{capital(what)}{curvatures}", curvatures, more)
+        self.described.emit(capital(what), more, estimate)
         self.found.emit(found, estimate)
 
 

@@ -17,7 +17,7 @@ from kappaskin import (
     Simulator,
     load_scene,
 )
-from kappaskin.contact import NO_OBJECT, ImprintObjects
+from kappaskin.contact import NO_CONTACT, NO_OBJECT, ImprintObjects
 from kappaskin.sensing import DigitalReadings
 from kappaskin_app.features.contact import recognition
 from kappaskin_app.features.contact.recognition import SteadyObject, curvature_text, object_text
@@ -218,14 +218,32 @@ def test_a_failure_is_reported_once_and_the_next_estimate_is_described(
     told: list[str] = []
     window.statusBar().messageChanged.connect(lambda text: text and told.append(text))
 
-    def fail_once(estimate):
+    def fail_once(*_):
         monkeypatch.undo()
         raise ZeroDivisionError("once")
 
-    monkeypatch.setattr("kappaskin_app.features.contact.recognition.curvature_text", fail_once)
+    monkeypatch.setattr("kappaskin_app.features.contact.recognition.object_text", fail_once)
     until(lambda: told)
     described: list[str] = []
     window.recognition.described.connect(lambda text, *_: described.append(text))
     until(lambda: described)
 
     assert told == ["Error in the program: once"]
+
+
+def test_an_object_that_lags_shows_its_age_or_nothing(window, until) -> None:
+    line = window.display.status_bar.object
+    until(lambda: line.text().startswith("Shape unknown") and "principal" in line.text())
+    estimate = window.session.estimate
+    window.session.timer.stop()
+    show = window.features["contact"]._show_object  # noqa: SLF001
+    window.features["contact"]._describe("A ball; or a pipe", "; or a pipe", estimate)  # noqa: SLF001
+    later = replace(estimate, host_time=estimate.host_time + 1.2)
+    show(later)
+    assert line.text().startswith("A ball (1.2 s ago); or a pipe; principal curvatures")
+    show(replace(estimate, host_time=estimate.host_time + 60.0))
+    assert line.text().startswith("Principal curvatures")
+    show(replace(estimate, host_time=estimate.host_time - 1.0))  # earlier in a recording
+    assert line.text().startswith("Principal curvatures")
+    show(replace(later, contact=NO_CONTACT))
+    assert line.text() == ""
