@@ -1,6 +1,6 @@
 """Docks beside and below the skin.
 
-The columns beside it own the corners, unless what is below it does not fit between them.
+The columns beside it reach to the bottom of the window where what is below it fits between them.
 """
 
 from collections.abc import Iterator, Mapping

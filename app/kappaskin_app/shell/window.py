@@ -18,7 +18,7 @@ from kappaskin_app.shell.simulation import settings_for
 from kappaskin_app.shell.window_file import WindowSaver
 from kappaskin_app.theme import THEMES, apply_look
 from kappaskin_app.widgets.layout import widen
-from kappaskin_app.widgets.text import ERROR_BARS, ErrorBars
+from kappaskin_app.widgets.text import ERROR_BARS, Coverage
 
 _SETTINGS = "Settings: connection, load, basis, view, skin, sensor, calibration"
 _PACKED = 80  # of a picture: packs a fifth less well than Qt does, in half the time
@@ -101,7 +101,7 @@ class MainWindow(Parts):
 
     def _show_settings(self, settings: Settings, anew: bool = False) -> None:
         before = None if anew else self.display.settings
-        ErrorBars.now = ERROR_BARS[settings.error_bars]
+        Coverage.now = ERROR_BARS[settings.error_bars]
         self.panels.show_settings(settings)
         shown = self.display.colouring.possible(settings)
         self.display.show_settings(shown)

@@ -47,7 +47,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.theme import FAINT, current, follow_look, series
 from kappaskin_app.widgets.layout import page_of
 from kappaskin_app.widgets.parts import ELLIPSIS, plain_tip, text_label
-from kappaskin_app.widgets.text import ErrorBars, in_digits, round_up
+from kappaskin_app.widgets.text import Coverage, in_digits, round_up
 
 _NEAR = 12.0  # px from the mouse, within which a point is shown
 _ROOM = 0.06  # of the data's extent, on either side of marks and on a logarithmic axis
@@ -186,7 +186,7 @@ class Series:
     @property
     def off(self) -> Array:
         """The band drawn, on each side of the points."""
-        return np.zeros(1) if self.band is None else ErrorBars.now.of(self.band)
+        return np.zeros(1) if self.band is None else Coverage.now.of(self.band)
 
     @property
     def ink(self) -> QColor:
@@ -457,7 +457,7 @@ class Chart(QWidget):
         )
         if each.band is not None:
             band = self.y_axis.value_text(float(each.off[index]), spans[1])
-            y += f" \N{PLUS-MINUS SIGN} {band} ({ErrorBars.now.label})"
+            y += f" \N{PLUS-MINUS SIGN} {band} ({Coverage.now.label})"
         rows = (each.name, f"{self.y_axis.title}: {y}", f"{self.x_axis.title}: {x}")
         return "\n".join(filter(None, rows))
 

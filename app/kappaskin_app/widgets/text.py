@@ -19,14 +19,14 @@ _NORMAL_95 = 1.96  # standard deviations in the half width of a 95 % interval
 
 
 @dataclass(frozen=True)
-class ErrorBars:
-    """Error bars of so many standard deviations: `now` are those of all views."""
+class Coverage:
+    """What an error bar covers: so many standard deviations; `now` is that of all views."""
 
     label: str
     title: str
     times: float
 
-    now: ClassVar["ErrorBars"]
+    now: ClassVar["Coverage"]
 
     def of(self, sd: Any, half_width: float = math.nan) -> Any:
         """The error bar of a standard deviation, or of an array of them.
@@ -41,11 +41,11 @@ class ErrorBars:
 
 
 ERROR_BARS = {
-    "sigma": ErrorBars(ONE_SIGMA, f"{ONE_SIGMA} (68 %)", 1.0),
-    "95": ErrorBars("95 %", "95 %", _NORMAL_95),
+    "sigma": Coverage(ONE_SIGMA, f"{ONE_SIGMA} (68 %)", 1.0),
+    "95": Coverage("95 %", "95 %", _NORMAL_95),
 }
 """The error bars that may be shown, by the value of the setting."""
-ErrorBars.now = ERROR_BARS["sigma"]
+Coverage.now = ERROR_BARS["sigma"]
 
 
 def length(metres: float) -> str:

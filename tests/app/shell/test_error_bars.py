@@ -13,7 +13,7 @@ from kappaskin_app.features.contact.numbers import FACTS
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.shell.window_file import WindowFile
 from kappaskin_app.widgets.chart import Chart, ChartAxis, Series
-from kappaskin_app.widgets.text import ERROR_BARS, ErrorBars
+from kappaskin_app.widgets.text import ERROR_BARS, Coverage
 
 CONTROL = Qt.KeyboardModifier.ControlModifier
 _BAR = re.compile("\N{PLUS-MINUS SIGN} ([0-9.]+)")
@@ -22,7 +22,7 @@ _BAR = re.compile("\N{PLUS-MINUS SIGN} ([0-9.]+)")
 @pytest.fixture(autouse=True)
 def one_sigma_again():
     yield
-    ErrorBars.now = ERROR_BARS["sigma"]
+    Coverage.now = ERROR_BARS["sigma"]
 
 
 def _bar(text: str) -> float:
@@ -43,7 +43,7 @@ def test_a_chart_draws_the_error_bars_in_use_and_copies_standard_deviations(qtbo
     qtbot.addWidget(chart)
     line = Series("", np.arange(3.0), np.ones(3), band=np.full(3, 0.1))
     seen = {}
-    for name, ErrorBars.now in ERROR_BARS.items():
+    for name, Coverage.now in ERROR_BARS.items():
         chart.show_series([line])
         seen[name] = float(line.off[0])
         assert "standard deviation, N" in chart.table(",")

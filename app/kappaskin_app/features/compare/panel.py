@@ -21,7 +21,7 @@ from kappaskin_app.widgets.layout import BesideOrBelow, scrolled
 from kappaskin_app.widgets.parts import button, sentence
 from kappaskin_app.widgets.surface_map import SurfaceMap
 from kappaskin_app.widgets.table import Table
-from kappaskin_app.widgets.text import ErrorBars, length
+from kappaskin_app.widgets.text import Coverage, length
 
 _SETTINGS = (
     "other_x",
@@ -112,7 +112,7 @@ class ComparePanel(QWidget):
 
     def show_settings(self, settings: Settings) -> None:
         self.form.show_settings(settings)
-        heads = f"Error bars: {ErrorBars.now.label}", *_COLUMNS[1:]
+        heads = f"Error bars: {Coverage.now.label}", *_COLUMNS[1:]
         self.table.setHorizontalHeaderLabels(heads)
 
     def show_status(self, status: Status, old: bool) -> None:
@@ -181,7 +181,7 @@ class ComparePanel(QWidget):
             texts = (
                 f"{a.label}, {a.unit}",
                 *(e.words or with_error(e.value, _off(e), digits=e.digits) for e in (a, b)),
-                difference_text(a, b, ErrorBars.now.of(sd)),
+                difference_text(a, b, Coverage.now.of(sd)),
             )
             for column, text in enumerate(texts):
                 self.table.write(row, column, text)
@@ -202,4 +202,4 @@ def difference_text(a: Readout, b: Readout, off: float) -> str:
 
 
 def _off(of: Readout) -> float:
-    return ErrorBars.now.of(of.sd, of.half_width)
+    return Coverage.now.of(of.sd, of.half_width)

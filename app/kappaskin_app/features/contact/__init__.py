@@ -16,7 +16,7 @@ from kappaskin_app.features.contact.recognition import (
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.widgets.parts import capital
-from kappaskin_app.widgets.text import ErrorBars
+from kappaskin_app.widgets.text import Coverage
 
 _FULL_SCREEN_PERIOD, _PERIOD = 0.25, 0.5  # s between two recognitions: in full screen, and else
 _OBJECT = (
@@ -43,7 +43,7 @@ class ContactFeature:
             display.places[f"readout-{name}"] = parts
         display.places["readouts"] = [self.readouts]
         display.numbers.connect(guarded(self._show))
-        shell.settings_shown.connect(guarded(lambda _: self.readouts.show_bars(ErrorBars.now)))
+        shell.settings_shown.connect(guarded(lambda _: self.readouts.show_bars(Coverage.now)))
         display.status_shown.connect(guarded(self._follow))
         self.recognition.described.connect(guarded(self._describe))
         self.recognition.found.connect(display.object_found)

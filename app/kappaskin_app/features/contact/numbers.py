@@ -17,7 +17,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.theme import grown
 from kappaskin_app.widgets.lettering import LEFT
 from kappaskin_app.widgets.table import Table
-from kappaskin_app.widgets.text import ERROR_BARS, ErrorBars
+from kappaskin_app.widgets.text import ERROR_BARS, Coverage
 
 FACTS = ("Quantity", "Value", "Standard deviation", "Unit")
 """The head of the table of the contact as CSV, with standard deviations."""
@@ -29,7 +29,7 @@ _OTHERS = {"m": 7, "m/m": 6, "1/m": 2}  # digits of readings, in SI units
 Rows = list[tuple[str, ...]]
 
 
-def facts_of(estimate: Estimate, object_: str, bars: ErrorBars) -> Rows:
+def facts_of(estimate: Estimate, object_: str, bars: Coverage) -> Rows:
     """Rows of the contact, the `object_` in words, and the accuracy of the shape."""
     rows = Rows()
     for each in readouts(estimate):
@@ -114,7 +114,7 @@ class NumbersPanel(QWidget):
         if estimate is not None and sensor is not None:
             self._facts = facts_of(estimate, what, ERROR_BARS["sigma"])
             self._elements = elements_of(estimate, sensor)
-        bars = ErrorBars.now
+        bars = Coverage.now
         shown = facts_of(estimate, what, bars) if self._facts and estimate is not None else []
         heads = (*FACTS[:2], f"Error bar ({bars.label})", FACTS[3])
         self.facts.setHorizontalHeaderLabels(list(heads))

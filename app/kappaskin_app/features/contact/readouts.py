@@ -12,7 +12,7 @@ from kappaskin.pipeline import REPORTED, Reported, readouts_of
 from kappaskin_app.theme import FAINT, follow_look
 from kappaskin_app.widgets.line import Line
 from kappaskin_app.widgets.parts import Label
-from kappaskin_app.widgets.text import NONE, ErrorBars
+from kappaskin_app.widgets.text import NONE, Coverage
 
 _NEGLIGIBLE_SD = 0.05  # ms: a smaller error bar is omitted
 
@@ -71,14 +71,14 @@ def _contact(contact: Contact, second: Contact) -> str:
 def _place(contact: Contact) -> tuple[str, str]:
     """The position in mm, and the larger of its error bars with the unit."""
     sd, half = (1e3 * float(np.max(of)) for of in (contact.position_sd, contact.position_95))
-    off = ErrorBars.now.of(sd, half)
+    off = Coverage.now.of(sd, half)
     (x, bar), (y, _) = (rounded(1e3 * value, off, 1) for value in contact.position.tolist())
     return f"({x}, {y})", f"mm {bar}" if bar == "exact" else f"\N{PLUS-MINUS SIGN} {bar} mm"
 
 
 def _forces(*contacts: Contact) -> str:
     """The forces of two contacts, without error bars, for which there is no room."""
-    off = ErrorBars.now.of
+    off = Coverage.now.of
     texts = [
         "edge" if of.near_rim else rounded(of.force, off(of.force_sd, of.force_95))[0]
         for of in contacts
@@ -92,7 +92,7 @@ def _age(age: float, sd: float) -> str:
         return NONE
     if not math.isfinite(sd):
         return f"\N{GREATER-THAN OR EQUAL TO} {age:.0f} ms"
-    return f"{age:.0f} ms" if sd < _NEGLIGIBLE_SD else with_error(age, ErrorBars.now.of(sd), "ms")
+    return f"{age:.0f} ms" if sd < _NEGLIGIBLE_SD else with_error(age, Coverage.now.of(sd), "ms")
 
 
 class Readouts(QWidget):
@@ -152,7 +152,7 @@ class Readouts(QWidget):
             label.setFont(font)
         self._fit()
 
-    def show_bars(self, bars: ErrorBars) -> None:
+    def show_bars(self, bars: Coverage) -> None:
         """Name the error bars of the numbers that have them."""
         for (key, (name, tip)), label in zip(FIELDS.items(), self._names, strict=True):
             if key in _BARRED:
@@ -206,7 +206,7 @@ class Readouts(QWidget):
         for quantity, header in _NUMBERS:
             (found,) = readouts_of(quantity, reported)
             sign = "+" if header.signed else ""
-            off = ErrorBars.now.of(found.sd, found.half_width)
+            off = Coverage.now.of(found.sd, found.half_width)
             words = with_error(found.value, off, found.unit, found.digits, sign)
             if header.key == "force" and estimate.second.present:
                 words = _forces(estimate.contact, estimate.second)

@@ -23,7 +23,7 @@ from kappaskin.pipeline import Setup
 from kappaskin.sensing import Sensor
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.widgets.parts import capital
-from kappaskin_app.widgets.text import ErrorBars
+from kappaskin_app.widgets.text import Coverage
 
 _UNFIT = "; press it straight at one place: it may touch at several or with its rim"
 _AT_EDGE = "shape unknown (contact at the edge)"
@@ -37,7 +37,7 @@ def curvature_text(estimate: Estimate) -> str:
     if not estimate.contact.present or estimate.contact.near_rim:
         return ""
     found = zip(estimate.geometry.principal, estimate.geometry.principal_sd, strict=True)
-    bars = ErrorBars.now
+    bars = Coverage.now
     one, other = (with_error(value, bars.of(sd), "1/m", sign="+") for value, sd in found)
     return f"; principal curvatures {one} and {other} ({bars.label})"
 

@@ -19,7 +19,7 @@ from kappaskin_app.shell.drawn_skin import MM, DrawnSkin
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.theme import DIVERGING
-from kappaskin_app.widgets.text import ErrorBars
+from kappaskin_app.widgets.text import Coverage
 
 _COLOUR = "#8fd0ff"
 
@@ -40,7 +40,7 @@ class Band:
         for actor in self._actors:
             actor.visibility = sd is not None
         if sd is not None:
-            wide = MM * times * np.nan_to_num(ErrorBars.now.of(sd)).ravel()
+            wide = MM * times * np.nan_to_num(Coverage.now.of(sd)).ravel()
             for side, mesh in zip((-1, 1), self._meshes, strict=True):
                 mesh.points[:] = skin.points(height=skin.height.ravel() + side * wide)
 
@@ -194,7 +194,7 @@ class ContactFrame:
         self.cone.visibility = slope_sd is not None
         if slope_sd is not None:
             around = 2 * np.pi * np.arange(_RIM) / _RIM
-            off = ErrorBars.now.of(slope_sd)[:, None] * np.stack([np.cos(around), np.sin(around)])
+            off = Coverage.now.of(slope_sd)[:, None] * np.stack([np.cos(around), np.sin(around)])
             rim = normal + off[0, :, None] * x + off[1, :, None] * y
             rim *= length / np.linalg.norm(rim, axis=1, keepdims=True)
             self._cone.points[:] = np.vstack([origin, origin + rim])

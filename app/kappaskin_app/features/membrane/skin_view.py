@@ -22,7 +22,7 @@ from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings, locked_at
 from kappaskin_app.theme import current, follow_look
 from kappaskin_app.widgets.colour_bar import SkinScale
-from kappaskin_app.widgets.text import ErrorBars
+from kappaskin_app.widgets.text import Coverage
 from kappaskin_app.widgets.tint import Tint
 
 _MARKS = 0.06  # s between two updates of the marks
@@ -174,7 +174,7 @@ class SkinView(QObject):
             self.legend.show_colours(tint.colours, tint.ink)
         self._show_reason(name, values)
         barred = self._settings.show_band or self._settings.show_frame
-        self.membrane.error_bars = ErrorBars.now.label if barred else ""
+        self.membrane.error_bars = Coverage.now.label if barred else ""
         self.membrane.limited = times < self._settings.exaggeration
         self.membrane.show_estimate(estimate, values, tint.limits, times)
         self.scale.bar.show_tint(tint, beside)

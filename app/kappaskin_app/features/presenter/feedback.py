@@ -7,7 +7,7 @@ import numpy as np
 
 from kappaskin.contact import NO_OBJECT, ContactObject
 from kappaskin.frames import Contact, Estimate
-from kappaskin_app.widgets.text import ERROR_BARS, ErrorBars
+from kappaskin_app.widgets.text import ERROR_BARS, Coverage
 
 _ROUND = ("sphere", "cylinder")  # the kinds that have a radius
 _MOST = 10.0  # largest ratio of an object's force to that of the best point load
@@ -65,7 +65,7 @@ def feedback_of(estimate: Estimate, recognised: Recognised | None = None) -> Fee
     contact = estimate.contact
     if not contact.present:
         return None
-    bars = ErrorBars.now
+    bars = Coverage.now
     force, force_off = contact.force, bars.of(contact.force_sd, contact.force_95)
     place, reach = contact.position, float(np.max(contact.position_95))
     place_off = bars.of(float(np.max(contact.position_sd)), reach)

@@ -23,7 +23,7 @@ from kappaskin_app.widgets.lettering import (
     shrunk,
     width_of,
 )
-from kappaskin_app.widgets.text import NONE, ErrorBars
+from kappaskin_app.widgets.text import NONE, Coverage
 
 
 class Indicator(QWidget):
@@ -272,7 +272,7 @@ class ForceBar(Indicator):
         """Show a force in N with its error bar, at `now` in s; NaN for none."""
         self.force, self.force_off = abs(force), force_off
         off = force_off if math.isfinite(force_off) else 0.0
-        most = max(self.force + min(off, self.force), _SIGMAS / ErrorBars.now.times * off)
+        most = max(self.force + min(off, self.force), _SIGMAS / Coverage.now.times * off)
         self._range.follow(most, now)
         self.update()
 

@@ -32,7 +32,7 @@ from kappaskin_app.features.presenter.indicators import (
 from kappaskin_app.guard import guarded
 from kappaskin_app.theme import current, follow_look
 from kappaskin_app.widgets.lettering import CAPTION, Words, letters, shrunk
-from kappaskin_app.widgets.text import NONE, ErrorBars
+from kappaskin_app.widgets.text import NONE, Coverage
 
 _HEIGHT, _WIDTH = 1080.0, 1920.0  # px of the screen for which a unit is one px
 _SKIN, _FIGURES = 51, 49  # shares of the width
@@ -332,5 +332,5 @@ def _figure(unit: str, half: float, *values: float) -> tuple[str, str]:
     found = [rounded(value, half, 3 if unit == "N" else 1) for value in values]
     bar = found[0][1]
     text = f"{', '.join(text for text, _ in found)} {unit}"
-    off = f"\N{PLUS-MINUS SIGN} {bar} {unit} ({ErrorBars.now.label})"
+    off = f"\N{PLUS-MINUS SIGN} {bar} {unit} ({Coverage.now.label})"
     return text, off if bar not in ("", "exact") else bar

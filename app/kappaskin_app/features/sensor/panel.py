@@ -15,7 +15,7 @@ from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.scene import SHAPES
 from kappaskin_app.shell.simulation import patch_of
 from kappaskin_app.widgets.parts import Label
-from kappaskin_app.widgets.text import ErrorBars
+from kappaskin_app.widgets.text import Coverage
 
 _PREPARING = "Computing this skin; the previous one is shown until then."
 _NUMBERS = ("side_x", "side_y", "base_radius", "rim_radius")
@@ -229,7 +229,7 @@ def _tradeoff_text(tradeoff: ScanTradeoff, requested: float, without: float) -> 
     if not known:
         return text
     mm, full = (1e3 * max(bound[known]) for bound in (tradeoff.bound, tradeoff.full_bound))
-    bars = ErrorBars.now
+    bars = Coverage.now
     mm, full = bars.of(mm), bars.of(full)
     off = f"\N{PLUS-MINUS SIGN} {mm:.2f} mm ({bars.label})"
     accuracy = off if math.isfinite(mm) else "undetermined"

@@ -15,7 +15,7 @@ from kappaskin_app.guard import guarded
 from kappaskin_app.widgets.chart import Chart, ChartAxis, ChartLine, Series
 from kappaskin_app.widgets.layout import Flow
 from kappaskin_app.widgets.parts import Label
-from kappaskin_app.widgets.text import ErrorBars
+from kappaskin_app.widgets.text import Coverage
 
 MIME = "application/x-kappaskin-quantities"
 """Kind of what is dragged from a readout: names of quantities, separated by spaces."""
@@ -207,7 +207,7 @@ class StripChart(QWidget):
             box.setChecked(name in names)
         self.span.setCurrentIndex(self.span.findData(seconds))
         self.span.setVisible(not length)
-        bars = ErrorBars.now
+        bars = Coverage.now
         if self._shown == (names, seconds, length, bars):
             return
         self._shown, self._length, self.part = (names, seconds, length, bars), length, None

@@ -27,7 +27,7 @@ from kappaskin_app.shell.history import History
 from kappaskin_app.shell.selection import Selection
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings
-from kappaskin_app.widgets.text import ErrorBars
+from kappaskin_app.widgets.text import Coverage
 
 _LEAST_PERIOD = 0.002  # s between two stored frames
 _GAP = 0.5  # s without a frame, as where a replay goes elsewhere, that a curve does not cross
@@ -110,7 +110,7 @@ def title(element: int, sensor: Sensor, displacement: float, sd: float) -> str:
     It ends with which error bars those of the element are.
     """
     x, y = 1e3 * sensor.layout.positions[element]
-    bars = ErrorBars.now
+    bars = Coverage.now
     inward = with_error(displacement, bars.of(sd), "mm")
     at = f"<b>Element {element}</b> at ({x:.1f}, {y:.1f}) mm"
     return f"{at}; displacement {inward}; error bars: {bars.label}"
@@ -137,13 +137,13 @@ def _read(quantity: ReportedQuantity, reported: Reported, channel: int, scale: f
     found = [of(reported) for suffix, _, of in quantity.forms if suffix != "_95"]
     each = np.broadcast_arrays(*found, math.nan)[:2]
     value, sd = (scale * float(one.flat[channel]) for one in each)
-    return with_error(value, ErrorBars.now.of(sd), digits=quantity.shown[2], sign="+")
+    return with_error(value, Coverage.now.of(sd), digits=quantity.shown[2], sign="+")
 
 
 def _calibration_cells(calibration: Calibration | None, channel: int) -> tuple[str, str]:
     if calibration is None:
         return "1 (nominal)", "0 (nominal)"
-    c, off = calibration, ErrorBars.now.of
+    c, off = calibration, Coverage.now.of
     return (
         with_error(c.gain[channel], off(c.gain_sd[channel])),
         with_error(c.offset[channel], off(c.offset_sd[channel]), sign="+"),

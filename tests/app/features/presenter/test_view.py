@@ -16,7 +16,7 @@ from kappaskin_app.shell.badge import GAP, LIVE, LOST, OFF, SIM, STALE, WAITING
 from kappaskin_app.theme import THEMES, apply_look
 from kappaskin_app.widgets.colour_bar import SkinScale
 from kappaskin_app.widgets.lettering import CAPTION, PRIMARY
-from kappaskin_app.widgets.text import ERROR_BARS, ErrorBars
+from kappaskin_app.widgets.text import ERROR_BARS, Coverage
 from kappaskin_app.widgets.timeline import Clock
 
 CAPITAL = 55  # px: 15 mm on a screen of 24 inches, to be read from three metres
@@ -202,8 +202,8 @@ def test_a_contact_near_the_rim_has_a_grey_place_and_no_force(qtbot) -> None:
 
 def test_the_bar_is_as_long_as_five_standard_deviations_and_as_no_load_at_most(qtbot) -> None:
     view = view_of((1280, 720), qtbot)
-    for ErrorBars.now in (ERROR_BARS["95"], ERROR_BARS["sigma"]):
-        view.bar.show_force(0.1, ErrorBars.now.of(0.1), 0.0)
+    for Coverage.now in (ERROR_BARS["95"], ERROR_BARS["sigma"]):
+        view.bar.show_force(0.1, Coverage.now.of(0.1), 0.0)
         assert view.bar.at(0.49) < view.bar.scale.width()  # 5 sd of 0.1 N
     view.bar.show_force(1153.772, 1482.331, 1.0)
     assert view.bar.at(100.0) == view.bar.scale.width()
