@@ -196,9 +196,16 @@ def test_each_port_is_identified_by_what_it_sends(brief, served, saying):
     assert {url: text[: len(sent[url])] for url, text in found.items()} == sent
 
 
-def test_a_board_is_identified_at_its_baud_rate(saying):
-    ends = []
+@pytest.fixture
+def ends():
+    """Descriptors that are closed after the threads of `saying`, set up later, have ended."""
+    opened = []
+    yield opened
+    for descriptor in opened:
+        os.close(descriptor)
 
+
+def test_a_board_is_identified_at_its_baud_rate(ends, saying):
     def at_9600(number):
         here = termios.tcgetattr(ends[0])[5] == termios.B9600 if ends else False
         return numbers(number) if here else bytes(range(128, 256))
@@ -206,7 +213,6 @@ def test_a_board_is_identified_at_its_baud_rate(saying):
     url = saying(at_9600)
     ends.append(os.open(url, os.O_RDWR | os.O_NOCTTY))
     text = dict(identified_ports([url]))[url]
-    os.close(ends[0])
     assert text.startswith("sends numbers: 3 columns")
 
 
