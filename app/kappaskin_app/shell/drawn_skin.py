@@ -126,7 +126,7 @@ class DrawnSkin:
         """
         h = self.height
         h_y, h_x = (d.ravel() for d in np.gradient(h, self.cell[1] * MM, self.cell[0] * MM))
-        wider = 1 + h.ravel() * self.patch.base_curvature / MM
+        wider = 1 + h.ravel() * self.patch.arc_curvature / MM
         sine, _, cosine = self._out.T  # N = (sine, 0, cosine), so that T = (cosine, 0, -sine)
         normals = np.stack(
             [wider * sine - h_x * cosine, -wider * h_y, wider * cosine + h_x * sine], axis=-1
@@ -158,7 +158,7 @@ class DrawnSkin:
         along, across = self.height[q, columns], self.height[rows, p]
         h_x = (along[-1] - along[0]) / ((len(along) - 1) * self.cell[0] * MM)
         h_y = (across[-1] - across[0]) / ((len(across) - 1) * self.cell[1] * MM)
-        wider = 1 + self.height[q, p] * self.patch.base_curvature / MM
+        wider = 1 + self.height[q, p] * self.patch.arc_curvature / MM
         x = wider * np.array([out[2], 0.0, -out[0]]) + h_x * out
         return x, np.array([0.0, 1.0, 0.0]) + h_y * out
 
@@ -192,7 +192,7 @@ class DrawnSkin:
         Of two crossings the one next to `beside`; of none, where the line passes closest.
         """
         patch, along = self.patch, far - near
-        if not patch.base_curvature:
+        if not patch.arc_curvature:
             share = (height - near[2]) / along[2] if abs(along[2]) > 1e-9 else 0.0
             return (near + share * along)[:2] / MM
         radius = MM * patch.radius

@@ -44,8 +44,8 @@ clamped at x = 0 whose other end is free.
 
 def edges_of(patch: Patch) -> tuple[str, ...]:
     """The boundary conditions that `patch` can have, the default first."""
-    barred = {"elastic"} if patch.base_curvature else set[str]()
-    barred |= set() if patch.strip and not patch.base_curvature else {"cantilever"}
+    barred = {"elastic"} if patch.arc_curvature else set[str]()
+    barred |= set() if patch.strip and not patch.arc_curvature else {"cantilever"}
     return tuple(edge for edge in _MAKERS[type(patch)] if edge not in barred)
 
 

@@ -93,7 +93,7 @@ def curvature_terms(patch: Patch, component: str) -> list[tuple[float, Order]]:
     if component not in _ORDERS:
         raise Refusal(f"expected a component among {', '.join(COMPONENTS)}; got {component!r}")
     plain, bent = _ORDERS[component]
-    H = patch.base_curvature
+    H = patch.arc_curvature
     return [(1.0, plain)] + ([(H**2, bent)] if H and bent else [])
 
 
@@ -116,7 +116,7 @@ def curvature_at(basis: Basis, positions: Array) -> Array:
 def hoop_at(basis: Basis, positions: Array) -> Array:
     """v along an inextensible arc with v_y and v_yy, (3, P, N) per m of each function."""
     v = np.stack([basis.at(positions, -1, order) for order in range(3)])
-    return basis.patch.base_curvature * v
+    return basis.patch.arc_curvature * v
 
 
 class CurvatureMap:

@@ -68,7 +68,7 @@ class CurvatureFormMap:
 
     def __init__(self, basis: Basis, x: Array, y: Array) -> None:
         self._maps = [basis.on_grid(x, y, *order) for order in ORDERS]
-        self._base_curvature = basis.patch.base_curvature
+        self._base_curvature = basis.patch.arc_curvature
 
     def __call__(self, coefficients: Array) -> Array:
         """xx, yy and xy of K (3, ny, nx) in 1/m for `coefficients` (Ni, Nj); NaN off the skin."""
@@ -81,7 +81,7 @@ def _geometry(patch: Patch, positions: Array, jet: Jet, covariance: Array) -> Lo
 
     One jet as six numbers takes a tenth of the time of arrays of one.
     """
-    H = patch.base_curvature
+    H = patch.arc_curvature
     xx, yy, xy = _curvature_form(jet, H)
     to_form = _sensitivity(jet, H, (xx, yy, xy))
     return LocalGeometry(
@@ -171,7 +171,7 @@ def _torsion_form(jet: Jet, H: float) -> tuple[Number, Number]:
 
 def _frame(patch: Patch, positions: Array, jet: Jet) -> tuple[Array, Array, Array]:
     """Position (..., 3), Gauss frame (..., 3, 3) and metric (..., 2, 2)."""
-    s, L, m, W = _lengths(jet, patch.base_curvature)
+    s, L, m, W = _lengths(jet, patch.arc_curvature)
     f, fx, fy = jet[:3]
     zero, k = 0 * f, L / W
     x, n = (s / L, zero, -fx / L), (fx / W, s * fy / W, s / W)

@@ -105,7 +105,7 @@ def _inside_ring(skin: ElasticSkin, forces: PointForces) -> tuple[float, Array]:
     out = forces.points - centre
     rise = _rise(skin, forces, centre[None], forces.points[None])[0]
     # A bent skin is bent back by its own curvature too.
-    rise -= skin.patch.base_curvature / 2 * out[:, 0] ** 2
+    rise -= skin.patch.arc_curvature / 2 * out[:, 0] ** 2
     columns = np.column_stack([np.sum(out**2, axis=1) / 2, -out])
     weight = np.sqrt(np.abs(forces.weights))[:, None]
     solved = cast("Array", np.linalg.lstsq(weight * columns, weight[:, 0] * rise)[0])
@@ -119,12 +119,12 @@ def ring_pattern(skin: ElasticSkin, sphere: Optimum) -> Array:
     that no point is pressed in less deep than the sphere is.
     """
     q = sphere.parameters[-1]
-    if q < (_WIDE * skin.half_wave) ** 2 and not skin.patch.base_curvature:
+    if q < (_WIDE * skin.half_wave) ** 2 and not skin.patch.arc_curvature:
         return ROUND
     p = _resolved(skin, sphere)
     curvature, tilt = _inside_ring(skin, sphere.contact(p))
     out = math.sqrt(p[-1]) * _PLACES
-    gap = curvature / 2 * np.sum(out**2, axis=1) + skin.patch.base_curvature / 2 * out[:, 0] ** 2
+    gap = curvature / 2 * np.sum(out**2, axis=1) + skin.patch.arc_curvature / 2 * out[:, 0] ** 2
     share = skin.pressed(p[:2] + out, gap - out @ tilt, abs(p[2])) / abs(p[2])
     on = share > _NOTHING / 10
     share, unit = share[on] / share[on].sum(), _PLACES[on]
@@ -202,7 +202,7 @@ def fitted_cylinder(skin: ElasticSkin, cylinder: Optimum) -> Hypothesis:
     """The cylinder, with the curvature of the skin along the stronger of its two arcs."""
     parameters, contact = _resolved(skin, cylinder), cylinder.contact
     inside = _inside_arcs(skin, contact(parameters))
-    base = skin.patch.base_curvature * math.sin(parameters[3]) ** 2
+    base = skin.patch.arc_curvature * math.sin(parameters[3]) ** 2
     forces = contact(cylinder.parameters)
     of_ends = [float(forces.weights[part].sum()) for part in (slice(ARC), slice(ARC, 2 * ARC))]
     strong = int(abs(of_ends[1]) > abs(of_ends[0]))
@@ -346,7 +346,7 @@ class WeightedReadings:
     def shaped(self, sphere: Optimum) -> Optimum:
         """The sphere, its ring of forces as the bending of the skin shapes it."""
         sphere = self.again(sphere, ring(ring_pattern(self.skin, sphere)), 4)
-        for _ in range(2 if self.skin.patch.base_curvature else 1):  # further from a circle
+        for _ in range(2 if self.skin.patch.arc_curvature else 1):  # further from a circle
             again = self.again(sphere, ring(ring_pattern(self.skin, sphere)), 4)
             if again.cost > _WORSE * sphere.cost:  # the pattern has tipped over to another
                 break
@@ -484,7 +484,7 @@ def plane_prior(skin: ElasticSkin, best: Optimum, width: Width) -> float:
 
     Minus infinity on a flat skin, where a large plane touches only the edges.
     """
-    if not skin.patch.base_curvature:
+    if not skin.patch.arc_curvature:
         return -math.inf
     turn = math.remainder(best.parameters[3] - math.pi / 2, math.pi)
     aligned = -0.5 * turn**2 / (best.covariance[3, 3] + _ALIGNED**2)

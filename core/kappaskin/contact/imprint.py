@@ -142,7 +142,7 @@ class Imprints:
 
         By the curvature `form` (3, ny, nx) in 1/m and the `depth` (ny, nx) in m.
         """
-        m = (self._basis.patch.base_curvature - form[0] - form[1]) / 2
+        m = (self._basis.patch.arc_curvature - form[0] - form[1]) / 2
         inward = (depth > 0) & (m > 0)
         if not inward.any():
             return None
@@ -162,7 +162,7 @@ class Imprints:
         others = pressed.ravel()[~inward.ravel() & (away > 1)].max(initial=0.0)
         single = bool(others < _SECOND * pressed.flat[peak])
         xx, yy, _ = self._form_over(form, 2 * away)[0].tolist()
-        single = single and (self._basis.patch.base_curvature - xx - yy) / 2 > level
+        single = single and (self._basis.patch.arc_curvature - xx - yy) / 2 > level
         outside = m.ravel()[(away > _OUTSIDE[0]) & (away < _OUTSIDE[1])]
         turns = float(np.nansum(outside)) < 0
         concave, moved = float(m[region].mean()), math.dist(place, other)

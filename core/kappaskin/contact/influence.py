@@ -378,7 +378,7 @@ def _rest_of(
     patch, positions = plate.patch, np.frombuffer(places).reshape(-1, 2)
     layout = replace(SensorLayout.scattered(patch, positions), gage_length=gage_length)
     x, y = patch.grid(*_nodes(patch, len(positions)))
-    is_shell = patch.base_curvature and edge in _SINES
+    is_shell = patch.arc_curvature and edge in _SINES
     of_skin = _of_shell if is_shell else _of_functions
     rest, gives, sd = of_skin(plate, layout, edge, x, y)
     for i in range(0, len(positions), _TOGETHER):
@@ -430,7 +430,7 @@ def _summed(
 ) -> tuple[ProductBasis, Array, Array, float]:
     """Functions, their means (nx, Ni), (ny, Nj) under Gaussians at the nodes, and the sd in m."""
     sides = patch.a, patch.b
-    if edge in _SINES and not patch.base_curvature:
+    if edge in _SINES and not patch.arc_curvature:
         sd = max(_SD * min(sides), _VANISHED * max(sides) / (math.pi * _MOST_WAVES))
         Ni, Nj = (math.ceil(_VANISHED * side / (math.pi * sd)) for side in sides)
         sines = SineBasis(patch, Ni, Nj)

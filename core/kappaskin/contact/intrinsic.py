@@ -194,7 +194,7 @@ class IntrinsicContact:
 
         d(F, M) = J d(x, y, p, q), and what is told changes by L d(x, y, p, q).
         """
-        H, e_y = self.patch.base_curvature, np.array([0.0, 1.0, 0.0])
+        H, e_y = self.patch.arc_curvature, np.array([0.0, 1.0, 0.0])
         J, L = np.zeros((6, 6)), np.eye(6)
         J[:3, 2:5] = np.eye(3)
         J[3:, 0] = _across(t) @ F + torque * H * t

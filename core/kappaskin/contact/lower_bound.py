@@ -30,7 +30,7 @@ class LowerBound:
     def __init__(self, plate: Plate, edge: str, seen: float = 0.0) -> None:
         self._seen = seen
         # A bent skin's force accounts for its stretch; a drum head's modulus is unknown.
-        accounted = plate.stretches or plate.patch.base_curvature or not plate.rigidity
+        accounted = plate.stretches or plate.patch.arc_curvature or not plate.rigidity
         self._h = plate.thickness or USUAL_THICKNESS
         self._beta = 0.0 if accounted else _stiffening(replace(plate, thickness=self._h), edge)
 

@@ -183,7 +183,7 @@ class ObjectFinder:
         if type(patch) is not Patch:
             fine = _COARSE
         else:
-            fine = _FINE if edge == "hinged" and not patch.base_curvature else _FINE_MIXED
+            fine = _FINE if edge == "hinged" and not patch.arc_curvature else _FINE_MIXED
         self._coarse = ElasticSkin(plate, layout, edge, _COARSE)
         self._skin = self._coarse
         if fine != _COARSE:
@@ -219,7 +219,7 @@ def _judged(skin: ElasticSkin, all_of: Hypotheses, noise: float) -> ContactObjec
     radius, radius_95 = _radius(skin, width, reach)
     fits = all_of.noise <= _WELL * noise
     known = probability[kind] >= _SURE
-    flat = not skin.patch.base_curvature
+    flat = not skin.patch.arc_curvature
     if flat:
         fits = fits and all_of.weighted.chance(found.best) >= _LEVEL
     if kind != "sphere":
@@ -267,7 +267,7 @@ def _length(found: Hypothesis, reach: float) -> tuple[float, float]:
 
 def _radius(skin: ElasticSkin, width: Width, reach: float) -> tuple[float, tuple[float, float]]:
     """The radius in m and its interval of `reach` standard deviations."""
-    bent = skin.patch.base_curvature
+    bent = skin.patch.arc_curvature
     low, high = width.q - reach * width.sd, max(width.q, 0.0) + reach * width.sd
     flattest, best = width.curvature(high), width.curvature(width.q)
     resolved = not bent or width.q > skin.half_wave**2

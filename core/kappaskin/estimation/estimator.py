@@ -212,7 +212,7 @@ class Estimator(ABC):
         patch, (Ni, Nj) = self.basis.patch, self.basis.shape
         at = patch.grid(*(min(4 * count + 1, _FINEST) for count in (Ni, Nj)))
         terms = [[(1.0, (1, 0))], [(1.0, (0, 1))]]
-        if H := patch.base_curvature:
+        if H := patch.arc_curvature:
             terms[0].append((H**2, (-1, 0)))
         return [[(h, self.basis.on_grid(*at, *order)) for h, order in each] for each in terms]
 
@@ -347,7 +347,7 @@ class Estimator(ABC):
     def _moves_as_a_whole(self) -> bool:
         """Whether a function of the basis changes no curvature anywhere; only arcs may have one."""
         patch, W = self.basis.patch, self.basis.free
-        if not (patch.strip and patch.base_curvature):
+        if not (patch.strip and patch.arc_curvature):
             return False
         x, y = patch.cell_centres(2 * self.basis.size + 1, 1)
         bends = curvature_at(self.basis, np.column_stack([x, np.repeat(y, len(x))]))[0]

@@ -520,7 +520,7 @@ def _sines(basis: Basis, layout: SensorLayout) -> SineBasis:
             f"expected sines (a hinged rectangle) for the fast transforms, got "
             f"{type(basis).__name__}; use least-squares"
         )
-    if basis.patch.base_curvature:
+    if basis.patch.arc_curvature:
         raise Refusal(
             f"expected a flat skin for the fast transforms, got a {basis.patch.name}: on a "
             "bent skin the functions are not orthogonal; use least-squares"

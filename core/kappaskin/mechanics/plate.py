@@ -141,7 +141,7 @@ class Plate:
                 "expected a rigidity above zero in N m with a thickness: its modulus follows from "
                 "both; omit the thickness of a drum head"
             )
-        flat = not self.patch.base_curvature
+        flat = not self.patch.arc_curvature
         possible = INPLANE[:-1] if flat else INPLANE
         if self.inplane and self.inplane not in possible:
             raise Refusal(
@@ -165,7 +165,7 @@ class Plate:
     @property
     def sheet_thickness(self) -> float | None:
         """Thickness h in m by which it stretches; None for a flat skin that was given none."""
-        if self.thickness is not None or not self.patch.base_curvature:
+        if self.thickness is not None or not self.patch.arc_curvature:
             return self.thickness
         D, C = self.rigidity, self.axial_stiffness
         return math.sqrt(12 * (1 - self.poisson**2) * D / C) if D and C else USUAL_THICKNESS
@@ -173,12 +173,12 @@ class Plate:
     @property
     def inplane_edge(self) -> str:
         """How its edge is held in its plane, one of `INPLANE`."""
-        return self.inplane or ("hoop" if self.patch.base_curvature else "held")
+        return self.inplane or ("hoop" if self.patch.arc_curvature else "held")
 
     @property
     def stretches(self) -> bool:
         """Whether it is a flat rectangle or strip of known thickness, as `Stretching` needs."""
-        flat = type(self.patch) is Patch and not self.patch.base_curvature
+        flat = type(self.patch) is Patch and not self.patch.arc_curvature
         return flat and self.thickness is not None
 
     def modulus(self, h: float) -> float:
@@ -207,7 +207,7 @@ class Plate:
         """
         if basis.patch != self.patch:
             raise Refusal(f"the plate is on {self.patch}, the basis on {basis.patch}; use one")
-        if isinstance(basis, SineBasis) and not self.patch.base_curvature:
+        if isinstance(basis, SineBasis) and not self.patch.arc_curvature:
             k2 = basis.laplacian.ravel()
             area = self.patch.a * self.patch.b / (2 if self.patch.strip else 4)
             stiffness = self.rigidity * k2**2 + self.tension * k2 + self.foundation
@@ -235,7 +235,7 @@ class Plate:
 
         The planar arc and a bent drum head are inextensible: v_x = H f.
         """
-        return bool(self.patch.base_curvature and self.rigidity) and not self.patch.strip
+        return bool(self.patch.arc_curvature and self.rigidity) and not self.patch.strip
 
     def sheet(self, sliding: bool = False) -> Sheet:
         """The bent sheet that it is; `sliding` edges let v go however they are held in plane."""
@@ -253,7 +253,7 @@ class Plate:
 
     def _stiffness(self, basis: Basis) -> tuple[Array, Array]:
         """Stiffness matrix (N, N) in N/m, and the same without its negative terms, for scaling."""
-        nu, H, overlap = self.poisson, self.patch.base_curvature, overlaps(basis)
+        nu, H, overlap = self.poisson, self.patch.arc_curvature, overlaps(basis)
         xx, yy, xy = (2, 0), (0, 2), (1, 1)
         # Of modes, half the time it takes is theirs.
         squares = overlap((0, 0), (0, 0)) if H or self.foundation else 0.0
@@ -282,7 +282,7 @@ class Plate:
     def _by_ritz(self, basis: Basis) -> Array:
         """Inverse (N, N) of the stiffness, scaled so that it is well conditioned."""
         K, bare = self._stiffness(basis)
-        inextensible = self.patch.base_curvature and not self._is_shell
+        inextensible = self.patch.arc_curvature and not self._is_shell
         W = np.eye(basis.size) if basis.free is None or not inextensible else basis.free
         scale = np.sqrt(np.diag(W.T @ bare @ W))
         values, vectors = np.linalg.eigh(W.T @ K @ W / np.multiply.outer(scale, scale))

@@ -131,7 +131,7 @@ class _Arc:
 
     def _strains(self) -> Array:
         """Strains (3, 9, X, n) by powers of q: e_x, e_y, g, k_x, k_y, t, f_x, f_y, f."""
-        H, F, V, U = self._sheet.patch.base_curvature, self.f, self.v, self.u
+        H, F, V, U = self._sheet.patch.arc_curvature, self.f, self.v, self.u
         f, v, u = self._fields
         S = np.zeros((3, 9, len(self.x), self.size))
         S[0, 0, :, F], S[0, 0, :, V] = -H * f[0], v[1]
@@ -146,7 +146,7 @@ class _Arc:
     def _law(self) -> Array:
         sheet = self._sheet
         C, D, nu, T = sheet.C, sheet.D, sheet.nu, sheet.T
-        squares = sheet.k_f - T * sheet.patch.base_curvature**2
+        squares = sheet.k_f - T * sheet.patch.arc_curvature**2
         law = np.diag([C, C, C * (1 - nu) / 2, D, D, 2 * D * (1 - nu), T, T, squares])
         law[0, 1] = law[1, 0] = nu * C
         law[3, 4] = law[4, 3] = nu * D
@@ -165,7 +165,7 @@ class Tangential:
             raise TypeError(f"a bent skin has products of functions, got {type(basis).__name__}")
         Ni, Nj = basis.shape
         a, b = sheet.patch.a, sheet.patch.b
-        self._basis, self._H = basis, sheet.patch.base_curvature
+        self._basis, self._H = basis, sheet.patch.arc_curvature
         self._arc = arc = _Arc(sheet, self._along, 2 * Ni + 16)
         waves = Nj if isinstance(basis, SineBasis) else 2 * Nj + 16
         self._q = np.pi / b * np.arange(1.0, waves + 1)
@@ -313,7 +313,7 @@ class Shell:
         They are the factors of sin(q y), sin(q y) and cos(q y). A gage along a diagonal reads the
         mean of (xx + yy) / 2 + xy or - xy; the twist is half of what the two differ by.
         """
-        H, q = self._sheet.patch.base_curvature, self._q[:, None]
+        H, q = self._sheet.patch.arc_curvature, self._q[:, None]
         s, w = _along_gage(gage_length)
         f, _, fxx, _, _ = self._arc.rows(np.add.outer(s, x))
         straight = self._arc.rows(x)[0]

@@ -53,7 +53,7 @@ class Stretching:
         if h is None or not plate.stretches or not isinstance(basis, ProductBasis):
             raise Refusal(
                 "stretching needs a flat rectangular plate or strip whose thickness is given, got "
-                f"a {patch.name} with thickness {h} m and base curvature {patch.base_curvature:g}"
+                f"a {patch.name} with thickness {h} m and base curvature {patch.arc_curvature:g}"
             )
         if basis.patch != patch:
             raise Refusal(f"the plate is on {patch}, the basis on {basis.patch}; use one")

@@ -90,7 +90,7 @@ class Quantities:
     def at_rest(self, name: str) -> float:
         """The value of a skin at rest, in SI units."""
         of = self._colours[name].at_rest
-        return 0.0 if of is None else of(self.layout.patch.base_curvature)
+        return 0.0 if of is None else of(self.layout.patch.arc_curvature)
 
     def on_surface(self, name: str, estimate: Estimate) -> Array:
         """The values (ny, nx) in SI units; NaN off the skin and where they are not known."""
@@ -139,7 +139,7 @@ class Quantities:
     @cached_property
     def _slopes(self) -> list[ValueMap]:
         """The derivatives along x and y; on a bent skin the integral along the arc too."""
-        orders = [(1, 0), (0, 1)] + [(-1, 0)] * bool(self.layout.patch.base_curvature)
+        orders = [(1, 0), (0, 1)] + [(-1, 0)] * bool(self.layout.patch.arc_curvature)
         return [self.basis.on_grid(*self.grid, *order) for order in orders]
 
     def reading(self, quantity: str, direction: float, estimate: Estimate) -> Array:
@@ -149,12 +149,12 @@ class Quantities:
             return estimate.surface
         if quantity == "slope":
             p, q, *along = (of(estimate.coefficients) for of in self._slopes)
-            return c * sum((self.layout.patch.base_curvature**2 * v for v in along), p) + s * q
+            return c * sum((self.layout.patch.arc_curvature**2 * v for v in along), p) + s * q
         xx, yy, xy = (self.change(name, estimate) for name in COMPONENTS)
         return xy if quantity == "twist" else c * c * xx + s * s * yy + 2 * c * s * xy
 
     def form_at_elements(self, curvature: Array) -> Array:
         """The curvature form (3, P) in 1/m as the elements read it, where slopes are small."""
         patch = self.layout.patch
-        form = curvature + np.array([[patch.base_curvature], [0.0], [0.0]])
+        form = curvature + np.array([[patch.arc_curvature], [0.0], [0.0]])
         return np.where([[False], [True], [True]], 0.0, form) if patch.strip else form

@@ -111,7 +111,7 @@ class Reported:
         t, e, normal = geometry.frame.tolist()
         (L, m), (_, k) = geometry.metric.tolist()
         (xx, xy), (_, yy) = geometry.curvature_form.tolist()
-        angle = (x - patch.a / 2) * patch.base_curvature
+        angle = (x - patch.a / 2) * patch.arc_curvature
         n0 = math.sin(angle), 0.0, math.cos(angle)
         spread = [
             math.hypot(L * t[i] * x_sd, (m * t[i] + k * e[i]) * y_sd, n0[i] * f_sd)

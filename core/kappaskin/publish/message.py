@@ -229,7 +229,7 @@ class SourceState:
         numbers = (
             round(self.rate, 1),
             round(age, 6) if math.isfinite(age) else None,
-            *((patch.a, patch.b, patch.base_curvature) if patch else (None, None, None)),
+            *((patch.a, patch.b, patch.arc_curvature) if patch else (None, None, None)),
         )
         fields = {
             "kind": "status",

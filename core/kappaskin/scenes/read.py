@@ -489,7 +489,7 @@ def check_elements(m: int, n: int = 1) -> None:
 def _check_functions(patch: Patch, edge: str, counts: tuple[int, int], elements: int) -> None:
     """Refuse more functions of the true shape than can be computed in a few seconds."""
     whole = isinstance(patch, Disk | Polygon)
-    mix = whole or patch.base_curvature or edge != "hinged"
+    mix = whole or patch.arc_curvature or edge != "hinged"
     most = _MOST_THAT_MIX if mix else _MOST_FUNCTIONS
     most = min(most, _MOST_VALUES // (3 * elements))
     if min(counts) > 0 and counts[0] * counts[1] > most:

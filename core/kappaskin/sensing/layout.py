@@ -55,7 +55,7 @@ def _along(basis: Basis, positions: Array, L: float, curvature: ValuesAt, t: Arr
     """
     if not L:
         return _normal(curvature(positions), t)
-    if basis.patch.base_curvature:
+    if basis.patch.arc_curvature:
         return _over_gage(lambda places: _normal(curvature(places), t), positions, L, t)
     half = L / 2 * t
     return (_slope(basis, positions + half, t) - _slope(basis, positions - half, t)) / L
@@ -583,7 +583,7 @@ class SensorLayout:
         self, reads: Readings, basis: Basis, plate: Plate | None, curvature: ValuesAt
     ) -> Array:
         """The operator (R, N), quantity by quantity."""
-        M, L, H = np.empty((self.channels, basis.size)), self.gage_length, self.patch.base_curvature
+        M, L, H = np.empty((self.channels, basis.size)), self.gage_length, self.patch.arc_curvature
         for name in dict.fromkeys(name for name, _ in self.kinds):
             own = np.flatnonzero(reads.quantity == name)
             at, t = self.positions[reads.element[own]], reads.along[own]
@@ -725,7 +725,7 @@ class NormalCurvature:
         dtype: DTypeLike = np.float64,
         plate: Plate | None = None,
     ) -> None:
-        places, H = layout.positions, basis.patch.base_curvature
+        places, H = layout.positions, basis.patch.arc_curvature
         at = [basis.at(places, 1, 0), basis.at(places, 0, 1)]
         if H:
             v, *turns = plate.hoop(basis, places) if plate else hoop_at(basis, places)

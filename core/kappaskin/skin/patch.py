@@ -181,10 +181,10 @@ class Patch:
     def name(self) -> str:
         """A short description for messages."""
         what = f"{'strip' if self.strip else 'patch'} of {self.a:g} x {self.b:g} m"
-        return f"{what} bent to {self.radius:g} m" if self.base_curvature else what
+        return f"{what} bent to {self.radius:g} m" if self.arc_curvature else what
 
     @property
-    def base_curvature(self) -> float:
+    def arc_curvature(self) -> float:
         """1 / radius in 1/m; zero when flat."""
         return 1 / self.radius
 
@@ -238,7 +238,7 @@ class Patch:
         """Points (..., 3) in m and outward unit normals (..., 3) of the skin at rest."""
         points, normals = np.zeros((2, *positions.shape[:-1], 3))
         points[..., :2] = positions
-        if not self.base_curvature:
+        if not self.arc_curvature:
             normals[..., 2] = 1.0
             return points, normals
         angle = (positions[..., 0] - self.a / 2) / self.radius

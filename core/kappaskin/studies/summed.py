@@ -40,7 +40,7 @@ class SummedResponse:
     @staticmethod
     def is_known(scene: Scene) -> bool:
         """Whether the response is known: of a flat skin with hinged edges, under loads."""
-        flat = isinstance(scene.basis, SineBasis) and not scene.plate.patch.base_curvature
+        flat = isinstance(scene.basis, SineBasis) and not scene.plate.patch.arc_curvature
         return flat and scene.indenter is None
 
     def errors(

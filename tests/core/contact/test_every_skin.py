@@ -117,7 +117,7 @@ def test_with_the_same_functions_the_contact_comes_back(held_skin):
 
 
 @pytest.mark.slow
-@pytest.mark.where(which=lambda held: is_rectangle(held) and not held.patch.base_curvature)
+@pytest.mark.where(which=lambda held: is_rectangle(held) and not held.patch.arc_curvature)
 def test_on_a_flat_rectangle_a_finer_series_is_found(held_skin):
     """Of the table of what the edges make of a load.
 

@@ -160,7 +160,7 @@ def smooth_shape(basis, slope, seed=0):
     places = np.column_stack([np.tile(x, 61), np.repeat(y, 61)])
     places = places[patch.contains(places)]
     p, q = (basis.at(places, *order) @ c.ravel() for order in ((1, 0), (0, 1)))
-    if H := patch.base_curvature:
+    if H := patch.arc_curvature:
         p = p + H**2 * basis.at(places, -1, 0) @ c.ravel()
     return c * slope / np.sqrt(p**2 + q**2).max()
 
@@ -336,7 +336,7 @@ def test_next_to_no_signal_is_least_squares(name, signal):
     answer, plain = FiniteSlopeLeastSquares(basis, layout)(K), LeastSquares(basis, layout)(K)
 
     # On a bent skin readings are known to the rounding of its curvature at rest.
-    rounding = 1e-14 * basis.patch.base_curvature * np.abs(plain.unit_sd).max()
+    rounding = 1e-14 * basis.patch.arc_curvature * np.abs(plain.unit_sd).max()
     scale = np.abs(plain.coefficients).max()
     np.testing.assert_allclose(
         answer.coefficients, plain.coefficients, rtol=0, atol=1e-6 * scale + 10 * rounding

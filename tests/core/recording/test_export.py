@@ -364,7 +364,7 @@ def test_the_surface_is_as_large_as_the_skin_and_faces_outwards(held_skin) -> No
 
 def test_a_skin_at_rest_has_its_base_curvature_everywhere(held_skin) -> None:
     surface, _ = shape_on(held_skin, 0.0)
-    H = held_skin.patch.base_curvature
+    H = held_skin.patch.arc_curvature
     np.testing.assert_allclose(
         surface.curvature, np.broadcast_to((H, 0.0, 0.0), surface.curvature.shape), atol=1e-9
     )

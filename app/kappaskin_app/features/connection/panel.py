@@ -441,7 +441,7 @@ def _sensor_text(sensor: Sensor, calibration: Calibration | None) -> str:
     sensing = live[:1] if bends else live
     dead = int((~sensing).sum())
     a, b, radius = (round(1e3 * length, 1) for length in (patch.a, patch.b, patch.radius))
-    bent = f", radius {radius:g} mm" if patch.base_curvature else ""
+    bent = f", radius {radius:g} mm" if patch.arc_curvature else ""
     health = f"\n{dead} of {sensing.size} channels dead" if dead else ""
     name = printable(f"{sensor.name} ({sensor.serial_number})")
     calibrated = f"\n{calibration_text(calibration)}" if calibration else ""

@@ -113,7 +113,7 @@ class StretchingPanel(SimulationForm):
     def show_settings(self, settings: Settings) -> None:
         super().show_settings(settings)
         with suppress(Refusal):  # shown with the shape
-            flat = not patch_of(settings).base_curvature
+            flat = not patch_of(settings).arc_curvature
             self.offer("inplane", ("", *(INPLANE[:-1] if flat else INPLANE)))
 
 
