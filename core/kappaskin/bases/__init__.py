@@ -36,15 +36,16 @@ _MAKERS: dict[type[Patch], dict[str, _Maker]] = {
 EDGES = tuple(_MAKERS[Patch])
 """Boundary conditions by name.
 
-`hinged`, with the ends of an arc pinned; `sliding`, with these free to slide; `clamped`, which
-fixes the slope too; `elastic`, a flat rectangle on an elastic rim; `cantilever`, a flat strip
-clamped at x = 0 whose other end is free.
+`hinged`, with the ends of an arc pinned; `sliding`, with these free to slide, and not of a shallow
+skin; `clamped`, which fixes the slope too; `elastic`, a flat rectangle on an elastic rim;
+`cantilever`, a flat strip clamped at x = 0 whose other end is free.
 """
 
 
 def edges_of(patch: Patch) -> tuple[str, ...]:
     """The boundary conditions that `patch` can have, the default first."""
-    barred = {"elastic"} if patch.arc_curvature else set[str]()
+    barred = {"elastic"} if any(patch.curvatures) else set[str]()
+    barred |= {"sliding"} if patch.is_shallow else set()
     barred |= set() if patch.strip and not patch.arc_curvature else {"cantilever"}
     return tuple(edge for edge in _MAKERS[type(patch)] if edge not in barred)
 

@@ -85,16 +85,19 @@ class Basis(Protocol):
 # A fit of the shape knows no loads and no stiffness, and nothing better of v and u; where they are
 # known, mechanics has them (`Plate.curvature`). Of a skin 0.25 mm thick, half round (R 12.9 mm),
 # the twist differs by 2 % of its peak, and the shape so fitted by 5 % in RMS.
-_ORDERS = {"xx": ((2, 0), (0, 0)), "yy": ((0, 2), None), "xy": ((1, 1), (-1, 1))}
+# A shallow skin's tangential displacements are neglected in bending and twist (Marguerre):
+#     xx: f_xx + f / Rx^2,    yy: f_yy + f / Ry^2,    xy: f_xy.
+_ORDERS = {"xx": (2, 0), "yy": (0, 2), "xy": (1, 1)}
 
 
 def curvature_terms(patch: Patch, component: str) -> list[tuple[float, Order]]:
     """The factors and derivative orders whose sum is a `component` of curvature."""
     if component not in _ORDERS:
         raise Refusal(f"expected a component among {', '.join(COMPONENTS)}; got {component!r}")
-    plain, bent = _ORDERS[component]
-    H = patch.arc_curvature
-    return [(1.0, plain)] + ([(H**2, bent)] if H and bent else [])
+    Hx, Hy = patch.curvatures
+    bent = {"xx": (Hx, (0, 0)), "yy": (Hy, (0, 0)), "xy": (patch.arc_curvature, (-1, 1))}
+    H, order = bent[component]
+    return [(1.0, _ORDERS[component])] + ([(H**2, order)] if H else [])
 
 
 def curvature_at(basis: Basis, positions: Array) -> Array:

@@ -393,7 +393,7 @@ def _of_functions(
     plate: Plate, layout: SensorLayout, edge: str, x: Array, y: Array
 ) -> tuple[Array, Array, float]:
     """Readings (ny, nx, 3, P) under a Gaussian load at each node, and the rest of `_rest_of`."""
-    basis, along_x, along_y, sd = _summed(plate.patch, edge, x, y)
+    basis, along_x, along_y, sd = _summed(plate, edge, x, y)
     compliance, unit = plate.compliance(basis), 8 * math.pi * plate.rigidity
     T = np.empty((len(y), len(x), 3, len(layout)))
     for i in range(0, len(layout), _TOGETHER):
@@ -426,11 +426,12 @@ def _nodes(patch: Patch, elements: int) -> tuple[int, int]:
 
 
 def _summed(
-    patch: Patch, edge: str, x: Array, y: Array
+    plate: Plate, edge: str, x: Array, y: Array
 ) -> tuple[ProductBasis, Array, Array, float]:
     """Functions, their means (nx, Ni), (ny, Nj) under Gaussians at the nodes, and the sd in m."""
+    patch = plate.patch
     sides = patch.a, patch.b
-    if edge in _SINES and not patch.arc_curvature:
+    if edge in _SINES and not plate.mixes_sines:
         sd = max(_SD * min(sides), _VANISHED * max(sides) / (math.pi * _MOST_WAVES))
         Ni, Nj = (math.ceil(_VANISHED * side / (math.pi * sd)) for side in sides)
         sines = SineBasis(patch, Ni, Nj)

@@ -20,7 +20,7 @@ from kappaskin.bases import (
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics.loads import Load, is_point
-from kappaskin.mechanics.shell import Sheet, Tangential
+from kappaskin.mechanics.shell import Sheet, Tangential, shallow_stiffness
 from kappaskin.skin import Patch
 
 
@@ -67,8 +67,9 @@ INPLANE = ("held", "diaphragm", "free", "hoop")
 
 `held`: no displacement. `diaphragm`: no membrane force across the edge, no displacement along it.
 `free`: no membrane force across the edge, no shear. `hoop`, of a bent skin: the hoop displacement
-is held, the axial one free. Of a bent skin they are those of the straight edges; the curved ones
-hold the radial and the hoop displacement and leave the axial one free.
+is held, the axial one free. Of a cylinder skin they are those of the straight edges; the curved
+ones hold the radial and the hoop displacement and leave the axial one free. Of a shallow skin, as
+of a flat one, they are those of all four edges, and there is no `hoop`.
 """
 
 
@@ -94,8 +95,8 @@ class Plate:
     of 0.1 x 0.1 m in by 5 mm. `thickness` h in m of a uniform sheet: a flat skin that was given
     none does not stretch, a bent one is 0.25 mm thick, or as its `axial_stiffness` E h in N/m has
     it, unless that is zero. `inplane` is how its edge is held in its plane, one of `INPLANE`; empty
-    means `held`, of a bent skin `hoop`. Of an `unknown_material` no force is told; a simulation
-    bends it like any other.
+    means `held`, of a skin of one radius `hoop`, of one of two radii `diaphragm`. Of an
+    `unknown_material` no force is told; a simulation bends it like any other.
     """
 
     patch: Patch
@@ -141,12 +142,12 @@ class Plate:
                 "expected a rigidity above zero in N m with a thickness: its modulus follows from "
                 "both; omit the thickness of a drum head"
             )
-        flat = not self.patch.arc_curvature
-        possible = INPLANE[:-1] if flat else INPLANE
+        possible = INPLANE if self.patch.arc_curvature else INPLANE[:-1]
         if self.inplane and self.inplane not in possible:
             raise Refusal(
-                f"expected inplane among {', '.join(possible)} for a {'flat' if flat else 'bent'} "
-                f"skin, got {self.inplane!r:.40}"
+                f"expected inplane among {', '.join(possible)} for a "
+                f"{self.patch.name if any(self.patch.curvatures) else 'flat skin'}, got "
+                f"{self.inplane!r:.40}"
             )
 
     @classmethod
@@ -165,7 +166,7 @@ class Plate:
     @property
     def sheet_thickness(self) -> float | None:
         """Thickness h in m by which it stretches; None for a flat skin that was given none."""
-        if self.thickness is not None or not self.patch.arc_curvature:
+        if self.thickness is not None or not any(self.patch.curvatures):
             return self.thickness
         D, C = self.rigidity, self.axial_stiffness
         return math.sqrt(12 * (1 - self.poisson**2) * D / C) if D and C else USUAL_THICKNESS
@@ -173,12 +174,13 @@ class Plate:
     @property
     def inplane_edge(self) -> str:
         """How its edge is held in its plane, one of `INPLANE`."""
-        return self.inplane or ("hoop" if self.patch.arc_curvature else "held")
+        usual = "hoop" if self.patch.arc_curvature else "held"
+        return self.inplane or ("diaphragm" if isinstance(self.patch.radius, tuple) else usual)
 
     @property
     def stretches(self) -> bool:
         """Whether it is a flat rectangle or strip of known thickness, as `Stretching` needs."""
-        flat = type(self.patch) is Patch and not self.patch.arc_curvature
+        flat = type(self.patch) is Patch and not any(self.patch.curvatures)
         return flat and self.thickness is not None
 
     def modulus(self, h: float) -> float:
@@ -201,16 +203,24 @@ class Plate:
             )
 
     def compliance(self, basis: Basis) -> Compliance:
-        """The compliance by Ritz's method; in closed form for sines on a flat skin.
+        """The compliance by Ritz's method; in closed form where it does not mix sines.
 
-        There it is 4 / (a b (D k^4 + T k^2 + k_f)) with k^2 = k_i^2 + k_j^2 (Eq. 9, extended).
+        There it is 4 / (a b K) with K = D k^4 + T k^2 + k_f and k^2 = k_i^2 + k_j^2 (Eq. 9,
+        extended), of a shallow skin with diaphragms E h (k_i^2 / Ry + k_j^2 / Rx)^2 / k^4 more
+        (Reissner; Marguerre), less T (1 / Rx^2 + 1 / Ry^2) under the pressure that makes T.
         """
         if basis.patch != self.patch:
             raise Refusal(f"the plate is on {self.patch}, the basis on {basis.patch}; use one")
-        if isinstance(basis, SineBasis) and not self.patch.arc_curvature:
-            k2 = basis.laplacian.ravel()
+        if isinstance(basis, SineBasis) and not self.mixes_sines:
+            k2, (Hx, Hy) = basis.laplacian.ravel(), self.patch.curvatures
             area = self.patch.a * self.patch.b / (2 if self.patch.strip else 4)
             stiffness = self.rigidity * k2**2 + self.tension * k2 + self.foundation
+            if self.patch.is_shallow:
+                ki, kj = basis.wavenumbers
+                stretch = np.add.outer(ki**2 * Hy, kj**2 * Hx).ravel() / k2
+                stiffness += (1 - self.poisson**2) * self.membrane_stiffness * stretch**2
+                stiffness -= self.tension * (Hx**2 + Hy**2)
+                self._check_held(bool((stiffness > 0).all()))
             values: Array = 1 / (area * stiffness)
         else:
             values = self._by_ritz(basis)
@@ -228,6 +238,12 @@ class Plate:
         # An arc whose ends are pinned keeps the volume already: no pressure moves it.
         isochoric = swelling <= 1e-12 * (volume @ volume) * np.abs(values).max()
         return Compliance(values, None if isochoric else volume)
+
+    @property
+    def mixes_sines(self) -> bool:
+        """Whether a load that is a sine each way moves it in others too."""
+        shallow = self.patch.is_shallow and self.inplane_edge != "diaphragm"
+        return bool(self.patch.arc_curvature) or (shallow and self.membrane_stiffness > 0)
 
     @property
     def _is_shell(self) -> bool:
@@ -253,7 +269,8 @@ class Plate:
 
     def _stiffness(self, basis: Basis) -> tuple[Array, Array]:
         """Stiffness matrix (N, N) in N/m, and the same without its negative terms, for scaling."""
-        nu, H, overlap = self.poisson, self.patch.arc_curvature, overlaps(basis)
+        nu, (Hx, Hy), overlap = self.poisson, self.patch.curvatures, overlaps(basis)
+        H = math.hypot(Hx, Hy)
         xx, yy, xy = (2, 0), (0, 2), (1, 1)
         # Of modes, half the time it takes is theirs.
         squares = overlap((0, 0), (0, 0)) if H or self.foundation else 0.0
@@ -273,6 +290,9 @@ class Plate:
         if self._is_shell:
             whole += self.membrane_stiffness * H**2 * squares
             negative += self._tangential(basis).relief
+        elif self.patch.is_shallow:
+            in_plane = self.membrane_stiffness, nu, self.inplane_edge
+            whole += shallow_stiffness(self.patch, *in_plane, basis)
         elif self.patch.strip:
             both = overlap(xx, (0, 0))
             whole += self.rigidity * H**4 * squares
@@ -286,14 +306,18 @@ class Plate:
         W = np.eye(basis.size) if basis.free is None or not inextensible else basis.free
         scale = np.sqrt(np.diag(W.T @ bare @ W))
         values, vectors = np.linalg.eigh(W.T @ K @ W / np.multiply.outer(scale, scale))
-        if not values[0] > 1e-13 * values[-1]:
+        self._check_held(bool(values[0] > 1e-13 * values[-1]))
+        V = W @ (vectors / scale[:, None])
+        return (V / values) @ V.T
+
+    @staticmethod
+    def _check_held(held: bool) -> None:
+        if not held:
             raise Refusal(
                 "the skin moves as a whole without bending: expected edges that hold it; pin the "
                 "ends of the arc, use an opening angle below 180 degrees, springs below an elastic "
                 "rim, or foam below the skin"
             )
-        V = W @ (vectors / scale[:, None])
-        return (V / values) @ V.T
 
     def curvature(self, basis: Basis) -> Callable[[Array], Array]:
         """The map from positions (P, 2) in m to the curvature (3, P, N) in 1/m per m of functions.

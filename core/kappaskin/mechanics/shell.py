@@ -209,6 +209,54 @@ class Tangential:
         return np.stack([xx + self._H**2 * f, yy, xy + self._H / 2 * twist])
 
 
+# A shallow skin (Marguerre): strains e_x = u_x - f / Rx, e_y = v_y - f / Ry, g = u_y + v_x with u
+# along x and v along y, and the bending of a plate. Stretching adds the energy of the u and v that
+# make it least.
+
+_IN_PLANE = 16  # functions of u and v along a side, more than f has
+
+
+def shallow_stiffness(patch: Patch, C: float, nu: float, inplane: str, basis: Basis) -> Array:
+    """What stretching adds to the stiffness (N, N) in N/m of the functions of a `basis`.
+
+    `C` = E h / (1 - nu^2) in N/m; `inplane` is one of `held`, `diaphragm` and `free`.
+    """
+    if not isinstance(basis, ProductBasis):
+        raise TypeError(f"a shallow skin has products of functions, got {type(basis).__name__}")
+    sides = (patch.a, basis.Ni), (patch.b, basis.Nj)
+    rules = [gauss(side, 2 * count + 2 * _IN_PLANE) for side, count in sides]
+    fixed, loose = list[Array](), list[Array]()  # by x and by y, with derivatives (2, X, n)
+    for (points, _), (side, count) in zip(rules, sides, strict=True):
+        fixed.append(_once(side, count + _IN_PLANE, points))
+        loose.append(np.dstack([_lines(side, points), fixed[-1]]))
+    across = fixed if inplane == "held" else loose
+    along_edge = loose if inplane == "free" else fixed
+    u, v = (across[0], along_edge[1]), (along_edge[0], across[1])
+    maps, shear = basis.on_grid(rules[0][0], rules[1][0]), (1 - nu) / 2
+    f: tuple[Array, Array] = maps.X, maps.Y
+    (u_x, u_y), (v_x, v_y) = (((X[1], Y[0]), (X[0], Y[1])) for X, Y in (u, v))
+
+    def product(one: tuple[Array, Array], other: tuple[Array, Array]) -> Array:
+        (_, x), (_, y) = rules
+        found: Array = np.kron((one[0].T * x) @ other[0], (one[1].T * y) @ other[1])
+        return found
+
+    K_u = product(u_x, u_x) + shear * product(u_y, u_y)
+    K_v = product(v_y, v_y) + shear * product(v_x, v_x)
+    mixed = nu * product(u_x, v_y) + shear * product(u_y, v_x)
+    stiffness: Array = np.block([[K_u, mixed], [mixed.T, K_v]])
+    Hx, Hy = patch.curvatures
+    coupled: Array = np.hstack([(Hx + nu * Hy) * product(f, u_x), (Hy + nu * Hx) * product(f, v_y)])
+    if inplane == "free":  # of two translations and a rotation, which strain nothing
+        strained = np.isin(np.arange(len(stiffness)), [0, 1, len(K_u)], invert=True)
+        stiffness, coupled = stiffness[np.ix_(strained, strained)], coupled[:, strained]
+    scale = 1 / np.sqrt(np.diag(stiffness))
+    coupled *= scale
+    relief = coupled @ np.linalg.solve(stiffness * np.multiply.outer(scale, scale), coupled.T)
+    stiffened: Array = (Hx**2 + Hy**2 + 2 * nu * Hx * Hy) * product(f, f) - relief
+    return C * stiffened
+
+
 _MOST_FUNCTIONS, _MOST_WAVES = 96, 160
 _DIAGONAL = 1 / math.sqrt(2)
 _POINTS = 12  # along a gage: exact to rounding for waves as short as the gage

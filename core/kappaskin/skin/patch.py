@@ -145,6 +145,7 @@ _MARGIN = 1e-3  # of a side: how near its rim a point may be and still move with
 _CORNER = 0.02  # of an edge: how near to its ends no place is looked for along it
 _CELLS = 64  # along each side of a raster that shows quickly whether a point is far inside
 _ROUNDING = 1e-12  # of a side: a point on the rim as computed may stand this far outside
+_STEEPEST = 0.01  # 1 / (R k)^2 of the lowest wave: what shallow shell theory may neglect
 
 
 @dataclass(frozen=True)
@@ -152,16 +153,19 @@ class Patch:
     """A rectangular skin of `a` by `b` metres, held along its edges.
 
     At rest it is flat, or bent along x to `radius` in m: a cylinder skin whose arc has the length
-    a. A `strip` is held at its two ends in x only and nothing varies along y: a planar curve.
+    a. Two radii are those along x and y, of either sign: a shallow dome, saddle or trough, and
+    where only the first is finite and above zero, the cylinder again. A `strip` is held at its two
+    ends in x only and nothing varies along y: a planar curve.
 
     In space, x runs along the arc, whose highest point is at (a/2, y, 0); the outward normal there
     is (0, 0, 1). Displacement is positive inward, as a load presses; curvature is positive where
-    the skin is convex seen from outside, so that pressing in adds f_xx (Eq. 3) to 1/radius.
+    the skin is convex seen from outside, so that pressing in adds f_xx (Eq. 3) to 1/radius. A
+    shallow skin is an arc along x carried along an arc along y, highest at (a/2, b/2, 0) of a dome.
     """
 
     a: float
     b: float
-    radius: float = math.inf
+    radius: float | tuple[float, float] = math.inf
     strip: bool = False
 
     def __post_init__(self) -> None:
@@ -171,27 +175,74 @@ class Patch:
                 f"expected a patch with two sides above zero in metres, {least:g} to {most:g}, "
                 f"got {self.a} x {self.b}; give lengths such as 0.1 x 0.1"
             )
-        if not self.radius >= self.a / (2 * math.pi):  # NaN too
+        if isinstance(self.radius, tuple) and not self.arc_curvature:
+            self._check_shallow(self.radius)
+        elif not self.radii[0] >= self.a / (2 * math.pi):  # NaN too
             raise Refusal(
                 f"an arc of {self.a:g} m is a full circle at radius {self.a / 2 / math.pi:.4g} "
                 f"m: expected a larger base radius, or infinity for a flat skin, got {self.radius}"
+            )
+
+    def _check_shallow(self, radii: tuple[float, float]) -> None:
+        if self.strip or any(math.isnan(R) or not R for R in radii):
+            raise Refusal(
+                "expected two radii other than zero in m, or infinity, of a skin that is no strip; "
+                f"got {list(radii)}, strip {self.strip}"
+            )
+        if self.steepness > _STEEPEST:
+            least = min(map(abs, radii)) * math.sqrt(self.steepness / _STEEPEST)
+            raise Refusal(
+                f"shallow shell theory neglects 1/(R k)^2, {self.steepness:.2%} of the longest "
+                f"wave on a skin of {self.a:g} x {self.b:g} m with radii of {radii[0]:g} and "
+                f"{radii[1]:g} m: expected at most {_STEEPEST:.0%}, which are radii of at least "
+                f"{least:.3g} m; for a steeper skin use a cap"
             )
 
     @property
     def name(self) -> str:
         """A short description for messages."""
         what = f"{'strip' if self.strip else 'patch'} of {self.a:g} x {self.b:g} m"
-        return f"{what} bent to {self.radius:g} m" if self.arc_curvature else what
+        if self.is_shallow:
+            return f"{what} bent to {self.radii[0]:g} and {self.radii[1]:g} m"
+        return f"{what} bent to {self.radii[0]:g} m" if self.arc_curvature else what
+
+    @property
+    def radii(self) -> tuple[float, float]:
+        """Radius of curvature along x and y in m; infinite where it is straight."""
+        return self.radius if isinstance(self.radius, tuple) else (self.radius, math.inf)
+
+    @property
+    def curvatures(self) -> tuple[float, float]:
+        """Curvature at rest along x and y in 1/m; zero when flat."""
+        return 1 / self.radii[0], 1 / self.radii[1]
 
     @property
     def arc_curvature(self) -> float:
-        """1 / radius in 1/m; zero when flat."""
-        return 1 / self.radius
+        """1 / radius in 1/m of a cylinder skin; zero when flat, and of a shallow skin."""
+        Rx, Ry = self.radii
+        return 1 / Rx if math.isinf(Ry) and Rx > 0 else 0.0
+
+    @property
+    def is_shallow(self) -> bool:
+        """Whether it is a dome, a saddle or a trough, bent as shallow shell theory has it."""
+        return any(self.curvatures) and not self.arc_curvature
+
+    @property
+    def steepness(self) -> float:
+        """1 / (R k)^2 of the longest wave: by how much shallow shell theory is in error."""
+        k = math.pi * math.hypot(1 / self.a, 1 / self.b)
+        return (max(map(abs, self.curvatures)) / k) ** 2
+
+    @property
+    def rise(self) -> float:
+        """Height in m between its highest and lowest points at rest."""
+        ends = self.at_rest(np.array([[0, 0], [self.a, 0], [0, self.b], [self.a, self.b]]) / 2)[0]
+        return float(np.ptp(ends[:, 2]))
 
     @property
     def opening(self) -> float:
-        """The angle of the arc, a / radius in rad; zero when flat."""
-        return self.a / self.radius
+        """The angle of the arc of a cylinder skin, a / radius in rad; else zero."""
+        return self.a * self.arc_curvature
 
     def grid(self, nx: int, ny: int) -> tuple[Array, Array]:
         """Evenly spaced x (nx,) and y (ny,) in m, edges included."""
@@ -238,13 +289,17 @@ class Patch:
         """Points (..., 3) in m and outward unit normals (..., 3) of the skin at rest."""
         points, normals = np.zeros((2, *positions.shape[:-1], 3))
         points[..., :2] = positions
-        if not self.arc_curvature:
+        if not any(self.curvatures):
             normals[..., 2] = 1.0
             return points, normals
-        angle = (positions[..., 0] - self.a / 2) / self.radius
-        normals[..., 0], normals[..., 2] = np.sin(angle), np.cos(angle)
-        points[..., 0] = self.a / 2 + self.radius * normals[..., 0]
-        points[..., 2] = -2 * self.radius * np.sin(angle / 2) ** 2
+        H, middle = np.array(self.curvatures), np.array((self.a, self.b)) / 2
+        angle, bent = (positions - middle) * H, H != 0
+        (sx, sy), (cx, cy) = np.moveaxis(np.sin(angle), -1, 0), np.moveaxis(np.cos(angle), -1, 0)
+        normals[..., 0], normals[..., 1], normals[..., 2] = sx * cy, cx * sy, cx * cy
+        points[..., :2][..., bent] = middle[bent] + np.sin(angle[..., bent]) / H[bent]
+        points[..., 2] = -2 * (np.sin(angle[..., bent] / 2) ** 2 / H[bent]).sum(axis=-1)
+        if self.is_shallow:
+            normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
         return points, normals
 
 
