@@ -1,5 +1,6 @@
 """The skin: its own coordinates, its outline, and surfaces on it."""
 
+from kappaskin.skin.patch import Base as Base
 from kappaskin.skin.patch import Disk as Disk
 from kappaskin.skin.patch import Outline as Outline
 from kappaskin.skin.patch import Patch as Patch
