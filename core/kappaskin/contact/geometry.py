@@ -106,17 +106,17 @@ def _matrix(*rows: Number) -> Array:
 # the tangents e_1, e_2 along x and y and n0, n0_i = b_ij e_j and e_i,j = -b_ij n0 with the base's
 # curvature b, which hardly changes from place to place. With S = 1 - f b and h_ij = f_ij + (b S)_ij
 #     r_i = S_ij e_j - f_i n0,     r_ij = -h_ij n0 - (f_j b_ik + f_i b_jk) e_k,
-#     r_1 x r_2 = N = W n = (S_yy f_x - S_xy f_y, S_xx f_y - S_xy f_x, D),   D = det S,
-#     -N . r_ij = D h_ij + f_i u_j + f_j u_i,   u_i = b_ik N_k, k = 1, 2.
+#     r_1 x r_2 = N = W n = (S_yy f_x - S_xy f_y, S_xx f_y - S_xy f_x, det S),
+#     -N . r_ij = det S h_ij + f_i u_j + f_j u_i,   u_i = b_ik N_k, k = 1, 2.
 # The first form g has g_xx = |r_1|^2 = L^2 and det g = W^2. Coordinates on a bent surface are not
 # orthogonal; Gram and Schmidt along x give the Gauss frame: r_1 = L x, r_2 = m r_1 + (W/L) y.
 
 
 class _Surface(NamedTuple):
-    """What all forms are made of: each three numbers are xx, yy and xy."""
+    """What all forms are made of: xx, yy and xy of S, b S, h and -N . r_ij, u, g_xx and W^2."""
 
     S: Components
-    stretched: Components
+    bS: Components
     h: Components
     N: Components
     u: tuple[Number, Number]
@@ -132,24 +132,23 @@ class _Surface(NamedTuple):
 
 
 def _surface(jet: Jet, b: Components) -> _Surface:
-    """S, b S, h, N, u and -N . r_ij; g_xx, m, W^2 and W of the formulas above."""
     f, fx, fy, fxx, fxy, fyy = jet
     bx, by, bxy = b
     s, t, c = 1 - f * bx, 1 - f * by, 0.0
     sxx, syy, sxy, hxy = bx * s, by * t, 0.0, fxy
-    nx, ny, D = t * fx, s * fy, s * t
+    nx, ny, nz = t * fx, s * fy, s * t
     ux, uy = bx * nx, by * ny
     g, gm = s * s + fx * fx, fx * fy
     if np.ndim(bxy) or bxy:
         c = -f * bxy
         sxx, syy, sxy = sxx + bxy * c, syy + bxy * c, bx * c + bxy * t
-        nx, ny, D = nx - c * fy, ny - c * fx, D - c * c
+        nx, ny, nz = nx - c * fy, ny - c * fx, nz - c * c
         ux, uy = bx * nx + bxy * ny, bxy * nx + by * ny
         g, gm, hxy = g + c * c, gm + c * (s + t), fxy + sxy
     h = fxx + sxx, fyy + syy, hxy
-    second = D * h[0] + 2 * fx * ux, D * h[1] + 2 * fy * uy, D * h[2] + fx * uy + fy * ux
-    V = nx * nx + ny * ny + D * D
-    bS, N = (sxx, syy, sxy), (nx, ny, D)
+    second = nz * h[0] + 2 * fx * ux, nz * h[1] + 2 * fy * uy, nz * h[2] + fx * uy + fy * ux
+    V = nx * nx + ny * ny + nz * nz
+    bS, N = (sxx, syy, sxy), (nx, ny, nz)
     return _Surface((s, t, c), bS, h, N, (ux, uy), second, g, gm / g, V, V**0.5)
 
 
@@ -164,8 +163,8 @@ def _curvature_form(of: _Surface) -> Components:
 def _sensitivity(jet: Jet, b: Components, of: _Surface, form: Components) -> Array:
     """How xx, yy and xy of the curvature `form` change with the jet, (..., 3, 6)."""
     (_, fx, fy, *_), (bx, by, bxy), (xx, yy, xy) = jet, b, form
-    (s, t, c), (hx, hy, hxy), (nx, ny, D), (ux, uy) = of.S, of.h, of.N, of.u
-    (nxx, _, nxy), (sxx, _, sxy), g, m, W = of.second, of.stretched, of.g, of.m, of.W
+    (s, t, c), (hx, hy, hxy), (nx, ny, nz), (ux, uy) = of.S, of.h, of.N, of.u
+    (nxx, _, nxy), (sxx, _, sxy), g, m, W = of.second, of.bS, of.g, of.m, of.W
     V, zero = of.V, 0 * fx
     # With V = W^2 and B = -N . r_ij the form is
     #     xx = Bxx / (W g),    yy = (Byy - 2 m Bxy + m^2 Bxx) g / (W V),    xy = (Bxy - m Bxx) / V.
@@ -174,9 +173,9 @@ def _sensitivity(jet: Jet, b: Components, of: _Surface, form: Components) -> Arr
         (
             (-2 * sxx, -2 * sxy, bxy * fy - by * fx, bxy * fx - bx * fy, -shrinks),
             (
-                -shrinks * hx - D * (bx * bx + bxy * bxy),
-                -shrinks * hy - D * (by * by + bxy * bxy),
-                -shrinks * hxy - D * bxy * (bx + by),
+                -shrinks * hx - nz * (bx * bx + bxy * bxy),
+                -shrinks * hy - nz * (by * by + bxy * bxy),
+                -shrinks * hxy - nz * bxy * (bx + by),
             ),
         ),
         ((2 * fx, fy, t, -c, zero), (2 * ux, zero, uy)),
@@ -184,8 +183,8 @@ def _sensitivity(jet: Jet, b: Components, of: _Surface, form: Components) -> Arr
     ]
     to_xx, to_yy, to_xy = 1 / (W * g), g / (W * V), 1 / V
     columns: list[list[Number]] = []
-    for (dg, dgm, dnx, dny, dD), (dxx, dyy, dxy) in steps:
-        dm, dV = (dgm - m * dg) / g, 2 * (nx * dnx + ny * dny + D * dD)
+    for (dg, dgm, dnx, dny, dnz), (dxx, dyy, dxy) in steps:
+        dm, dV = (dgm - m * dg) / g, 2 * (nx * dnx + ny * dny + nz * dnz)
         dux, duy = bx * dnx + bxy * dny, bxy * dnx + by * dny
         dxx = dxx + 2 * fx * dux
         dxy = dxy + fx * duy + fy * dux - m * dxx - dm * nxx
@@ -198,9 +197,9 @@ def _sensitivity(jet: Jet, b: Components, of: _Surface, form: Components) -> Arr
             ]
         )
     columns += [  # with f_xx, f_xy and f_yy
-        [D * to_xx, m * m * D * to_yy, -m * D * to_xy],
-        [zero, -2 * m * D * to_yy, D * to_xy],
-        [zero, D * to_yy, zero],
+        [nz * to_xx, m * m * nz * to_yy, -m * nz * to_xy],
+        [zero, -2 * m * nz * to_yy, nz * to_xy],
+        [zero, nz * to_yy, zero],
     ]
     return np.array(columns).T
 
@@ -208,7 +207,7 @@ def _sensitivity(jet: Jet, b: Components, of: _Surface, form: Components) -> Arr
 def _torsion_form(jet: Jet, of: _Surface) -> tuple[Number, Number]:
     """T = y' [x_x x_y] [metric]^-1."""
     _, fx, fy, *_, fxy, _ = jet
-    (sxx, syy, sxy), (hx, *_), m, L, W = of.stretched, of.h, of.m, of.L, of.W
+    (sxx, syy, sxy), (hx, *_), m, L, W = of.bS, of.h, of.m, of.L, of.W
     # y . r_11 / L and y . r_12 / L, with y = (r_2 - m r_1) L / W.
     turn_x = (fy * hx - 2 * fx * sxy - m * fx * (hx - 2 * sxx)) / W
     turn_y = (fy * fxy - fx * syy - m * (fx * fxy - fy * sxx)) / W
@@ -218,11 +217,11 @@ def _torsion_form(jet: Jet, of: _Surface) -> tuple[Number, Number]:
 def _frame(base: Base, jet: Jet, of: _Surface) -> tuple[Array, Array, Array]:
     """Position (..., 3), Gauss frame (..., 3, 3) and metric (..., 2, 2)."""
     (f, fx, fy, *_), (s, t, c), m, L, W = jet, of.S, of.m, of.L, of.W
-    (nx, ny, D), k = of.N, L / W
+    (nx, ny, nz), k = of.N, L / W
     in_base = (
         (s / L, c / L, -fx / L),
         ((c - m * s) * k, (t - m * c) * k, (m * fx - fy) * k),
-        (nx / W, ny / W, D / W),
+        (nx / W, ny / W, nz / W),
     )
     axes = list(zip(*base[1:4], strict=True))
     rows = [u * e + v * d + w * n for u, v, w in in_base for e, d, n in axes]
