@@ -55,7 +55,7 @@ def _along(basis: Basis, positions: Array, L: float, curvature: ValuesAt, t: Arr
     """
     if not L:
         return _normal(curvature(positions), t)
-    if basis.patch.arc_curvature:
+    if any(basis.patch.curvatures):
         return _over_gage(lambda places: _normal(curvature(places), t), positions, L, t)
     half = L / 2 * t
     return (_slope(basis, positions + half, t) - _slope(basis, positions - half, t)) / L
