@@ -174,6 +174,16 @@ class Base(NamedTuple):
     second: tuple[Numbers, ...] = ()
     turning: Numbers = ()
 
+    @property
+    def covariant(self) -> Array:
+        """As that of `LocalGeometry`, (..., 6, 6)."""
+        found = np.zeros((*np.shape(self.point[0]), 6, 6))
+        found[...] = np.eye(6)
+        for i, row in enumerate(self.slopes + self.second, 1):
+            for j, each in enumerate(row, 1):
+                found[..., i, j] = each
+        return found
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LocalGeometry:
@@ -358,12 +368,7 @@ class Patch:
         for k in range(3):
             frame[:, 0, k], frame[:, 1, k] = base.along[k], base.across[k]
         form = np.stack([np.broadcast_to(each, P) for each in base.curvature])
-        covariant = np.zeros((P, 6, 6))
-        covariant[:] = np.eye(6)
-        for i, row in enumerate(base.slopes + base.second, 1):
-            for j, each in enumerate(row, 1):
-                covariant[:, i, j] = each
-        return LocalGeometry(frame, form, covariant)
+        return LocalGeometry(frame, form, base.covariant)
 
     def around(self, x: float, y: float, offsets: Array) -> Array:
         """Positions (Q, 2) in m that lie from (x, y) as far along the skin as `offsets` (Q, 2)."""
@@ -543,7 +548,7 @@ class Cap(Disk):
             (1 + flat * cc, flat * cn, -out * c),
             (flat * cn, 1 + flat * nn, -out * n),
             (out * c, out * n, slope),
-            (k2 + bend * cc, k2 + bend * nn, bend * cn),
+            (1 / R, 1 / R, 0.0) if k == 1 else (k2 + bend * cc, k2 + bend * nn, bend * cn),
             ((mxx, mxy), (mxy, myy)),
             second,
             (-flat / r * n, flat / r * c),
