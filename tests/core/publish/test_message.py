@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import Disk, Patch, Plate, PointLoad, Scene, SensorLayout, Setup, load_scene
+from kappaskin import Cap, Disk, Patch, Plate, PointLoad, Scene, SensorLayout, Setup, load_scene
 from kappaskin.contact import surface_geometry
 from kappaskin.estimation import METHODS
 from kappaskin.pipeline.reported import UNKNOWN
@@ -40,6 +40,7 @@ SKINS = {
     "bent": bent(Patch(0.04, 0.03, 12.9e-3)),
     "dome": bent(Patch(0.04, 0.03, (0.1, 0.08))),
     "saddle": bent(Patch(0.04, 0.03, (-0.1, 0.08))),
+    "cap": bent(Cap(0.016, 1.2)),
 }
 on_each_skin = pytest.mark.parametrize("scene", SKINS.values(), ids=SKINS)
 
