@@ -22,18 +22,28 @@ _POINTS = 12  # exact to rounding for waves as short as the gage
 # in the limit of short ones is f_xy. Each alone mixes the modes: it sees sin(k x) sin(l y) as
 # waves of k + l and of k - l. What they differ by does not: with h = L / sqrt(8) it is the twist
 #     k l cos(k x) cos(l y)   times   (cos(k h) sinc(l h) + sinc(k h) cos(l h)) / 2.
+# A shallow skin has w Hx^2 more along x, that is xx times 1 - (Hx / k)^2, and along y alike. Along
+# the diagonals its mean is w (Hx^2 + Hy^2) / 2, which adds to the twist's factor
+#     (Hx^2 + Hy^2) / (4 k l)   times   sinc((k - l) h) - sinc((k + l) h).
 _DIAGONAL = 1 / math.sqrt(2)
 
 
 def gage_multipliers(sines: SineBasis, gage_length: float) -> Array:
-    """Factors (3, Ni, Nj) by which gages of `gage_length` in m read sines on a flat skin.
+    """Factors (3, Ni, Nj) by which gages of `gage_length` in m read sines on no cylinder skin.
 
-    xx: sinc(k_i L / 2) and yy: sinc(k_j L / 2), with sinc(t) = sin(t) / t; xy as derived above.
+    On a flat skin xx: sinc(k_i L / 2) and yy: sinc(k_j L / 2), with sinc(t) = sin(t) / t; xy as
+    derived above.
     """
     ki, kj = np.meshgrid(*sines.wavenumbers, indexing="ij")
     L, h = gage_length, gage_length * _DIAGONAL / 2
     twist = np.cos(ki * h) * _sinc(kj * h) + _sinc(ki * h) * np.cos(kj * h)
-    return np.stack([_sinc(ki * L / 2), _sinc(kj * L / 2), twist / 2])
+    xx, yy, xy = _sinc(ki * L / 2), _sinc(kj * L / 2), twist / 2
+    if sines.patch.is_shallow:
+        squares = np.square(sines.patch.curvatures)
+        xx, yy = xx * (1 - squares[0] / ki**2), yy * (1 - squares[1] / kj**2)
+        aslant = _sinc((ki - kj) * h) - _sinc((ki + kj) * h)
+        xy = xy + squares.sum() / (4 * ki * kj) * aslant
+    return np.stack([xx, yy, xy])
 
 
 def _sinc(t: Array) -> Array:
@@ -533,7 +543,9 @@ class SensorLayout:
             if name == "twist":
                 return gages[2]
             along_y = int(abs(math.sin(direction)) > _DIAGONAL)
-            return over_cell if name == "height" or (name == "slope" and not L) else gages[along_y]
+            if name == "curvature":
+                return gages[along_y]
+            return _sinc((ki, kj)[along_y] * L / 2) if name == "slope" and L else over_cell
 
         return np.stack([factors(*kind) for kind in self.kinds])
 
