@@ -238,23 +238,25 @@ def shallow_stiffness(patch: Patch, C: float, nu: float, inplane: str, basis: Ba
 
     def product(one: tuple[Array, Array], other: tuple[Array, Array]) -> Array:
         (_, x), (_, y) = rules
-        found: Array = np.kron((one[0].T * x) @ other[0], (one[1].T * y) @ other[1])
-        return found
+        along_x, along_y = (one[0].T * x) @ other[0], (one[1].T * y) @ other[1]
+        found = np.einsum("ij,kl->ikjl", along_x, along_y)
+        return found.reshape(len(along_x) * len(along_y), -1)
 
     K_u = product(u_x, u_x) + shear * product(u_y, u_y)
     K_v = product(v_y, v_y) + shear * product(v_x, v_x)
     mixed = nu * product(u_x, v_y) + shear * product(u_y, v_x)
     stiffness: Array = np.block([[K_u, mixed], [mixed.T, K_v]])
     Hx, Hy = patch.curvatures
-    coupled: Array = np.hstack([(Hx + nu * Hy) * product(f, u_x), (Hy + nu * Hx) * product(f, v_y)])
+    coupled = np.hstack([(Hx + nu * Hy) * product(f, u_x), (Hy + nu * Hx) * product(f, v_y)])
     if inplane == "free":  # of two translations and a rotation, which strain nothing
         strained = np.isin(np.arange(len(stiffness)), [0, 1, len(K_u)], invert=True)
         stiffness, coupled = stiffness[np.ix_(strained, strained)], coupled[:, strained]
-    scale = 1 / np.sqrt(np.diag(stiffness))
+    scale: Array = 1 / np.sqrt(np.diag(stiffness))
     coupled *= scale
-    relief = coupled @ np.linalg.solve(stiffness * np.multiply.outer(scale, scale), coupled.T)
-    stiffened: Array = (Hx**2 + Hy**2 + 2 * nu * Hx * Hy) * product(f, f) - relief
-    return C * stiffened
+    stiffness *= np.multiply.outer(scale, scale)
+    relief: Array = coupled @ np.linalg.solve(stiffness, coupled.T)
+    own = (Hx**2 + Hy**2 + 2 * nu * Hx * Hy) * product(f, f)
+    return C * (own - relief)
 
 
 _MOST_FUNCTIONS, _MOST_WAVES = 96, 160

@@ -1,10 +1,11 @@
-"""Skins at rest: rectangles, arcs, cylinders, disks and polygons in their own coordinates."""
+"""Skins at rest: rectangles, cylinders, disks, polygons and caps in their own coordinates."""
 
 import math
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 
 from kappaskin.errors import Refusal
@@ -146,6 +147,21 @@ _CORNER = 0.02  # of an edge: how near to its ends no place is looked for along 
 _CELLS = 64  # along each side of a raster that shows quickly whether a point is far inside
 _ROUNDING = 1e-12  # of a side: a point on the rim as computed may stand this far outside
 _STEEPEST = 0.01  # 1 / (R k)^2 of the lowest wave: what shallow shell theory may neglect
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LocalGeometry:
+    """The skin at rest around each of P places.
+
+    `frame` (P, 2, 3): orthonormal tangents e_x and e_y in space. `curvature` (3, P) in 1/m: the
+    curvature form xx, yy, xy along them, positive where the skin is convex seen from outside.
+    `covariant` (P, 6, 6): from a function's derivatives f, f_x, f_y, f_xx, f_xy, f_yy in the skin's
+    coordinates to its covariant ones along e_x and e_y, in that order.
+    """
+
+    frame: Array
+    curvature: Array
+    covariant: Array
 
 
 @dataclass(frozen=True)
@@ -302,6 +318,20 @@ class Patch:
             normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
         return points, normals
 
+    def local(self, positions: Array) -> LocalGeometry:
+        """The frames, curvature and covariant derivatives at `positions` (P, 2) in m."""
+        normals = self.at_rest(positions)[1]
+        frame = np.zeros((len(positions), 2, 3))
+        frame[:, 0, 0], frame[:, 0, 2] = normals[:, 2], -normals[:, 0]
+        frame[:, 0] /= np.linalg.norm(frame[:, 0], axis=-1, keepdims=True)
+        frame[:, 1] = np.cross(normals, frame[:, 0])
+        form = np.repeat([[H] for H in (*self.curvatures, 0.0)], len(positions), axis=1)
+        return LocalGeometry(frame, form, np.broadcast_to(np.eye(6), (len(positions), 6, 6)))
+
+    def around(self, x: float, y: float, offsets: Array) -> Array:
+        """Positions (Q, 2) in m that lie from (x, y) as far along the skin as `offsets` (Q, 2)."""
+        return np.array([x, y]) + offsets
+
 
 @dataclass(frozen=True, init=False)
 class Disk(Patch):
@@ -341,6 +371,178 @@ class Disk(Patch):
             return []
         out = (1 - 2 * _MARGIN) * r / away
         return [(r + out * (x - r), r + out * (y - r), share)]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Meridian:
+    """The meridian of a cap at some distances from its pole along it.
+
+    `radius` in m of the parallel there, and its `slope` per distance; `curvatures` (2, ...) in 1/m
+    along the meridian and along the parallel, and their `changes` in 1/m^2 per distance. `angle` in
+    rad of the spheroid: its parallels have the radius R sin(angle).
+    """
+
+    radius: Array
+    slope: Array
+    curvatures: Array
+    changes: Array
+    angle: Array
+
+
+def _turned(cos: Array, sin: Array) -> Array:
+    """The maps (P, 6, 6) of derivatives along axes turned by an angle back to x and y."""
+    found = np.zeros((len(cos), 6, 6))
+    found[:, 0, 0] = 1.0
+    found[:, 1:3, 1:3] = np.moveaxis(np.array([[cos, -sin], [sin, cos]]), -1, 0)
+    c2, cs, s2 = cos**2, cos * sin, sin**2
+    of_second = np.array([[c2, -2 * cs, s2], [cs, c2 - s2, -cs], [s2, 2 * cs, c2]])
+    found[:, 3:, 3:] = np.moveaxis(of_second, -1, 0)
+    return found
+
+
+_STRETCHES = (0.2, 5.0)
+_NEAR_POLE = 1e-5  # of the arc to the rim: where differences are rounding, and limits hold
+
+
+@dataclass(frozen=True, init=False)
+class Cap(Disk):
+    """A domed skin: a cap of a sphere of `radius` in m, held along its rim.
+
+    Of a spheroid with `stretch` other than 1: its equator has the `radius`, and it is `stretch`
+    times as long along its axis. At the rim its normal is turned by `angle` in rad from that at the
+    pole; pi/2 makes a hemisphere.
+
+    Positions are azimuthal equidistant: the pole is in the middle of the box, and a place lies as
+    far from there as along the skin, and in its azimuth. `rim_radius` is that distance of the rim.
+    In space the pole is at (a/2, b/2, 0), and the outward normal there is (0, 0, 1).
+    """
+
+    angle: float
+    stretch: float
+
+    def __init__(self, radius: float, angle: float = math.pi / 2, stretch: float = 1.0) -> None:
+        least, most = _STRETCHES
+        if not (0 < radius < math.inf and least <= stretch <= most):
+            raise Refusal(
+                f"expected a cap with a radius above zero in metres and a stretch from {least:g} "
+                f"to {most:g}, got {radius} and {stretch}"
+            )
+        if not 0 < angle <= math.pi / 2 * (1 + _ROUNDING):
+            raise Refusal(
+                "expected a cap whose rim is turned by an angle above zero, at most pi/2 (a "
+                f"hemisphere), got {angle} rad"
+            )
+        for name, value in (("angle", min(angle, math.pi / 2)), ("stretch", stretch)):
+            object.__setattr__(self, name, value)
+        rim = math.atan2(math.sin(self.angle), stretch * math.cos(self.angle))
+        super().__init__(radius * float(scipy.special.ellipeinc(rim, 1 - stretch**2)))
+        object.__setattr__(self, "radius", radius)
+
+    @property
+    def name(self) -> str:
+        of = f" stretched {self.stretch:g} times" if self.stretch != 1 else ""
+        return f"cap of radius {self._equator:g} m{of} with {math.degrees(self.angle):g} degrees"
+
+    @property
+    def _equator(self) -> float:
+        return self.radius if isinstance(self.radius, float | int) else self.radius[0]
+
+    @property
+    def radii(self) -> tuple[float, float]:
+        """Radius of curvature in m along x and y at the pole."""
+        return (self._equator / self.stretch,) * 2
+
+    @property
+    def is_shallow(self) -> bool:
+        return False
+
+    @property
+    def rise(self) -> float:
+        rim = self.at_rest(np.array([[self.a, self.b / 2]]))[0]
+        return -float(rim[0, 2])
+
+    @property
+    def is_hemisphere(self) -> bool:
+        return math.isclose(self.angle, math.pi / 2)
+
+    def meridian(self, distance: Array) -> Meridian:
+        """The meridian at each `distance` (...) in m from the pole along the skin."""
+        R, k = self._equator, self.stretch
+        m, t = 1 - k**2, distance / R
+        for _ in range(0 if k == 1 else 8):  # Newton's method
+            steep = np.sqrt(1 - m * np.sin(t) ** 2)
+            t = t - (scipy.special.ellipeinc(t, m) - distance / R) / steep
+        sin, cos = np.sin(t), np.cos(t)
+        L = np.sqrt(1 - m * sin**2)  # the arc, over R, per angle
+        curvatures = np.stack([k / L**3, k / L]) / R
+        changes = np.stack([3 * k / L**6, k / L**4]) * (m * sin * cos) / R**2
+        return Meridian(R * sin, cos / L, curvatures, changes, t)
+
+    def _azimuth(self, positions: Array) -> tuple[Array, Array, Array]:
+        """Distance (...) from the pole in m, cosine and sine of the azimuth."""
+        offset = positions - self.rim_radius
+        s = np.hypot(offset[..., 0], offset[..., 1])
+        far, at_pole = np.where(s > 0, s, 1.0), s == 0
+        return s, np.where(at_pole, 1.0, offset[..., 0] / far), offset[..., 1] / far
+
+    def at_rest(self, positions: Array) -> tuple[Array, Array]:
+        s, cos, sin = self._azimuth(positions)
+        along = self.meridian(s)
+        up, out = along.slope, along.curvatures[1] * along.radius
+        fall = 2 * self._equator * self.stretch * np.sin(along.angle / 2) ** 2
+        pole, r = self.rim_radius, along.radius
+        points = np.stack([pole + r * cos, pole + r * sin, -fall], axis=-1)
+        return points, np.stack([out * cos, out * sin, up], axis=-1)
+
+    def places(self, points: Array) -> Array:
+        """Positions (..., 2) in m of `points` (..., 3) of the skin in space, or just off it."""
+        pole, R, k = self.rim_radius, self._equator, self.stretch
+        x, y = points[..., 0] - pole, points[..., 1] - pole
+        r = np.hypot(x, y)
+        t = np.arctan2(r, points[..., 2] / k + R)
+        s = R * scipy.special.ellipeinc(t, 1 - k**2)
+        out = np.where(r > 0, s / np.where(r > 0, r, 1.0), 1.0)
+        return np.stack([pole + out * x, pole + out * y], axis=-1)
+
+    def local(self, positions: Array) -> LocalGeometry:
+        s, cos, sin = self._azimuth(positions)
+        along, zero = self.meridian(s), np.zeros_like(s)
+        (k1, k2), slope = along.curvatures, along.slope
+        # Along the meridian and the parallel, with q = f_theta / s and g = r / s:
+        #     f_;st = F_st / g + q (1 - r'/g) / r      f_;tt = F_tt / g^2 + f_s (r' - 1/g) / r
+        # where F are the second derivatives in flat polar coordinates. To polar and back by `turn`.
+        near = s < _NEAR_POLE * self.rim_radius
+        r, far = np.where(near, 1.0, along.radius), np.where(near, 1.0, s)
+        g = np.where(near, 1.0, r / far)
+        third = k1 * k2 * s / 3
+        by_polar = np.zeros((len(s), 6, 6))
+        by_polar[:, [0, 1, 3], [0, 1, 3]] = 1.0
+        by_polar[:, 2, 2] = by_polar[:, 4, 4] = 1 / g
+        by_polar[:, 5, 5] = 1 / g**2
+        by_polar[:, 4, 2] = np.where(near, third, (1 - slope / g) / r)
+        by_polar[:, 5, 1] = np.where(near, -2 * third, (slope - 1 / g) / r)
+        turn, out = _turned(cos, sin), k2 * along.radius
+        polar = np.array([[slope, zero, -out], [zero, zero + 1, zero]])  # out, round and up
+        azimuths = np.array([[cos, -sin, zero], [sin, cos, zero], [zero, zero, zero + 1]])
+        frame = np.einsum("pkj,jip,lip->pkl", turn[:, 1:3, 1:3], polar, azimuths)
+        form = turn[:, 3:, 3:] @ np.stack([k1, zero, k2], -1)[..., None]
+        xx, xy, yy = form[..., 0].T
+        return LocalGeometry(frame, np.stack([xx, yy, xy]), turn @ by_polar @ _turned(cos, -sin))
+
+    def around(self, x: float, y: float, offsets: Array) -> Array:
+        """Positions (Q, 2) in m that lie from (x, y) as far along the skin as `offsets` (Q, 2).
+
+        Along circles of the skin's curvature there: of a spheroid nearly.
+        """
+        at = np.array([[x, y]])
+        ((point,), (normal,)), local = self.at_rest(at), self.local(at)
+        (xx, yy, xy), (u, v) = local.curvature[:, 0], offsets.T
+        squares = u**2 + v**2
+        H = np.where(squares > 0, xx * u**2 + yy * v**2 + 2 * xy * u * v, xx)
+        H = H / np.where(squares > 0, squares, 1.0)
+        turn = H * np.sqrt(squares)
+        along = np.sinc(turn / np.pi)[:, None] * offsets @ local.frame[0]
+        return self.places(point + along - (2 * np.sin(turn / 2) ** 2 / H)[:, None] * normal)
 
 
 @dataclass(frozen=True, init=False)
