@@ -13,7 +13,7 @@ from kappaskin.bases import Basis, SineBasis, covariant_at, curvature_at, gauss,
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Array, Indices, Mask
 from kappaskin.mechanics import Plate
-from kappaskin.skin import Patch
+from kappaskin.skin import Cap, Patch
 
 _POINTS = 12  # exact to rounding for waves as short as the gage
 
@@ -217,7 +217,8 @@ class Readings:
 class SensorLayout:
     """P elements at `positions` (P, 2) in m, and what they read.
 
-    That is the curvature xx, yy and xy of each (a curvature sensor), or the `reads`. `live` is
+    That is the curvature xx, yy and xy of each (a curvature sensor), or the `reads`, along x and y,
+    on a cap along the frame of `Patch.local`, where elements read at a point. `live` is
     False for dead channels: (3, P) of a curvature sensor, (R,) of other readings. `shape` is
     (m, n) for a regular grid, with element p + m q in column p (along x) and row q (along y), and
     None otherwise. Curvature is the mean over gages of `gage_length` in m, along x, y or the
@@ -256,8 +257,19 @@ class SensorLayout:
                 f"{outside.size} of {len(P)} elements lie outside the {self.patch.name}: element "
                 f"{p} is at ({x:g}, {y:g}) m; positions are in metres from the corner x = y = 0"
             )
+        if isinstance(self.patch, Cap):
+            self._check_on_cap()
         self._check_gages()
         self._check_cells()
+
+    def _check_on_cap(self) -> None:
+        slopes = self.reads is not None and "slope" in self.reads.quantity
+        if self.gage_length or any(self.cell) or slopes:
+            raise Refusal(
+                f"expected heights, curvature and twist at a point of each element of a "
+                f"{self.patch.name}, got {'slopes' if slopes else 'a mean over gages or cells'}; "
+                "set gage_length and cell to 0"
+            )
 
     def _check_gages(self) -> None:
         L = self.gage_length

@@ -481,7 +481,8 @@ class Cap(Disk):
     @property
     def radii(self) -> tuple[float, float]:
         """Radius of curvature in m along x and y at the pole."""
-        return (self._equator / self.stretch,) * 2
+        R = self._equator / self.stretch
+        return R, R
 
     @property
     def is_shallow(self) -> bool:
@@ -571,12 +572,12 @@ class Cap(Disk):
         """
         at = np.array([[x, y]])
         ((point,), (normal,)), local = self.at_rest(at), self.local(at)
-        (xx, yy, xy), (u, v) = local.curvature[:, 0], offsets.T
-        squares = u**2 + v**2
-        H = np.where(squares > 0, xx * u**2 + yy * v**2 + 2 * xy * u * v, xx)
-        H = H / np.where(squares > 0, squares, 1.0)
+        xx, yy, xy = local.curvature[:, 0]
+        squares: Array = np.sum(offsets**2, axis=1)
+        forms: Array = offsets**2 @ np.array([xx, yy]) + 2 * xy * offsets[:, 0] * offsets[:, 1]
+        H = np.where(squares > 0, forms, xx) / np.where(squares > 0, squares, 1.0)
         turn = H * np.sqrt(squares)
-        along = np.sinc(turn / np.pi)[:, None] * offsets @ local.frame[0]
+        along: Array = (np.sinc(turn / np.pi)[:, None] * offsets) @ local.frame[0]
         return self.places(point + along - (2 * np.sin(turn / 2) ** 2 / H)[:, None] * normal)
 
 

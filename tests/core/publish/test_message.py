@@ -248,6 +248,23 @@ def test_the_state_of_the_source_is_json_with_every_number_promised() -> None:
     assert set(there) == set(told)
 
 
+@pytest.mark.parametrize(
+    ("patch", "curvatures"),
+    [
+        (Patch(0.1, 0.1), (0.0, 0.0)),
+        (Patch(0.04, 0.03, 0.04), (25.0, 0.0)),
+        (Patch(0.1, 0.1, (0.5, -0.4)), (2.0, -2.5)),
+    ],
+    ids=["flat", "cylinder", "saddle"],
+)
+def test_the_state_of_the_source_has_both_curvatures_of_the_skin(patch, curvatures) -> None:
+    sensor = Scene("", Plate(patch), SensorLayout.regular(patch, 4, 4)).sensor()
+
+    told = read(SourceState("streaming", "sim", "", sensor, 500.0, 0.0).encoded())
+
+    assert (told["base_curvature_per_m"], told["base_curvature_y_per_m"]) == curvatures
+
+
 # The guide
 
 
