@@ -26,14 +26,22 @@ _DIAGONAL = 1 / math.sqrt(2)
 
 
 def gage_multipliers(sines: SineBasis, gage_length: float) -> Array:
-    """Factors (3, Ni, Nj) by which gages of `gage_length` in m read sines on a flat skin.
+    """Factors (3, Ni, Nj) by which gages of `gage_length` in m read sines, to second derivatives.
 
-    xx: sinc(k_i L / 2) and yy: sinc(k_j L / 2), with sinc(t) = sin(t) / t; xy as derived above.
+    xx: sinc(k_i L / 2) and yy: sinc(k_j L / 2), with sinc(t) = sin(t) / t; xy as derived above. On
+    a skin with the curvatures Hx and Hy at rest, 1 - (Hx / k_i)^2 and 1 - (Hy / k_j)^2 times that; gages
+    on the diagonals also differ in their mean of f.
     """
     ki, kj = np.meshgrid(*sines.wavenumbers, indexing="ij")
     L, h = gage_length, gage_length * _DIAGONAL / 2
     twist = np.cos(ki * h) * _sinc(kj * h) + _sinc(ki * h) * np.cos(kj * h)
-    return np.stack([_sinc(ki * L / 2), _sinc(kj * L / 2), twist / 2])
+    along, twist = [_sinc(ki * L / 2), _sinc(kj * L / 2)], twist / 2
+    if sines.patch.is_shallow:
+        Hx, Hy = sines.patch.curvatures
+        along = [along[0] * (1 - (Hx / ki) ** 2), along[1] * (1 - (Hy / kj) ** 2)]
+        apart = _sinc((ki - kj) * h) - _sinc((ki + kj) * h)
+        twist += (Hx**2 + Hy**2) / 4 * apart / (ki * kj)
+    return np.stack([*along, twist])
 
 
 def _sinc(t: Array) -> Array:
@@ -55,7 +63,7 @@ def _along(basis: Basis, positions: Array, L: float, curvature: ValuesAt, t: Arr
     """
     if not L:
         return _normal(curvature(positions), t)
-    if basis.patch.arc_curvature:
+    if any(basis.patch.curvatures):
         return _over_gage(lambda places: _normal(curvature(places), t), positions, L, t)
     half = L / 2 * t
     return (_slope(basis, positions + half, t) - _slope(basis, positions - half, t)) / L
@@ -533,7 +541,9 @@ class SensorLayout:
             if name == "twist":
                 return gages[2]
             along_y = int(abs(math.sin(direction)) > _DIAGONAL)
-            return over_cell if name == "height" or (name == "slope" and not L) else gages[along_y]
+            if name == "curvature":
+                return gages[along_y]
+            return _sinc((ki, kj)[along_y] * L / 2) if name == "slope" and L else over_cell
 
         return np.stack([factors(*kind) for kind in self.kinds])
 
