@@ -75,8 +75,9 @@ class Contact:
     reliable position and force.
     `size` and `size_sd` in m^2 are the squared radius of the disc that the load is spread over;
     NaN where the skin does not tell it. `force_is_lower_bound` says that the skin may stretch, by
-    which the force would change by more than its error bar (`kappaskin.contact.LowerBound`). The
-    force is NaN where the skin's material is unknown; the size is then that of the contact's area.
+    which the force would change by more than its error bar (`kappaskin.contact.LargeDeflection`);
+    `force_is_upper_bound` likewise that a curved skin softens. Where it `snaps_through` the force
+    is NaN, as where the skin's material is unknown; the size is then that of the contact's area.
     Every number is NaN when the readings hold no contact that stands out of the noise.
     """
 
@@ -92,6 +93,8 @@ class Contact:
     size: float = math.nan
     size_sd: float = math.nan
     force_is_lower_bound: bool = False
+    force_is_upper_bound: bool = False
+    snaps_through: bool = False
 
     @property
     def present(self) -> bool:

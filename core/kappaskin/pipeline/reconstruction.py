@@ -19,7 +19,7 @@ from kappaskin.contact import (
     ContactObject,
     Contacts,
     Imprints,
-    LowerBound,
+    LargeDeflection,
     as_one,
     contacts_of,
     object_finder,
@@ -300,7 +300,7 @@ def reconstruct(
     if not (contact or objects):
         return out
     plate = _plate(patch, found, str(texts.get("inplane", np.array("")).item()))
-    bounded = LowerBound(plate, edge)
+    bounded = LargeDeflection(plate, edge)
     fits = _fits(method, functions, layout, frames, sigma if layout.reads else None)
     read = [each.readings for each in fits]
     pairs, drifts = list[tuple[Contact, Contact]](), np.zeros(len(fits))
