@@ -7,6 +7,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from kappaskin._text import NO_FORCE, SNAPS
+
 Array = NDArray[np.float64]
 Counts = NDArray[np.int32]
 Mask = NDArray[np.bool_]
@@ -99,6 +101,17 @@ class Contact:
     @property
     def present(self) -> bool:
         return math.isfinite(self.position.item(0))
+
+    @property
+    def force_bound(self) -> str:
+        """What stands before the force: a sign where it is a lower or an upper bound."""
+        least = "\N{GREATER-THAN OR EQUAL TO} " if self.force_is_lower_bound else ""
+        return "\N{LESS-THAN OR EQUAL TO} " if self.force_is_upper_bound else least
+
+    @property
+    def no_force(self) -> str:
+        """Why there is no force, in words; empty where there may be one."""
+        return NO_FORCE if self.near_rim else SNAPS if self.snaps_through else ""
 
     @property
     def position_95(self) -> Array:

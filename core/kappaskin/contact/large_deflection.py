@@ -42,7 +42,7 @@ class LargeDeflection:
         self._seen, patch = seen, plate.patch
         bent, curved = patch.arc_curvature, any(patch.curvatures)
         self._curved = None
-        if curved and not bent and plate.rigidity:
+        if curved and not bent and plate.rigidity and not plate.unknown_material:
             self._curved = _curved(plate, edge)
         # A cylinder skin's force accounts for its stretch; a drum head's modulus is unknown.
         accounted = plate.stretches or curved or not plate.rigidity
@@ -64,7 +64,7 @@ class LargeDeflection:
 # force F of the disc under which the curvatures of the linear shell are nearest to its own is what
 # is reported, in place of the true force T. T / F - 1 depends on w / h, with the depth w that the
 # linear shell has under F, and hardly on the place; in the middle it is largest, and the skin snaps
-# through first. In a dome that is wide for its radius nothing matters but a dent of a few sqrt(R h).
+# through first. In a dome that is wide for its radius only a dent of a few sqrt(R h) matters.
 # Lengths k times as long and radii k^2 times as large change nothing but what the skin gives, k^2
 # times as much: computed is a dome as wide as the dent and as shallow as the theory needs. A cap
 # counts as what it is at its pole.
@@ -88,7 +88,7 @@ class _CurvedSkin:
         self._gives = gives if whole else np.full_like(gives, middle / grown)
         modal = PointLoad(patch.a / 2, patch.b / 2).modal(basis)
         stretching, reported = Stretching(plate, basis), _reported_force(basis, C)
-        self._ends, table = list[float](), set[tuple[float, float]]()
+        self._ends, table = list[float](), dict[float, float]()
         for sign in (-1, 1):
             depths = _SOFTER if sign * sum(patch.curvatures) >= 0 else _STIFFER
             side = [(0.0, 0.0)]
@@ -96,8 +96,9 @@ class _CurvedSkin:
                 force = reported(shape)
                 side.append((middle * force, true / force - 1))
             self._ends.append(sign * math.inf if len(side) > len(depths) else side[-1][0])
-            table.update(side)
-        self._depths, self._changes = np.array(sorted(table)).T
+            table |= dict(side)
+        self._depths = sorted(table)
+        self._changes = [table[depth] for depth in self._depths]
 
     def __call__(self, contact: Contact) -> Contact:
         """The contact, with the error of a linear shell in its force's error bar."""

@@ -192,9 +192,8 @@ class Stretching:
         there = values > _ROUNDING * values[-1]
         return vectors[:, there] * np.sqrt(values[there])
 
-    # With q = L p the energy is p'p/2 + that of the membrane - F'q. Where the membrane is compressed
-    # its Hessian I + L'KL may be indefinite. One Hessian serves as long as it brings the gradient
-    # down.
+    # With q = L p the energy is p'p/2 - F'q and that of the membrane. Where that is compressed the
+    # Hessian I + L'KL may be indefinite. One Hessian serves as long as it brings the gradient down.
     def __call__(self, modal: Array) -> Array:
         """Coefficients (Ni, Nj) in m under modal forces (Ni, Nj) in N, by Newton's method.
 
