@@ -6,11 +6,15 @@ from functools import partial
 from kappaskin.bases.basis import ORDERS as ORDERS
 from kappaskin.bases.basis import Basis as Basis
 from kappaskin.bases.basis import CurvatureMap as CurvatureMap
+from kappaskin.bases.basis import PointMap as PointMap
 from kappaskin.bases.basis import ValueMap as ValueMap
+from kappaskin.bases.basis import covariant_at as covariant_at
 from kappaskin.bases.basis import curvature_at as curvature_at
 from kappaskin.bases.basis import hoop_at as hoop_at
+from kappaskin.bases.modes import CapBasis as CapBasis
 from kappaskin.bases.modes import DiskBasis, PolygonBasis
 from kappaskin.bases.modes import ModeBasis as ModeBasis
+from kappaskin.bases.modes import radial as radial
 from kappaskin.bases.product import ClampedBasis
 from kappaskin.bases.product import ElasticBasis as ElasticBasis
 from kappaskin.bases.product import ProductBasis as ProductBasis
@@ -18,7 +22,7 @@ from kappaskin.bases.product import SineBasis as SineBasis
 from kappaskin.bases.product import gauss as gauss
 from kappaskin.bases.product import overlaps as overlaps
 from kappaskin.errors import Refusal
-from kappaskin.skin import Disk, Patch, Polygon
+from kappaskin.skin import Cap, Disk, Patch, Polygon
 
 _Maker = Callable[[Patch, int, int], Basis]
 _MAKERS: dict[type[Patch], dict[str, _Maker]] = {
@@ -30,6 +34,7 @@ _MAKERS: dict[type[Patch], dict[str, _Maker]] = {
         "cantilever": partial(ClampedBasis, tip=True),
     },
     Disk: {"hinged": DiskBasis, "clamped": partial(DiskBasis, clamped=True)},
+    Cap: {"hinged": CapBasis, "clamped": partial(CapBasis, clamped=True)},
     Polygon: {"hinged": PolygonBasis, "clamped": partial(PolygonBasis, clamped=True)},
 }
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from kappaskin.bases import (
     Basis,
+    CapBasis,
     ElasticBasis,
     ModeBasis,
     ProductBasis,
@@ -19,9 +20,10 @@ from kappaskin.bases import (
 )
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
+from kappaskin.mechanics.cap import CapShell
 from kappaskin.mechanics.loads import Load, is_point
 from kappaskin.mechanics.shell import Sheet, Tangential, shallow_stiffness
-from kappaskin.skin import Patch
+from kappaskin.skin import Cap, Patch
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +71,8 @@ INPLANE = ("held", "diaphragm", "free", "hoop")
 `free`: no membrane force across the edge, no shear. `hoop`, of a bent skin: the hoop displacement
 is held, the axial one free. Of a cylinder skin they are those of the straight edges; the curved
 ones hold the radial and the hoop displacement and leave the axial one free. Of a shallow skin, as
-of a flat one, they are those of all four edges, and there is no `hoop`.
+of a flat one, they are those of all four edges, and there is no `hoop`. Of a cap they are those of
+its rim: `held` and, of less than a hemisphere, `diaphragm`, which lets it slide along the meridian.
 """
 
 
@@ -143,11 +146,23 @@ class Plate:
                 "both; omit the thickness of a drum head"
             )
         possible = INPLANE if self.patch.arc_curvature else INPLANE[:-1]
+        if isinstance(self.patch, Cap):
+            self._check_cap(self.patch)
         if self.inplane and self.inplane not in possible:
             raise Refusal(
                 f"expected inplane among {', '.join(possible)} for a "
                 f"{self.patch.name if any(self.patch.curvatures) else 'flat skin'}, got "
                 f"{self.inplane!r:.40}"
+            )
+
+    def _check_cap(self, cap: Cap) -> None:
+        if not self.rigidity:
+            raise Refusal(f"expected a rigidity above zero in N m of a {cap.name}, got 0")
+        if self.inplane == "free" or (self.inplane == "diaphragm" and cap.is_hemisphere):
+            raise Refusal(
+                f"expected inplane held of a {cap.name}, or diaphragm of less than a hemisphere, "
+                f"got {self.inplane}: such a rim lets the cap turn or bend without stretching, and "
+                "its force is not determined"
             )
 
     @classmethod
@@ -224,7 +239,7 @@ class Plate:
             values: Array = 1 / (area * stiffness)
         else:
             values = self._by_ritz(basis)
-            if isinstance(basis, ModeBasis):
+            if isinstance(basis, ModeBasis) and not any(self.patch.curvatures):
                 values = _unmixed(values)
         return self._over_fluid(values, basis) if self.fluid else Compliance(values)
 
@@ -264,6 +279,10 @@ class Plate:
         v_held = held in ("hoop", "held") and not sliding
         return Sheet(self.patch, *of_sheet, *below, v_held, held in ("diaphragm", "held"))
 
+    def _cap(self, basis: CapBasis) -> CapShell:
+        support = self.tension, self.foundation, self.inplane_edge == "diaphragm"
+        return CapShell(basis, self.rigidity, self.membrane_stiffness, self.poisson, *support)
+
     def _tangential(self, basis: Basis) -> Tangential:
         return Tangential(self.sheet(isinstance(basis, SineBasis) and basis.sliding), basis)
 
@@ -300,15 +319,22 @@ class Plate:
         return whole - negative, whole
 
     def _by_ritz(self, basis: Basis) -> Array:
-        """Inverse (N, N) of the stiffness, scaled so that it is well conditioned."""
+        """Inverse (N, N) of the stiffness."""
+        if isinstance(basis, CapBasis):
+            cap = self._cap(basis)
+            return cap.by_function(self._inverse(cap.stiffness, cap.bare))
         K, bare = self._stiffness(basis)
         inextensible = self.patch.arc_curvature and not self._is_shell
         W = np.eye(basis.size) if basis.free is None or not inextensible else basis.free
-        scale = np.sqrt(np.diag(W.T @ bare @ W))
-        values, vectors = np.linalg.eigh(W.T @ K @ W / np.multiply.outer(scale, scale))
-        self._check_held(bool(values[0] > 1e-13 * values[-1]))
-        V = W @ (vectors / scale[:, None])
-        return (V / values) @ V.T
+        return W @ self._inverse(W.T @ K @ W, W.T @ bare @ W) @ W.T
+
+    def _inverse(self, K: Array, bare: Array) -> Array:
+        """Inverse (..., N, N) of stiffnesses, scaled by `bare` so that it is well conditioned."""
+        scale = np.sqrt(np.einsum("...ii->...i", bare))
+        values, vectors = np.linalg.eigh(K / (scale[..., None] * scale[..., None, :]))
+        self._check_held(bool((values[..., 0] > 1e-13 * values[..., -1]).all()))
+        V = vectors / scale[..., None]
+        return (V / values[..., None, :]) @ np.swapaxes(V, -1, -2)
 
     @staticmethod
     def _check_held(held: bool) -> None:
@@ -325,6 +351,8 @@ class Plate:
         That of the skin under loads along its normal: a bent one stretches under them, and its
         tangential displacements follow from its stiffness.
         """
+        if isinstance(basis, CapBasis):
+            return self._cap(basis).curvature_at
         if self._is_shell:
             return self._tangential(basis).curvature_at
         return partial(curvature_at, basis)

@@ -143,7 +143,7 @@ def _plate(patch: Patch, found: dict[str, Array], inplane: str) -> Plate:
 
 
 def _patch(path: Path, size: Array, radius: Array, outline: Array | None) -> Patch:
-    """The skin of `size` (2,), or of size (1,) a strip, bent to one `radius`.
+    """The skin of `size` (2,), or of size (1,) a strip, bent to one `radius` or two (2,).
 
     With an `outline`, (V, 2) in m or one number, it is a polygon, or a disk of that radius.
     """
@@ -163,10 +163,11 @@ def _patch(path: Path, size: Array, radius: Array, outline: Array | None) -> Pat
         raise Refusal(
             f"{path}: expected size of shape (2,) in m, or (1,) for a strip, got {size.shape}"
         )
-    if radius.size != 1:
-        raise Refusal(f"{path}: expected one radius in m, got shape {radius.shape}")
-    strip = len(size) == 1
-    return Patch(float(size[0]), 1.0 if strip else float(size[1]), float(radius.item()), strip)
+    if radius.size not in (1, 2):
+        raise Refusal(f"{path}: expected one radius in m or two, got shape {radius.shape}")
+    strip, (Rx, *Ry) = len(size) == 1, radius.ravel().tolist()
+    bent = (Rx, Ry[0]) if Ry else Rx
+    return Patch(float(size[0]), 1.0 if strip else float(size[1]), bent, strip)
 
 
 def _layout(path: Path, patch: Patch, positions: Array) -> SensorLayout:

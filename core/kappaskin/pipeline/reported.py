@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 
 from kappaskin.errors import Refusal
-from kappaskin.estimation import Fit
+from kappaskin.estimation import Fit, propagated_covariance
 from kappaskin.frames import COMPONENTS, Array, Estimate
 from kappaskin.sensing import Sensor, SensorLayout
 
@@ -95,7 +95,8 @@ class Reported:
         To first order, from what the readings' noise makes of the displacement f and its slopes
         there, and of the place x, y itself, as if these were independent:
             dr = r_x dx + r_y dy - n0 df,    |dn| = |d(f_x, f_y) + K [metric] (dx, dy)|,
-        where [r_x r_y] = [t e] [metric] and n0 is the normal of the skin at rest.
+        where [r_x r_y] = [t e] [metric] and n0 is the normal of the skin at rest. On a cap the
+        slopes are those along the axes of its elements.
         """
         if self._in_space is not None:
             return self._in_space
@@ -105,18 +106,22 @@ class Reported:
         x, y = self.contact.position.tolist()
         x_sd, y_sd = self.contact.position_sd.tolist()
         # Cached: the geometry there was computed of it.
-        variances = self.fit.jet(x, y)[1].diagonal()[:3].tolist()
+        base, covariance = patch.base(x, y), self.fit.jet(x, y)[1]
+        if base.slopes:
+            covariance = propagated_covariance(base.covariant, covariance)
+        variances = covariance.diagonal()[:3].tolist()
         f_sd, *slopes_sd = (math.sqrt(v) if v >= 0 else math.nan for v in variances)
         t, e, normal = geometry.frame.tolist()
-        (L, m), (_, k) = geometry.metric.tolist()
+        (L, m), (o, k) = geometry.metric.tolist()
         (xx, xy), (_, yy) = geometry.curvature_form.tolist()
-        angle = (x - patch.a / 2) * patch.arc_curvature
-        n0 = math.sin(angle), 0.0, math.cos(angle)
         spread = [
-            math.hypot(L * t[i] * x_sd, (m * t[i] + k * e[i]) * y_sd, n0[i] * f_sd)
+            math.hypot(
+                (L * t[i] + o * e[i]) * x_sd, (m * t[i] + k * e[i]) * y_sd, base.normal[i] * f_sd
+            )
             for i in range(3)
         ]
-        tilt = L * xx * x_sd, L * xy * x_sd, (m * xx + k * xy) * y_sd, (m * xy + k * yy) * y_sd
+        tilt_x = (L * xx + o * xy) * x_sd, (L * xy + o * yy) * x_sd
+        tilt = *tilt_x, (m * xx + k * xy) * y_sd, (m * xy + k * yy) * y_sd
         self._in_space = spread, [*normal, math.hypot(*slopes_sd, *tilt)]
         return self._in_space
 
@@ -185,7 +190,7 @@ class SkinColour:
     The `symbol` is HTML, the `tip` has the equation, and `unknown` says why there may be no value.
     `on_surface` gets the values (ny, nx) on the surface's points; without it there are values at
     the elements only. `of_elements` gets these (P,); without it they are those of the surface.
-    `at_rest` gets the value of a skin at rest from its curvature, zero if left out, from which
+    `at_rest` gets the value of a skin at rest from its xx, yy, xy, zero if left out, from which
     colours of what is `signed` go both ways. They reach as far as `least` at least, on the screen's
     scale, or for a length as that share of the skin's longer side; those of one `group` may share
     a range.
@@ -199,7 +204,7 @@ class SkinColour:
     tip: str
     on_surface: Getter | None = None
     of_elements: Getter | None = None
-    at_rest: Callable[[float], float] | None = None
+    at_rest: Callable[[Array], float] | None = None
     unknown: str = ""
     signed: bool = True
     least: float = 0.5
@@ -558,7 +563,7 @@ def _invariant(
                 symbol,
                 tip,
                 of_elements=lambda r: of(_skin(r).form_at_elements(r.estimate.curvature)),
-                at_rest=lambda H: float(of(np.array([H, 0.0, 0.0]))),
+                at_rest=lambda form: float(of(form)),
                 least=least,
                 group=group,
             ),

@@ -166,7 +166,7 @@ def scene_of(top: TomlTable, file: Path, trust: Trust = False) -> Scene:
     reference = SCENE.value(top, "reference", default=usual_reference(plate.patch))
     basis = partial(basis_for, plate.patch, edge, *reference)
     with top.blamed("reference"):
-        _check_functions(plate.patch, edge, reference, len(layout))
+        _check_functions(plate, edge, reference, len(layout))
         basis()
     if len(top.tables("touch")) > _MOST_TOUCHES:
         raise top.refusal(
@@ -486,10 +486,10 @@ def check_elements(m: int, n: int = 1) -> None:
         raise Refusal(f"expected at most {_MOST_ELEMENTS} elements, got {m} x {n}; take fewer")
 
 
-def _check_functions(patch: Patch, edge: str, counts: tuple[int, int], elements: int) -> None:
+def _check_functions(plate: Plate, edge: str, counts: tuple[int, int], elements: int) -> None:
     """Refuse more functions of the true shape than can be computed in a few seconds."""
-    whole = isinstance(patch, Disk | Polygon)
-    mix = whole or patch.arc_curvature or edge != "hinged"
+    whole = isinstance(plate.patch, Disk | Polygon)
+    mix = whole or plate.mixes_sines or edge != "hinged"
     most = _MOST_THAT_MIX if mix else _MOST_FUNCTIONS
     most = min(most, _MOST_VALUES // (3 * elements))
     if min(counts) > 0 and counts[0] * counts[1] > most:

@@ -119,7 +119,11 @@ SKIN = Part(
             kind=tuple[tuple[float, float], ...],
         ),
         "radius": Key(
-            "Bent to radius", "The skin at rest is an arc along x.", _MM, 0.0, example=0.05
+            "Bent to radius",
+            "Radius of the arc along x that the skin is at rest, or the two along x and y of a "
+            "shallow skin: a dome, a saddle where their signs differ, a trough where one is inf.",
+            _MM,
+            example=0.05,
         ),
         "edge": Key(
             "Edge",

@@ -113,7 +113,7 @@ class Simulator:
             self._sensed = sloped[0].sensed(self._basis, layout, plate)
         else:
             self._sensed = _linear(layout, self._basis, plate)
-        flat = isinstance(self._basis, SineBasis) and not self._basis.patch.arc_curvature
+        flat = isinstance(self._basis, SineBasis) and not any(self._basis.patch.curvatures)
         self._told = (slice(_TOLD), slice(_TOLD)) if flat else ()
 
     def _truth(self, time: float) -> Truth:

@@ -296,8 +296,9 @@ def _fields(owner: object, usual: object = None, without: tuple[str, ...] = ()) 
 
 def _toml(value: Any, kind: Any) -> Any:
     """The `value` as TOML has it: a number where `kind` is float is one, however it came."""
-    if get_origin(kind) is tuple:
-        return [_toml(each, get_args(kind)[0]) for each in value]
+    if isinstance(value, tuple):
+        each = next(get_args(one)[0] for one in (kind, *get_args(kind)) if get_origin(one) is tuple)
+        return [_toml(one, each) for one in cast("tuple[Any, ...]", value)]
     if isinstance(value, bool | str):
         return value
     return float(value) if kind is float or float in get_args(kind) else int(value)

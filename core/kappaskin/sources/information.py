@@ -43,9 +43,10 @@ SENSOR = Part(
         "size": _SKIN.key("size"),
         "base_curvature": Key(
             "Base curvature",
-            "Curvature of the skin at rest along x: one over its radius.",
+            "Curvature at rest along x of a skin bent to an arc: one over its radius. Of a shallow "
+            "skin, a dome or saddle, the two along x and y.",
             _PER_METRE,
-            kind=float,
+            kind=float | tuple[float, float],
             default=0.0,
         ),
         "strip": Key(
@@ -116,6 +117,7 @@ def sensor_to_json(sensor: Sensor) -> str:
     }
     values |= {
         "size": (patch.a, patch.b),
+        "base_curvature": patch.curvatures if isinstance(patch.radius, tuple) else 1 / patch.radius,
         "outline": _outline(patch),
         "grid": layout.shape,
         "positions": None if layout.shape else layout.positions.tolist(),
@@ -187,14 +189,15 @@ def _sensor(table: TomlTable) -> Sensor:
 def _patch(values: dict[str, Any]) -> Patch:
     size, H, outline = values["size"], values["base_curvature"], values["outline"]
     if outline is None:
-        return Patch(*size, radius=1 / H if H else math.inf, strip=values["strip"])
+        Rx, *Ry = (1 / one if one else math.inf for one in np.ravel(H).tolist())
+        return Patch(*size, radius=(Rx, Ry[0]) if Ry else Rx, strip=values["strip"])
     if isinstance(outline, str) and outline != "disk":
         raise Refusal(f"expected the outline 'disk' or a list of corners, got {outline!r:.80}")
     patch = Disk(size[0] / 2) if outline == "disk" else Polygon(outline)
     if H or values["strip"] or size != (patch.a, patch.b):
         raise Refusal(
             f"expected a flat {patch.name}, of size {[patch.a, patch.b]}, got size {[*size]}, base "
-            f"curvature {H:g} and strip {values['strip']}"
+            f"curvature {H} and strip {values['strip']}"
         )
     return patch
 

@@ -99,6 +99,24 @@ def test_a_ready_scene_is_the_same_once_written_and_read(name):
     assert write_scene(read) == write_scene(scene)
 
 
+@pytest.mark.parametrize(
+    ("radius", "written"),
+    [
+        (0.05, "0.05"),
+        ((0.4, 0.5), "[0.4, 0.5]"),
+        ((-0.4, 0.5), "[-0.4, 0.5]"),
+        ((np.inf, 0.4), "[inf, 0.4]"),
+        ((0.4, np.inf), "[0.4, inf]"),
+    ],
+)
+def test_the_radii_of_a_bent_skin_are_written_and_read(radius, written):
+    patch = Patch(0.1, 0.08, radius)
+    scene = Scene("bent", Plate(patch), SensorLayout.regular(patch, 4, 4))
+
+    assert f"\nradius = {written}  # m\n" in write_scene(scene)
+    assert again(scene).plate == scene.plate
+
+
 def test_a_scene_is_written_as_a_person_would_write_it():
     disk = Disk(0.05)
     scene = Scene(

@@ -1,6 +1,7 @@
 """What a device says it is: understood whole, or refused with a reason."""
 
 import json
+import math
 import re
 import tracemalloc
 from dataclasses import replace
@@ -90,6 +91,13 @@ def test_how_the_skin_stretches_survives() -> None:
     assert same(sensor_from_json(sensor_to_json(sensor)), sensor)
     with pytest.raises(SourceError, match="expected inplane among held, diaphragm, free"):
         sensor_from_json(json.dumps(said(inplane="hoop")))
+
+
+@pytest.mark.parametrize("radii", [(0.4, 0.5), (-0.4, 0.5), (math.inf, 0.4), (0.4, math.inf)])
+def test_the_radii_of_a_shallow_skin_survive(radii) -> None:
+    sensor = sensor_on(SensorLayout.regular(Patch(0.1, 0.08, radii), 3, 2))
+
+    assert same(sensor_from_json(sensor_to_json(sensor)), sensor)
 
 
 def test_every_outline_and_edge_survives(held_skin) -> None:
@@ -275,6 +283,14 @@ BAD = {
     "disk bent": (
         said(outline="disk", size=[0.1, 0.1], base_curvature=5),
         "expected a flat disk .* curvature 5",
+    ),
+    "base curvature of three": (
+        said(base_curvature=[1, 2, 3]),
+        "base_curvature: expected a number or a list of 2 numbers, got",
+    ),
+    "too steep for a shallow skin": (
+        said(base_curvature=[10, 10]),
+        r"1/\(R k\)\^2, 3\.95% .* radii of at least 0.199 m",
     ),
     "disk with a rim that gives": (
         said(outline="disk", size=[0.1, 0.1], edge="elastic", grid=[3, 3]),

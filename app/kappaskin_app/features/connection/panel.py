@@ -440,8 +440,13 @@ def _sensor_text(sensor: Sensor, calibration: Calibration | None) -> str:
     bends = patch.strip and not sensor.layout.reads  # along x alone
     sensing = live[:1] if bends else live
     dead = int((~sensing).sum())
-    a, b, radius = (round(1e3 * length, 1) for length in (patch.a, patch.b, patch.radius))
-    bent = f", radius {radius:g} mm" if patch.arc_curvature else ""
+    a, b, along_x, along_y = (round(1e3 * one, 1) for one in (patch.a, patch.b, *patch.radii))
+    bent = f", radius {along_x:g} mm" if patch.arc_curvature else ""
+    if patch.is_shallow:
+        bent = (
+            f", radii {along_x:g} and {along_y:g} mm\nrises {1e3 * patch.rise:.2g} mm; shallow "
+            f"shell theory is accurate to {100 * patch.steepness:.2g} %"
+        )
     health = f"\n{dead} of {sensing.size} channels dead" if dead else ""
     name = printable(f"{sensor.name} ({sensor.serial_number})")
     calibrated = f"\n{calibration_text(calibration)}" if calibration else ""
