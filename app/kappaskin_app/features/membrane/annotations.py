@@ -118,7 +118,7 @@ class Sides:
             label.input = text
             label.position = tuple(at)
         # A centred text would lie below a skin that rises steeply.
-        y_at = "right" if skin.patch.arc_curvature else "center"
+        y_at = "right" if any(skin.patch.curvatures) else "center"
         self.labels[2].prop.justification_horizontal = y_at
 
     def show_from(self, direction: Direction | None) -> None:

@@ -140,16 +140,21 @@ _LONG = 0.2  # of the skin's size
 _POINTS = 9  # of a line
 _RIM = 32  # points of the cone's rim
 _NORMAL = (31, 209, 122)  # as the contact's own mark
-_COLOURS = np.array([_NORMAL, DIVERGING[215], DIVERGING[40]], np.uint8)
+_COLOURS = np.array([_NORMAL, DIVERGING[215], DIVERGING[40], _NORMAL], np.uint8)
+_AROUND, _OUT, _FINE = 48, 14, 32  # points around, outward, and to find the extent
+_WAYS = 2 * np.pi * np.arange(_AROUND) / _AROUND
+_SIDES = np.stack([np.cos(_WAYS), np.sin(_WAYS)], axis=-1)
 
 
 class ContactFrame:
-    """Axes of the contact frame, and a cone of the normal's uncertainty."""
+    """Axes of the contact frame, a cone of the normal's and an ellipse of the place's error bar."""
 
     def __init__(self, plotter: Any) -> None:
-        points = np.arange(3 * _POINTS).reshape(3, -1)
-        lines = np.insert(points, 0, _POINTS, axis=1).ravel()
-        self._lines: Any = pv.PolyData(np.zeros((3 * _POINTS, 3)), lines=lines)
+        points = np.arange(3 * _POINTS + _AROUND)
+        axes, ellipse = points[: 3 * _POINTS].reshape(3, -1), points[3 * _POINTS :]
+        lines = np.insert(axes, 0, _POINTS, axis=1).ravel()
+        lines = np.r_[lines, _AROUND + 1, ellipse, ellipse[0]]
+        self._lines: Any = pv.PolyData(np.zeros((len(points), 3)), lines=lines)
         self._lines.cell_data["rgb"] = _COLOURS
         rim = 1 + np.arange(_RIM)
         faces = np.column_stack([np.full(_RIM, 3), np.zeros(_RIM, int), rim, 1 + rim % _RIM])
@@ -171,12 +176,14 @@ class ContactFrame:
         position: Array,
         angle: float,
         slope_sd: Array | None,
+        reach: Array,
         lift: float = 0.0,
     ) -> None:
         """Draw it at `position` (2,) in m, the first direction `angle` rad from x.
 
-        The directions lie on the skin, `lift` mm above it. `slope_sd` (2,) are the standard
-        deviations of the drawn slopes, None if unknown.
+        Directions and ellipse lie on the skin, `lift` mm above it. `slope_sd` (2,) are the standard
+        deviations of the drawn slopes, None if unknown; `reach` (2,) in m is the error bar of the
+        position.
         """
         (origin,), _ = skin.place(position[None])
         x, y = skin.tangents(position)
@@ -189,6 +196,7 @@ class ContactFrame:
             along = length / MM * np.linspace(-0.5, 0.5, _POINTS)[:, None]
             there = position + along * (np.cos(turn), np.sin(turn))
             lines.append(skin.place(there, lift)[0])
+        lines.append(skin.place(position + np.nan_to_num(reach) * _SIDES, lift)[0])
         self._lines.points[:] = np.concatenate(lines)
         self.actor.visibility = True
         self.cone.visibility = slope_sd is not None
@@ -200,10 +208,7 @@ class ContactFrame:
             self._cone.points[:] = np.vstack([origin, origin + rim])
 
 
-_AROUND, _OUT, _FINE = 48, 14, 32  # points around, outward, and to find the extent
 _ABOVE = 0.35  # of the skin's size: the highest part drawn
-_WAYS = 2 * np.pi * np.arange(_AROUND) / _AROUND
-_SIDES = np.stack([np.cos(_WAYS), np.sin(_WAYS)], axis=-1)
 
 
 class ObjectMesh:
@@ -348,9 +353,10 @@ class Overlays:
         bars, slopes = self._colouring.error_bars(estimate), None
         if bars is not None:
             slopes = times * bars.of_slopes(contact.position, estimate.noise)
-        angle = float(estimate.geometry.angle)
-        membrane = self._membrane
-        self.frame.show(membrane.skin, contact.position, angle, slopes, membrane.lift)
+        angle, membrane = float(estimate.geometry.angle), self._membrane
+        half_widths = zip(contact.position_sd, contact.position_95, strict=True)
+        reach = np.array([Coverage.now.of(sd, half) for sd, half in half_widths])
+        self.frame.show(membrane.skin, contact.position, angle, slopes, reach, membrane.lift)
 
     def _recognised_object(self, estimate: Estimate) -> PlacedObject | None:
         """The recently recognised object at the present contact."""
