@@ -105,11 +105,12 @@ class Directions:
         """Both ends (4 G, 3) in mm of each line, `step` (2, 2 G) in mm from its node."""
         h_y, h_x = np.gradient(skin.height, skin.cell[1] * MM, skin.cell[0] * MM)
         nodes = np.tile(self._nodes, 2)
-        slope = step[0] * h_x.ravel()[nodes] + step[1] * h_y.ravel()[nodes]
+        moved = np.einsum("ik,kij->kj", step, self._ways)
+        slope = moved[:, 0] * h_x.ravel()[nodes] + moved[:, 1] * h_y.ravel()[nodes]
         height = skin.height.ravel()[nodes] + lift
         ends: list[Array] = []
         for side in (-1, 1):
-            rest, out = skin.at_rest(self._positions + side * step.T / MM)
+            rest, out = skin.at_rest(self._positions + side * moved / MM)
             ends.append(rest + out * (height + side * slope)[:, None])
         return np.stack(ends, axis=1).reshape(-1, 3)
 
@@ -120,6 +121,8 @@ class Directions:
         chosen[stride // 2 :: stride, stride // 2 :: stride] = True
         self._nodes = np.flatnonzero(chosen & skin.on)
         self._positions = np.tile(skin.shares[self._nodes] * (skin.patch.a, skin.patch.b), (2, 1))
+        # From steps along the skin's frames to steps of its coordinates.
+        self._ways = skin.patch.local(self._positions).covariant[:, 1:3, 1:3]
         self._apart = stride * MM * float(skin.cell.min())
         if self.actor is not None:
             self._plotter.remove_actor(self.actor, render=False)
@@ -194,9 +197,10 @@ class ContactFrame:
         for turn in (angle, angle + np.pi / 2):
             # Along the skin: straight lines would be hidden where it is concave.
             along = length / MM * np.linspace(-0.5, 0.5, _POINTS)[:, None]
-            there = position + along * (np.cos(turn), np.sin(turn))
+            there = skin.patch.around(*position, along * (np.cos(turn), np.sin(turn)))
             lines.append(skin.place(there, lift)[0])
-        lines.append(skin.place(position + np.nan_to_num(reach) * _SIDES, lift)[0])
+        ellipse = skin.patch.around(*position, np.nan_to_num(reach) * _SIDES)
+        lines.append(skin.place(ellipse, lift)[0])
         self._lines.points[:] = np.concatenate(lines)
         self.actor.visibility = True
         self.cone.visibility = slope_sd is not None
@@ -254,9 +258,10 @@ def underside(stands: PlacedObject, skin: DrawnSkin, times: float) -> Array | No
     """
     reach = min(float(np.hypot(*stands.object_.extent)), skin.side / MM)
     shares = np.linspace(0.0, 1.0, _FINE)
-    places = stands.place + reach * shares[:, None, None] * _SIDES
-    height = stands.over(skin.patch, places.reshape(-1, 2))[0].reshape(_FINE, _AROUND)
-    depth = _depth(skin, places.reshape(-1, 2), height.ravel(), times)
+    offsets = (reach * shares[:, None, None] * _SIDES).reshape(-1, 2)
+    places = skin.patch.around(*stands.place, offsets)
+    height = stands.over(skin.patch, places)[0].reshape(_FINE, _AROUND)
+    depth = _depth(skin, places, height.ravel(), times)
     if not np.isfinite(depth):
         return None
     near = np.isfinite(height) & (times * MM * (height - depth) < _ABOVE * skin.size)
@@ -264,10 +269,10 @@ def underside(stands: PlacedObject, skin: DrawnSkin, times: float) -> Array | No
     if outermost.max() <= 0:
         return None
     far = reach * shares[np.maximum(outermost, 0)]
-    places = stands.place + np.linspace(0, 1, _OUT)[:, None, None] * far[:, None] * _SIDES
-    flat = places.reshape(-1, 2)
-    rise = np.nan_to_num(stands.over(skin.patch, flat)[0] - depth, posinf=0.0)
-    rest, out = skin.at_rest(flat)
+    offsets = np.linspace(0, 1, _OUT)[:, None, None] * far[:, None] * _SIDES
+    places = skin.patch.around(*stands.place, offsets.reshape(-1, 2))
+    rise = np.nan_to_num(stands.over(skin.patch, places)[0] - depth, posinf=0.0)
+    rest, out = skin.at_rest(places)
     return rest + out * (times * MM * rise)[:, None]
 
 
