@@ -9,6 +9,7 @@ import numpy as np
 
 from kappaskin.bases import (
     Basis,
+    CapBasis,
     ElasticBasis,
     ModeBasis,
     ProductBasis,
@@ -19,6 +20,7 @@ from kappaskin.bases import (
 )
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
+from kappaskin.mechanics.cap import CapShell
 from kappaskin.mechanics.loads import Load, is_point
 from kappaskin.mechanics.shell import Sheet, Tangential, shallow_stiffness
 from kappaskin.skin import Patch
@@ -224,7 +226,7 @@ class Plate:
             values: Array = 1 / (area * stiffness)
         else:
             values = self._by_ritz(basis)
-            if isinstance(basis, ModeBasis):
+            if isinstance(basis, ModeBasis) and not any(self.patch.curvatures):
                 values = _unmixed(values)
         return self._over_fluid(values, basis) if self.fluid else Compliance(values)
 
@@ -264,6 +266,10 @@ class Plate:
         v_held = held in ("hoop", "held") and not sliding
         return Sheet(self.patch, *of_sheet, *below, v_held, held in ("diaphragm", "held"))
 
+    def _cap(self, basis: CapBasis) -> CapShell:
+        support = self.tension, self.foundation, self.inplane_edge == "diaphragm"
+        return CapShell(basis, self.rigidity, self.membrane_stiffness, self.poisson, *support)
+
     def _tangential(self, basis: Basis) -> Tangential:
         return Tangential(self.sheet(isinstance(basis, SineBasis) and basis.sliding), basis)
 
@@ -300,15 +306,22 @@ class Plate:
         return whole - negative, whole
 
     def _by_ritz(self, basis: Basis) -> Array:
-        """Inverse (N, N) of the stiffness, scaled so that it is well conditioned."""
+        """Inverse (N, N) of the stiffness."""
+        if isinstance(basis, CapBasis):
+            cap = self._cap(basis)
+            return cap.by_function(self._inverse(cap.stiffness, cap.bare))
         K, bare = self._stiffness(basis)
         inextensible = self.patch.arc_curvature and not self._is_shell
         W = np.eye(basis.size) if basis.free is None or not inextensible else basis.free
-        scale = np.sqrt(np.diag(W.T @ bare @ W))
-        values, vectors = np.linalg.eigh(W.T @ K @ W / np.multiply.outer(scale, scale))
-        self._check_held(bool(values[0] > 1e-13 * values[-1]))
-        V = W @ (vectors / scale[:, None])
-        return (V / values) @ V.T
+        return W @ self._inverse(W.T @ K @ W, W.T @ bare @ W) @ W.T
+
+    def _inverse(self, K: Array, bare: Array) -> Array:
+        """Inverse (..., N, N) of stiffnesses, scaled by `bare` so that it is well conditioned."""
+        scale = np.sqrt(np.einsum("...ii->...i", bare))
+        values, vectors = np.linalg.eigh(K / (scale[..., None] * scale[..., None, :]))
+        self._check_held(bool((values[..., 0] > 1e-13 * values[..., -1]).all()))
+        V = vectors / scale[..., None]
+        return (V / values[..., None, :]) @ np.swapaxes(V, -1, -2)
 
     @staticmethod
     def _check_held(held: bool) -> None:
@@ -325,6 +338,8 @@ class Plate:
         That of the skin under loads along its normal: a bent one stretches under them, and its
         tangential displacements follow from its stiffness.
         """
+        if isinstance(basis, CapBasis):
+            return self._cap(basis).curvature_at
         if self._is_shell:
             return self._tangential(basis).curvature_at
         return partial(curvature_at, basis)

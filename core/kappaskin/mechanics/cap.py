@@ -1,0 +1,157 @@
+"""Caps: how a domed skin that stretches gives, and what it reads."""
+
+import numpy as np
+
+from kappaskin.bases import CapBasis, curvature_at, gauss, radial
+from kappaskin.frames import Array
+from kappaskin.skin import Meridian
+
+# Sanders' and Koiter's theory of a shell of revolution, with the displacement f inward and the
+# tangential ones u along the meridian and v around, r the radius of the parallel and ' the
+# derivative by the arc s. Of the wave m around, f = F cos m t, u = U cos m t, v = V sin m t:
+#
+#     strain       e_s = U' - k1 F      e_t = (m V + r' U) / r - k2 F      g = V' - (m U + r' V) / r
+#     reading      ss = F'' + k1^2 F + k1' U
+#                  tt = r' F' / r - m^2 F / r^2 + k2^2 F + k2' U
+#                  st = m (r' F / r - F') / r + (k2 - k1) (V' + (m U + r' V) / r) / 2 + k2' V
+#     curvature    ss + k1 e_s      tt + k2 e_t      st + (k1 + k2) g / 4
+#
+# The energy is that of a cylinder (shell.py) with these, the tension's with k1^2 + k2^2 for H^2.
+# The readings are those of gages back to back, as there: half of what the strains at z and -z
+# differ by, over z. At z a line is 1 + z k times as long, so that they are the changes of the
+# second form less k e twice. In general they are f_;ij + (K^2)_ij f, what the rotation of the skin
+# in its plane turns the form K by, and what u carries it: on a sphere the first two terms alone.
+#
+# Smooth at the pole, (u + i v) turned to the fixed frame, are A r^(m+1) and B r^|m-1| times
+# polynomials of r^2: U = A + B and V = A - B. Nothing presses the skin along itself: they are those
+# of the least energy for a given F. No wave m mixes with another.
+
+_MORE = 12  # functions of u and v along the meridian, more than f has
+_AT_POLE = 1e-6  # of the arc to the rim: nearer, nothing depends on u and v
+
+
+class CapShell:
+    """A cap of D in N m, C and T in N/m, nu and k_f in N/m^3, on the functions of a `basis`.
+
+    Its rim holds u and v, or with `u_free` v alone.
+    """
+
+    def __init__(
+        self,
+        basis: CapBasis,
+        D: float,
+        C: float,
+        nu: float,
+        T: float = 0.0,
+        k_f: float = 0.0,
+        u_free: bool = False,
+    ) -> None:
+        self._basis, self._u_free = basis, u_free
+        self._m = np.arange(basis.Nj // 2 + 1)
+        self._count = basis.Ni + _MORE
+        rho, weights = gauss(1.0, 2 * self._count + len(self._m) + 24)
+        a = basis.cap.rim_radius
+        along = basis.cap.meridian(a * rho)
+        S = self._strains(rho, along)
+        law = np.zeros((len(rho), 9, 9))
+        law[:] = np.diag([C, C, C * (1 - nu) / 2, D, D, 2 * D * (1 - nu), T, T, k_f])
+        law[:, 0, 1] = law[:, 1, 0] = nu * C
+        law[:, 3, 4] = law[:, 4, 3] = nu * D
+        bare = self._integral(S, law, a * weights * along.radius)
+        law[:, 8, 8] -= T * np.sum(along.curvatures**2, axis=0)
+        K = self._integral(S, law, a * weights * along.radius) if T else bare
+        f, t = slice(0, basis.Ni), slice(basis.Ni, None)
+        alone = np.einsum("mtt->mt", K[:, t, t])
+        alone[alone == 0] = 1.0  # of no v at m = 0
+        scale = 1 / np.sqrt(alone)
+        Ktt = K[:, t, t] * scale[:, :, None] * scale[:, None, :]
+        np.einsum("mtt->mt", Ktt)[:] = 1.0
+        coupled = K[:, t, f] * scale[:, :, None]
+        self._least: Array = -scale[:, :, None] * np.linalg.solve(Ktt, coupled)
+        self.stiffness: Array = K[:, f, f] + K[:, f, t] @ self._least
+        """Stiffness (M, Ni, Ni) in N/m of the functions of each wave m around."""
+        self.bare: Array = bare[:, f, f]
+        """The same without u, v and the negative terms, for scaling."""
+
+    def _integral(self, S: Array, law: Array, weights: Array) -> Array:
+        """S' law S (M, n, n) over the skin."""
+        around = np.pi * np.where(self._m > 0, 1.0, 2.0)
+        stress = np.einsum("qij,jqmn->iqmn", law * weights[:, None, None], S, optimize=True)
+        left, right = (
+            np.moveaxis(of, 2, 0).reshape(len(self._m), -1, S.shape[-1]) for of in (S, stress)
+        )
+        return around[:, None, None] * (np.swapaxes(left, 1, 2) @ right)
+
+    def _tangential(self, rho: Array) -> tuple[Array, Array]:
+        """U and V of each function of them with their derivatives by s, (2, Q, M, n)."""
+        per_arc = np.array([1.0, 1 / self._basis.cap.rim_radius])[:, None, None, None]
+        powers = self._m + 1, np.abs(self._m - 1)
+        A, B = (per_arc * radial(rho, m, self._count, 1)[:2] for m in powers)
+        U, V = [A, B], [A, -B]
+        if self._u_free:  # one more of each, alike at the rim
+            A, B = (radial(np.append(rho, 1.0), m, 1, 0)[:2] for m in powers)
+            A, B = (per_arc * of[:, :-1] / of[0, -1] for of in (A, B))
+            U, V = [*U, A + B], [*V, A - B]
+        found = np.concatenate(U, axis=-1), np.concatenate(V, axis=-1)
+        found[0][:, :, 0, self._count : 2 * self._count] = 0.0  # of m = 0 as A
+        found[1][:, :, 0] = 0.0
+        return found
+
+    def _strains(self, rho: Array, along: Meridian) -> Array:
+        """Strains (9, Q, M, n): e_s, e_t, g, of curvature ss, tt, st, and f_s, f_t, f."""
+        (k1, k2), (c1, c2) = along.curvatures[..., None, None], along.changes[..., None, None]
+        r, slope = along.radius[:, None, None], along.slope[:, None, None]
+        m, a, Ni = self._m[:, None], self._basis.cap.rim_radius, self._basis.Ni
+        F = self._basis.along(rho) / np.array([1.0, a, a**2])[:, None, None, None]
+        (U, U1), (V, V1) = self._tangential(rho)
+        S = np.zeros((9, *F.shape[1:3], Ni + U.shape[-1]))
+        f, t = S[..., :Ni], S[..., Ni:]
+        f[0], f[1] = -k1 * F[0], -k2 * F[0]
+        t[0], t[1], t[2] = U1, (m * V + slope * U) / r, V1 - (m * U + slope * V) / r
+        f[3], f[4] = F[2] + k1**2 * F[0], (slope * F[1] - m**2 * F[0] / r) / r + k2**2 * F[0]
+        f[5] = m * (slope * F[0] / r - F[1]) / r
+        t[3], t[4], t[5] = c1 * U, c2 * U, (k2 - k1) / 2 * (V1 + (m * U + slope * V) / r) + c2 * V
+        S[3] += k1 * S[0]
+        S[4] += k2 * S[1]
+        S[5] += (k1 + k2) / 4 * S[2]
+        f[6], f[7], f[8] = F[1], m * F[0] / r, F[0]
+        return S
+
+    def curvature_at(self, positions: Array) -> Array:
+        """Curvature xx, yy, xy (3, P, N) in 1/m per m of each function at `positions` (P, 2)."""
+        found, cap = curvature_at(self._basis, positions), self._basis.cap
+        if cap.stretch == 1:
+            return found
+        x, y = (positions - cap.rim_radius).T
+        s, angle = np.maximum(np.hypot(x, y), _AT_POLE * cap.rim_radius), np.arctan2(y, x)
+        along = cap.meridian(s)
+        (U, _), (V, V1) = (
+            np.einsum("dqmt,mti->dqmi", of, self._least, optimize=True)
+            for of in self._tangential(s / cap.rim_radius)
+        )
+        (k1, k2), (c1, c2) = along.curvatures[..., None, None], along.changes[..., None, None]
+        r, slope, m = along.radius[:, None, None], along.slope[:, None, None], self._m[:, None]
+        mixed = (k2 - k1) / 2 * (V1 + (m * U + slope * V) / r) + c2 * V
+        turn = np.multiply.outer(angle, self._m)[..., None]
+        cos, sin = np.cos(turn), np.sin(turn)
+        c, z = np.cos(angle)[:, None], np.sin(angle)[:, None]
+
+        def by_function(of_cosines: Array, of_sines: Array) -> Array:
+            both = np.stack([of_cosines, of_sines], axis=2).reshape(len(s), -1, self._basis.Ni)
+            own = np.delete(both, 1, axis=1)[:, : self._basis.Nj]  # without a sine of m = 0
+            return np.swapaxes(own, 1, 2).reshape(len(s), -1)
+
+        ss, tt = (by_function(change * U * cos, change * U * sin) for change in (c1, c2))
+        st = by_function(mixed * sin, -mixed * cos)
+        found[0] += c**2 * ss - 2 * c * z * st + z**2 * tt
+        found[1] += z**2 * ss + 2 * c * z * st + c**2 * tt
+        found[2] += c * z * (ss - tt) + (c**2 - z**2) * st
+        return found
+
+    def by_function(self, blocks: Array) -> Array:
+        """A matrix (N, N) of the functions from its `blocks` (M, Ni, Ni) of each wave m."""
+        Ni, Nj = self._basis.shape
+        found = np.zeros((Ni, Nj, Ni, Nj))
+        for j in range(Nj):
+            found[:, j, :, j] = blocks[(j + 1) // 2]
+        return found.reshape(Ni * Nj, Ni * Nj)
