@@ -90,7 +90,7 @@ class Quantities:
     def at_rest(self, name: str) -> float:
         """The value of a skin at rest, in SI units."""
         of = self._colours[name].at_rest
-        return 0.0 if of is None else of(self.layout.patch.arc_curvature)
+        return 0.0 if of is None else of(np.array([*self.layout.patch.curvatures, 0.0]))
 
     def on_surface(self, name: str, estimate: Estimate) -> Array:
         """The values (ny, nx) in SI units; NaN off the skin and where they are not known."""
@@ -156,5 +156,5 @@ class Quantities:
     def form_at_elements(self, curvature: Array) -> Array:
         """The curvature form (3, P) in 1/m as the elements read it, where slopes are small."""
         patch = self.layout.patch
-        form = curvature + np.array([[patch.arc_curvature], [0.0], [0.0]])
+        form = curvature + np.array([*patch.curvatures, 0.0])[:, None]
         return np.where([[False], [True], [True]], 0.0, form) if patch.strip else form

@@ -111,8 +111,7 @@ class Reported:
         t, e, normal = geometry.frame.tolist()
         (L, m), (_, k) = geometry.metric.tolist()
         (xx, xy), (_, yy) = geometry.curvature_form.tolist()
-        angle = (x - patch.a / 2) * patch.arc_curvature
-        n0 = math.sin(angle), 0.0, math.cos(angle)
+        n0 = patch.base(x, y).normal
         spread = [
             math.hypot(L * t[i] * x_sd, (m * t[i] + k * e[i]) * y_sd, n0[i] * f_sd)
             for i in range(3)
@@ -186,7 +185,7 @@ class SkinColour:
     The `symbol` is HTML, the `tip` has the equation, and `unknown` says why there may be no value.
     `on_surface` gets the values (ny, nx) on the surface's points; without it there are values at
     the elements only. `of_elements` gets these (P,); without it they are those of the surface.
-    `at_rest` gets the value of a skin at rest from its curvature, zero if left out, from which
+    `at_rest` gets the value of a skin at rest from its xx, yy, xy, zero if left out, from which
     colours of what is `signed` go both ways. They reach as far as `least` at least, on the screen's
     scale, or for a length as that share of the skin's longer side; those of one `group` may share
     a range.
@@ -200,7 +199,7 @@ class SkinColour:
     tip: str
     on_surface: Getter | None = None
     of_elements: Getter | None = None
-    at_rest: Callable[[float], float] | None = None
+    at_rest: Callable[[Array], float] | None = None
     unknown: str = ""
     signed: bool = True
     least: float = 0.5
@@ -559,7 +558,7 @@ def _invariant(
                 symbol,
                 tip,
                 of_elements=lambda r: of(_skin(r).form_at_elements(r.estimate.curvature)),
-                at_rest=lambda H: float(of(np.array([H, 0.0, 0.0]))),
+                at_rest=lambda form: float(of(form)),
                 least=least,
                 group=group,
             ),

@@ -629,33 +629,42 @@ class SensorLayout:
 # Both are of two unit vectors u and v, which are t and t, or x and y: II_uv / sqrt(I_uu I_vv). What
 # shear takes off is (1 - u.v) H I_dy / 2. Heights and slopes are of first order by definition:
 # their u and v, p, q and w are zero.
+# A shallow skin's tangential displacements are neglected, of both curvatures Hx and Hy:
+#     r_x = (1, 0, -p)     r_xx = (-Hx p, 0, -Hx - p_x)     r_xy = (0, 0, -p_y)
+#     r_y = (0, 1, -q)     r_yy = (0, -Hy q, -Hy - q_y)     r_x x r_y = (p, q, 1) = W n,
+# c^2 Hx + s^2 Hy are taken off along t, and (1 - u.v) (Hx + Hy) I_xy / 2 by shear.
 
 
 class DeflectedSurface:
     """What R readings are on the deflected surface, from the `jet` (Q, ..., R) of each.
 
-    That is the reading of first order, p and q as derived above; on a skin of `base_curvature` H in
-    1/m, also w, w_y, q_y and p_y. `forms` (3, 3, R) are what of dd, dy and yy is in uu, vv and uv.
+    That is the reading of first order, p and q as derived above; on a cylinder skin also w, w_y,
+    q_y and p_y. `forms` (3, 3, R) are what of dd, dy and yy is in uu, vv and uv. `curvatures` in
+    1/m are those of the skin at rest along x and y.
     """
 
-    def __init__(self, jet: Array, forms: Array, base_curvature: float) -> None:
-        self._jet, self._forms, self._H = jet, forms, base_curvature
+    def __init__(self, jet: Array, forms: Array, curvatures: tuple[float, float]) -> None:
+        self._jet, self._forms, (Hx, Hy) = jet, forms, curvatures
+        self._Hx, self._Hy, self._is_arc, is_bent = Hx, Hy, len(jet) > 3, bool(Hx or Hy)
         first, p, q = jet[:3]
         dd, dy, yy, m = p * p, p * q, q * q, q
-        if base_curvature:
+        if self._is_arc:
             w, wy, qy, py = jet[3:]
             dd, dy = (p - w * q) ** 2 + w * w * (w * w - 1), dy - w * (w * w + yy)
             yy, m, in_y = yy + w * w, q - p * w, qy - p * wy
-            in_d = base_curvature * (1 + p * p) - w * (2 * py - w * in_y)
+            in_d = Hx * (1 + p * p) - w * (2 * py - w * in_y)
             first = first + self._mixed(2, in_d, -w * in_y, -p * wy)
+        elif is_bent:
+            first = first + forms[2, 0] * (Hx * (1 + dd)) + forms[2, 2] * (Hy * (1 + yy))
         self._first, self._area = first, 1 + p * p + m * m  # W II_uv and W^2
         self._lengths = [1 + self._mixed(k, dd, dy, yy) for k in range(2)]  # I_uu and I_vv
         self._length = np.sqrt(self._lengths[0]) * np.sqrt(self._lengths[1])
         self._scale = 1 / (np.sqrt(self._area) * self._length)
         self._second = self._ratio = self._scale * first
-        if base_curvature:
-            self._sheared = base_curvature / 2 * (1 - forms[2, 0] - forms[2, 2]) / self._length
+        if is_bent:
+            self._sheared = (Hx + Hy) / 2 * (1 - forms[2, 0] - forms[2, 2]) / self._length
             self._ratio = self._second - self._sheared * dy
+        self._of_base = Hx * forms[2, 0] + Hy * forms[2, 2] if is_bent else None
 
     def _mixed(self, k: int, dd: Array, dy: Array, yy: Array) -> Array:
         form = self._forms[k]
@@ -664,7 +673,7 @@ class DeflectedSurface:
     @property
     def readings(self) -> Array:
         """What is read, (..., R)."""
-        return self._ratio - self._forms[2, 0] * self._H if self._H else self._ratio
+        return self._ratio if self._of_base is None else self._ratio - self._of_base
 
     @property
     def slope(self) -> Array:
@@ -675,9 +684,10 @@ class DeflectedSurface:
         """How the readings of one frame change with their jet, (Q, R)."""
         found, rates = np.zeros_like(self._jet), self._rates()
         found[0] = self._scale
-        if self._H:
-            found[[1, 3, 4, 5, 6]] = self._scale * self._of_second_form()
-            found[1:4] -= self._sheared * rates[1]
+        if self._of_base is not None:
+            own = [1, 3, 4, 5, 6] if self._is_arc else [1, 2]
+            found[own] = self._scale * self._of_second_form()
+            found[1 : 1 + len(rates[1])] -= self._sheared * rates[1]
         of_u, of_v = (self._mixed(k, *rates[:3]) for k in range(2))
         in_u, in_v = (self._ratio / (2 * length) for length in self._lengths)
         change = self._second / self._area * rates[3] + in_u * of_u + in_v * of_v
@@ -688,7 +698,7 @@ class DeflectedSurface:
         """How I_dd, I_dy, I_yy and W^2 / 2 change with p, with q and with w, (4, 2 or 3, R)."""
         p, q = self._jet[1:3]
         none = np.zeros_like(p)
-        if not self._H:
+        if not self._is_arc:
             return np.array([[2 * p, none], [q, p], [none, 2 * q], [p, q]])
         w = self._jet[3]
         m, e = q - p * w, p - w * q
@@ -702,10 +712,14 @@ class DeflectedSurface:
         )
 
     def _of_second_form(self) -> Array:
-        """How W II_uv changes with p, w, w_y, q_y and p_y, (5, R)."""
+        """How W II_uv changes with p, w, w_y, q_y and p_y, (5, R); of a shallow skin p, q."""
+        if not self._is_arc:
+            p, q = self._jet[1:3]
+            of_x, of_y = self._Hx * self._forms[2, 0], self._Hy * self._forms[2, 2]
+            return np.array([2 * p * of_x, 2 * q * of_y])
         _, p, _, w, wy, qy, py = self._jet
         in_y, none, square = qy - p * wy, np.zeros_like(p), w * w
-        in_dd = [2 * self._H * p - square * wy, 2 * (w * in_y - py), -square * p, square, -2 * w]
+        in_dd = [2 * self._Hx * p - square * wy, 2 * (w * in_y - py), -square * p, square, -2 * w]
         in_dy, in_yy = [w * wy, -in_y, w * p, -w, none], [-wy, none, -p, none, none]
         return self._mixed(2, *np.array([in_dd, in_dy, in_yy]))
 
@@ -745,7 +759,7 @@ class NormalCurvature:
         self._element, self._curved = layout.element, curved[layout.kind]
         self._all_curved = bool(self._curved.all())
         self._columns = np.concatenate([self._first, *self._at]).T
-        self.frame_shape, self._H = layout.frame_shape, H
+        self.frame_shape, self._curvatures = layout.frame_shape, basis.patch.curvatures
 
     @property
     def maps(self) -> Array:
@@ -759,7 +773,7 @@ class NormalCurvature:
         if not self._all_curved:
             at *= self._curved
         jet = np.moveaxis(np.concatenate([values[..., None, :R], at], axis=-2), -2, 0)
-        return DeflectedSurface(jet, self._forms, self._H)
+        return DeflectedSurface(jet, self._forms, self._curvatures)
 
     def __call__(self, coefficients: Array) -> Array:
         """Readings (..., 3, P) in 1/m, or (..., R), for `coefficients` (..., Ni, Nj)."""

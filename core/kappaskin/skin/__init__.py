@@ -1,5 +1,6 @@
 """The skin: its own coordinates, its outline, and surfaces on it."""
 
+from kappaskin.skin.patch import Base as Base
 from kappaskin.skin.patch import Cap as Cap
 from kappaskin.skin.patch import Disk as Disk
 from kappaskin.skin.patch import LocalGeometry as LocalGeometry

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -149,6 +150,23 @@ _ROUNDING = 1e-12  # of a side: a point on the rim as computed may stand this fa
 _STEEPEST = 0.01  # 1 / (R k)^2 of the lowest wave: what shallow shell theory may neglect
 
 
+Number = Any  # a float, or an array
+Vector = tuple[Number, Number, Number]
+
+
+class Base(NamedTuple):
+    """A skin at rest: its point in m, unit tangents along x and across it, and outward normal.
+
+    And its curvature xx, yy and xy in 1/m along these.
+    """
+
+    point: Vector
+    along: Vector
+    across: Vector
+    normal: Vector
+    curvature: Vector
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class LocalGeometry:
     """The skin at rest around each of P places.
@@ -227,7 +245,7 @@ class Patch:
         """Radius of curvature along x and y in m; infinite where it is straight."""
         return self.radius if isinstance(self.radius, tuple) else (self.radius, math.inf)
 
-    @property
+    @cached_property
     def curvatures(self) -> tuple[float, float]:
         """Curvature at rest along x and y in 1/m; zero when flat."""
         return 1 / self.radii[0], 1 / self.radii[1]
@@ -303,20 +321,27 @@ class Patch:
 
     def at_rest(self, positions: Array) -> tuple[Array, Array]:
         """Points (..., 3) in m and outward unit normals (..., 3) of the skin at rest."""
-        points, normals = np.zeros((2, *positions.shape[:-1], 3))
-        points[..., :2] = positions
-        if not any(self.curvatures):
-            normals[..., 2] = 1.0
-            return points, normals
-        H, middle = np.array(self.curvatures), np.array((self.a, self.b)) / 2
-        angle, bent = (positions - middle) * H, H != 0
-        (sx, sy), (cx, cy) = np.moveaxis(np.sin(angle), -1, 0), np.moveaxis(np.cos(angle), -1, 0)
-        normals[..., 0], normals[..., 1], normals[..., 2] = sx * cy, cx * sy, cx * cy
-        points[..., :2][..., bent] = middle[bent] + np.sin(angle[..., bent]) / H[bent]
-        points[..., 2] = -2 * (np.sin(angle[..., bent] / 2) ** 2 / H[bent]).sum(axis=-1)
-        if self.is_shallow:
-            normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-        return points, normals
+        base = self.base(positions[..., 0], positions[..., 1])
+        point, normal = (np.broadcast_arrays(*each) for each in (base.point, base.normal))
+        return np.stack(point, axis=-1), np.stack(normal, axis=-1)
+
+    def base(self, x: Number, y: Number) -> Base:
+        """The skin at rest at x, y in m: numbers, or arrays of one shape."""
+        sin, cos = (math.sin, math.cos) if isinstance(x, float) else (np.sin, np.cos)
+        Hx, Hy = self.curvatures
+        u, v = x - self.a / 2, y - self.b / 2
+        sx, cx, sy, cy = sin(Hx * u), cos(Hx * u), sin(Hy * v), cos(Hy * v)
+        px, py, pz = x, y, 0.0
+        if Hx:
+            px, pz = self.a / 2 + sx / Hx, -2 * sin(Hx * u / 2) ** 2 / Hx
+        if Hy:
+            py, pz = self.b / 2 + sy / Hy, pz - 2 * sin(Hy * v / 2) ** 2 / Hy
+        # The arcs' tangents (cx, 0, -sx) and (0, cy, -sy) meet at a right angle only along the
+        # middles.
+        up = 1 / (1 - (sx * sy) ** 2) ** 0.5
+        ny, nz = cx * sy * up, cx * cy * up
+        across, normal = (-sx * ny, cy * up, -cx * ny), (sx * cy * up, ny, nz)
+        return Base((px, py, pz), (cx, 0.0, -sx), across, normal, (Hx, Hy, 0.0))
 
     def local(self, positions: Array) -> LocalGeometry:
         """The frames, curvature and covariant derivatives at `positions` (P, 2) in m."""

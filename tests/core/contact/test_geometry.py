@@ -23,11 +23,38 @@ from kappaskin import (
 from kappaskin.bases import ORDERS
 from kappaskin.contact import surface_geometry
 from kappaskin.estimation.fit import DenseUncertainty
+from kappaskin.skin import Base
 from navier import HingedPlate, Load
 
 FLAT = Patch(0.1, 0.08)
 BENT = Patch(0.1, 0.08, 0.045)
+SADDLE = Patch(0.1, 0.08, (0.25, -0.3))
 HERE = np.array([[0.031, 0.052], [0.07, 0.01], [0.05, 0.04], [0.0, 0.08]])
+
+
+class Turned:
+    """A patch with its coordinates turned by `angle` around its middle."""
+
+    def __init__(self, patch, angle):
+        self._patch, (c, s) = patch, (math.cos(angle), math.sin(angle))
+        self._middle, self._turn = np.array([patch.a, patch.b]) / 2, np.array([[c, -s], [s, c]])
+
+    def _turned(self, positions):
+        return self._middle + (positions - self._middle) @ self._turn.T
+
+    def at_rest(self, positions):
+        return self._patch.at_rest(self._turned(positions))
+
+    def base(self, x, y):
+        base = self._patch.base(*np.moveaxis(self._turned(np.stack([x, y], axis=-1)), -1, 0))
+        turn, (p, q, r) = self._turn, base.curvature
+        (xx, xy), (_, yy) = turn.T @ np.array([[p, r], [r, q]]) @ turn
+        axes = np.array(np.broadcast_arrays(*base.along, *base.across)).reshape(2, 3, *np.shape(x))
+        along, across = np.tensordot(turn.T, axes, 1)
+        return Base(base.point, tuple(along), tuple(across), base.normal, (xx, yy, xy))
+
+
+TURNED = Turned(BENT, 0.4)
 
 
 @dataclass
@@ -212,10 +239,20 @@ def by_differences(surface, x, y, h=2e-5):
     return E, metric, K, T
 
 
-@pytest.mark.parametrize("patch", [FLAT, BENT], ids=["flat", "bent"])
+@pytest.mark.parametrize(
+    ("patch", "place"),
+    [
+        (FLAT, (0.061, 0.033)),
+        (BENT, (0.061, 0.033)),
+        (TURNED, (0.061, 0.033)),
+        (SADDLE, (0.05, 0.04)),
+        (Turned(SADDLE, 0.4), (0.05, 0.04)),
+    ],
+    ids=["flat", "bent", "askew", "saddle", "saddle askew"],
+)
 @pytest.mark.parametrize("seed", range(5))
-def test_frame_metric_and_forms_are_what_montana_defines(patch, seed):
-    surface, (x, y) = steep(seed, patch), (0.061, 0.033)
+def test_frame_metric_and_forms_are_what_montana_defines(patch, place, seed):
+    surface, (x, y) = steep(seed, patch), place
 
     ours = surface.geometry(np.array([x, y]))
 
@@ -373,7 +410,7 @@ def test_the_error_bars_are_the_scatter_of_noisy_shapes(name):
     np.testing.assert_allclose(values.mean(axis=0), without_noise, atol=0.1 * told.min())
 
 
-@pytest.mark.parametrize("patch", [FLAT, BENT], ids=["flat", "bent"])
+@pytest.mark.parametrize("patch", [FLAT, BENT, SADDLE], ids=["flat", "bent", "saddle"])
 def test_the_error_bars_are_those_of_how_the_curvature_changes_with_each_coefficient(patch):
     basis, c = sine_surface(patch)
     step = 1e-7
@@ -394,6 +431,36 @@ def test_the_error_bars_are_those_of_how_the_curvature_changes_with_each_coeffic
     expected = np.einsum("npi,npj->pij", changes, changes)
     np.testing.assert_allclose(told, expected, rtol=1e-6, atol=1e-6 * expected.max())
     assert np.abs(form(c)).max() > 10  # steep enough for every term to count
+
+
+@pytest.mark.parametrize("patch", [TURNED, Turned(SADDLE, 0.4)], ids=["bent", "saddle"])
+def test_the_error_bars_hold_along_axes_that_are_not_those_of_the_base(patch):
+    surface, step = steep(3, patch), np.array([1e-6, 1e-6, 1e-6, 1e-3, 1e-3, 1e-3])
+    jet = np.array(surface.values(0.061, 0.033))
+
+    def form(jet):
+        return Surface(patch, lambda x, y: jet).geometry(np.array([0.061, 0.033])).curvature_form
+
+    changes = [(form(jet + d) - form(jet - d)).ravel()[[0, 3, 1]] / 2 for d in np.diag(step)]
+    told = surface_geometry(
+        surface, np.ones((1, 1)), np.array([0.061, 0.033]), lambda rows: np.diag(step**2)
+    ).covariance
+
+    expected = np.transpose(changes) @ changes
+    np.testing.assert_allclose(told, expected, rtol=1e-6, atol=1e-6 * expected.max())
+
+
+def test_a_dome_at_rest_has_its_own_curvature_and_pressed_in_evenly_a_greater_one():
+    dome = Patch(0.1, 0.08, (0.25, 0.4))
+    pressed = polynomial(np.full((1, 1), 0.005), patch=dome).geometry(HERE)
+    rest = polynomial(np.zeros((1, 1)), patch=dome).geometry(HERE)
+
+    np.testing.assert_allclose(rest.curvature_form, [np.diag([4, 2.5])] * 4, rtol=1e-13)
+    points, normals = dome.at_rest(HERE)
+    np.testing.assert_allclose(rest.position, points, atol=1e-15)
+    np.testing.assert_allclose(rest.normal, normals, atol=1e-15)
+    np.testing.assert_allclose(pressed.curvature_form, [np.diag([1 / 0.245, 1 / 0.395])] * 4)
+    np.testing.assert_allclose(pressed.position, points - 0.005 * normals, atol=1e-15)
 
 
 def test_readings_that_are_missing_widen_the_error_bars():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from deflected import DeflectedSkin, sines
+from deflected import DeflectedSkin, ShallowSkin, sines
 from kappaskin import (
     Disk,
     LeastSquares,
@@ -136,6 +136,8 @@ SKINS = {
     "half round, clamped": (ARC, "clamped", 6, 6),
     "slightly bent": (Patch(0.04, 0.03, 0.03), "hinged", 6, 6),
     "slightly bent, sliding": (Patch(0.04, 0.03, 0.03), "sliding", 6, 6),
+    "dome": (Patch(0.04, 0.03, (0.09, 0.12)), "hinged", 6, 6),
+    "saddle, clamped": (Patch(0.04, 0.03, (0.09, -0.12)), "clamped", 6, 6),
     "arc": (Patch(np.pi * 12.9e-3, 1.0, 12.9e-3, strip=True), "hinged", 8, 1),
 }
 
@@ -177,12 +179,14 @@ def dent_at(fit, place, slope):
 def in_space(basis, c):
     """The skin with coefficients `c` as a surface in space."""
     patch = basis.patch
-    if isinstance(basis, SineBasis) and not patch.strip:
+    if isinstance(basis, SineBasis) and not (patch.strip or patch.is_shallow):
         return DeflectedSkin(patch.a, sines(patch.a, patch.b, c), patch.radius)
 
     def f(x, y, dx=0, dy=0):
         return basis.at(np.column_stack([x, y]), dx, dy) @ c.ravel()
 
+    if patch.is_shallow:
+        return ShallowSkin(patch.a, f, radii=patch.radii)
     return DeflectedSkin(patch.a, f, patch.radius)
 
 
@@ -210,7 +214,7 @@ def test_steep_skins_come_back_to_a_hundred_thousandth_in_six_steps(name, slope)
     assert peak_error(basis, answer.coefficients, c) < 1e-5
 
 
-@pytest.mark.parametrize("name", ["flat", "half round", "slightly bent"])
+@pytest.mark.parametrize("name", ["flat", "half round", "slightly bent", "dome"])
 def test_dents_of_contacts_come_back_wherever_they_are(name):
     basis, layout = skin_of(name)
     fit = FiniteSlopeLeastSquares(basis, layout)
@@ -223,7 +227,7 @@ def test_dents_of_contacts_come_back_wherever_they_are(name):
         assert peak_error(basis, answer.coefficients, c) < 1e-5
 
 
-@pytest.mark.parametrize("name", ["flat", "half round, clamped", "arc"])
+@pytest.mark.parametrize("name", ["flat", "half round, clamped", "arc", "dome", "saddle, clamped"])
 def test_the_prediction_is_what_gages_read_of_the_surface_in_space(name):
     basis, layout = skin_of(name)
     c = smooth_shape(basis, 0.8)
@@ -234,7 +238,7 @@ def test_the_prediction_is_what_gages_read_of_the_surface_in_space(name):
     np.testing.assert_allclose(predicted[layout.live], expected[layout.live], rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["flat", "disk, clamped", "half round"])
+@pytest.mark.parametrize("name", ["flat", "disk, clamped", "half round", "saddle, clamped"])
 @pytest.mark.parametrize("slope", [0.05, 1.0])
 def test_the_covariance_is_that_of_the_problem_linearised_at_the_solution(name, slope):
     basis, layout = skin_of(name)
@@ -404,7 +408,7 @@ OTHERS = {
     ),
 }
 SD = {"height": 1e-5, "slope": 1e-3, "curvature": 0.2, "twist": 0.2}
-BENT = ["flat", "flat, clamped", "half round, clamped", "slightly bent"]
+BENT = ["flat", "flat, clamped", "half round, clamped", "slightly bent", "saddle, clamped"]
 every_other = pytest.mark.parametrize("kind", OTHERS)
 
 
@@ -456,7 +460,7 @@ def test_steep_skins_come_back_from_any_readings(name, slope, kind):
 
 
 @every_other
-@pytest.mark.parametrize("name", ["flat", "half round, clamped"])
+@pytest.mark.parametrize("name", ["flat", "half round, clamped", "saddle, clamped"])
 def test_the_covariance_of_any_readings_is_that_of_the_linearised_problem(name, kind):
     basis, layout = other_skin(name, kind)
     W = np.eye(basis.size) if basis.free is None else basis.free

@@ -102,6 +102,18 @@ def test_a_bent_skin_at_rest_keeps_its_bend() -> None:
     assert at_rest == pytest.approx([H, 0.0, H / 2, 0.0, 0.0])
 
 
+def test_a_saddle_at_rest_keeps_both_its_bends_on_the_surface_and_at_the_elements(centre) -> None:
+    saddle = Patch(0.04, 0.03, (0.1, -0.2))
+    quantities = Quantities(
+        SensorLayout.regular(saddle, 4, 4), basis_for(saddle, "hinged", 3, 3), 5, 5
+    )
+    still = replace(centre[1], coefficients=np.zeros((3, 3)), curvature=np.zeros((3, 16)))
+    for name, expected in {"first": 10, "second": -5, "mean": 2.5, "gaussian": -50}.items():
+        assert quantities.at_rest(name) == pytest.approx(expected)
+        np.testing.assert_allclose(quantities.on_surface(name, still), expected)
+        np.testing.assert_allclose(quantities.of_elements(name, still), expected)
+
+
 def test_elements_tell_what_they_read_and_what_the_fit_left_of_it(centre) -> None:
     pipeline, estimate = centre
     quantities = quantities_of(pipeline)
