@@ -138,8 +138,10 @@ class LocalGeometry:
     1/m; `metric` (..., 2, 2), what a step in the coordinates x, y is along the frame. Montana's
     coordinates are orthogonal and his metric is diagonal. The coordinates of a bent skin are not;
     the frame's first vector stays along x, and the metric is upper triangular: his formulas hold
-    with it as they stand. Curvature is positive where the skin is convex seen from outside, so
-    that a flat skin with a slight displacement f has K = [[f_xx, f_xy], [f_xy, f_yy]] (Eqs. 3-5).
+    with it as they stand. On a cap it stays along the axis that its elements read by, and all four
+    numbers of the metric count. Curvature is positive where the skin is convex seen from outside,
+    so that a flat skin with a slight displacement f has K = [[f_xx, f_xy], [f_xy, f_yy]] (Eqs.
+    3-5).
 
     `covariance` (..., 3, 3) in 1/m^2 is that of xx, yy and xy of K.
     """

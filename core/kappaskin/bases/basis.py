@@ -109,14 +109,22 @@ def curvature_terms(patch: Patch, component: str) -> list[tuple[float, Order]]:
 # how far these carry the skin to where it is curved otherwise (mechanics/cap.py has that).
 
 
+def covariant_at(basis: Basis, positions: Array) -> Array:
+    """Covariant derivatives (6, P, N) of every function along the frame of `Patch.local`.
+
+    At `positions` (P, 2) in m; in the order of `ORDERS`.
+    """
+    jet = np.stack([basis.at(positions, *order) for order in ORDERS])
+    found: Array = np.einsum("pij,jpn->ipn", basis.patch.local(positions).covariant, jet)
+    return found
+
+
 def _on_cap(basis: Basis, cap: Cap, positions: Array) -> Array:
     """As `curvature_at`, on a cap."""
-    local = cap.local(positions)
-    jet = np.stack([basis.at(positions, *order) for order in ORDERS])
-    xx, xy, yy = np.einsum("pij,jpn->ipn", local.covariant[:, 3:], jet)
-    Kxx, Kyy, Kxy = local.curvature
+    f, _, _, xx, xy, yy = covariant_at(basis, positions)
+    Kxx, Kyy, Kxy = cap.local(positions).curvature
     squares = np.stack([Kxx**2 + Kxy**2, Kyy**2 + Kxy**2, Kxy * (Kxx + Kyy)])
-    found: Array = np.stack([xx, yy, xy]) + squares[..., None] * jet[0]
+    found: Array = np.stack([xx, yy, xy]) + squares[..., None] * f
     return found
 
 

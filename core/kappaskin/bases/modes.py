@@ -68,10 +68,13 @@ class RoundBasis(ModeBasis):
 
     clamped: bool = False
 
-    @property
     @abstractmethod
-    def _functions(self) -> "_PolarFunctions":
+    def _made(self) -> "_PolarFunctions":
         """Them on the disk of radius 1."""
+
+    @cached_property
+    def _functions(self) -> "_PolarFunctions":
+        return self._made()
 
     def _derivative(self, positions: Array, order: Order) -> Array:
         R = self.patch.a / 2
@@ -123,8 +126,7 @@ class DiskBasis(RoundBasis):
         if type(self.patch) is not Disk:
             raise Refusal(f"expected a disk, got a {self.patch.name}")
 
-    @cached_property
-    def _functions(self) -> "_PolarFunctions":
+    def _made(self) -> "_PolarFunctions":
         return _disk_modes(self.size, self.clamped)
 
 
@@ -147,8 +149,7 @@ class CapBasis(RoundBasis):
     def cap(self) -> Cap:
         return cast("Cap", self.patch)
 
-    @cached_property
-    def _functions(self) -> "_PolarFunctions":
+    def _made(self) -> "_PolarFunctions":
         return _cap_functions(*self.shape, self.clamped)
 
     def _parallel(self, distance: Array) -> Array:

@@ -5,11 +5,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kappaskin.bases import ORDERS, Basis
+from kappaskin.bases import ORDERS, Basis, PointMap, ValueMap, covariant_at
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Fit, propagated_covariance
 from kappaskin.frames import Array, Contact, LocalGeometry
-from kappaskin.skin import Base, Patch
+from kappaskin.skin import Base, Cap, Patch
 
 Number = Any  # a float, or an array of P
 Jet = list[Number]  # the displacement f and its derivatives f_x, f_y, f_xx, f_xy, f_yy
@@ -68,8 +68,13 @@ class CurvatureFormMap:
     """A map from coefficients to the curvature form on the grid of `x` (nx,), `y` (ny,) in m."""
 
     def __init__(self, basis: Basis, x: Array, y: Array) -> None:
-        self._maps = [basis.on_grid(x, y, *order) for order in ORDERS]
+        self._maps: list[ValueMap] = [basis.on_grid(x, y, *order) for order in ORDERS]
         self._base_curvature = (*basis.patch.curvatures, 0.0)
+        if isinstance(basis.patch, Cap):
+            grid = np.meshgrid(x, y)
+            self._base_curvature = basis.patch.base(*grid).curvature
+            jets = covariant_at(basis, np.stack(grid, axis=-1).reshape(-1, 2))
+            self._maps = [PointMap.of(lambda _, jet=jet: jet, x, y) for jet in jets]
 
     def __call__(self, coefficients: Array) -> Array:
         """xx, yy and xy of K (3, ny, nx) in 1/m for `coefficients` (Ni, Nj); NaN off the skin."""
@@ -84,13 +89,18 @@ def _geometry(patch: Patch, positions: Array, jet: Jet, covariance: Array) -> Lo
     """
     x, y = positions.tolist() if positions.ndim == 1 else positions.T
     base = patch.base(x, y)
+    if base.slopes:
+        to_local = base.covariant
+        along = np.vecdot(to_local, np.array(jet).T[..., None, :]).T
+        jet = along.tolist() if positions.ndim == 1 else list(along)
+        covariance = propagated_covariance(to_local, covariance)
     b, surface = base.curvature, _surface(jet, base.curvature)
     xx, yy, xy = form = _curvature_form(surface)
     to_form = _sensitivity(jet, b, surface, form)
     return LocalGeometry(
         *_frame(base, jet, surface),
         _matrix(xx, xy, xy, yy),
-        np.array(_torsion_form(jet, surface)).T,
+        np.array(_torsion_form(jet, base, surface)).T,
         propagated_covariance(to_form, covariance),
     )
 
@@ -204,13 +214,18 @@ def _sensitivity(jet: Jet, b: Components, of: _Surface, form: Components) -> Arr
     return np.array(columns).T
 
 
-def _torsion_form(jet: Jet, of: _Surface) -> tuple[Number, Number]:
+def _torsion_form(jet: Jet, base: Base, of: _Surface) -> tuple[Number, Number]:
     """T = y' [x_x x_y] [metric]^-1."""
     _, fx, fy, *_, fxy, _ = jet
     (sxx, syy, sxy), (hx, *_), m, L, W = of.bS, of.h, of.m, of.L, of.W
     # y . r_11 / L and y . r_12 / L, with y = (r_2 - m r_1) L / W.
     turn_x = (fy * hx - 2 * fx * sxy - m * fx * (hx - 2 * sxx)) / W
     turn_y = (fy * fxy - fx * syy - m * (fx * fxy - fy * sxx)) / W
+    if base.turning:
+        turn_x, turn_y = (
+            turned + W / of.g * own
+            for turned, own in zip((turn_x, turn_y), base.turning, strict=True)
+        )
     return turn_x / L, (turn_y - m * turn_x) * L / W
 
 
@@ -226,4 +241,10 @@ def _frame(base: Base, jet: Jet, of: _Surface) -> tuple[Array, Array, Array]:
     axes = list(zip(*base[1:4], strict=True))
     rows = [u * e + v * d + w * n for u, v, w in in_base for e, d, n in axes]
     place = [p - f * n for p, n in zip(base.point, base.normal, strict=True)]
-    return np.array(place).T, _matrix(*rows), _matrix(L, m * L, 0 * f, 1 / k)
+    metric = L, m * L, 0 * f, 1 / k
+    if base.slopes:  # of steps along e_1 and e_2: the inverse of these has x and y
+        (axx, axy), (_, ayy) = base.slopes
+        det = axx * ayy - axy * axy
+        xx, xy, yy = ayy / det, -axy / det, axx / det
+        metric = L * (xx + m * xy), L * (xy + m * yy), xy / k, yy / k
+    return np.array(place).T, _matrix(*rows), _matrix(*metric)

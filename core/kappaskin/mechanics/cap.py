@@ -66,8 +66,9 @@ class CapShell:
         scale = 1 / np.sqrt(alone)
         Ktt = K[:, t, t] * scale[:, :, None] * scale[:, None, :]
         np.einsum("mtt->mt", Ktt)[:] = 1.0
-        coupled = K[:, t, f] * scale[:, :, None]
-        self._least: Array = -scale[:, :, None] * np.linalg.solve(Ktt, coupled)
+        coupled: Array = K[:, t, f] * scale[:, :, None]
+        least: Array = np.linalg.solve(Ktt, coupled)
+        self._least = -scale[:, :, None] * least
         self.stiffness: Array = K[:, f, f] + K[:, f, t] @ self._least
         """Stiffness (M, Ni, Ni) in N/m of the functions of each wave m around."""
         self.bare: Array = bare[:, f, f]
@@ -87,15 +88,15 @@ class CapShell:
         per_arc = np.array([1.0, 1 / self._basis.cap.rim_radius])[:, None, None, None]
         powers = self._m + 1, np.abs(self._m - 1)
         A, B = (per_arc * radial(rho, m, self._count, 1)[:2] for m in powers)
-        U, V = [A, B], [A, -B]
+        of_u, of_v = [A, B], [A, -B]
         if self._u_free:  # one more of each, alike at the rim
-            A, B = (radial(np.append(rho, 1.0), m, 1, 0)[:2] for m in powers)
-            A, B = (per_arc * of[:, :-1] / of[0, -1] for of in (A, B))
-            U, V = [*U, A + B], [*V, A - B]
-        found = np.concatenate(U, axis=-1), np.concatenate(V, axis=-1)
-        found[0][:, :, 0, self._count : 2 * self._count] = 0.0  # of m = 0 as A
-        found[1][:, :, 0] = 0.0
-        return found
+            ends = [radial(np.append(rho, 1.0), m, 1, 0)[:2] for m in powers]
+            one, other = (per_arc * of[:, :-1] / of[0, -1] for of in ends)
+            of_u, of_v = [*of_u, one + other], [*of_v, one - other]
+        U, V = np.concatenate(of_u, axis=-1), np.concatenate(of_v, axis=-1)
+        U[:, :, 0, self._count : 2 * self._count] = 0.0  # of m = 0 as A
+        V[:, :, 0] = 0.0
+        return U, V
 
     def _strains(self, rho: Array, along: Meridian) -> Array:
         """Strains (9, Q, M, n): e_s, e_t, g, of curvature ss, tt, st, and f_s, f_t, f."""
@@ -117,32 +118,48 @@ class CapShell:
         f[6], f[7], f[8] = F[1], m * F[0] / r, F[0]
         return S
 
-    def curvature_at(self, positions: Array) -> Array:
-        """Curvature xx, yy, xy (3, P, N) in 1/m per m of each function at `positions` (P, 2)."""
-        found, cap = curvature_at(self._basis, positions), self._basis.cap
-        if cap.stretch == 1:
-            return found
-        x, y = (positions - cap.rim_radius).T
-        s, angle = np.maximum(np.hypot(x, y), _AT_POLE * cap.rim_radius), np.arctan2(y, x)
-        along = cap.meridian(s)
-        (U, _), (V, V1) = (
-            np.einsum("dqmt,mti->dqmi", of, self._least, optimize=True)
-            for of in self._tangential(s / cap.rim_radius)
-        )
-        (k1, k2), (c1, c2) = along.curvatures[..., None, None], along.changes[..., None, None]
-        r, slope, m = along.radius[:, None, None], along.slope[:, None, None], self._m[:, None]
-        mixed = (k2 - k1) / 2 * (V1 + (m * U + slope * V) / r) + c2 * V
+    def _waves(self, positions: Array) -> tuple[Array, Array, Array, Array]:
+        """Distance and azimuth (P,), and U and V of each function of f, (2, P, M, Ni)."""
+        x, y = (positions - self._basis.cap.rim_radius).T
+        a = self._basis.cap.rim_radius
+        s = np.maximum(np.hypot(x, y), _AT_POLE * a)
+        both = self._tangential(s / a)
+        U, V = (np.einsum("dpmt,mti->dpmi", of, self._least, optimize=True) for of in both)
+        return s, np.arctan2(y, x), U, V
+
+    def _summed(self, even: Array, odd: Array, angle: Array) -> tuple[Array, Array]:
+        """Of every function (P, N): `even` (P, M, Ni) as cos m t, `odd` as sin m t of a cosine."""
+        Ni, Nj = self._basis.shape
         turn = np.multiply.outer(angle, self._m)[..., None]
         cos, sin = np.cos(turn), np.sin(turn)
-        c, z = np.cos(angle)[:, None], np.sin(angle)[:, None]
 
         def by_function(of_cosines: Array, of_sines: Array) -> Array:
-            both = np.stack([of_cosines, of_sines], axis=2).reshape(len(s), -1, self._basis.Ni)
-            own = np.delete(both, 1, axis=1)[:, : self._basis.Nj]  # without a sine of m = 0
-            return np.swapaxes(own, 1, 2).reshape(len(s), -1)
+            both = np.stack([of_cosines, of_sines], axis=2).reshape(len(angle), -1, Ni)
+            own = np.delete(both, 1, axis=1)[:, :Nj]  # without a sine of m = 0
+            return np.swapaxes(own, 1, 2).reshape(len(angle), -1)
 
-        ss, tt = (by_function(change * U * cos, change * U * sin) for change in (c1, c2))
-        st = by_function(mixed * sin, -mixed * cos)
+        return by_function(even * cos, even * sin), by_function(odd * sin, -odd * cos)
+
+    def tangential_at(self, positions: Array) -> Array:
+        """Tangential displacement (2, P, N) along the frame, per m of each function."""
+        _, angle, U, V = self._waves(positions)
+        u, v = self._summed(U[0], V[0], angle)
+        c, z = np.cos(angle)[:, None], np.sin(angle)[:, None]
+        return np.stack([c * u - z * v, z * u + c * v])
+
+    def curvature_at(self, positions: Array) -> Array:
+        """Curvature xx, yy, xy (3, P, N) in 1/m per m of each function at `positions` (P, 2)."""
+        found, cap, m = curvature_at(self._basis, positions), self._basis.cap, self._m[:, None]
+        if cap.stretch == 1:
+            return found
+        s, angle, (U, _), (V, V1) = self._waves(positions)
+        along = cap.meridian(s)
+        (k1, k2), (c1, c2) = along.curvatures[..., None, None], along.changes[..., None, None]
+        r, slope = along.radius[:, None, None], along.slope[:, None, None]
+        mixed = (k2 - k1) / 2 * (V1 + (m * U + slope * V) / r) + c2 * V
+        ss, st = self._summed(c1 * U, mixed, angle)
+        tt, _ = self._summed(c2 * U, mixed, angle)
+        c, z = np.cos(angle)[:, None], np.sin(angle)[:, None]
         found[0] += c**2 * ss - 2 * c * z * st + z**2 * tt
         found[1] += z**2 * ss + 2 * c * z * st + c**2 * tt
         found[2] += c * z * (ss - tt) + (c**2 - z**2) * st

@@ -23,7 +23,7 @@ from kappaskin.frames import Array
 from kappaskin.mechanics.cap import CapShell
 from kappaskin.mechanics.loads import Load, is_point
 from kappaskin.mechanics.shell import Sheet, Tangential, shallow_stiffness
-from kappaskin.skin import Patch
+from kappaskin.skin import Cap, Patch
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,8 @@ INPLANE = ("held", "diaphragm", "free", "hoop")
 `free`: no membrane force across the edge, no shear. `hoop`, of a bent skin: the hoop displacement
 is held, the axial one free. Of a cylinder skin they are those of the straight edges; the curved
 ones hold the radial and the hoop displacement and leave the axial one free. Of a shallow skin, as
-of a flat one, they are those of all four edges, and there is no `hoop`.
+of a flat one, they are those of all four edges, and there is no `hoop`. Of a cap they are those of
+its rim: `held` and, of less than a hemisphere, `diaphragm`, which lets it slide along the meridian.
 """
 
 
@@ -145,11 +146,23 @@ class Plate:
                 "both; omit the thickness of a drum head"
             )
         possible = INPLANE if self.patch.arc_curvature else INPLANE[:-1]
+        if isinstance(self.patch, Cap):
+            self._check_cap(self.patch)
         if self.inplane and self.inplane not in possible:
             raise Refusal(
                 f"expected inplane among {', '.join(possible)} for a "
                 f"{self.patch.name if any(self.patch.curvatures) else 'flat skin'}, got "
                 f"{self.inplane!r:.40}"
+            )
+
+    def _check_cap(self, cap: Cap) -> None:
+        if not self.rigidity:
+            raise Refusal(f"expected a rigidity above zero in N m of a {cap.name}, got 0")
+        if self.inplane == "free" or (self.inplane == "diaphragm" and cap.is_hemisphere):
+            raise Refusal(
+                f"expected inplane held of a {cap.name}, or diaphragm of less than a hemisphere, "
+                f"got {self.inplane}: such a rim lets the cap turn or bend without stretching, and "
+                "its force is not determined"
             )
 
     @classmethod

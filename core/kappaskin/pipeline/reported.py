@@ -17,7 +17,7 @@ import numpy as np
 
 from kappaskin._text import NO_FORCE
 from kappaskin.errors import Refusal
-from kappaskin.estimation import Fit
+from kappaskin.estimation import Fit, propagated_covariance
 from kappaskin.frames import COMPONENTS, Array, Estimate
 from kappaskin.sensing import Sensor, SensorLayout
 
@@ -96,7 +96,8 @@ class Reported:
         To first order, from what the readings' noise makes of the displacement f and its slopes
         there, and of the place x, y itself, as if these were independent:
             dr = r_x dx + r_y dy - n0 df,    |dn| = |d(f_x, f_y) + K [metric] (dx, dy)|,
-        where [r_x r_y] = [t e] [metric] and n0 is the normal of the skin at rest.
+        where [r_x r_y] = [t e] [metric] and n0 is the normal of the skin at rest. On a cap the
+        slopes are those along the axes of its elements.
         """
         if self._in_space is not None:
             return self._in_space
@@ -106,17 +107,22 @@ class Reported:
         x, y = self.contact.position.tolist()
         x_sd, y_sd = self.contact.position_sd.tolist()
         # Cached: the geometry there was computed of it.
-        variances = self.fit.jet(x, y)[1].diagonal()[:3].tolist()
+        base, covariance = patch.base(x, y), self.fit.jet(x, y)[1]
+        if base.slopes:
+            covariance = propagated_covariance(base.covariant, covariance)
+        variances = covariance.diagonal()[:3].tolist()
         f_sd, *slopes_sd = (math.sqrt(v) if v >= 0 else math.nan for v in variances)
         t, e, normal = geometry.frame.tolist()
-        (L, m), (_, k) = geometry.metric.tolist()
+        (L, m), (o, k) = geometry.metric.tolist()
         (xx, xy), (_, yy) = geometry.curvature_form.tolist()
-        n0 = patch.base(x, y).normal
         spread = [
-            math.hypot(L * t[i] * x_sd, (m * t[i] + k * e[i]) * y_sd, n0[i] * f_sd)
+            math.hypot(
+                (L * t[i] + o * e[i]) * x_sd, (m * t[i] + k * e[i]) * y_sd, base.normal[i] * f_sd
+            )
             for i in range(3)
         ]
-        tilt = L * xx * x_sd, L * xy * x_sd, (m * xx + k * xy) * y_sd, (m * xy + k * yy) * y_sd
+        tilt_x = (L * xx + o * xy) * x_sd, (L * xy + o * yy) * x_sd
+        tilt = *tilt_x, (m * xx + k * xy) * y_sd, (m * xy + k * yy) * y_sd
         self._in_space = spread, [*normal, math.hypot(*slopes_sd, *tilt)]
         return self._in_space
 

@@ -13,7 +13,7 @@ from kappaskin.bases import Basis, SineBasis, curvature_at, gauss, hoop_at
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Array, Indices, Mask
 from kappaskin.mechanics import Plate
-from kappaskin.skin import Patch
+from kappaskin.skin import Cap, Patch
 
 _POINTS = 12  # exact to rounding for waves as short as the gage
 
@@ -22,18 +22,28 @@ _POINTS = 12  # exact to rounding for waves as short as the gage
 # in the limit of short ones is f_xy. Each alone mixes the modes: it sees sin(k x) sin(l y) as
 # waves of k + l and of k - l. What they differ by does not: with h = L / sqrt(8) it is the twist
 #     k l cos(k x) cos(l y)   times   (cos(k h) sinc(l h) + sinc(k h) cos(l h)) / 2.
+# A shallow skin has w Hx^2 more along x, that is xx times 1 - (Hx / k)^2, and along y alike. Along
+# the diagonals its mean is w (Hx^2 + Hy^2) / 2, which adds to the twist's factor
+#     (Hx^2 + Hy^2) / (4 k l)   times   sinc((k - l) h) - sinc((k + l) h).
 _DIAGONAL = 1 / math.sqrt(2)
 
 
 def gage_multipliers(sines: SineBasis, gage_length: float) -> Array:
-    """Factors (3, Ni, Nj) by which gages of `gage_length` in m read sines on a flat skin.
+    """Factors (3, Ni, Nj) by which gages of `gage_length` in m read sines on no cylinder skin.
 
-    xx: sinc(k_i L / 2) and yy: sinc(k_j L / 2), with sinc(t) = sin(t) / t; xy as derived above.
+    On a flat skin xx: sinc(k_i L / 2) and yy: sinc(k_j L / 2), with sinc(t) = sin(t) / t; xy as
+    derived above.
     """
     ki, kj = np.meshgrid(*sines.wavenumbers, indexing="ij")
     L, h = gage_length, gage_length * _DIAGONAL / 2
     twist = np.cos(ki * h) * _sinc(kj * h) + _sinc(ki * h) * np.cos(kj * h)
-    return np.stack([_sinc(ki * L / 2), _sinc(kj * L / 2), twist / 2])
+    xx, yy, xy = _sinc(ki * L / 2), _sinc(kj * L / 2), twist / 2
+    if sines.patch.is_shallow:
+        squares = np.square(sines.patch.curvatures)
+        xx, yy = xx * (1 - squares[0] / ki**2), yy * (1 - squares[1] / kj**2)
+        aslant = _sinc((ki - kj) * h) - _sinc((ki + kj) * h)
+        xy = xy + squares.sum() / (4 * ki * kj) * aslant
+    return np.stack([xx, yy, xy])
 
 
 def _sinc(t: Array) -> Array:
@@ -55,7 +65,7 @@ def _along(basis: Basis, positions: Array, L: float, curvature: ValuesAt, t: Arr
     """
     if not L:
         return _normal(curvature(positions), t)
-    if basis.patch.arc_curvature:
+    if any(basis.patch.curvatures):
         return _over_gage(lambda places: _normal(curvature(places), t), positions, L, t)
     half = L / 2 * t
     return (_slope(basis, positions + half, t) - _slope(basis, positions - half, t)) / L
@@ -217,7 +227,8 @@ class Readings:
 class SensorLayout:
     """P elements at `positions` (P, 2) in m, and what they read.
 
-    That is the curvature xx, yy and xy of each (a curvature sensor), or the `reads`. `live` is
+    That is the curvature xx, yy and xy of each (a curvature sensor), or the `reads`, along x and y,
+    on a cap along the frame of `Patch.local`, where elements read at a point. `live` is
     False for dead channels: (3, P) of a curvature sensor, (R,) of other readings. `shape` is
     (m, n) for a regular grid, with element p + m q in column p (along x) and row q (along y), and
     None otherwise. Curvature is the mean over gages of `gage_length` in m, along x, y or the
@@ -256,8 +267,19 @@ class SensorLayout:
                 f"{outside.size} of {len(P)} elements lie outside the {self.patch.name}: element "
                 f"{p} is at ({x:g}, {y:g}) m; positions are in metres from the corner x = y = 0"
             )
+        if isinstance(self.patch, Cap):
+            self._check_on_cap()
         self._check_gages()
         self._check_cells()
+
+    def _check_on_cap(self) -> None:
+        slopes = self.reads is not None and "slope" in self.reads.quantity
+        if self.gage_length or any(self.cell) or slopes:
+            raise Refusal(
+                f"expected heights, curvature and twist at a point of each element of a "
+                f"{self.patch.name}, got {'slopes' if slopes else 'a mean over gages or cells'}; "
+                "set gage_length and cell to 0"
+            )
 
     def _check_gages(self) -> None:
         L = self.gage_length
@@ -521,7 +543,9 @@ class SensorLayout:
             if name == "twist":
                 return gages[2]
             along_y = int(abs(math.sin(direction)) > _DIAGONAL)
-            return over_cell if name == "height" or (name == "slope" and not L) else gages[along_y]
+            if name == "curvature":
+                return gages[along_y]
+            return _sinc((ki, kj)[along_y] * L / 2) if name == "slope" and L else over_cell
 
         return np.stack([factors(*kind) for kind in self.kinds])
 

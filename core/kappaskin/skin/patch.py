@@ -151,13 +151,18 @@ _STEEPEST = 0.01  # 1 / (R k)^2 of the lowest wave: what shallow shell theory ma
 
 
 Number = Any  # a float, or an array
+Numbers = tuple[Number, ...]
 Vector = tuple[Number, Number, Number]
 
 
 class Base(NamedTuple):
-    """A skin at rest: its point in m, unit tangents along x and across it, and outward normal.
+    """A skin at rest at one place, each number, or at many, each an array.
 
-    And its curvature xx, yy and xy in 1/m along these.
+    Its point in m and outward normal in space, orthonormal tangents e_x and e_y, and its curvature
+    xx, yy and xy in 1/m along these. On a cap also, on other skins empty: the rows of the matrix
+    `slopes` (2, 2) from derivatives along x and y to those along e_x and e_y, those of the matrix
+    (3, 5) from f_x, f_y, f_xx, f_xy, f_yy to the second ones, and by how much e_x turns to e_y
+    along each of them, in 1/m.
     """
 
     point: Vector
@@ -165,6 +170,19 @@ class Base(NamedTuple):
     across: Vector
     normal: Vector
     curvature: Vector
+    slopes: tuple[Numbers, ...] = ()
+    second: tuple[Numbers, ...] = ()
+    turning: Numbers = ()
+
+    @property
+    def covariant(self) -> Array:
+        """As that of `LocalGeometry`, (..., 6, 6)."""
+        found = np.zeros((*np.shape(self.point[0]), 6, 6))
+        found[...] = np.eye(6)
+        for i, row in enumerate(self.slopes + self.second, 1):
+            for j, each in enumerate(row, 1):
+                found[..., i, j] = each
+        return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -345,13 +363,12 @@ class Patch:
 
     def local(self, positions: Array) -> LocalGeometry:
         """The frames, curvature and covariant derivatives at `positions` (P, 2) in m."""
-        normals = self.at_rest(positions)[1]
-        frame = np.zeros((len(positions), 2, 3))
-        frame[:, 0, 0], frame[:, 0, 2] = normals[:, 2], -normals[:, 0]
-        frame[:, 0] /= np.linalg.norm(frame[:, 0], axis=-1, keepdims=True)
-        frame[:, 1] = np.cross(normals, frame[:, 0])
-        form = np.repeat([[H] for H in (*self.curvatures, 0.0)], len(positions), axis=1)
-        return LocalGeometry(frame, form, np.broadcast_to(np.eye(6), (len(positions), 6, 6)))
+        base, P = self.base(*positions.T), len(positions)
+        frame = np.zeros((P, 2, 3))
+        for k in range(3):
+            frame[:, 0, k], frame[:, 1, k] = base.along[k], base.across[k]
+        form = np.stack([np.broadcast_to(each, P) for each in base.curvature])
+        return LocalGeometry(frame, form, base.covariant)
 
     def around(self, x: float, y: float, offsets: Array) -> Array:
         """Positions (Q, 2) in m that lie from (x, y) as far along the skin as `offsets` (Q, 2)."""
@@ -414,19 +431,8 @@ class Meridian:
     angle: Array
 
 
-def _turned(cos: Array, sin: Array) -> Array:
-    """The maps (P, 6, 6) of derivatives along axes turned by an angle back to x and y."""
-    found = np.zeros((len(cos), 6, 6))
-    found[:, 0, 0] = 1.0
-    found[:, 1:3, 1:3] = np.moveaxis(np.array([[cos, -sin], [sin, cos]]), -1, 0)
-    c2, cs, s2 = cos**2, cos * sin, sin**2
-    of_second = np.array([[c2, -2 * cs, s2], [cs, c2 - s2, -cs], [s2, 2 * cs, c2]])
-    found[:, 3:, 3:] = np.moveaxis(of_second, -1, 0)
-    return found
-
-
 _STRETCHES = (0.2, 5.0)
-_NEAR_POLE = 1e-5  # of the arc to the rim: where differences are rounding, and limits hold
+_NEAR_POLE = 1e-7  # of the arc to the rim: so far from the pole azimuths have a value
 
 
 @dataclass(frozen=True, init=False)
@@ -475,7 +481,8 @@ class Cap(Disk):
     @property
     def radii(self) -> tuple[float, float]:
         """Radius of curvature in m along x and y at the pole."""
-        return (self._equator / self.stretch,) * 2
+        R = self._equator / self.stretch
+        return R, R
 
     @property
     def is_shallow(self) -> bool:
@@ -490,34 +497,63 @@ class Cap(Disk):
     def is_hemisphere(self) -> bool:
         return math.isclose(self.angle, math.pi / 2)
 
+    def _angle(self, distance: Number) -> Number:
+        """The `angle` of the `meridian` at a `distance` in m from the pole."""
+        m, t = 1 - self.stretch**2, distance / self._equator
+        for _ in range(8 if m else 0):  # Newton's method
+            steep = (1 - m * np.sin(t) ** 2) ** 0.5
+            t = t - (scipy.special.ellipeinc(t, m) - distance / self._equator) / steep
+        return t
+
     def meridian(self, distance: Array) -> Meridian:
         """The meridian at each `distance` (...) in m from the pole along the skin."""
-        R, k = self._equator, self.stretch
-        m, t = 1 - k**2, distance / R
-        for _ in range(0 if k == 1 else 8):  # Newton's method
-            steep = np.sqrt(1 - m * np.sin(t) ** 2)
-            t = t - (scipy.special.ellipeinc(t, m) - distance / R) / steep
-        sin, cos = np.sin(t), np.cos(t)
+        R, k, t = self._equator, self.stretch, self._angle(distance)
+        m, sin, cos = 1 - k**2, np.sin(t), np.cos(t)
         L = np.sqrt(1 - m * sin**2)  # the arc, over R, per angle
         curvatures = np.stack([k / L**3, k / L]) / R
         changes = np.stack([3 * k / L**6, k / L**4]) * (m * sin * cos) / R**2
         return Meridian(R * sin, cos / L, curvatures, changes, t)
 
-    def _azimuth(self, positions: Array) -> tuple[Array, Array, Array]:
-        """Distance (...) from the pole in m, cosine and sine of the azimuth."""
-        offset = positions - self.rim_radius
-        s = np.hypot(offset[..., 0], offset[..., 1])
-        far, at_pole = np.where(s > 0, s, 1.0), s == 0
-        return s, np.where(at_pole, 1.0, offset[..., 0] / far), offset[..., 1] / far
-
-    def at_rest(self, positions: Array) -> tuple[Array, Array]:
-        s, cos, sin = self._azimuth(positions)
-        along = self.meridian(s)
-        up, out = along.slope, along.curvatures[1] * along.radius
-        fall = 2 * self._equator * self.stretch * np.sin(along.angle / 2) ** 2
-        pole, r = self.rim_radius, along.radius
-        points = np.stack([pole + r * cos, pole + r * sin, -fall], axis=-1)
-        return points, np.stack([out * cos, out * sin, up], axis=-1)
+    def base(self, x: Number, y: Number) -> Base:
+        one, R, k, pole = isinstance(x, float), self._equator, self.stretch, self.rim_radius
+        of_sin, of_cos = (math.sin, math.cos) if one else (np.sin, np.cos)
+        u, v = x - pole, y - pole
+        least, s = _NEAR_POLE * pole, (u * u + v * v) ** 0.5
+        far = max(s, least) if one else np.maximum(s, least)
+        t = self._angle(far)
+        sin, cos = of_sin(t), of_cos(t)
+        # In space e_s = (r' c, r' n, -k2 r) along the meridian and e_t = (-n, c, 0) around meet
+        # e_x = c e_s - n e_t and e_y = n e_s + c e_t; what is left of c^2 + n^2 = 1 at the pole,
+        # where the azimuth has no value, vanishes there.
+        c, n, L = u / far, v / far, (1 - (1 - k**2) * sin * sin) ** 0.5
+        r, slope, k1, k2 = R * sin, cos / L, k / (R * L**3), k / (R * L)
+        g, cc, nn, cn = r / far, c * c, n * n, c * n
+        out, flat, bend = k2 * r, slope - 1, k1 - k2
+        fall = 2 * R * k * of_sin(t * s / far / 2) ** 2
+        # With M = 1 + (1/g - 1) e_t e_t' the slopes are M f_i, the second derivatives
+        #     M F M + p (e_s e_t' + e_t e_s') f_t + q e_t e_t' f_s
+        # where F are those of the coordinates, p = (1 - r'/g) / r and q = (r' - 1/g) / r.
+        near, p, q = 1 / g - 1, (1 - slope / g) / r, (slope - 1 / g) / r
+        mxx, mxy, myy = 1 + near * nn, -near * cn, 1 + near * cc
+        on_s, on_t = (q * c, q * n), (-p * n, p * c)
+        second = tuple(
+            (*(st * of_t + tt * of_s for of_s, of_t in zip(on_s, on_t, strict=True)), *of_second)
+            for st, tt, of_second in (
+                (-2 * cn, nn, (mxx * mxx, 2 * mxx * mxy, mxy * mxy)),
+                (cc - nn, -cn, (mxx * mxy, mxx * myy + mxy * mxy, mxy * myy)),
+                (2 * cn, cc, (mxy * mxy, 2 * mxy * myy, myy * myy)),
+            )
+        )
+        return Base(
+            (pole + g * u, pole + g * v, -fall),
+            (1 + flat * cc, flat * cn, -out * c),
+            (flat * cn, 1 + flat * nn, -out * n),
+            (out * c, out * n, slope),
+            (1 / R, 1 / R, 0.0) if k == 1 else (k2 + bend * cc, k2 + bend * nn, bend * cn),
+            ((mxx, mxy), (mxy, myy)),
+            second,
+            (-flat / r * n, flat / r * c),
+        )
 
     def places(self, points: Array) -> Array:
         """Positions (..., 2) in m of `points` (..., 3) of the skin in space, or just off it."""
@@ -529,31 +565,6 @@ class Cap(Disk):
         out = np.where(r > 0, s / np.where(r > 0, r, 1.0), 1.0)
         return np.stack([pole + out * x, pole + out * y], axis=-1)
 
-    def local(self, positions: Array) -> LocalGeometry:
-        s, cos, sin = self._azimuth(positions)
-        along, zero = self.meridian(s), np.zeros_like(s)
-        (k1, k2), slope = along.curvatures, along.slope
-        # Along the meridian and the parallel, with q = f_theta / s and g = r / s:
-        #     f_;st = F_st / g + q (1 - r'/g) / r      f_;tt = F_tt / g^2 + f_s (r' - 1/g) / r
-        # where F are the second derivatives in flat polar coordinates. To polar and back by `turn`.
-        near = s < _NEAR_POLE * self.rim_radius
-        r, far = np.where(near, 1.0, along.radius), np.where(near, 1.0, s)
-        g = np.where(near, 1.0, r / far)
-        third = k1 * k2 * s / 3
-        by_polar = np.zeros((len(s), 6, 6))
-        by_polar[:, [0, 1, 3], [0, 1, 3]] = 1.0
-        by_polar[:, 2, 2] = by_polar[:, 4, 4] = 1 / g
-        by_polar[:, 5, 5] = 1 / g**2
-        by_polar[:, 4, 2] = np.where(near, third, (1 - slope / g) / r)
-        by_polar[:, 5, 1] = np.where(near, -2 * third, (slope - 1 / g) / r)
-        turn, out = _turned(cos, sin), k2 * along.radius
-        polar = np.array([[slope, zero, -out], [zero, zero + 1, zero]])  # out, round and up
-        azimuths = np.array([[cos, -sin, zero], [sin, cos, zero], [zero, zero, zero + 1]])
-        frame = np.einsum("pkj,jip,lip->pkl", turn[:, 1:3, 1:3], polar, azimuths)
-        form = turn[:, 3:, 3:] @ np.stack([k1, zero, k2], -1)[..., None]
-        xx, xy, yy = form[..., 0].T
-        return LocalGeometry(frame, np.stack([xx, yy, xy]), turn @ by_polar @ _turned(cos, -sin))
-
     def around(self, x: float, y: float, offsets: Array) -> Array:
         """Positions (Q, 2) in m that lie from (x, y) as far along the skin as `offsets` (Q, 2).
 
@@ -561,12 +572,12 @@ class Cap(Disk):
         """
         at = np.array([[x, y]])
         ((point,), (normal,)), local = self.at_rest(at), self.local(at)
-        (xx, yy, xy), (u, v) = local.curvature[:, 0], offsets.T
-        squares = u**2 + v**2
-        H = np.where(squares > 0, xx * u**2 + yy * v**2 + 2 * xy * u * v, xx)
-        H = H / np.where(squares > 0, squares, 1.0)
+        xx, yy, xy = local.curvature[:, 0]
+        squares: Array = np.sum(offsets**2, axis=1)
+        forms: Array = offsets**2 @ np.array([xx, yy]) + 2 * xy * offsets[:, 0] * offsets[:, 1]
+        H = np.where(squares > 0, forms, xx) / np.where(squares > 0, squares, 1.0)
         turn = H * np.sqrt(squares)
-        along = np.sinc(turn / np.pi)[:, None] * offsets @ local.frame[0]
+        along: Array = (np.sinc(turn / np.pi)[:, None] * offsets) @ local.frame[0]
         return self.places(point + along - (2 * np.sin(turn / 2) ** 2 / H)[:, None] * normal)
 
 

@@ -204,7 +204,7 @@ def test_what_is_averaged_is_the_mean_of_what_points_read(patch, more):
 
 def test_a_slope_on_a_bent_skin_is_how_far_its_tangent_has_turned():
     """By the change of the tangent of the arc itself, f inward and v along it, v' = H f."""
-    basis, H = SineBasis(ROUND, 4, 3), ROUND.base_curvature
+    basis, H = SineBasis(ROUND, 4, 3), ROUND.arc_curvature
     layout = SensorLayout.scattered(ROUND, [(0.008, 0.007), (0.021, 0.011)])
     slopes = layout.reading([0, 1], "slope", 0.0).operator(basis)
     c = 1e-7 * np.random.default_rng(1).normal(size=basis.size)
