@@ -29,8 +29,8 @@ def gage_multipliers(sines: SineBasis, gage_length: float) -> Array:
     """Factors (3, Ni, Nj) by which gages of `gage_length` in m read sines, to second derivatives.
 
     xx: sinc(k_i L / 2) and yy: sinc(k_j L / 2), with sinc(t) = sin(t) / t; xy as derived above. On
-    a skin with the curvatures Hx and Hy at rest, 1 - (Hx / k_i)^2 and 1 - (Hy / k_j)^2 times that; gages
-    on the diagonals also differ in their mean of f.
+    a skin with the curvatures Hx and Hy at rest, 1 - (Hx / k_i)^2 and 1 - (Hy / k_j)^2 times that;
+    gages on the diagonals also differ in their mean of f.
     """
     ki, kj = np.meshgrid(*sines.wavenumbers, indexing="ij")
     L, h = gage_length, gage_length * _DIAGONAL / 2
