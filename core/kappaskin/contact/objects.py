@@ -32,6 +32,7 @@ _INEXACT = 0.02  # of a curvature: what a ring or arcs leave out of a real conta
 # On a bent skin, of its curvature and the object's: 0.02 to 0.07 of shells from 0.25 to 2 mm thick,
 # but 0.23 where the arcs are narrower than a half wave.
 _INEXACT_BENT = 0.08
+_LONG = 2.0  # half waves: on a bent skin, two ends that are nearer may be one
 _QUIET = 1e-4  # of the largest reading: no skin is quieter
 _SEEN = 2.6  # standard deviations: a width below is only an upper bound, or noise passes for one
 _LEAST, _DEEPEST = 1e-12, 10.0  # of a side: displacements beyond show no shape of an object
@@ -228,6 +229,7 @@ def _judged(skin: ElasticSkin, all_of: Hypotheses, noise: float) -> ContactObjec
             known = known and weights[kind] - oval_likelihood(skin, all_of, oval) >= _ODDS
         else:  # arcs are too rough to be weighed against it, as they leave more than noise
             fits = fits and found.best.squares <= _WELL**2 * oval.squares
+            known = known and found.best.parameters[4] > (_LONG * skin.half_wave) ** 2
     known = known and not (kind == "plane" and math.isnan(radius))  # flattened, not just touched
     return ContactObject(
         kind if known and fits else "",
