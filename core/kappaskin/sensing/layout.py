@@ -13,7 +13,7 @@ from kappaskin.bases import Basis, SineBasis, covariant_at, curvature_at, gauss,
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Array, Indices, Mask
 from kappaskin.mechanics import Plate
-from kappaskin.skin import Cap, Patch
+from kappaskin.skin import Cap, Disk, Patch
 
 _POINTS = 12  # exact to rounding for waves as short as the gage
 
@@ -22,26 +22,28 @@ _POINTS = 12  # exact to rounding for waves as short as the gage
 # in the limit of short ones is f_xy. Each alone mixes the modes: it sees sin(k x) sin(l y) as
 # waves of k + l and of k - l. What they differ by does not: with h = L / sqrt(8) it is the twist
 #     k l cos(k x) cos(l y)   times   (cos(k h) sinc(l h) + sinc(k h) cos(l h)) / 2.
+# A shallow skin has w Hx^2 more along x, that is xx times 1 - (Hx / k)^2, and along y alike. Along
+# the diagonals its mean is w (Hx^2 + Hy^2) / 2, which adds to the twist's factor
+#     (Hx^2 + Hy^2) / (4 k l)   times   sinc((k - l) h) - sinc((k + l) h).
 _DIAGONAL = 1 / math.sqrt(2)
 
 
 def gage_multipliers(sines: SineBasis, gage_length: float) -> Array:
-    """Factors (3, Ni, Nj) by which gages of `gage_length` in m read sines, to second derivatives.
+    """Factors (3, Ni, Nj) by which gages of `gage_length` in m read sines on no cylinder skin.
 
-    xx: sinc(k_i L / 2) and yy: sinc(k_j L / 2), with sinc(t) = sin(t) / t; xy as derived above. On
-    a skin with the curvatures Hx and Hy at rest, 1 - (Hx / k_i)^2 and 1 - (Hy / k_j)^2 times that;
-    gages on the diagonals also differ in their mean of f.
+    On a flat skin xx: sinc(k_i L / 2) and yy: sinc(k_j L / 2), with sinc(t) = sin(t) / t; xy as
+    derived above.
     """
     ki, kj = np.meshgrid(*sines.wavenumbers, indexing="ij")
     L, h = gage_length, gage_length * _DIAGONAL / 2
     twist = np.cos(ki * h) * _sinc(kj * h) + _sinc(ki * h) * np.cos(kj * h)
-    along, twist = [_sinc(ki * L / 2), _sinc(kj * L / 2)], twist / 2
+    xx, yy, xy = _sinc(ki * L / 2), _sinc(kj * L / 2), twist / 2
     if sines.patch.is_shallow:
-        Hx, Hy = sines.patch.curvatures
-        along = [along[0] * (1 - (Hx / ki) ** 2), along[1] * (1 - (Hy / kj) ** 2)]
-        apart = _sinc((ki - kj) * h) - _sinc((ki + kj) * h)
-        twist += (Hx**2 + Hy**2) / 4 * apart / (ki * kj)
-    return np.stack([*along, twist])
+        squares = np.square(sines.patch.curvatures)
+        xx, yy = xx * (1 - squares[0] / ki**2), yy * (1 - squares[1] / kj**2)
+        aslant = _sinc((ki - kj) * h) - _sinc((ki + kj) * h)
+        xy = xy + squares.sum() / (4 * ki * kj) * aslant
+    return np.stack([xx, yy, xy])
 
 
 def _sinc(t: Array) -> Array:
@@ -108,6 +110,12 @@ def _over_cell(values: ValuesAt, positions: Array, cell: tuple[float, float]) ->
 
 _SHORTEST = 1e-6  # m: the mean over a shorter gage is lost in rounding
 _ROUNDING = 1e-9  # of a depth: gages as long as the element distance end on the rim
+
+
+def _round(patch: Patch) -> Disk:
+    if not isinstance(patch, Disk):
+        raise Refusal(f"expected a disk or a cap, got a {patch.name}; give a grid or positions")
+    return patch
 
 
 def _channels(patch: Patch, elements: int) -> Mask:
@@ -331,6 +339,45 @@ class SensorLayout:
         if points.ndim != 2:
             raise Refusal(f"expected positions of shape (P, 2) in m, got {points.shape}")
         return cls(patch, points, _channels(patch, len(points)))
+
+    @classmethod
+    def on_rings(cls, patch: Patch, counts: Iterable[int]) -> "SensorLayout":
+        """Elements on rings about the middle of a disk or a cap, as many on each as `counts` say.
+
+        The rings are evenly far apart, the last one half as far from the rim. A first ring of one
+        element is in the middle; every other ring is turned by half of its step.
+        """
+        rim, each = _round(patch).rim_radius, list(counts)
+        if not each or min(each) < 1:
+            raise Refusal(f"expected at least one element on each ring, got {each or 'no ring'}")
+        begin = 0.0 if each[0] == 1 else 0.5
+        far: Array = rim * (np.arange(len(each), dtype=float) + begin) / (len(each) - 0.5 + begin)
+        turns = [(np.arange(n) + k % 2 / 2) / n for k, n in enumerate(each)]
+        return cls._about_middle(patch, np.repeat(far, each), np.concatenate(turns))
+
+    @classmethod
+    def in_spiral(cls, patch: Patch, count: int) -> "SensorLayout":
+        """`count` elements on a Fibonacci spiral of a disk or a cap: one to each equal area.
+
+        Each is turned by the golden angle from the one before. The last ones are half the mean
+        distance of two elements from the rim.
+        """
+        rim, N = _round(patch).rim_radius, count
+        if N < 1:
+            raise Refusal(f"expected at least one element on a spiral, got {N}")
+        far: Array = np.linspace(0.0, rim, 4097)
+        around: Array = patch.meridian(far).radius if isinstance(patch, Cap) else far
+        area: Array = np.concatenate([[0.0], np.cumsum(around[1:] + around[:-1])]) * np.pi * far[1]
+        within = float(np.interp(rim - math.sqrt(area[-1] / N) / 2, far, area))
+        places: Array = np.interp((np.arange(N, dtype=float) + 0.5) / N * within, area, far)
+        return cls._about_middle(patch, places, np.arange(N) * (3 - math.sqrt(5)) / 2)
+
+    @classmethod
+    def _about_middle(cls, patch: Patch, far: Array, turns: Array) -> "SensorLayout":
+        """Elements so `far` (P,) in m from the middle along the skin, after `turns` (P,) from x."""
+        around = 2 * np.pi * turns
+        x, y = patch.a / 2 + far * np.cos(around), patch.b / 2 + far * np.sin(around)
+        return cls.scattered(patch, np.column_stack([x, y]))
 
     def reading(
         self,

@@ -41,7 +41,7 @@ def test_squares_of_readings_on_a_grid_are_those_at_each_place(plate, layout, ba
 @pytest.mark.parametrize("gage_length", [0.0, 0.009])
 @pytest.mark.parametrize(
     "patch",
-    [OBLONG, Patch(0.1, 0.02, strip=True), Patch(0.1, 0.08, (0.25, -0.3))],
+    [OBLONG, Patch(0.1, 0.02, strip=True), Patch(0.1, 0.07, (0.3, -0.25))],
     ids=["plate", "strip", "saddle"],
 )
 def test_readings_on_a_grid_meet_the_functions_as_by_the_whole_matrix(patch, gage_length):

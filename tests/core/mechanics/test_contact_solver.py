@@ -240,7 +240,7 @@ def test_no_object_is_pulled_or_enters_any_skin(held_skin, make, place, depth):
     # What bears, bears everywhere on the skin; what does not, clears it.
     assert (answer.gap > -1e-9 * scale).all()
     assert np.abs(answer.gap[answer.forces > 0]).max(initial=0) < 1e-9 * scale
-    if not held_skin.patch.arc_curvature:
+    if not any(held_skin.patch.curvatures):
         c, sin = math.cos(turn), math.sin(turn)
         height = object_.height((answer.points - (x, y)) @ np.array([[c, -sin], [sin, c]]))
         gap = w + answer.compression - (depth * s - height)
