@@ -495,7 +495,7 @@ def _on_cap(plate: Plate, edge: str, places: bytes) -> tuple[Array, tuple[float,
     turn = np.multiply.outer(t, np.arange(cos.shape[1]))
     around = np.hstack([np.cos(turn), np.sin(turn)]).astype(np.float32)
     table = (around @ by_m.reshape(around.shape[1], -1)).reshape(len(t), *by_m.shape[2:])
-    f = basis.along(np.linspace(0, 1, 4 * n + 1))[0]
+    f = basis.along(np.linspace(0, 1, n + 1))[0]
     gives = np.einsum("qmi,mij,qmj->q", f, compliance, f, optimize=True)
     return table, (step_t, step, step), gives
 
