@@ -432,6 +432,7 @@ class Meridian:
 
 
 _STRETCHES = (0.2, 5.0)
+_LEVEL = 0.05  # of what the pole moves by along the axis, the rim does across itself
 _NEAR_POLE = 1e-7  # of the arc to the rim: so far from the pole azimuths have a value
 
 
@@ -505,6 +506,11 @@ class Cap(Disk):
             arc = cast("Number", scipy.special.ellipeinc(t, m))
             t = t - (arc - distance / self.equator) / (1 - m * np.sin(t) ** 2) ** 0.5
         return t
+
+    @property
+    def moves_as_a_whole(self) -> bool:
+        """Whether it can move along its axis, and its rim along itself alone, or nearly so."""
+        return self.stretch == 1 and math.cos(self.angle) < _LEVEL
 
     def meridian(self, distance: Array) -> Meridian:
         """The meridian at each `distance` (...) in m from the pole along the skin."""
