@@ -152,11 +152,12 @@ class CapBasis(RoundBasis):
 
     @property
     def free(self) -> Array | None:
-        """On a hinged hemisphere, those without a part that moves along its axis as a whole.
+        """On a hemisphere, or nearly one, those without a part that moves along its axis.
 
-        That changes no curvature; of all shapes that explain the readings it is the least.
+        To move so changes no curvature, on a clamped one but at its rim, where what is finer than
+        the functions looks the same: of all shapes that explain the readings it is the least.
         """
-        return None if self.clamped or not self.cap.moves_as_a_whole else self._bent
+        return self._bent if self.cap.moves_as_a_whole else None
 
     @cached_property
     def _bent(self) -> Array:

@@ -488,7 +488,7 @@ def _on_cap(plate: Plate, edge: str, places: bytes) -> tuple[Single, tuple[float
         shapes = share * along[:, m]
         by_m[:, m] = (shapes.astype(np.float32) @ rows[:, m, None]).reshape(by_m[:, m].shape)
     azimuths = 2 * np.pi / turns * np.arange(-1.0, turns + 2)
-    turn = np.multiply.outer(azimuths, np.arange(M))
+    turn = np.multiply.outer(azimuths, np.arange(float(M)))
     around = np.hstack([np.cos(turn), np.sin(turn)]).astype(np.float32)
     table = (around @ by_m.reshape(2 * M, -1)).reshape(len(around), *by_m.shape[2:])
     return table, (2 * np.pi / turns, step, step), gives
@@ -512,7 +512,8 @@ def _waves_on_cap(plate: Plate, edge: str, places: bytes) -> tuple[Array, Array,
     M = layout.operator(basis, plate).reshape(-1, *basis.shape)
     for j in range(Nj):
         M[..., j] = M[..., j] @ compliance[(j + 1) // 2]
-    rows = np.moveaxis(np.stack(waves.rows(M.reshape(len(M), -1))), 1, 3)
+    unit = 8 * math.pi * plate.rigidity
+    rows = np.moveaxis(np.stack(waves.rows(unit * M.reshape(len(M), -1))), 1, 3)
     f = basis.along(np.linspace(0, 1, _ON_CAP + 1))[0]
     gives: Array = np.einsum("qmi,mij,qmj->q", f, compliance, f, optimize=True)
     along = waves.along(cap.a / _ON_CAP * np.arange(-1.0, _ON_CAP // 2 + 1))

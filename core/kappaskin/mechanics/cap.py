@@ -80,13 +80,14 @@ class CapShell:
         Ktt: Array = K[:, t, t] * scale[:, :, None] * scale[:, None, :]
         np.einsum("mtt->mt", Ktt)[:] = 1.0
         coupled: Array = K[:, t, f] * scale[:, :, None]
-        least: Array = np.linalg.solve(Ktt, coupled)
+        least = np.asarray(np.linalg.solve(Ktt, coupled), float)
         self._least = -scale[:, :, None] * least
-        curved: Array = np.sqrt(T * np.sum(along.curvatures**2, axis=0))[:, None, None] * flat
-        coupled = np.matmul(K[:, f, t], self._least)
-        self.stiffness: Array = own - _products(curved[None]) + coupled
+        squares = T * np.sum(along.curvatures**2, axis=0)
+        curved = np.sqrt(squares)[:, None, None] * flat
+        relief: Array = np.matmul(K[:, f, t], self._least)
+        self.stiffness: Array = own - _products(curved[None]) + relief
         """Stiffness (M, Ni, Ni) in N/m of the functions of each wave m around."""
-        self.bare: Array = own
+        self.bare = own
         """The same without u, v and the negative terms, for scaling."""
 
     def _tangential(self, rho: Array) -> tuple[Array, Array]:

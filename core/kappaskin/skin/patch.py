@@ -432,7 +432,7 @@ class Meridian:
 
 
 _STRETCHES = (0.2, 5.0)
-_LEVEL = 0.05  # of what the pole moves by along the axis, the rim does across itself
+_LEVEL = 0.2  # of what the pole moves by across itself, along the axis, the rim does
 _NEAR_POLE = 1e-7  # of the arc to the rim: so far from the pole azimuths have a value
 
 
@@ -509,7 +509,7 @@ class Cap(Disk):
 
     @property
     def moves_as_a_whole(self) -> bool:
-        """Whether it can move along its axis, and its rim along itself alone, or nearly so."""
+        """Whether its rim moves along itself where it moves along its axis, or nearly so."""
         return self.stretch == 1 and math.cos(self.angle) < _LEVEL
 
     def meridian(self, distance: Array) -> Meridian:
