@@ -285,6 +285,18 @@ def _on_cap(cap, s, azimuth):
     return cap.rim_radius + np.stack([s * np.cos(azimuth), s * np.sin(azimuth)], -1)
 
 
+def along_x(read, azimuth):
+    """Readings (3, P) along the meridian and the parallel as they are along the axes of a cap."""
+    (xx, yy, xy), c, s = read, np.cos(azimuth), np.sin(azimuth)
+    return np.stack(
+        [
+            c**2 * xx - 2 * c * s * xy + s**2 * yy,
+            s**2 * xx + 2 * c * s * xy + c**2 * yy,
+            c * s * (xx - yy) + (c**2 - s**2) * xy,
+        ]
+    )
+
+
 @cache
 def _revolved(cap, edge):
     surface = Spheroid(cap.radius, cap.stretch * cap.radius)
@@ -297,18 +309,10 @@ def _cap_case(name, cap, edge, force, **width):
         x, y = (layout.positions - cap.rim_radius).T
         azimuth = np.arctan2(y, x)
         read = _revolved(cap, edge)(np.stack([np.hypot(x, y), azimuth], -1).tobytes())
-        c, s = np.cos(azimuth), np.sin(azimuth)
 
-        def turned(load):  # from the meridian to x, as the elements are
+        def turned(load):
             out = replace(load, x=load.x - cap.rim_radius, y=load.y - cap.rim_radius)
-            xx, yy, xy = read(out)
-            return np.stack(
-                [
-                    c**2 * xx - 2 * c * s * xy + s**2 * yy,
-                    s**2 * xx + 2 * c * s * xy + c**2 * yy,
-                    c * s * (xx - yy) + (c**2 - s**2) * xy,
-                ]
-            )
+            return along_x(read(out), azimuth)
 
         return turned
 
