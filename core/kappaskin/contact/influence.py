@@ -384,10 +384,11 @@ class _OfDirections:
 class _OfCap:
     """A cap's: a table of what a load over discs of several radii makes, summed until it stands."""
 
-    unit, sized = 1.0, True
+    sized = True
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str, out: Array) -> None:
         self._cap = cap = cast("Cap", plate.patch)
+        self.unit = 8 * math.pi * plate.rigidity
         self._table, self._steps, self._gives = _on_cap(plate, edge, layout.positions.tobytes())
         self._positions, self._out = layout.positions, out
         inverse = np.linalg.inv(cap.local(layout.positions).covariant[:, 1:3, 1:3])
@@ -461,7 +462,7 @@ _SIZES = 0.2  # of the box: the largest radius of a load
 
 @lru_cache(2)
 def _on_cap(plate: Plate, edge: str, places: bytes) -> tuple[Array, tuple[float, ...], Array]:
-    """Readings (T, Q, S, C) in 1/m per N under discs, the steps, and displacements in m per N.
+    """Readings (T, Q, S, C) in 1/m of 8 pi D on discs, the steps, and displacements in m per N.
 
     By azimuth from -1 step, radius of the disc from -3/2 steps, and distance from the pole from -1
     step; the steps are in rad, m and m. The displacements under a point load are at even distances
@@ -477,7 +478,7 @@ def _on_cap(plate: Plate, edge: str, places: bytes) -> tuple[Array, tuple[float,
     M, C = layout.operator(basis, plate).reshape(-1, *basis.shape), 3 * len(layout)
     for j in range(basis.Nj):
         M[..., j] = M[..., j] @ compliance[(j + 1) // 2]
-    cos, sin = waves.rows(M.reshape(C, -1))
+    cos, sin = waves.rows(8 * math.pi * plate.rigidity * M.reshape(C, -1))
     n = _ON_CAP
     turns, sizes, steps = math.ceil(np.pi * rim / a * n), math.ceil(_SIZES * n), n // 2
     step_t, step = 2 * np.pi / turns, a / steps
