@@ -108,8 +108,8 @@ class DrawnSkin:
     @property
     def bounds(self) -> tuple[Array, Array]:
         """From where to where (3,) in mm it may be drawn, along x, y and upwards in space."""
-        upwards = np.array([0.0, 0.0, self.deepest])
-        return self._rest.min(axis=0) - upwards, self._rest.max(axis=0) + upwards
+        upwards, drawn = np.array([0.0, 0.0, self.deepest]), self._rest[np.unique(self._triangles)]
+        return drawn.min(axis=0) - upwards, drawn.max(axis=0) + upwards
 
     # Its faces and lines, over the points of the grid.
 
