@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, ClassVar, cast
 
 import numpy as np
 import scipy
@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from kappaskin.bases.argyris import PlateModes
 
 
-_MOST = 1024  # modes: more take minutes to make
-
-
 @dataclass(frozen=True)
 class ModeBasis(FunctionBasis):
     """Ni x Nj functions of a whole skin; their mean square is 1/4, as that of sines.
@@ -32,10 +29,12 @@ class ModeBasis(FunctionBasis):
     Of a flat skin they are the first modes by frequency.
     """
 
+    MOST: ClassVar = 1024  # more take minutes to make
+
     def __post_init__(self) -> None:
-        if not (self.Ni > 0 and self.Nj > 0 and self.size <= _MOST):
+        if not (self.Ni > 0 and self.Nj > 0 and self.size <= self.MOST):
             raise Refusal(
-                f"expected 1 x 1 to {_MOST} functions on a {self.patch.name}, got "
+                f"expected 1 x 1 to {self.MOST} functions on a {self.patch.name}, got "
                 f"{self.Ni} x {self.Nj}"
             )
 
@@ -139,6 +138,8 @@ class CapBasis(RoundBasis):
     (1 - r^2)^2 and P_i^(4, m). All are smooth at the pole and vanish at the rim, clamped with their
     slope.
     """
+
+    MOST: ClassVar = 8192
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -148,6 +148,8 @@ _INSIDE = 1 - 1e-9  # of a load's size: one that touches an edge is on the patch
 class DistributedLoad(CentredLoad, ABC):
     """A force in N distributed about (x, y) in m, symmetric about the two axes through it.
 
+    Its size is along the skin.
+
     By the symmetry, the mean of sin(k x) sin(l y) under the load is the product at its centre times
     the mean of cos(k x) cos(l y) about it: a multiplier per function (Eq. 9, extended).
     """
@@ -168,14 +170,14 @@ class DistributedLoad(CentredLoad, ABC):
         """
 
     def check(self, patch: Patch) -> None:
-        check_on(self, patch, self.centre() + _INSIDE * self._rim())
+        check_on(self, patch, patch.around(self.x, self.y, _INSIDE * self._rim()))
 
     def modal(self, basis: Basis) -> Array:
         if isinstance(basis, SineBasis):
             k, l = np.meshgrid(*basis.wavenumbers, indexing="ij")
             return PointLoad(self.x, self.y, self.force).modal(basis) * self._wave(k, l)
         points, weights = self._quadrature(max(basis.shape))
-        felt = weights @ basis.at(self.centre() + points)
+        felt = weights @ basis.at(basis.patch.around(self.x, self.y, points))
         if np.isnan(felt).any():  # a notch in the outline that passes between the rim's points
             raise Refusal(f"expected a load completely on the skin, got {self}; make it smaller")
         return self.force * felt.reshape(basis.shape)
