@@ -231,7 +231,7 @@ class DrawnSkin:
         met = np.flatnonzero((u >= -_SEAM) & (v >= -_SEAM) & (u + v <= 1 + _SEAM))
         weights = np.stack([1 - u[met] - v[met], u[met], v[met]], axis=1)
         corners = self.shares[self._triangles[met]] * (self.patch.a, self.patch.b)
-        return np.vecdot(weights[..., None], corners, axis=1), np.vecdot(ac, q)[met] / area[met]
+        return np.einsum("kv,kvi->ki", weights, corners), np.vecdot(ac, q)[met] / area[met]
 
 
 NO_SKIN = DrawnSkin(Patch(0.1, 0.1), 2, 2)
