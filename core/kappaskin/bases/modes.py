@@ -238,6 +238,7 @@ class _PolarFunctions:
         parts: Callable[[Array], Array],
     ) -> None:
         self.m, self._columns, self.fineness = m, columns, fineness
+        self._turns, self._which = np.unique(m, return_inverse=True)
         self._degrees = np.arange(fineness // 2 + 33)  # resolve k r, then to rounding
         nodes = np.pi * (self._degrees + 0.5) / len(self._degrees)
         to_series = 2 / len(nodes) * np.cos(np.multiply.outer(self._degrees, nodes))
@@ -254,7 +255,8 @@ class _PolarFunctions:
         for step, factor in enumerate(_BY_STEPS[ORDERS.index(order)]):
             if factor:
                 values += factor * turn ** _TURNS[step] * (polynomials @ self._series[step])
-        return self._parts(values * np.exp(1j * np.multiply.outer(np.angle(z), self.m)))
+        turns = np.exp(1j * np.multiply.outer(np.angle(z), self._turns))
+        return self._parts(values * turns[:, self._which])
 
     def jet(self, z: complex, R: float) -> Array:
         """All derivatives (6, N) at one point, z = x + i y on the disk of radius 1, of radius R."""

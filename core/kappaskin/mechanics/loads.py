@@ -3,13 +3,14 @@
 import math
 from abc import ABC, abstractmethod
 from dataclasses import Field, dataclass, fields, replace
+from functools import lru_cache
 from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from kappaskin.bases import Basis, SineBasis
+from kappaskin.bases import Basis, CapBasis, SineBasis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.skin import Patch, Polygon
@@ -176,6 +177,10 @@ class DistributedLoad(CentredLoad, ABC):
         if isinstance(basis, SineBasis):
             k, l = np.meshgrid(*basis.wavenumbers, indexing="ij")
             return PointLoad(self.x, self.y, self.force).modal(basis) * self._wave(k, l)
+        if isinstance(basis, CapBasis) and isinstance(self, DiscLoad | GaussianLoad):
+            round_it = _RoundOnCap.of(replace(self, x=0.0, y=0.0, force=1.0), basis)
+            if (found := round_it(self.x, self.y)) is not None:
+                return self.force * found
         points, weights = self._quadrature(max(basis.shape))
         felt = weights @ basis.at(basis.patch.around(self.x, self.y, points))
         if np.isnan(felt).any():  # a notch in the outline that passes between the rim's points
@@ -289,3 +294,48 @@ class RectangleLoad(DistributedLoad):
         t, w = _gauss(count)
         x, y = np.meshgrid(self.width / 2 * t, self.height / 2 * t)
         return np.column_stack([x.ravel(), y.ravel()]), np.multiply.outer(w, w).ravel()
+
+
+class _RoundOnCap:
+    """What a round load feels of the functions of a cap, by a series in its distance from the pole.
+
+    Turned about the pole it feels as much of cos m t, and by its symmetry nothing of sin m t, from
+    the azimuth of its centre. The series are Chebyshev's, from the pole to where it meets the rim.
+    """
+
+    of = staticmethod(lru_cache(8)(lambda load, basis: _RoundOnCap(load, basis)))
+
+    def __init__(self, load: DiscLoad | GaussianLoad, basis: CapBasis) -> None:
+        size = load.radius if isinstance(load, DiscLoad) else 4 * load.sd
+        self._rim, (Ni, Nj) = basis.cap.rim_radius, basis.shape
+        self._reach, self._shape = self._rim - size, basis.shape
+        self._degrees = np.arange(2 * Ni + Nj // 2 + 10)
+        if self._reach <= 0:
+            return
+        # A disc has fewer waves across it than a Gaussian, whose weight is no polynomial.
+        waves = math.ceil(max(basis.shape) * size / self._rim)
+        points, weights = load._quadrature(waves - 8 * isinstance(load, DiscLoad))
+        half = points[:, 1] >= -1e-9 * size
+        points, weights = (
+            points[half],
+            weights[half] * np.where(points[half, 1] > 1e-9 * size, 2, 1),
+        )
+        nodes = np.pi * (self._degrees + 0.5) / len(self._degrees)
+        far = self._rim + self._reach * (1 - 1e-12) * (1 + np.cos(nodes)) / 2
+        felt = [weights @ basis.at(basis.cap.around(at, self._rim, points)) for at in far.tolist()]
+        to_series = 2 / len(nodes) * np.cos(np.multiply.outer(self._degrees, nodes))
+        to_series[0] /= 2
+        self._series = to_series @ np.array(felt)
+
+    def __call__(self, x: float, y: float) -> Array | None:
+        """The means (Ni, Nj) under the load at (x, y) in m; None where it goes over the rim."""
+        u, v = x - self._rim, y - self._rim
+        far = math.hypot(u, v)
+        if far > self._reach * (1 + 1e-9) or self._reach <= 0:
+            return None
+        turn, t = math.atan2(v, u), math.acos(min(2 * far / self._reach - 1, 1.0))
+        felt = (np.cos(t * self._degrees) @ self._series).reshape(self._shape)
+        m = (np.arange(self._shape[1]) + 1) // 2
+        felt[:, 2::2] = felt[:, 1 : self._shape[1] - 1 : 2] * np.sin(m[2::2] * turn)
+        felt[:, 1::2] *= np.cos(m[1::2] * turn)
+        return felt

@@ -19,7 +19,7 @@ from kappaskin.contact import (
     ContactObject,
     Contacts,
     Imprints,
-    LowerBound,
+    LargeDeflection,
     as_one,
     contacts_of,
     object_finder,
@@ -320,7 +320,7 @@ def reconstruct(
     if not (contact or objects):
         return out
     plate = _plate(patch, found, str(texts.get("inplane", np.array("")).item()))
-    bounded = LowerBound(plate, edge)
+    bounded = LargeDeflection(plate, edge)
     fits = _fits(method, functions, layout, frames, sigma if layout.reads else None)
     read = [each.readings for each in fits]
     pairs, drifts = list[tuple[Contact, Contact]](), np.zeros(len(fits))
@@ -340,7 +340,8 @@ def reconstruct(
         there.append(contacts_in.geometry(fits[frame], contacts[-1]))
     out["drift"] = drifts
     out |= _contacts(there, contacts, forces="rigidity" in found)
-    out |= _pairs(pairs, forces="rigidity" in found)
+    both = [(bounded(one), bounded(other)) for one, other in pairs]
+    out |= _pairs(both, forces="rigidity" in found)
     if objects:
         whole = [as_one(*pair) for pair in pairs]
         out |= _objects(_found_objects(plate, layout, edge, fits, read, whole))
@@ -386,11 +387,13 @@ def _contacts(
     `load_radius` (T,) and the ends of its 95 % interval `load_radius_95` (T, 2) in m; `normal`
     (T, 3), `curvature_form` (T, 2, 2), `torsion_form` (T, 2) and `principal` (T, 2) in 1/m; with
     `forces` also `force` and `force_sd` (T,) in N. `single`, `near_rim` and, with `forces`,
-    `force_is_lower_bound` (T,) say whether to trust them (`Contact`). All readings weigh the same.
+    `force_is_lower_bound`, `force_is_upper_bound` and `snaps_through` (T,) say whether to trust
+    them (`Contact`). All readings weigh the same.
     """
     names = ["displacement", "displacement_sd", "single", "near_rim"]
     names += ["load_radius", "load_radius_95"]
-    names += ["force", "force_sd", "force_is_lower_bound"] if forces else []
+    bounds = ["force_is_lower_bound", "force_is_upper_bound", "snaps_through"]
+    names += ["force", "force_sd", *bounds] if forces else []
     out = {
         "contact": np.stack([contact.position for contact in contacts]),
         "contact_sd": np.stack([contact.position_sd for contact in contacts]),

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import scipy
@@ -502,8 +502,8 @@ class Cap(Disk):
         """The `angle` of the `meridian` at a `distance` in m from the pole."""
         m, t = 1 - self.stretch**2, distance / self.equator
         for _ in range(8 if m else 0):  # Newton's method
-            steep = (1 - m * np.sin(t) ** 2) ** 0.5
-            t = t - (scipy.special.ellipeinc(t, m) - distance / self.equator) / steep
+            arc = cast("Number", scipy.special.ellipeinc(t, m))
+            t = t - (arc - distance / self.equator) / (1 - m * np.sin(t) ** 2) ** 0.5
         return t
 
     def meridian(self, distance: Array) -> Meridian:

@@ -194,7 +194,8 @@ def test_a_table_has_every_frame_bit_for_bit_as_it_was_live(suffix: str, taps, t
         assert found[name].tobytes() == was.astype(found[name].dtype).tobytes(), name
     counts = np.array([one.frame.counts for one in told])
     np.testing.assert_array_equal(found["counts"].reshape(len(told), -1), counts)
-    others = {"counts", "time", "setup", "single", "near_rim", "force_is_lower_bound"}
+    others = {"counts", "time", "setup", "single", "near_rim"}
+    others |= {"force_is_lower_bound", "force_is_upper_bound", "snaps_through"}
     assert set(found) - set(OF_ESTIMATE) == others
     np.testing.assert_allclose(found["time"], found["host_time"] - 1000.0, atol=1e-6)
 

@@ -210,8 +210,8 @@ class Readouts(QWidget):
             words = with_error(found.value, off, found.unit, found.digits, sign)
             if header.key == "force" and estimate.second.present:
                 words = _forces(estimate.contact, estimate.second)
-            if header.key == "force" and estimate.contact.force_is_lower_bound:
-                words = f"\N{GREATER-THAN OR EQUAL TO} {words}"
+            if header.key == "force":
+                words = estimate.contact.force_bound + words
             self._write(header.key, found.words or words)
 
     def _write(self, key: str, text: str) -> None:

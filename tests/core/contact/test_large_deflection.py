@@ -9,7 +9,7 @@ import pytest
 from kappaskin import Disk, Patch, Pipeline, Plate, PointLoad, Setup, Simulator
 from kappaskin import load_scene as scene_called
 from kappaskin.bases import basis_for
-from kappaskin.contact import NO_CONTACT, LowerBound
+from kappaskin.contact import NO_CONTACT, LargeDeflection
 from kappaskin.frames import Contact
 from kappaskin.mechanics import Stretching
 
@@ -34,7 +34,7 @@ def stretched(force, at, inplane="held", edge="hinged"):
 @pytest.mark.parametrize("inplane", ["held", "diaphragm", "free"])
 @pytest.mark.parametrize("edge", ["hinged", "clamped"])
 def test_the_law_tells_what_stretching_changes(at, inplane, edge):
-    bounded = LowerBound(Plate(SQUARE, inplane=inplane), edge)
+    bounded = LargeDeflection(Plate(SQUARE, inplane=inplane), edge)
     for force, share in ((0.01, 0.35), (0.1, 0.35), (0.2, 0.5)):
         w, without = stretched(force, at, inplane, edge)
         change = force - without
@@ -46,7 +46,7 @@ def test_the_law_tells_what_stretching_changes(at, inplane, edge):
 def test_the_number_stays_as_it_is():
     contact = told(0.1, 1e-3, 1e-3)
 
-    marked = LowerBound(Plate(SQUARE), "hinged")(contact)
+    marked = LargeDeflection(Plate(SQUARE), "hinged")(contact)
 
     assert replace(marked, force_is_lower_bound=False) is not contact
     assert (marked.force, marked.force_sd, marked.displacement) == (0.1, 1e-3, 1e-3)
@@ -54,7 +54,7 @@ def test_the_number_stays_as_it_is():
 
 
 def test_a_pull_is_judged_as_a_press_is():
-    bounded = LowerBound(Plate(SQUARE), "hinged")
+    bounded = LargeDeflection(Plate(SQUARE), "hinged")
     assert bounded(told(-0.1, 1e-3, -1e-3)).force_is_lower_bound
 
 
@@ -69,19 +69,19 @@ def test_a_pull_is_judged_as_a_press_is():
     ids=["of known thickness", "bent", "drum head", "strip that slides in"],
 )
 def test_what_accounts_for_its_stretch_or_has_none_is_not_marked(plate):
-    assert not LowerBound(plate, "hinged")(told(0.1, 1e-3, 5e-3)).force_is_lower_bound
+    assert not LargeDeflection(plate, "hinged")(told(0.1, 1e-3, 5e-3)).force_is_lower_bound
 
 
 @pytest.mark.parametrize("thickness", [None, 2 * H])
 def test_a_disk_is_marked_also_where_its_thickness_is_given(thickness):
-    bounded = LowerBound(Plate(Disk(0.05), thickness=thickness), "clamped")
+    bounded = LargeDeflection(Plate(Disk(0.05), thickness=thickness), "clamped")
     assert bounded(told(0.1, 1e-3, 5e-4)).force_is_lower_bound
     assert not bounded(told(0.1, 1e-3, 2e-5)).force_is_lower_bound
 
 
 def test_without_a_contact_there_is_nothing_to_mark():
-    assert LowerBound(Plate(SQUARE), "hinged")(NO_CONTACT) is NO_CONTACT
-    unknown = LowerBound(Plate(SQUARE), "hinged")(told(math.nan, math.nan, math.nan))
+    assert LargeDeflection(Plate(SQUARE), "hinged")(NO_CONTACT) is NO_CONTACT
+    unknown = LargeDeflection(Plate(SQUARE), "hinged")(told(math.nan, math.nan, math.nan))
     assert not unknown.force_is_lower_bound
 
 
