@@ -160,3 +160,14 @@ def test_a_window_loads_what_charts_need_in_another_thread_and_collects_garbage_
     program.write_text(_OPENED)
     done = subprocess.run([sys.executable, str(program)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_the_app_opens_on_a_fingertip_without_a_source() -> None:
+    started: list[str] = []
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("kappaskin_app.launch.launch", lambda source, *_: started.append(source))
+        main(["app"])
+    settings = settings_for(*started)
+    scene = scene_of(settings)
+    assert isinstance(scene.plate.patch, Cap)
+    assert (scene.plate.patch.radii, len(scene.layout)) == ((0.008, 0.008), 60)
