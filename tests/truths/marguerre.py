@@ -63,6 +63,12 @@ class ShallowShell:
         k = len(forces) if first is None else first
         return depths[k - 1], forces[k - 1]
 
+    def curvature(self, q, places):
+        """Curvature xx, yy, xy (3, P) in 1/m that pairs of gages read at `places` (P, 2) in m."""
+        rows = self._at(*(2 * places / (self.a, self.b) - 1).T)
+        (Hx, Hy), w = self.curvatures, rows["w"] @ q
+        return np.stack([rows["wxx"] @ q + Hx**2 * w, rows["wyy"] @ q + Hy**2 * w, rows["wxy"] @ q])
+
     @cached_property
     def stiffness(self):
         """The force in N per m of depth of a linear shell."""

@@ -6,13 +6,13 @@ derivative of it. Places are (s, azimuth): metres from the pole along the meridi
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 from scipy.linalg import solve_banded
-from scipy.special import ellipe, ellipeinc
+from scipy.special import ellipe, ellipeinc, roots_genlaguerre
 
 from navier import Load
 
@@ -120,7 +120,8 @@ class RevolvedShell:
 
         def read(load):
             s0, azimuth = np.hypot(load.x, load.y), np.arctan2(load.y, load.x)
-            by_ring = self._work(load, s0, nodes, table).reshape(len(n), len(s), -1)
+            parts = (self._work(part, s0, nodes, table) for part in _discs(load))
+            by_ring = sum(parts).reshape(len(n), len(s), -1)
             turn = n * (places[:, 1] - azimuth)
             waves = np.stack([np.cos(turn)] * 3 + [np.sin(turn)])[which]
             return np.einsum("nec,cne->ce", by_ring[:, ring.ravel()], waves)
@@ -294,7 +295,8 @@ class RevolvedShell:
         wide = self._half_width(s, s0, c)
         arcs = weights * self.meridian.at(s)[0] / np.pi
         force = np.where(n, 2 * np.sin(n * wide) / np.maximum(n, 1), wide) * arcs
-        return s, force * load.force / np.sum(2 * np.pi * force[0])
+        total = np.sum(2 * np.pi * force[0])
+        return s, np.where(s < self.end, force, 0.0) * load.force / total
 
     def _half_width(self, s, s0, c):
         """Azimuth (Q,) in rad to either side of the parallels at `s` within geodesic `c` of `s0`.
@@ -313,6 +315,20 @@ class RevolvedShell:
             arc = np.sqrt(chord2) * np.where(bend > 1e-6, np.arcsin(bend) / (bend + 1e-300), 1.0)
             low, high = np.where(arc < c, (azimuth, high), (low, azimuth))
         return (low + high) / 2
+
+
+def _discs(load):
+    """Loads over discs that are the `load` together: of radius c c^3 exp(-c^2 / 2 sd^2) / 2 sd^4.
+
+    That is a Gaussian's share of them, u exp(-u) by u = c^2 / 2 sd^2.
+    """
+    if not load.sd:
+        return [load]
+    u, shares = roots_genlaguerre(8, 1)
+    return [
+        replace(load, sd=0.0, radius=load.sd * np.sqrt(2 * each), force=load.force * share)
+        for each, share in zip(u, shares, strict=True)
+    ]
 
 
 def _composite(breaks, half):

@@ -192,3 +192,12 @@ def test_what_a_place_gives_elsewhere_is_what_it_gets_from_there():
 
     there = shell.displacement(at(one), np.array([other]))[0]
     assert shell.displacement(at(other), np.array([one]))[0] == pytest.approx(there, rel=1e-6)
+
+
+def test_a_gaussian_at_the_apex_moves_a_cap_as_discs_do_in_sum():
+    sd, fine = 1e-3, np.linspace(0, 8, 4001)[1:]  # of sd: radii of discs
+    c, shares = sd * fine, fine**3 * np.exp(-(fine**2) / 2) / 2 * (fine[1] - fine[0])
+    m = c / math.sqrt(0.8 * H) * (12 * (1 - NU**2)) ** 0.25
+
+    w = 0.8**2 / (E * H) * np.sum(shares * (1 + m * kerp(m)) / (math.pi * c**2))
+    assert apex(0.8, Load(0, 0, sd=sd)) == pytest.approx(w, rel=2e-3)

@@ -180,9 +180,8 @@ def _jacobi(r: Array, m: NDArray[np.intp], count: int, k: int) -> Array:
     x = 2 * r**2 - 1
     P, rest = list[Array](), list[Array]()  # P(2 t - 1), (1 - t)^k, and derivatives by t = r^2
     for d in range(3):
-        rising = np.prod([i + 2 * k + m + 1 + e for e in range(d)], axis=0) * (i >= d)
-        jacobi = scipy.special.eval_jacobi(np.maximum(i - d, 0), 2 * k + d, m + d, x)
-        P.append(rising * jacobi)
+        rising = np.prod([i + 2 * k + m + 1 + e for e in range(d)], axis=0)
+        P.append(rising * _polynomials(2 * k + d, m[:, 0] + d, count, x[..., 0], d))
         rest.append((-1.0) ** d * math.perm(k, d) * ((1 - x) / 2) ** max(k - d, 0))
     G, G1 = rest[0] * P[0], rest[1] * P[0] + rest[0] * P[1]
     G2 = rest[2] * P[0] + 2 * rest[1] * P[1] + rest[0] * P[2]
@@ -219,6 +218,22 @@ _BY_STEPS = np.array(
 )
 _TURNS = np.array([q - p for p, q in _STEPS])
 _SUMS = np.array([[sum(order)] for order in ORDERS])
+
+
+def _polynomials(a: int, b: NDArray[np.intp], count: int, x: Array, skipped: int) -> Array:
+    """Jacobi polynomials P_i^(a, b) (Q, M, count) at `x` (Q, 1), for each of `b` (M,).
+
+    After as many zeros as are `skipped`. By their three-term recurrence.
+    """
+    found = np.zeros((len(x), len(b), count + 2))
+    own = found[..., skipped:]
+    own[..., 0], own[..., 1] = 1.0, a + 1 + (a + b + 2) * (x - 1) / 2
+    for i in range(2, count - skipped):
+        c = 2 * i + a + b
+        ahead = (c - 1) * (c * (c - 2) * x + (a - b) * (a + b)) * own[..., i - 1]
+        behind = 2 * (i + a - 1) * (i + b - 1) * c * own[..., i - 2]
+        own[..., i] = (ahead - behind) / (2 * i * (i + a + b) * (c - 2))
+    return found[..., :count]
 
 
 class _PolarFunctions:

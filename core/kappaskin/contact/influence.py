@@ -7,6 +7,7 @@ from typing import Protocol, cast
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from kappaskin.bases import Basis, CapBasis, ProductBasis, SineBasis, basis_for
 from kappaskin.frames import Array
@@ -22,6 +23,8 @@ class Influence(Protocol):
     """The load in N that the readings are of."""
     sized: bool
     """Whether they depend on the size of the load; else they are those of a point load."""
+    nodes: tuple[Array, NDArray[np.float32]] | None
+    """Loads to search among, x, y and s (S, 3) each, and their readings (S, C); None for a grid."""
 
     def at(self, x: float, y: float, s: float) -> None:
         """Write the readings in 1/m of a load at (x, y) in m into the first row of `out` (4, C).
@@ -86,7 +89,7 @@ _PLACES, _SHARES = np.vstack([[0.0, 0.0], _RING]), np.array([1 / 4] + 6 * [1 / 8
 class _OfFunctions:
     """As the functions of a basis follow it; heights and slopes depend on the size of a load."""
 
-    unit = 1.0
+    unit, nodes = 1.0, None
 
     def __init__(
         self, plate: Plate, layout: SensorLayout, edge: str, functions: int, out: Array
@@ -292,7 +295,7 @@ def _trust(t: Array, s: float, share: float) -> Array | None:
 class _OfPlate:
     """A plate's or a shell's: in closed form what grows without bound, and a table of the rest."""
 
-    sized = True
+    sized, nodes = True, None
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str, out: Array) -> None:
         self.unit = 8 * math.pi * plate.rigidity
@@ -355,13 +358,17 @@ class _OfDirections:
         self._rows, self._out = np.zeros((4, 3 * len(layout))), out
         of_skin = _OfCap if isinstance(plate.patch, Cap) else _OfPlate
         self._of = of_skin(plate, layout.of_curvature, edge, self._rows)
-        self.unit = self._of.unit
+        self.unit, self.nodes = self._of.unit, None
         reads, P = cast("Readings", layout.reads), len(layout)
         c, s = reads.along.T
         twist = reads.quantity == "twist"
         self._parts = np.where(twist, 0.0, [c * c, s * s, 2 * c * s])
         self._parts[2, twist] = 1.0
         self._channels = layout.element + P * np.arange(3)[:, None]
+        if self._of.nodes is not None:
+            places, read = self._of.nodes
+            parts = self._parts.astype(np.float32)
+            self.nodes = places, np.einsum("cr,ncr->nr", parts, read[:, self._channels])
 
     def at(self, x: float, y: float, s: float) -> None:
         self._of.at(x, y, s)
@@ -377,10 +384,11 @@ class _OfDirections:
 class _OfCap:
     """A cap's: a table of what a load over discs of several radii makes, summed until it stands."""
 
-    unit, sized = 1.0, True
+    sized = True
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str, out: Array) -> None:
         self._cap = cap = cast("Cap", plate.patch)
+        self.unit = 8 * math.pi * plate.rigidity
         self._table, self._steps, self._gives = _on_cap(plate, edge, layout.positions.tobytes())
         self._positions, self._out = layout.positions, out
         inverse = np.linalg.inv(cap.local(layout.positions).covariant[:, 1:3, 1:3])
@@ -388,6 +396,22 @@ class _OfCap:
         self._last = [n - 4 for n in self._table.shape[:3]]
         self._block, self._weights = lru_cache(16)(self._block_at), np.empty((4, 4, 16))
         self.t = np.empty(len(layout))
+        self.nodes = self._searched()
+
+    def _searched(self) -> tuple[Array, NDArray[np.float32]]:
+        """`nodes`: rings of the table, as far apart as the places on them."""
+        table, (step_t, step_r, step) = self._table, self._steps
+        found = list[tuple[int, int, int]]()
+        for i in range(1, table.shape[2], _RINGS):
+            radius = float(self._cap.meridian(np.array((i - 1) * step)).radius)
+            around = max(round(2 * math.pi * radius / (_RINGS * step)), 1)
+            turns = np.linspace(1, table.shape[0] - 2, around, endpoint=False).astype(int).tolist()
+            found += [(turn, size, i) for turn in turns for size in _SEARCHED_SIZES]
+        turn, size, ring = np.array(found).T
+        angle, away = (turn - 1) * step_t, (ring - 1) * step
+        offset = away * np.stack([np.cos(angle), np.sin(angle)])
+        s = ((size - 1.5) * step_r) ** 2
+        return np.column_stack([*(self._cap.rim_radius + offset), s]), table[turn, size, ring]
 
     def _block_at(self, i: int, j: int, k: int) -> Array:
         return self._table[i : i + 4, j : j + 4, k : k + 4].reshape(64, -1)
@@ -431,12 +455,14 @@ class _OfCap:
 _WAVES = 28  # functions along the meridian of a cap that a load is followed by
 _ON_CAP = 64  # steps of the table of a cap across its box
 _AT_POLE = 1e-3  # of a step: nearer, it is taken for a place so far away
+_RINGS = 2  # steps between the places searched
+_SEARCHED_SIZES = 3, 6, 10  # of the table: radii of 1.5, 4.5 and 8.5 steps
 _SIZES = 0.2  # of the box: the largest radius of a load
 
 
 @lru_cache(2)
 def _on_cap(plate: Plate, edge: str, places: bytes) -> tuple[Array, tuple[float, ...], Array]:
-    """Readings (T, Q, S, C) in 1/m per N under discs, the steps, and displacements in m per N.
+    """Readings (T, Q, S, C) in 1/m of 8 pi D on discs, the steps, and displacements in m per N.
 
     By azimuth from -1 step, radius of the disc from -3/2 steps, and distance from the pole from -1
     step; the steps are in rad, m and m. The displacements under a point load are at even distances
@@ -452,7 +478,7 @@ def _on_cap(plate: Plate, edge: str, places: bytes) -> tuple[Array, tuple[float,
     M, C = layout.operator(basis, plate).reshape(-1, *basis.shape), 3 * len(layout)
     for j in range(basis.Nj):
         M[..., j] = M[..., j] @ compliance[(j + 1) // 2]
-    cos, sin = waves.rows(M.reshape(C, -1))
+    cos, sin = waves.rows(8 * math.pi * plate.rigidity * M.reshape(C, -1))
     n = _ON_CAP
     turns, sizes, steps = math.ceil(np.pi * rim / a * n), math.ceil(_SIZES * n), n // 2
     step_t, step = 2 * np.pi / turns, a / steps
@@ -469,7 +495,7 @@ def _on_cap(plate: Plate, edge: str, places: bytes) -> tuple[Array, tuple[float,
     turn = np.multiply.outer(t, np.arange(cos.shape[1]))
     around = np.hstack([np.cos(turn), np.sin(turn)]).astype(np.float32)
     table = (around @ by_m.reshape(around.shape[1], -1)).reshape(len(t), *by_m.shape[2:])
-    f = basis.along(np.linspace(0, 1, 4 * n + 1))[0]
+    f = basis.along(np.linspace(0, 1, n + 1))[0]
     gives = np.einsum("qmi,mij,qmj->q", f, compliance, f, optimize=True)
     return table, (step_t, step, step), gives
 

@@ -97,8 +97,8 @@ class _CurvedSkin:
                 side.append((middle * force, true / force - 1))
             self._ends.append(sign * math.inf if len(side) > len(depths) else side[-1][0])
             table |= dict(side)
-        self._depths = sorted(table)
-        self._changes = [table[depth] for depth in self._depths]
+        self._depths = np.array(sorted(table))
+        self._changes = np.array([table[depth] for depth in sorted(table)])
 
     def __call__(self, contact: Contact) -> Contact:
         """The contact, with the error of a linear shell in its force's error bar."""
@@ -107,7 +107,7 @@ class _CurvedSkin:
         x, y = contact.position.item(0), contact.position.item(1)
         last = _NODES - 1
         node = round(last * y / self._patch.b), round(last * x / self._patch.a)
-        depth = self._gives.item(*node) * contact.force
+        depth: float = self._gives.item(*node) * contact.force
         outward, inward = self._ends
         if depth < outward or depth > inward:
             return replace(contact, force=math.nan, force_sd=math.nan, snaps_through=True)

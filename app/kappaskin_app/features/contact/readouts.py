@@ -80,7 +80,7 @@ def _forces(*contacts: Contact) -> str:
     """The forces of two contacts, without error bars, for which there is no room."""
     off = Coverage.now.of
     texts = [
-        "edge" if of.near_rim else rounded(of.force, off(of.force_sd, of.force_95))[0]
+        of.no_force.partition(":")[0] or rounded(of.force, off(of.force_sd, of.force_95))[0]
         for of in contacts
     ]
     return NONE if NONE in texts else f"{', '.join(texts)} N"
