@@ -152,7 +152,7 @@ class CardPainter(QStyledItemDelegate):
 
 # Demonstrations, then the paper's scenes, those of one effect, and those of other readings.
 _DEMONSTRATIONS = (
-    "fingertip-cap sphere pencil coin bolt tapping two-contacts fingertip dome saddle circle "
+    "sphere pencil coin bolt tapping two-contacts fingertip-cap fingertip dome saddle circle "
     "exploring cylinder edge slipping demo"
 )
 _PAPER = "centre off-centre line calibration"
