@@ -328,7 +328,8 @@ def _radius(estimate: RadiusEstimate, recorded: bool) -> tuple[str, str]:
 
 def _figure(unit: str, half: float, *values: float) -> tuple[str, str]:
     """The values with their unit, and their error bar `half`, with which one that is."""
-    found = [rounded(value, half, 3 if unit == "N" else 1) for value in values]
+    digits = 3 if unit == "N" else 1 + (max(map(abs, values)) < 1)
+    found = [rounded(value, half, digits) for value in values]
     bar = found[0][1]
     text = f"{', '.join(text for text, _ in found)} {unit}"
     off = f"\N{PLUS-MINUS SIGN} {bar} {unit} ({Coverage.now.label})"
