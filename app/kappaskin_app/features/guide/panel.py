@@ -274,6 +274,7 @@ def _ground(block: QTextBlock, theme: Theme) -> None:
     cursor, ground, letters = QTextCursor(block), QTextBlockFormat(), QTextCharFormat()
     ground.setBackground(QColor(theme.window))
     ground.setLeftMargin(_CODE)
+    ground.setNonBreakableLines(False)  # a long line goes on below
     if _kind(block) != _kind(block.previous()):
         ground.setTopMargin(_ABOVE / 2)
     if not _is_code(block.next()):
