@@ -199,18 +199,18 @@ BENT = [
 
 
 @cache
-def _panel(sides, radii):
-    return Panel(*sides, *radii, polynomials=36, modes=300)
+def _panel(sides, radii, inplane):
+    return Panel(*sides, *radii, inplane=inplane, polynomials=36, modes=300)
 
 
-def _shallow_case(name, sides, radii, force, mm, elements=(10, 10)):
+def _shallow_case(name, sides, radii, force, mm, elements=(10, 10), inplane="diaphragm"):
     def truth(layout):
-        return _panel(sides, radii).reader(layout.positions)
+        return _panel(sides, radii, inplane).reader(layout.positions)
 
     def load(share):
         return Load(*(share * sides), force, radius=1e-3 * mm)
 
-    skin, name = Plate(Patch(*sides, radius=radii)), f"{name}, disc of {mm} mm"
+    skin, name = Plate(Patch(*sides, radii), inplane=inplane), f"{name}, disc of {mm} mm"
     return Case(name, skin, truth, load, bound=False, elements=elements)
 
 
@@ -221,6 +221,7 @@ SHALLOW = [
     _shallow_case("trough of 40 mm", _FINGER, (inf, 0.1), 0.4, 2),
     _shallow_case("dome of 60 x 32 mm", (0.06, 0.032), (0.1, 0.1), 1.0, 2, (15, 8)),
     _shallow_case("dome of 100 mm", _PALM, (0.3, 0.3), 0.5, 2),
+    _shallow_case("dome of 100 mm, held", _PALM, (0.3, 0.3), 0.5, 2, inplane="held"),
     _shallow_case("saddle of 100 mm", _PALM, (0.3, -0.3), 0.1, 2),
 ]
 

@@ -46,11 +46,11 @@ def moved(plate, edge="hinged", functions=16):
     return basis.at(PLACES) @ c.ravel()
 
 
-def read(plate, layout, edge="hinged"):
+def read(plate, layout, edge="hinged", load=LOAD):
     """What the elements read (3, P) in 1/m, as a contact has it."""
     rows = np.zeros((4, 3 * len(layout)))
     influence = influence_of(plate, layout, edge, 15, rows)
-    influence.at(LOAD.x, LOAD.y, LOAD.radius**2)
+    influence.at(load.x, load.y, load.radius**2)
     return (rows[0] / influence.unit).reshape(3, -1)
 
 
@@ -103,6 +103,19 @@ def test_other_edges_are_as_koiters(inplane, edge, radii):
 
     for one, true, off in zip(found, (f, K), OFF[radii], strict=True):
         np.testing.assert_allclose(one, true, rtol=0, atol=more * off * np.abs(true).max())
+
+
+@pytest.mark.parametrize("inplane", ["diaphragm", "held"])
+def test_a_load_is_followed_where_it_fades_over_a_thirtieth_of_a_side(inplane):
+    thin = {"inplane": inplane, "thickness": 1e-4}
+    plate = Plate(Patch(0.1, 0.1, (0.3, 0.3)), **thin)
+    layout = SensorLayout.regular(plate.patch, 20, 20)
+    load = Load(0.0413, 0.0537, radius=2e-3)
+    K = Panel(0.1, 0.1, 0.3, 0.3, **thin, polynomials=40).reader(layout.positions)(load)
+
+    found = read(plate, layout, load=load)
+
+    np.testing.assert_allclose(found, K, rtol=0, atol=5e-3 * np.abs(K).max())
 
 
 # Hardly bent, and bent one way
