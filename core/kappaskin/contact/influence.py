@@ -263,8 +263,10 @@ def _under_gaussian(d: Array, sd: float, gage_length: float) -> Array:
 
 
 _NODES = 41  # along the shorter side
-_MOST_BYTES = 64e6  # of a table
+_PER_DECAY = 2  # nodes at least over the distance that a load on a shallow skin is felt
+_MOST_BYTES = 64e6  # of a table; four times as many where that distance is short
 _SD = 0.02  # of the shorter side, of the Gaussian load that the table is summed for
+_SD_OF_DECAY = 0.3  # at most, of that distance
 _VANISHED = 5.3  # k sd, beyond which a Gaussian load moves less than 1e-6 of what a point load does
 _MOST_WAVES = 256  # along a side
 _MIXED, _MOST_MIXED = 24, 1500  # functions where a load mixes them: along the shorter side, in all
@@ -532,7 +534,7 @@ def _rest_of(
     """
     patch, positions = plate.patch, np.frombuffer(places).reshape(-1, 2)
     layout = replace(SensorLayout.scattered(patch, positions), gage_length=gage_length)
-    x, y = patch.grid(*_nodes(patch, len(positions)))
+    x, y = patch.grid(*_nodes(plate, len(positions)))
     is_shell = patch.arc_curvature and edge in _SINES
     of_skin = _of_shell if is_shell else _of_functions
     rest, gives, sd = of_skin(plate, layout, edge, x, y)
@@ -548,16 +550,41 @@ def _of_functions(
     plate: Plate, layout: SensorLayout, edge: str, x: Array, y: Array
 ) -> tuple[Array, Array, float]:
     """Readings (ny, nx, 3, P) under a Gaussian load at each node, and the rest of `_rest_of`."""
-    basis, along_x, along_y, sd = _summed(plate, edge, x, y)
-    compliance, unit = plate.compliance(basis), 8 * math.pi * plate.rigidity
-    T = np.empty((len(y), len(x), 3, len(layout)))
+    if edge in _SINES and not plate.mixes_sines:
+        sines, sd = _sines(plate)
+        return *_felt(plate, layout, sines, _means(sines, x, y, sd), x, y), sd
+    basis, sd = _mixed(plate.patch, edge)
+    if not plate.patch.is_shallow:
+        return *_felt(plate, layout, basis, _means(basis, x, y, sd), x, y), sd
+    # So few functions do not follow how a load fades on a skin that stretches. Sines do where the
+    # edges are diaphragms; what other edges change is smooth.
+    usual, sines = replace(plate, inplane="diaphragm"), SineBasis(plate.patch, *basis.shape)
+    fine, fine_gives, sd = _of_functions(usual, layout, "hinged", x, y)
+    (read, gives), (usual_read, usual_gives) = (
+        _felt(skin, layout, few, _means(few, x, y, sd), x, y)
+        for skin, few in ((plate, basis), (usual, sines))
+    )
+    return fine + (read - usual_read), fine_gives + (gives - usual_gives), sd
+
+
+def _felt(
+    plate: Plate,
+    layout: SensorLayout,
+    basis: ProductBasis,
+    means: tuple[Array, Array],
+    x: Array,
+    y: Array,
+) -> tuple[Array, Array]:
+    """Readings and displacements at each node, of functions with these `means` under a load."""
+    (along_x, along_y), compliance = means, plate.compliance(basis)
+    T, unit = np.empty((len(y), len(x), 3, len(layout))), 8 * math.pi * plate.rigidity
     for i in range(0, len(layout), _TOGETHER):
         here = slice(i, i + _TOGETHER)
         part = replace(layout, positions=layout.positions[here], live=layout.live[:, here])
         M = compliance.after(part.operator(basis, plate)).reshape(-1, *basis.shape)
         read = unit * (along_x @ (M @ along_y.T)).T
         T[..., here] = read.reshape(len(y), len(x), 3, len(part))
-    return T, _displacement(basis, compliance, x, y), sd
+    return T, _displacement(basis, compliance, x, y)
 
 
 def _of_shell(
@@ -571,45 +598,62 @@ def _of_shell(
     return unit * T.reshape(len(y), len(x), 3, len(layout)), gives, sd
 
 
-def _nodes(patch: Patch, elements: int) -> tuple[int, int]:
+def _decay(plate: Plate) -> float:
+    """Distance in m over which what stretching adds to a load on a shallow skin fades.
+
+    (D / (E h H^2))^(1/4), with the mean over all directions of H^2 = (c^2 / Ry + s^2 / Rx)^2.
+    """
+    Hx, Hy = plate.patch.curvatures if plate.patch.is_shallow else (0.0, 0.0)
+    square = (3 * Hx**2 + 3 * Hy**2 + 2 * Hx * Hy) / 8
+    stretch = (1 - plate.poisson**2) * plate.membrane_stiffness * square
+    return (plate.rigidity / stretch) ** 0.25 if stretch else math.inf
+
+
+def _nodes(plate: Plate, elements: int) -> tuple[int, int]:
     """Nodes along x and y: as near one another along both, and within the memory."""
-    near = min(patch.a, patch.b) / (_NODES - 1)
-    most = _MOST_BYTES / (2 * 8 * 3 * elements)
-    near = max(near, math.sqrt(patch.a * patch.b / most))
+    patch = plate.patch
+    least = math.sqrt(patch.a * patch.b * 2 * 8 * 3 * elements / _MOST_BYTES)
+    near = max(min(patch.a, patch.b) / (_NODES - 1), least)
+    near = min(near, max(_decay(plate) / _PER_DECAY, least / 2))
     nx, ny = (max(math.ceil(side / near * (1 - 1e-9)) + 1, 5) for side in (patch.a, patch.b))
     return nx, ny
 
 
-def _summed(
-    plate: Plate, edge: str, x: Array, y: Array
-) -> tuple[ProductBasis, Array, Array, float]:
-    """Functions, their means (nx, Ni), (ny, Nj) under Gaussians at the nodes, and the sd in m."""
-    patch = plate.patch
-    sides = patch.a, patch.b
-    if edge in _SINES and not plate.mixes_sines:
-        sd = max(_SD * min(sides), _VANISHED * max(sides) / (math.pi * _MOST_WAVES))
-        Ni, Nj = (math.ceil(_VANISHED * side / (math.pi * sd)) for side in sides)
-        sines = SineBasis(patch, Ni, Nj)
-        along_x, along_y = (
-            np.sin(np.multiply.outer(at, k)) * np.exp(-((sd * k) ** 2) / 2)
-            for at, k in zip((x, y), sines.wavenumbers, strict=True)
-        )
-        return sines, along_x, along_y, sd
-    # As fine along both sides, of as many functions as a matrix of them may have.
-    shorter = min(sides)
-    most = min(_MIXED, math.sqrt(_MOST_MIXED * shorter / max(sides)))
-    Ni, Nj = (math.ceil(most * side / shorter) for side in sides)
+def _sines(plate: Plate) -> tuple[SineBasis, float]:
+    """Sines that follow a Gaussian load, and its standard deviation in m."""
+    sides = plate.patch.a, plate.patch.b
+    sd = min(_SD * min(sides), _SD_OF_DECAY * _decay(plate))
+    sd = max(sd, _VANISHED * max(sides) / (math.pi * _MOST_WAVES))
+    Ni, Nj = (math.ceil(_VANISHED * side / (math.pi * sd)) for side in sides)
+    return SineBasis(plate.patch, Ni, Nj), sd
+
+
+def _mixed(patch: Patch, edge: str) -> tuple[ProductBasis, float]:
+    """The same of other functions: as fine along both sides, as many as a matrix may have."""
+    shorter = min(patch.a, patch.b)
+    most = min(_MIXED, math.sqrt(_MOST_MIXED * shorter / max(patch.a, patch.b)))
+    Ni, Nj = (math.ceil(most * side / shorter) for side in (patch.a, patch.b))
     mixed = cast("ProductBasis", basis_for(patch, edge, Ni, Nj))
-    sd = _MIXED_SD * shorter / (math.pi * most)
+    return mixed, _MIXED_SD * shorter / (math.pi * most)
+
+
+def _means(basis: ProductBasis, x: Array, y: Array, sd: float) -> tuple[Array, Array]:
+    """Means (nx, Ni), (ny, Nj) of the functions under Gaussians at the nodes."""
+    if isinstance(basis, SineBasis):
+        ki, kj = basis.wavenumbers
+        share_i, share_j = (np.exp(-((sd * k) ** 2) / 2) for k in (ki, kj))
+        return np.sin(np.multiply.outer(x, ki)) * share_i, np.sin(
+            np.multiply.outer(y, kj)
+        ) * share_j
     z, weights = np.polynomial.hermite_e.hermegauss(9)
     near_x, near_y = (
         np.clip(np.add.outer(at, sd * z), 0.0, side).ravel()
-        for at, side in zip((x, y), sides, strict=True)
+        for at, side in ((x, basis.patch.a), (y, basis.patch.b))
     )
-    grid, shares = mixed.on_grid(near_x, near_y), weights / weights.sum()
+    grid, shares = basis.on_grid(near_x, near_y), weights / weights.sum()
     along_x = np.einsum("q,pqn->pn", shares, grid.X.reshape(len(x), len(z), -1))
     along_y = np.einsum("q,pqn->pn", shares, grid.Y.reshape(len(y), len(z), -1))
-    return mixed, along_x, along_y, sd
+    return along_x, along_y
 
 
 def _second(values: Array, nodes: Array, axis: int) -> Array:

@@ -164,7 +164,7 @@ class DistributedLoad(CentredLoad, ABC):
         """Points (P, 2) in m on its rim, relative to its centre."""
 
     @abstractmethod
-    def _quadrature(self, count: int) -> tuple[Array, Array]:
+    def quadrature(self, count: int) -> tuple[Array, Array]:
         """Points (Q, 2) in m, relative to its centre, and weights (Q,) whose sum is one.
 
         Exact to rounding for functions with up to `count` half waves across the load.
@@ -178,11 +178,13 @@ class DistributedLoad(CentredLoad, ABC):
             k, l = np.meshgrid(*basis.wavenumbers, indexing="ij")
             return PointLoad(self.x, self.y, self.force).modal(basis) * self._wave(k, l)
         if isinstance(basis, CapBasis) and isinstance(self, DiscLoad | GaussianLoad):
-            round_it = _RoundOnCap.of(replace(self, x=0.0, y=0.0, force=1.0), basis)
-            if (found := round_it(self.x, self.y)) is not None:
-                return self.force * found
-        points, weights = self._quadrature(max(basis.shape))
-        felt = weights @ basis.at(basis.patch.around(self.x, self.y, points))
+            felt = _on_cap(replace(self, x=0.0, y=0.0, force=1.0), basis)(self.x, self.y)
+            if felt is not None:
+                return self.force * felt
+        points, weights = self.quadrature(max(basis.shape))
+        on_cap = isinstance(basis, CapBasis)
+        at = basis.cap.around(self.x, self.y, points) if on_cap else self.centre() + points
+        felt = weights @ basis.at(at)
         if np.isnan(felt).any():  # a notch in the outline that passes between the rim's points
             raise Refusal(f"expected a load completely on the skin, got {self}; make it smaller")
         return self.force * felt.reshape(basis.shape)
@@ -233,7 +235,7 @@ class DiscLoad(DistributedLoad):
     def _rim(self) -> Array:
         return self.radius * _circle(64)
 
-    def _quadrature(self, count: int) -> tuple[Array, Array]:
+    def quadrature(self, count: int) -> tuple[Array, Array]:
         t, w = _gauss(count)
         radius = (1 + t) / 2
         return _rings(self.radius * radius, 2 * radius * w)
@@ -261,7 +263,7 @@ class GaussianLoad(DistributedLoad):
     def _rim(self) -> Array:
         return 4 * self.sd * _circle(64)
 
-    def _quadrature(self, count: int) -> tuple[Array, Array]:
+    def quadrature(self, count: int) -> tuple[Array, Array]:
         t, w = _gauss(count)
         radius = 2 * (1 + t)  # in standard deviations
         share = w * radius * np.exp(-(radius**2) / 2)
@@ -290,7 +292,7 @@ class RectangleLoad(DistributedLoad):
         round_it = np.vstack([np.column_stack([along, one]), np.column_stack([one, along])])
         return round_it * (self.width / 2, self.height / 2)
 
-    def _quadrature(self, count: int) -> tuple[Array, Array]:
+    def quadrature(self, count: int) -> tuple[Array, Array]:
         t, w = _gauss(count)
         x, y = np.meshgrid(self.width / 2 * t, self.height / 2 * t)
         return np.column_stack([x.ravel(), y.ravel()]), np.multiply.outer(w, w).ravel()
@@ -303,8 +305,6 @@ class _RoundOnCap:
     the azimuth of its centre. The series are Chebyshev's, from the pole to where it meets the rim.
     """
 
-    of = staticmethod(lru_cache(8)(lambda load, basis: _RoundOnCap(load, basis)))
-
     def __init__(self, load: DiscLoad | GaussianLoad, basis: CapBasis) -> None:
         size = load.radius if isinstance(load, DiscLoad) else 4 * load.sd
         self._rim, (Ni, Nj) = basis.cap.rim_radius, basis.shape
@@ -314,11 +314,11 @@ class _RoundOnCap:
             return
         # A disc has fewer waves across it than a Gaussian, whose weight is no polynomial.
         waves = math.ceil(max(basis.shape) * size / self._rim)
-        points, weights = load._quadrature(waves - 8 * isinstance(load, DiscLoad))
+        points, weights = load.quadrature(waves - 8 * isinstance(load, DiscLoad))
         half = points[:, 1] >= -1e-9 * size
         points, weights = (
             points[half],
-            weights[half] * np.where(points[half, 1] > 1e-9 * size, 2, 1),
+            np.where(points[:, 1] > 1e-9 * size, 2, 1)[half] * weights[half],
         )
         nodes = np.pi * (self._degrees + 0.5) / len(self._degrees)
         far = self._rim + self._reach * (1 - 1e-12) * (1 + np.cos(nodes)) / 2
@@ -339,3 +339,8 @@ class _RoundOnCap:
         felt[:, 2::2] = felt[:, 1 : self._shape[1] - 1 : 2] * np.sin(m[2::2] * turn)
         felt[:, 1::2] *= np.cos(m[1::2] * turn)
         return felt
+
+
+@lru_cache(8)
+def _on_cap(load: DiscLoad | GaussianLoad, basis: CapBasis) -> _RoundOnCap:
+    return _RoundOnCap(load, basis)

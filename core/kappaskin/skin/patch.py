@@ -185,6 +185,9 @@ class Base(NamedTuple):
         return found
 
 
+_FLAT = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class LocalGeometry:
     """The skin at rest around each of P places.
@@ -340,13 +343,15 @@ class Patch:
     def at_rest(self, positions: Array) -> tuple[Array, Array]:
         """Points (..., 3) in m and outward unit normals (..., 3) of the skin at rest."""
         base = self.base(positions[..., 0], positions[..., 1])
-        point, normal = (np.broadcast_arrays(*each) for each in (base.point, base.normal))
-        return np.stack(point, axis=-1), np.stack(normal, axis=-1)
+        each = np.broadcast_arrays(*base.point, *base.normal)
+        return np.stack(each[:3], axis=-1), np.stack(each[3:], axis=-1)
 
     def base(self, x: Number, y: Number) -> Base:
         """The skin at rest at x, y in m: numbers, or arrays of one shape."""
-        sin, cos = (math.sin, math.cos) if isinstance(x, float) else (np.sin, np.cos)
         Hx, Hy = self.curvatures
+        if not (Hx or Hy):
+            return Base((x, y, 0.0), *_FLAT)
+        sin, cos = (math.sin, math.cos) if isinstance(x, float) else (np.sin, np.cos)
         u, v = x - self.a / 2, y - self.b / 2
         sx, cx, sy, cy = sin(Hx * u), cos(Hx * u), sin(Hy * v), cos(Hy * v)
         px, py, pz = x, y, 0.0

@@ -293,7 +293,7 @@ def test_a_round_load_is_felt_all_over_a_cap_as_by_quadrature(kind, Nj, share, t
 
     felt = load.modal(basis)
 
-    points, weights = load._quadrature(12)
+    points, weights = load.quadrature(12)
     expected = 0.3 * weights @ basis.at(cap.around(x, y, points))
     scale = np.abs(expected).max()
     np.testing.assert_allclose(felt.ravel(), expected, rtol=0, atol=1e-9 * scale)
