@@ -143,6 +143,7 @@ class PointContact:
         self._rows = np.zeros((5 + len(self._free), len(self._M)))
         self._influence = influence_of(plate, layout, edge, _FUNCTIONS, self._rows[:4])
         self._unknowns = 4 if self._influence.sized else 3
+        self._theory_error = plate.theory_error
         self._stretched = StretchedSkin(plate, layout, edge) if plate.stretches else None
         self._live, self._element = layout.live.ravel(), layout.element
         self._readings = self._none = np.zeros(len(self._M))
@@ -360,7 +361,7 @@ class PointContact:
             np.array([x, y]),
             sd[1:3] / strength,
             force,
-            float(sd[0]) * unit,
+            math.hypot(float(sd[0]) * unit, self._theory_error * force),
             *self._displacement(fit, x, y, under),
             tables.spare,
             spread < _AS_WELL * float(fit.noise),
