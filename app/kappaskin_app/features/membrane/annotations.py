@@ -115,7 +115,7 @@ class Sides:
         x, y = f"x {round(a * MM, 1):g} mm", f"y {round(b * MM, 1):g} mm"
         if isinstance(skin.patch, Cap):
             ends, texts = np.array([(0, b / 2), (a, b / 2), (a / 2, 0)]), ("x 0", x, "y 0")
-            shares = np.array([(-0.1, 0, 0), (0.1, 0, 0), (-0.02, -0.06, 0)])
+            shares = np.array([(-0.1, 0, 0), (0.06, 0, 0), (-0.02, -0.12, 0)])
             turn = np.linspace(0, 2 * np.pi, _AROUND)
             line = skin.patch.rim_radius * (1 + np.stack([np.cos(turn), np.sin(turn)], axis=-1))
         else:
