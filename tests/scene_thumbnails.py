@@ -152,7 +152,7 @@ def _hardest(scene: Scene, skin: DrawnSkin) -> tuple[Array, AppliedLoads | None]
         bent = [scene.laid.curvature(t) for t in times]
         k_xx, k_yy, k_xy = max(bent, key=lambda k: float(np.abs(k).max()))
         u, v = np.meshgrid(x - x.mean(), y - y.mean())
-        return (k_xx - patch.base_curvature) * u**2 / 2 + k_yy * v**2 / 2 + k_xy * u * v, None
+        return (k_xx - patch.arc_curvature) * u**2 / 2 + k_yy * v**2 / 2 + k_xy * u * v, None
     pressing, basis = LoadingHistory(scene, scene.plate), scene.basis
     pressed = [pressing(t) for t in times]
     forces = np.array([moment.force.ravel() for moment in pressed])

@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from kappaskin.sensing import Sensor as Sensor
     from kappaskin.sensing import SensorLayout as SensorLayout
     from kappaskin.sensing import Transduction as Transduction
+    from kappaskin.skin import Cap as Cap
     from kappaskin.skin import Disk as Disk
     from kappaskin.skin import Patch as Patch
     from kappaskin.skin import Polygon as Polygon
@@ -81,6 +82,6 @@ else:
         ("recording", "Recording"),
         ("scenes", "Scene Simulator Stimulus load_scene planned read_scene write_scene"),
         ("sensing", "Sensor SensorLayout Transduction"),
-        ("skin", "Disk Patch Polygon"),
+        ("skin", "Cap Disk Patch Polygon"),
         ("sources", "feed"),
     )

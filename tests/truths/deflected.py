@@ -39,6 +39,11 @@ class DeflectedSkin:
     f: object
     radius: float = np.inf
 
+    @property
+    def base(self):
+        """Curvature at rest in 1/m along x and y."""
+        return 1 / self.radius, 0.0
+
     def _parts(self, x):
         """Unit vectors (P, 3) along the arc, across it and outward."""
         angle = (x - self.a / 2) / self.radius
@@ -100,9 +105,9 @@ class DeflectedSkin:
         The twist is the second form's mixed entry between unit vectors along the two gages, less
         what shear alone makes of the curvature at rest.
         """
-        H, (first, second) = 1 / self.radius, self._forms(x, y)
-        twist = (second[2] - H / 2 * first[2]) / np.sqrt(first[0] * first[1])
-        return np.stack([second[0] / first[0] - H, second[1] / first[1], twist])
+        (Hx, Hy), (first, second) = self.base, self._forms(x, y)
+        twist = (second[2] - (Hx + Hy) / 2 * first[2]) / np.sqrt(first[0] * first[1])
+        return np.stack([second[0] / first[0] - Hx, second[1] / first[1] - Hy, twist])
 
     def read(self, quantity, x, y, direction):
         """A `quantity` at x, y (P,) along `direction` (P,) in rad from x, in SI units.
@@ -118,9 +123,10 @@ class DeflectedSkin:
         if quantity == "slope":
             v = self._moved(x, y, 0, 0)[1][:, 0]
             return c * (self.f(x, y, 1, 0) + H * v) + s * self.f(x, y, 0, 1)
-        first, second = self._forms(x, y)
+        (Hx, Hy), (first, second) = self.base, self._forms(x, y)
         parts = np.stack([c * c, s * s, 2 * c * s])
-        return np.sum(parts * second, axis=0) / np.sum(parts * first, axis=0) - c * c * H
+        of_base = c * c * Hx + s * s * Hy
+        return np.sum(parts * second, axis=0) / np.sum(parts * first, axis=0) - of_base
 
     def diagonal_difference(self, x, y):
         """Half of what the normal curvatures along the two diagonals differ by, (P,) in 1/m."""
@@ -131,3 +137,27 @@ class DeflectedSkin:
             for sign in (1, -1)
         ]
         return (both[0] - both[1]) / 2
+
+
+@dataclass(frozen=True)
+class ShallowSkin(DeflectedSkin):
+    """A shallow skin of `radii` along x and y in m: nothing moves along it."""
+
+    radii: tuple = (np.inf, np.inf)
+
+    @property
+    def base(self):
+        return 1 / self.radii[0], 1 / self.radii[1]
+
+    def derivatives(self, x, y):
+        """In its own tangents and normal, whose turning stretches nothing: 1 - f/R is 1."""
+        (Hx, Hy), (t, e, n) = self.base, np.eye(3)
+        f, fx, fy, fxx, fyy, fxy = (self.f(x, y, *order)[:, None] for order in
+             [(0, 0), (1, 0), (0, 1), (2, 0), (0, 2), (1, 1)])  # fmt: skip
+        return (
+            t - fx * n,
+            e - fy * n,
+            -Hx * fx * t - (Hx + fxx + Hx**2 * f) * n,
+            -Hy * fy * e - (Hy + fyy + Hy**2 * f) * n,
+            -(Hx * fy * t + Hy * fx * e) / 2 - fxy * n,
+        )

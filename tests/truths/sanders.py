@@ -27,6 +27,7 @@ _ENDS = {
 # What holds f, v and u at the straight edges. A mirror is a plane of symmetry.
 EDGES = {
     "hoop": ("held", "held", "let go"),
+    "diaphragm": ("held", "let go", "held"),
     "free": ("let go", "let go", "let go"),
     "mirror": ("guided", "held", "let go"),
 }

@@ -12,12 +12,13 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from math import pi, sqrt
+from math import inf, pi, sqrt
 
 import numpy as np
 
 from argyris import ArgyrisPlate
 from kappaskin import (
+    Cap,
     LeastSquares,
     Patch,
     Plate,
@@ -26,6 +27,7 @@ from kappaskin import (
     Robust,
     SensorLayout,
     Simulator,
+    SineBasis,
     basis_for,
     estimator_for,
     load_scene,
@@ -38,9 +40,11 @@ from kappaskin.health import HealthMonitor
 from kappaskin.mechanics import DiscLoad
 from kappaskin.scenes.effects import UniformNoise
 from kappaskin.studies import Setting, costs
+from koiter import Panel
 from navier import HingedPlate, Load
 from objects import objects_table
 from planned import effects_table
+from revolution import RevolvedShell, Spheroid
 from sanders import CylinderShell
 from sweeps import sweeps_table
 from von_karman import StretchingPlate
@@ -79,25 +83,29 @@ class Case:
     truth: Callable[[SensorLayout], Callable[[Load], np.ndarray]]
     load: Callable[[np.ndarray], Load]
     gage_length: float = 0.0
+    edge: str = "hinged"
     low: float = 0.2
     high: float = 0.8
     noise: float = NOISE
     bound: bool = True
+    elements: tuple[int, int] = (10, 10)
 
     @property
     def layout(self):
-        return replace(SensorLayout.regular(self.skin.patch, 10, 10), gage_length=self.gage_length)
+        regular = SensorLayout.regular(self.skin.patch, *self.elements)
+        return replace(regular, gage_length=self.gage_length)
 
 
 def coverage(case, frames, seed=0) -> Figures:
     """The figures of `frames` presses at random places, each with its own noise."""
     rng, layout = np.random.default_rng(seed), case.layout
-    read, contact = case.truth(layout), PointContact(case.skin, layout)
-    fit = LeastSquares(basis_for(case.skin.patch, "hinged", 8, 8), layout)
+    read, contact = case.truth(layout), PointContact(case.skin, layout, case.edge)
+    fit = LeastSquares(basis_for(case.skin.patch, case.edge, 8, 8), layout)
     loads = [case.load(share) for share in rng.uniform(case.low, case.high, (frames, 2))]
     rows, limits = [], []
     for load in loads:
-        curvature = read(load) + rng.uniform(-case.noise, case.noise, (3, 100))
+        curvature = read(load)
+        curvature = curvature + rng.uniform(-case.noise, case.noise, curvature.shape)
         found = contact(curvature, fit(curvature))
         error = *(found.position - (load.x, load.y)), found.force - load.force
         rows.append([error, (*found.position_sd, found.force_sd)])
@@ -186,6 +194,50 @@ BENT = [
     _bent_case("bent to 30 mm, disc of 2 mm", 47e-3, 40e-3, 30e-3, 1.0),
 ]
 
+# Skins that are bent both ways, on their true surface. A dome and a trough go in by less than a
+# thickness or two; a saddle, which bends without stretching, by two.
+
+
+@cache
+def _panel(sides, radii, inplane):
+    return Panel(*sides, *radii, inplane=inplane, polynomials=36, modes=300)
+
+
+def _shallow_case(name, sides, radii, force, mm, elements=(10, 10), inplane="diaphragm"):
+    def truth(layout):
+        return _panel(sides, radii, inplane).reader(layout.positions)
+
+    def load(share):
+        return Load(*(share * sides), force, radius=1e-3 * mm)
+
+    skin, name = Plate(Patch(*sides, radii), inplane=inplane), f"{name}, disc of {mm} mm"
+    return Case(name, skin, truth, load, bound=False, elements=elements)
+
+
+_FINGER, _PALM = (0.04, 0.04), (0.1, 0.1)  # sides in m
+SHALLOW = [
+    *(_shallow_case("dome of 40 mm", _FINGER, (0.1, 0.1), 1.0, mm) for mm in (1, 2, 3)),
+    *(_shallow_case("saddle of 40 mm", _FINGER, (0.1, -0.1), 0.12, mm) for mm in (1, 2, 3)),
+    _shallow_case("trough of 40 mm", _FINGER, (inf, 0.1), 0.4, 2),
+    _shallow_case("dome of 60 x 32 mm", (0.06, 0.032), (0.1, 0.1), 1.0, 2, (15, 8)),
+    _shallow_case("dome of 100 mm", _PALM, (0.3, 0.3), 0.5, 2),
+    _shallow_case("dome of 100 mm, held", _PALM, (0.3, 0.3), 0.5, 2, inplane="held"),
+    _shallow_case("saddle of 100 mm", _PALM, (0.3, -0.3), 0.1, 2),
+]
+
+
+def read_as_flat(case, frames=60, seed=0) -> float:
+    """The median share of the force that a contact has on a skin that is taken for a flat one."""
+    read, patch = case.truth(case.layout), Patch(case.skin.patch.a, case.skin.patch.b)
+    layout = SensorLayout.regular(patch, *case.elements)
+    contact, fit = PointContact(Plate(patch), layout), LeastSquares(SineBasis(patch, 8, 8), layout)
+    shares = []
+    for place in np.random.default_rng(seed).uniform(case.low, case.high, (frames, 2)):
+        load = case.load(place)
+        shares.append(contact(read(load), fit(read(load))).force / load.force)
+    return np.nanmedian(shares)
+
+
 # A flat skin 0.25 mm thick, which goes in by 0.9 and 1.7 of that in the middle, where it is held
 
 
@@ -207,6 +259,80 @@ STRETCHED = [
     _stretched_case("held, 1.7 thicknesses", "held", 0.042),
     _stretched_case("diaphragm, 2.1 thicknesses", "diaphragm", 0.042),
     _stretched_case("free, 2.5 thicknesses", "free", 0.042),
+]
+
+# Caps of 60 elements, even by area, pressed anywhere from the pole to three quarters of the arc by
+# about 100 noises of all readings: by less than a tenth of their thickness
+
+
+@dataclass(frozen=True, eq=False)
+class CapCase(Case):
+    """A case on a cap."""
+
+    @property
+    def layout(self):
+        cap, k = self.skin.patch, np.arange(60)
+        s = cap.rim_radius * _even((k + 0.5) / 60, cap.angle) / cap.angle
+        azimuth = k * pi * (3 - sqrt(5))
+        return SensorLayout.scattered(cap, _on_cap(cap, s, azimuth))
+
+
+def _even(share, angle):
+    """The angle from the pole within which a `share` of a sphere's cap of an `angle` lies."""
+    return np.arccos(1 - share * (1 - np.cos(angle)))
+
+
+def _on_cap(cap, s, azimuth):
+    return cap.rim_radius + np.stack([s * np.cos(azimuth), s * np.sin(azimuth)], -1)
+
+
+def along_x(read, azimuth):
+    """Readings (3, P) along the meridian and the parallel as they are along the axes of a cap."""
+    (xx, yy, xy), c, s = read, np.cos(azimuth), np.sin(azimuth)
+    return np.stack(
+        [
+            c**2 * xx - 2 * c * s * xy + s**2 * yy,
+            s**2 * xx + 2 * c * s * xy + c**2 * yy,
+            c * s * (xx - yy) + (c**2 - s**2) * xy,
+        ]
+    )
+
+
+@cache
+def _revolved(cap, edge):
+    surface = Spheroid(cap.radius, cap.stretch * cap.radius)
+    shell = RevolvedShell(surface, cap.rim_radius, edge=edge)
+    return cache(lambda elements: shell.reader(np.frombuffer(elements).reshape(-1, 2)))
+
+
+def _cap_case(name, cap, edge, force, **width):
+    def truth(layout):
+        x, y = (layout.positions - cap.rim_radius).T
+        azimuth = np.arctan2(y, x)
+        read = _revolved(cap, edge)(np.stack([np.hypot(x, y), azimuth], -1).tobytes())
+
+        def turned(load):
+            out = replace(load, x=load.x - cap.rim_radius, y=load.y - cap.rim_radius)
+            return along_x(read(out), azimuth)
+
+        return turned
+
+    def load(share):
+        far = cap.rim_radius * _even(share[0], 0.75 * cap.angle) / cap.angle
+        return Load(*_on_cap(cap, far, 2 * pi * share[1]), force, **width)
+
+    return CapCase(name, Plate(cap), truth, load, edge=edge, low=0, high=1, bound=False)
+
+
+FINGERTIP, PAD, LONG_FINGER = Cap(8e-3), Cap(20e-3, 0.6), Cap(8e-3, stretch=1.4)
+CAPS = [
+    _cap_case("fingertip, disc of 1 mm", FINGERTIP, "clamped", 2.1, radius=1e-3),
+    _cap_case("fingertip, disc of 2 mm", FINGERTIP, "clamped", 4.4, radius=2e-3),
+    _cap_case("fingertip, disc of 3 mm", FINGERTIP, "clamped", 8.7, radius=3e-3),
+    _cap_case("fingertip, Gaussian of 1 mm", FINGERTIP, "clamped", 4.4, sd=1e-3),
+    _cap_case("shallow cap, disc of 1 mm", PAD, "hinged", 1.0, radius=1e-3),
+    _cap_case("shallow cap, disc of 3 mm", PAD, "hinged", 2.6, radius=3e-3),
+    _cap_case("spheroid, disc of 2 mm", LONG_FINGER, "clamped", 4.4, radius=2e-3),
 ]
 
 # Shapes: the bands of the surface, of estimators with functions that end where the truth does not
@@ -327,7 +453,7 @@ def accused(frames, seed=0) -> int:
     return count
 
 
-CASES: Sequence[Case] = (*FLAT, *BENT, *STRETCHED, WEAK)
+CASES: Sequence[Case] = (*FLAT, *BENT, *SHALLOW, *CAPS, *STRETCHED, WEAK)
 
 
 def table(frames=1000, name=""):

@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from scipy.special import j0
 
 from argyris import ArgyrisPlate
+from koiter import Panel
 from navier import HingedPlate, Load
 from rigid import Compliance, ball
 from sanders import CylinderShell
@@ -200,18 +201,13 @@ def test_the_deflection_of_a_shell_has_converged_to_four_digits(arc, R):
     np.testing.assert_allclose(f, finer, rtol=1.5e-4)
 
 
-def _of_two_faces(shell, load, place, step=3e-5):
+def _of_two_faces(middle, size, place):
     """Curvature (3,) from how lengths and angles change on both faces, to first order in a force.
 
-    From places in space alone, with none of the formulas of a shell.
+    From places in space alone, with none of the formulas of a shell: `middle` gives those (P, 3) in
+    m of places (P, 2) under so many times a load, which moves them by `size` in m at most.
     """
-    R, z, steps = shell.radius, 1e-4, step * np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])
-
-    def middle(places, amount):
-        f, v, u = amount * shell.displacement(load, places)
-        s, c = np.sin(places[:, 0] / R), np.cos(places[:, 0] / R)
-        x, y, up = (R - f) * s + v * c, places[:, 1] + u, (R - f) * c - v * s
-        return np.stack([x, y, up], -1)
+    z, steps = 1e-4, 3e-5 * np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])
 
     def face(place, amount, z):
         east, west, north, south = middle(place + steps, amount)
@@ -221,11 +217,15 @@ def _of_two_faces(shell, load, place, step=3e-5):
     def measures(amount, z):
         east, west, north, south = (face(place + d, amount, z) for d in steps)
         along, across = east - west, north - south
-        lengths = np.linalg.norm(along), np.linalg.norm(across)
-        return np.array([*np.log(lengths), along @ across / np.prod(lengths) / 2])
+        return np.array(
+            [
+                *(np.log(np.linalg.norm(length)) for length in (along, across)),
+                np.log(np.linalg.norm(along + across) / np.linalg.norm(along - across)) / 2,
+            ]
+        )
 
     def strain(z):
-        amount = 1e-6 / np.abs(shell.displacement(load, place[None])).max()
+        amount = 1e-6 / size
         return (measures(amount, z) - measures(-amount, z)) / (2 * amount)
 
     return (strain(z) - strain(-z)) / (2 * z)
@@ -236,9 +236,109 @@ def test_a_pair_of_gages_reads_what_both_faces_stretch():
     shell = CylinderShell(math.pi * R, 0.03, R, polynomials=24, waves=24)
     load, place = Load(0.017, 0.013, radius=3e-3), np.array([0.021, 0.016])
 
+    def middle(places, amount):
+        f, v, u = amount * shell.displacement(load, places)
+        s, c = np.sin(places[:, 0] / R), np.cos(places[:, 0] / R)
+        x, y, up = (R - f) * s + v * c, places[:, 1] + u, (R - f) * c - v * s
+        return np.stack([x, y, up], -1)
+
     K = shell.reader(place[None])(load)[:, 0]
 
-    np.testing.assert_allclose(K, _of_two_faces(shell, load, place), rtol=2e-3)
+    size = np.abs(shell.displacement(load, place[None])).max()
+    np.testing.assert_allclose(K, _of_two_faces(middle, size, place), rtol=2e-3)
+
+
+# Koiter's shell that is bent both ways
+
+DOME, SADDLE, TROUGH = (0.1, 0.1), (0.1, -0.1), (math.inf, 0.1)
+SMALL = Load(0.017, 0.023, radius=2e-3)
+NEAR = np.array([[0.017, 0.023], [0.02, 0.02], [0.03, 0.01], [0.018, 0.0245]])
+
+
+@pytest.mark.parametrize(("b", "deflection"), [(1.0, 0.00560), (2.0, 0.00722)])
+def test_a_central_force_moves_a_clamped_panel_as_in_table_37(b, deflection):
+    plate = Panel(1.0, b, math.inf, math.inf, 1.0, edge="clamped", polynomials=20)
+
+    w = plate.displacement(Load(0.5, b / 2), np.array([[0.5, b / 2]]))[2]
+
+    assert w[0] == pytest.approx(deflection, rel=2.5e-3)
+
+
+@pytest.mark.parametrize(("side", "R"), [(0.04, 0.1), (0.1, 0.3)])
+def test_a_point_load_moves_a_dome_as_reissners(side, R):
+    dome, middle = Panel(side, side, R, R), side / 2
+
+    f = dome.displacement(Load(middle, middle), np.array([[middle, middle]]))[2]
+
+    # Reissner (1946): sqrt(12 (1 - nu^2)) P R / (8 E h^2), of a shallow sphere without a rim.
+    root = math.sqrt(12 * (1 - dome.poisson**2))
+    E = root**2 * dome.rigidity / dome.thickness**3
+    assert f[0] == pytest.approx(root * R / (8 * E * dome.thickness**2), rel=5e-3)
+
+
+def test_a_panel_that_is_bent_one_way_is_sanders_cylinder():
+    panel = Panel(0.04, 0.03, 0.1, math.inf)
+    cylinder = CylinderShell(0.04, 0.03, 0.1, edge="diaphragm")
+    load, elements = Load(0.017, 0.02, radius=2e-3), np.array([[0.01, 0.02], [0.03, 0.01]])
+
+    u, v, f = panel.displacement(load, NEAR)
+
+    of_cylinder = cylinder.displacement(load, NEAR)
+    np.testing.assert_allclose([f, u, v], of_cylinder, atol=1e-4 * np.abs(f).max())
+    np.testing.assert_allclose(
+        panel.reader(elements)(load), cylinder.reader(elements)(load), rtol=0, atol=2e-2
+    )
+
+
+@pytest.mark.parametrize("radii", [DOME, SADDLE, TROUGH, (0.12, -0.2)])
+def test_gages_of_a_panel_read_what_both_faces_stretch(radii):
+    panel, place = Panel(0.04, 0.03, *radii, polynomials=16), np.array([0.03, 0.009])
+    load, middle, H = Load(0.026, 0.012, radius=3e-3), np.array([0.02, 0.015]), 1 / np.array(radii)
+
+    def space(places, amount):
+        turn, nil = (places - middle) * H, 0 * places[:, 0]
+        (sx, sy), (cx, cy), bent = np.sin(turn).T, np.cos(turn).T, (H != 0)
+        flat = np.where(bent, np.sin(turn) / np.where(bent, H, 1), places - middle)
+        down = np.where(bent, 2 * np.sin(turn / 2) ** 2 / np.where(bent, H, 1), 0).sum(-1)
+        along, across = np.stack([cx, nil, -sx], -1), np.stack([nil, cy, -sy], -1)
+        inward = np.cross(across, along)
+        inward /= np.linalg.norm(inward, axis=-1, keepdims=True)
+        u, v, f = (amount * panel.displacement(load, places))[..., None]
+        return np.column_stack([flat, -down]) + u * along + v * across + f * inward
+
+    K = panel.reader(place[None])(load)[:, 0]
+
+    size = np.abs(panel.displacement(load, place[None])).max()
+    np.testing.assert_allclose(K, _of_two_faces(space, size, place), rtol=2e-3)
+
+
+@pytest.mark.cases("hinged-held-dome", "clamped-diaphragm-saddle")
+@pytest.mark.parametrize("radii", [DOME, SADDLE, TROUGH], ids=["dome", "saddle", "trough"])
+@pytest.mark.parametrize("inplane", ["diaphragm", "held", "free"])
+@pytest.mark.parametrize("edge", ["hinged", "clamped"])
+def test_what_a_panel_reads_has_converged(radii, inplane, edge):
+    x = 0.04 * (np.arange(6) + 0.5) / 6
+    elements = np.stack(np.meshgrid(x, x), -1).reshape(-1, 2)
+
+    (f, K), (finer, finer_K) = (
+        (panel.displacement(SMALL, NEAR)[2], panel.reader(elements)(SMALL))
+        for panel in (
+            Panel(0.04, 0.04, *radii, inplane=inplane, edge=edge, polynomials=N, modes=modes)
+            for N, modes in ((24, 240), (32, 360))
+        )
+    )
+
+    np.testing.assert_allclose(f, finer, atol=2e-4 * finer.max())
+    np.testing.assert_allclose(K, finer_K, atol=2e-3 * np.abs(finer_K).max())
+
+
+def test_work_on_a_saddle_is_reciprocal():
+    saddle, there = Panel(0.04, 0.03, *SADDLE, inplane="held"), Load(0.026, 0.011)
+
+    one = saddle.displacement(there, np.array([[0.017, 0.02]]))[2]
+    other = saddle.displacement(Load(0.017, 0.02), np.array([[0.026, 0.011]]))[2]
+
+    assert one[0] == pytest.approx(other[0], rel=2e-4)
 
 
 # Argyris' elements

@@ -115,7 +115,8 @@ def _slow(settings: Settings) -> _Slow | None:
     except Refusal:
         return None
     # Rectangles and arcs have sines or beams: the others' functions are computed first.
-    return skin if type(skin[0].patch) is not Patch else None
+    patch, mixed = skin[0].patch, skin[0].mixes_sines
+    return skin if type(patch) is not Patch or (patch.is_shallow and mixed) else None
 
 
 RECORDED = "replay:"

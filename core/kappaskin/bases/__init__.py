@@ -7,10 +7,14 @@ from kappaskin.bases.basis import ORDERS as ORDERS
 from kappaskin.bases.basis import Basis as Basis
 from kappaskin.bases.basis import CurvatureMap as CurvatureMap
 from kappaskin.bases.basis import ValueMap as ValueMap
+from kappaskin.bases.basis import covariant_at as covariant_at
+from kappaskin.bases.basis import covariant_maps as covariant_maps
 from kappaskin.bases.basis import curvature_at as curvature_at
 from kappaskin.bases.basis import hoop_at as hoop_at
+from kappaskin.bases.modes import CapBasis as CapBasis
 from kappaskin.bases.modes import DiskBasis, PolygonBasis
 from kappaskin.bases.modes import ModeBasis as ModeBasis
+from kappaskin.bases.modes import radial as radial
 from kappaskin.bases.product import ClampedBasis
 from kappaskin.bases.product import ElasticBasis as ElasticBasis
 from kappaskin.bases.product import ProductBasis as ProductBasis
@@ -18,7 +22,7 @@ from kappaskin.bases.product import SineBasis as SineBasis
 from kappaskin.bases.product import gauss as gauss
 from kappaskin.bases.product import overlaps as overlaps
 from kappaskin.errors import Refusal
-from kappaskin.skin import Disk, Patch, Polygon
+from kappaskin.skin import Cap, Disk, Patch, Polygon
 
 _Maker = Callable[[Patch, int, int], Basis]
 _MAKERS: dict[type[Patch], dict[str, _Maker]] = {
@@ -30,22 +34,24 @@ _MAKERS: dict[type[Patch], dict[str, _Maker]] = {
         "cantilever": partial(ClampedBasis, tip=True),
     },
     Disk: {"hinged": DiskBasis, "clamped": partial(DiskBasis, clamped=True)},
+    Cap: {"hinged": CapBasis, "clamped": partial(CapBasis, clamped=True)},
     Polygon: {"hinged": PolygonBasis, "clamped": partial(PolygonBasis, clamped=True)},
 }
 
 EDGES = tuple(_MAKERS[Patch])
 """Boundary conditions by name.
 
-`hinged`, with the ends of an arc pinned; `sliding`, with these free to slide; `clamped`, which
-fixes the slope too; `elastic`, a flat rectangle on an elastic rim; `cantilever`, a flat strip
-clamped at x = 0 whose other end is free.
+`hinged`, with the ends of an arc pinned; `sliding`, with these free to slide, and not of a shallow
+skin; `clamped`, which fixes the slope too; `elastic`, a flat rectangle on an elastic rim;
+`cantilever`, a flat strip clamped at x = 0 whose other end is free.
 """
 
 
 def edges_of(patch: Patch) -> tuple[str, ...]:
     """The boundary conditions that `patch` can have, the default first."""
-    barred = {"elastic"} if patch.base_curvature else set[str]()
-    barred |= set() if patch.strip and not patch.base_curvature else {"cantilever"}
+    barred = {"elastic"} if any(patch.curvatures) else set[str]()
+    barred |= {"sliding"} if patch.is_shallow else set()
+    barred |= set() if patch.strip and not patch.arc_curvature else {"cantilever"}
     return tuple(edge for edge in _MAKERS[type(patch)] if edge not in barred)
 
 

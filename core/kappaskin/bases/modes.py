@@ -1,55 +1,40 @@
-"""Mode bases: the vibration modes of round and polygonal plates."""
+"""Bases of whole skins: vibration modes of disks and polygons, polynomials of caps."""
 
 import cmath
 import math
 from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar, cast
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from kappaskin.bases.basis import ORDERS, FunctionBasis, Order
+from kappaskin.bases.basis import ORDERS, FunctionBasis, Order, PointMap
 from kappaskin.bases.product import gauss
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.skin import Disk, Polygon
+from kappaskin.skin import Cap, Disk, Polygon
 
 if TYPE_CHECKING:
     from kappaskin.bases.argyris import PlateModes
 
 
-_MOST = 1024  # modes: more take minutes to make
-
-
-@dataclass(frozen=True, eq=False)
-class PointMap:
-    """A map from coefficients to values on a grid by one dense product; NaN off the skin.
-
-    Reading its matrix takes most of the time: single precision, exact to a ten-millionth of the
-    coefficients, halves it, and no point off the skin is in it. Its columns are the points on the
-    skin and one off it, of NaN; `column` (ny, nx) is that of each point of the grid.
-    """
-
-    values: NDArray[np.float32]
-    column: NDArray[np.intp]
-
-    def __call__(self, coefficients: Array) -> Array:
-        """Values (..., ny, nx) for `coefficients` (..., Ni, Nj)."""
-        flat = coefficients.reshape(*coefficients.shape[:-2], -1).astype(np.float32, copy=False)
-        return np.dot(flat, self.values).astype(float).take(self.column, axis=-1)
-
-
 @dataclass(frozen=True)
 class ModeBasis(FunctionBasis):
-    """The first Ni x Nj modes of a flat skin by frequency; their mean square is 1/4, as sines'."""
+    """Ni x Nj functions of a whole skin; their mean square is 1/4, as that of sines.
+
+    Of a flat skin they are the first modes by frequency.
+    """
+
+    MOST: ClassVar = 1024  # more take minutes to make
 
     def __post_init__(self) -> None:
-        if not (self.Ni > 0 and self.Nj > 0 and self.size <= _MOST):
+        if not (self.Ni > 0 and self.Nj > 0 and self.size <= self.MOST):
             raise Refusal(
-                f"expected 1 x 1 to {_MOST} functions on a {self.patch.name}, got "
+                f"expected 1 x 1 to {self.MOST} functions on a {self.patch.name}, got "
                 f"{self.Ni} x {self.Nj}"
             )
 
@@ -67,14 +52,7 @@ class ModeBasis(FunctionBasis):
 
     def on_grid(self, x: Array, y: Array, dx: int = 0, dy: int = 0) -> PointMap:
         """The map from coefficients to that derivative on the grid of `x` (nx,), `y` (ny,)."""
-        points = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
-        values = self.at(points, dx, dy).T
-        on = np.flatnonzero(np.isfinite(values[0]))
-        column = np.full(len(points), len(on))
-        column[on] = np.arange(len(on))
-        nan = np.full((self.size, 1), np.nan)
-        of_skin = np.hstack([values[:, on], nan]).astype(np.float32)
-        return PointMap(of_skin, column.reshape(len(y), len(x)))
+        return PointMap.of(lambda points: self.at(points, dx, dy), x, y)
 
 
 Complex = NDArray[np.complex128]
@@ -84,7 +62,51 @@ _POISSON = 0.3  # of the plate whose hinged modes these are
 
 
 @dataclass(frozen=True)
-class DiskBasis(ModeBasis):
+class RoundBasis(ModeBasis):
+    """Functions of the radius times cos m theta or sin m theta, in the box of a disk."""
+
+    clamped: bool = False
+
+    @abstractmethod
+    def _made(self) -> "_PolarFunctions":
+        """Them on the disk of radius 1."""
+
+    @cached_property
+    def _functions(self) -> "_PolarFunctions":
+        return self._made()
+
+    def _derivative(self, positions: Array, order: Order) -> Array:
+        R = self.patch.a / 2
+        x, y = (positions.T - R) / R
+        on = np.hypot(x, y) <= 1 + _ROUNDING
+        values = np.full((len(positions), self.size), np.nan)
+        values[on] = self._functions.derivative(x[on] + 1j * y[on], order) / R ** sum(order)
+        return values
+
+    def _place(self, x: float, y: float) -> Array:
+        R = self.patch.a / 2
+        z = complex(x - R, y - R) / R
+        if not abs(z) <= 1 + _ROUNDING:
+            return np.full((len(ORDERS), self.size), np.nan)
+        return self._functions.jet(z, R)
+
+    def quadrature(self) -> tuple[Array, Array]:
+        """Points (Q, 2) in m and weights (Q,) in m^2: Gauss along the radius, even in angle."""
+        R, functions = self.patch.a / 2, self._functions
+        r, w = gauss(1.0, functions.fineness + 20)
+        count = 2 * int(functions.m.max()) + 8
+        angle = 2 * np.pi * np.arange(count) / count
+        direction = np.column_stack([np.cos(angle), np.sin(angle)])
+        points = R + R * np.multiply.outer(r, direction).reshape(-1, 2)
+        return points, np.repeat(R * w * self._parallel(R * r) * 2 * np.pi / count, count)
+
+    def _parallel(self, distance: Array) -> Array:
+        """Radius in m of the parallel at each `distance` in m from the middle."""
+        return distance
+
+
+@dataclass(frozen=True)
+class DiskBasis(RoundBasis):
     """The vibration modes of a round plate, hinged or `clamped` along its rim.
 
     With r = 1 at the rim they are (J_m(k r) - J_m(k)/I_m(k) I_m(k r)) times cos m theta and, for
@@ -98,41 +120,100 @@ class DiskBasis(ModeBasis):
     whose Laplacian vanishes at the rim, always as n^(-1/2), with three times the error.
     """
 
-    clamped: bool = False
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if type(self.patch) is not Disk:
+            raise Refusal(f"expected a disk, got a {self.patch.name}")
+
+    def _made(self) -> "_PolarFunctions":
+        return _disk_modes(self.size, self.clamped)
+
+
+@dataclass(frozen=True)
+class CapBasis(RoundBasis):
+    """Polynomials on a cap: Ni along its meridian, times Nj of 1, cos t, sin t, cos 2t ... around.
+
+    With r = 1 at the rim they are r^m (1 - r^2) P_i(2 r^2 - 1) times cos m t or sin m t, with the
+    Jacobi polynomials P_i = P_i^(2, m) that make them orthogonal on the disk; clamped,
+    (1 - r^2)^2 and P_i^(4, m). All are smooth at the pole and vanish at the rim, clamped with their
+    slope.
+    """
+
+    MOST: ClassVar = 8192
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not isinstance(self.patch, Disk):
-            raise Refusal(f"expected a disk, got a {self.patch.name}")
+        if not isinstance(self.patch, Cap):
+            raise Refusal(f"expected a cap, got a {self.patch.name}")
+
+    @property
+    def cap(self) -> Cap:
+        return cast("Cap", self.patch)
+
+    @property
+    def free(self) -> Array | None:
+        """On a hemisphere, or nearly one, those without a part that moves along its axis.
+
+        To move so changes no curvature, on a clamped one but at its rim, where what is finer than
+        the functions looks the same: of all shapes that explain the readings it is the least.
+        """
+        return self._bent if self.cap.moves_as_a_whole else None
 
     @cached_property
-    def _modes(self) -> "_DiskModes":
-        return _disk_modes(self.size, self.clamped)
+    def _bent(self) -> Array:
+        points, weights = self.quadrature()
+        moved = (weights * self.cap.at_rest(points)[1][:, 2]) @ self.at(points)
+        return np.linalg.qr(moved[:, None], mode="complete")[0][:, 1:]
 
-    def _derivative(self, positions: Array, order: Order) -> Array:
-        R = self.patch.a / 2
-        x, y = (positions.T - R) / R
-        on = np.hypot(x, y) <= 1 + _ROUNDING
-        values = np.full((len(positions), self.size), np.nan)
-        values[on] = self._modes.derivative(x[on] + 1j * y[on], order) / R ** sum(order)
-        return values
+    def _made(self) -> "_PolarFunctions":
+        return _cap_functions(*self.shape, self.clamped)
 
-    def _place(self, x: float, y: float) -> Array:
-        R = self.patch.a / 2
-        z = complex(x - R, y - R) / R
-        if not abs(z) <= 1 + _ROUNDING:
-            return np.full((len(ORDERS), self.size), np.nan)
-        return self._modes.jet(z, R)
+    def _parallel(self, distance: Array) -> Array:
+        return self.cap.meridian(distance).radius
 
-    def quadrature(self) -> tuple[Array, Array]:
-        """Points (Q, 2) in m and weights (Q,) in m^2: Gauss along the radius, even in angle."""
-        R, modes = self.patch.a / 2, self._modes
-        r, w = gauss(1.0, int(modes.k[-1]) + 20)
-        count = 2 * int(modes.m.max()) + 8
-        angle = 2 * np.pi * np.arange(count) / count
-        direction = np.column_stack([np.cos(angle), np.sin(angle)])
-        points = R + R * np.multiply.outer(r, direction).reshape(-1, 2)
-        return points, np.repeat(R**2 * w * r * 2 * np.pi / count, count)
+    def along(self, r: Array) -> Array:
+        """Each function along a meridian, and its first two derivatives, (3, Q, M, Ni).
+
+        At the shares `r` (Q,) of the arc to the rim, and by them; for m = 0 to M - 1.
+        """
+        return radial(r, np.arange(self.Nj // 2 + 1), self.Ni, 1 + self.clamped)
+
+
+def radial(r: Array, m: NDArray[np.intp], count: int, k: int) -> Array:
+    """r^m (1 - r^2)^k P_i(2 r^2 - 1) and two derivatives, (3, Q, M, count), at `r` (Q,).
+
+    For each of `m` (M,). P_i = P_i^(2k, m), i < count. Their mean square over the disk, times that
+    of cos m t, is 1/4.
+    """
+    f, down, up, *second = _jacobi(r, m, count, k)
+    return np.stack([f, (down + up) / 2, (second[0] + 2 * second[1] + second[2]) / 4])
+
+
+def _jacobi(r: Array, m: NDArray[np.intp], count: int, k: int) -> Array:
+    """Radial parts (6, Q, M, count) of the functions of `radial` by `_STEPS`."""
+    i, m, r = np.arange(count), m[:, None], r[:, None, None]
+    x = 2 * r**2 - 1
+    P, rest = list[Array](), list[Array]()  # P(2 t - 1), (1 - t)^k, and derivatives by t = r^2
+    for d in range(3):
+        rising = np.prod([i + 2 * k + m + 1 + e for e in range(d)], axis=0)
+        P.append(rising * _polynomials(2 * k + d, m[:, 0] + d, count, x[..., 0], d))
+        rest.append((-1.0) ** d * math.perm(k, d) * ((1 - x) / 2) ** max(k - d, 0))
+    G, G1 = rest[0] * P[0], rest[1] * P[0] + rest[0] * P[1]
+    G2 = rest[2] * P[0] + 2 * rest[1] * P[1] + rest[0] * P[2]
+    # With r^m G(r^2) D- adds 2 m r^(m-1) G + 2 r^(m+1) G', D+ 2 r^(m+1) G', and so on.
+    below, two_below = r ** np.maximum(m - 1, 0), r ** np.maximum(m - 2, 0)
+    up, twice = 2 * r ** (m + 1) * G1, 4 * r ** (m + 2) * G2
+    steps = [
+        r**m * G,
+        2 * m * below * G + up,
+        up,
+        4 * m * (m - 1) * two_below * G + 8 * m * r**m * G1 + twice,
+        4 * (m + 1) * r**m * G1 + twice,
+        twice,
+    ]
+    share = np.prod([(i + d) / (i + m + d) for d in range(1, 2 * k + 1)], axis=0)
+    mean_square = share / (2 * i + 2 * k + m + 1) * np.where(m > 0, 0.5, 1.0)
+    return np.stack(steps) / (2 * np.sqrt(mean_square))
 
 
 # With z = x + i y the derivatives of J_m(k r) e^(i m theta) along D- = d/dx - i d/dy and
@@ -154,31 +235,46 @@ _TURNS = np.array([q - p for p, q in _STEPS])
 _SUMS = np.array([[sum(order)] for order in ORDERS])
 
 
-class _DiskModes:
-    """The first `count` modes on the disk of radius 1, their radial parts as Chebyshev series."""
+def _polynomials(a: int, b: NDArray[np.intp], count: int, x: Array, skipped: int) -> Array:
+    """Jacobi polynomials P_i^(a, b) (Q, M, count) at `x` (Q, 1), for each of `b` (M,).
 
-    def __init__(self, count: int, clamped: bool) -> None:
-        self.k, self.m, self._columns = _lowest(count, clamped)
-        self._degrees = np.arange(int(self.k[-1] / 2) + 33)  # resolve k r, then to rounding
-        r, w = gauss(1.0, int(self.k[-1]) + 20)
-        around = np.where(self.m > 0, 0.5, 1.0)
-        mean_square = 2 * (w * r) @ self._radial(r, 0, 0) ** 2 * around
+    After as many zeros as are `skipped`. By their three-term recurrence.
+    """
+    found = np.zeros((len(x), len(b), count + 3))
+    own = found[..., skipped:]
+    own[..., 0], own[..., 1] = 1.0, a + 1 + (a + b + 2) * (x - 1) / 2
+    for i in range(2, count - skipped):
+        c = 2 * i + a + b
+        ahead = (c - 1) * (c * (c - 2) * x + (a - b) * (a + b)) * own[..., i - 1]
+        behind = 2 * (i + a - 1) * (i + b - 1) * c * own[..., i - 2]
+        own[..., i] = (ahead - behind) / (2 * i * (i + a + b) * (c - 2))
+    return found[..., :count]
+
+
+class _PolarFunctions:
+    """Functions on the disk of radius 1, their radial parts as Chebyshev series.
+
+    They are the real and imaginary parts of U radial functions times e^(i m theta), with `m` (U,);
+    `columns` (N,) are 2 u of the real part of the function u, 2 u + 1 of the imaginary one.
+    `parts` gives the radial parts (6, P, U) by `_STEPS` at r (P,). `fineness` is that of them, as
+    the argument k r of Bessel functions.
+    """
+
+    def __init__(
+        self,
+        m: Array,
+        columns: NDArray[np.intp],
+        fineness: int,
+        parts: Callable[[Array], Array],
+    ) -> None:
+        self.m, self._columns, self.fineness = m, columns, fineness
+        self._turns, self._which = np.unique(m, return_inverse=True)
+        self._degrees = np.arange(fineness // 2 + 33)  # resolve k r, then to rounding
         nodes = np.pi * (self._degrees + 0.5) / len(self._degrees)
         to_series = 2 / len(nodes) * np.cos(np.multiply.outer(self._degrees, nodes))
         to_series[0] /= 2
-        at_nodes = np.stack([self._radial((1 + np.cos(nodes)) / 2, *step) for step in _STEPS])
-        self._series = to_series @ at_nodes / (2 * np.sqrt(mean_square))
+        self._series = to_series @ parts((1 + np.cos(nodes)) / 2)
         self._flat = np.hstack(list(self._series))
-
-    def _radial(self, r: Array, p: int, q: int) -> Array:
-        """The radial part of D-^p D+^q of the pairs of modes, (P, U), at `r` (P,)."""
-        k, m, kr = self.k, self.m, np.multiply.outer(r, self.k)
-        growing: Array = (
-            scipy.special.ive(m - p + q, kr) / scipy.special.ive(m, k) * np.exp(kr - k)
-        )  # I_m-p+q(k r)/I_m(k)
-        return k ** (p + q) * (
-            (-1.0) ** q * scipy.special.jv(m - p + q, kr) - scipy.special.jv(m, k) * growing
-        )
 
     def derivative(self, z: Complex, order: Order) -> Array:
         """The derivatives (P, N) of one order at the points z = x + i y (P,) of the disk."""
@@ -189,7 +285,8 @@ class _DiskModes:
         for step, factor in enumerate(_BY_STEPS[ORDERS.index(order)]):
             if factor:
                 values += factor * turn ** _TURNS[step] * (polynomials @ self._series[step])
-        return self._parts(values * np.exp(1j * np.multiply.outer(np.angle(z), self.m)))
+        turns = np.exp(1j * np.multiply.outer(np.angle(z), self._turns))
+        return self._parts(values * turns[:, self._which])
 
     def jet(self, z: complex, R: float) -> Array:
         """All derivatives (6, N) at one point, z = x + i y on the disk of radius 1, of radius R."""
@@ -206,7 +303,43 @@ class _DiskModes:
         return values.view(float).take(self._columns, axis=-1)
 
 
-_disk_modes = lru_cache(8)(_DiskModes)
+@lru_cache(8)
+def _cap_functions(Ni: int, Nj: int, clamped: bool) -> _PolarFunctions:
+    around = np.arange(Nj // 2 + 1)
+    i, j = np.divmod(np.arange(Ni * Nj), Nj)
+    columns = 2 * (i * len(around) + (j + 1) // 2) + (j > 0) * (1 - j % 2)
+
+    def parts(r: Array) -> Array:
+        return np.swapaxes(_jacobi(r, around, Ni, 1 + clamped), 2, 3).reshape(6, len(r), -1)
+
+    m = np.tile(around, Ni).astype(float)
+    return _PolarFunctions(m, columns, 2 * (2 * Ni + len(around) + 4), parts)
+
+
+@lru_cache(8)
+def _disk_modes(count: int, clamped: bool) -> _PolarFunctions:
+    """The first `count` modes."""
+    k, m, columns = _lowest(count, clamped)
+    fineness = int(k[-1])
+    r, w = gauss(1.0, fineness + 20)
+    mean_square = 2 * (w * r) @ _bessel(r, k, m, 0, 0) ** 2 * np.where(m > 0, 0.5, 1.0)
+
+    def parts(r: Array) -> Array:
+        at = [_bessel(r, k, m, *step) for step in _STEPS]
+        return np.stack(at) / (2 * np.sqrt(mean_square))
+
+    return _PolarFunctions(m, columns, fineness, parts)
+
+
+def _bessel(r: Array, k: Array, m: Array, p: int, q: int) -> Array:
+    """The radial part of D-^p D+^q of the pairs of modes, (P, U), at `r` (P,)."""
+    kr = np.multiply.outer(r, k)
+    growing: Array = (
+        scipy.special.ive(m - p + q, kr) / scipy.special.ive(m, k) * np.exp(kr - k)
+    )  # I_m-p+q(k r)/I_m(k)
+    return k ** (p + q) * (
+        (-1.0) ** q * scipy.special.jv(m - p + q, kr) - scipy.special.jv(m, k) * growing
+    )
 
 
 def _lowest(count: int, clamped: bool) -> tuple[Array, Array, NDArray[np.intp]]:

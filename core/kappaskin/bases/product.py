@@ -162,7 +162,7 @@ class SineBasis(ProductBasis):
 
     @property
     def _pinned(self) -> bool:
-        return self.patch.base_curvature > 0 and not self.sliding
+        return self.patch.arc_curvature > 0 and not self.sliding
 
     @property
     def free(self) -> Array | None:
@@ -244,12 +244,12 @@ class ClampedBasis(JetProductBasis):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.tip and (not self.patch.strip or self.patch.base_curvature):
+        if self.tip and (not self.patch.strip or self.patch.arc_curvature):
             raise Refusal(
                 f"expected a flat strip for a cantilever, got a {self.patch.name} with a base "
-                f"curvature of {self.patch.base_curvature:g} 1/m; select another edge"
+                f"curvature of {self.patch.arc_curvature:g} 1/m; select another edge"
             )
-        if self.patch.base_curvature and self.Ni < 2:
+        if self.patch.arc_curvature and self.Ni < 2:
             raise Refusal(
                 "a clamped inextensible arc cannot bend with one function only: expected at "
                 "least 2 functions along x, got 1"
@@ -258,7 +258,7 @@ class ClampedBasis(JetProductBasis):
     @property
     def free(self) -> Array | None:
         """On an arc, that the mean along x vanishes leaves Ni - 1 of Ni."""
-        return self._inextensible if self.patch.base_curvature else None
+        return self._inextensible if self.patch.arc_curvature else None
 
     @cached_property
     def _inextensible(self) -> Array:
@@ -347,7 +347,7 @@ class ElasticBasis(JetProductBasis):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.patch.base_curvature:
+        if self.patch.arc_curvature:
             raise Refusal(
                 f"expected a flat skin for an elastic rim, got a base radius of "
                 f"{self.patch.radius:g} m; select hinged, clamped or sliding edges"

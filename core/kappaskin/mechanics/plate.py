@@ -3,12 +3,13 @@
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
 from kappaskin.bases import (
     Basis,
+    CapBasis,
     ElasticBasis,
     ModeBasis,
     ProductBasis,
@@ -19,9 +20,10 @@ from kappaskin.bases import (
 )
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
+from kappaskin.mechanics.cap import CapShell
 from kappaskin.mechanics.loads import Load, is_point
-from kappaskin.mechanics.shell import Sheet, Tangential
-from kappaskin.skin import Patch
+from kappaskin.mechanics.shell import Sheet, Tangential, shallow_stiffness
+from kappaskin.skin import Cap, Patch
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,11 +69,16 @@ INPLANE = ("held", "diaphragm", "free", "hoop")
 
 `held`: no displacement. `diaphragm`: no membrane force across the edge, no displacement along it.
 `free`: no membrane force across the edge, no shear. `hoop`, of a bent skin: the hoop displacement
-is held, the axial one free. Of a bent skin they are those of the straight edges; the curved ones
-hold the radial and the hoop displacement and leave the axial one free.
+is held, the axial one free. Of a cylinder skin they are those of the straight edges; the curved
+ones hold the radial and the hoop displacement and leave the axial one free. Of a shallow skin, as
+of a flat one, they are those of all four edges, and there is no `hoop`; where they are free, it
+does not slide along itself as a whole. Of a cap they are those of its rim: `held` and, of less than
+a hemisphere, `diaphragm`, which lets it slide along the meridian.
 """
 
 
+_HARDLY = 1e-8  # of the bending stiffness of the longest wave: what stretching adds is left out
+_LARGEST_ERROR = 0.03  # of a force, by the theory of shallow skins
 _STIFFEST = 1e50  # in SI units; and its inverse: squares of what they make of loads are numbers
 
 
@@ -94,8 +101,8 @@ class Plate:
     of 0.1 x 0.1 m in by 5 mm. `thickness` h in m of a uniform sheet: a flat skin that was given
     none does not stretch, a bent one is 0.25 mm thick, or as its `axial_stiffness` E h in N/m has
     it, unless that is zero. `inplane` is how its edge is held in its plane, one of `INPLANE`; empty
-    means `held`, of a bent skin `hoop`. Of an `unknown_material` no force is told; a simulation
-    bends it like any other.
+    means `held`, of a skin of one radius `hoop`, of one of two radii `diaphragm`. Of an
+    `unknown_material` no force is told; a simulation bends it like any other.
     """
 
     patch: Patch
@@ -141,12 +148,30 @@ class Plate:
                 "expected a rigidity above zero in N m with a thickness: its modulus follows from "
                 "both; omit the thickness of a drum head"
             )
-        flat = not self.patch.base_curvature
-        possible = INPLANE[:-1] if flat else INPLANE
+        possible = INPLANE if self.patch.arc_curvature else INPLANE[:-1]
+        if isinstance(self.patch, Cap):
+            self._check_cap(self.patch)
         if self.inplane and self.inplane not in possible:
             raise Refusal(
-                f"expected inplane among {', '.join(possible)} for a {'flat' if flat else 'bent'} "
-                f"skin, got {self.inplane!r:.40}"
+                f"expected inplane among {', '.join(possible)} for a "
+                f"{self.patch.name if any(self.patch.curvatures) else 'flat skin'}, got "
+                f"{self.inplane!r:.40}"
+            )
+        if self.theory_error > _LARGEST_ERROR:
+            raise Refusal(
+                f"shallow shell theory may err by {self.theory_error:.1%} in a force on a "
+                f"{self.patch.name} with edges that are free in plane: expected at most "
+                f"{_LARGEST_ERROR:.0%}; hold the edges in plane, or use larger radii"
+            )
+
+    def _check_cap(self, cap: Cap) -> None:
+        if not self.rigidity:
+            raise Refusal(f"expected a rigidity above zero in N m of a {cap.name}, got 0")
+        if self.inplane == "free" or (self.inplane == "diaphragm" and cap.is_hemisphere):
+            raise Refusal(
+                f"expected inplane held of a {cap.name}, or diaphragm of less than a hemisphere, "
+                f"got {self.inplane}: such a rim lets the cap turn or bend without stretching, and "
+                "its force is not determined"
             )
 
     @classmethod
@@ -165,7 +190,7 @@ class Plate:
     @property
     def sheet_thickness(self) -> float | None:
         """Thickness h in m by which it stretches; None for a flat skin that was given none."""
-        if self.thickness is not None or not self.patch.base_curvature:
+        if self.thickness is not None or not any(self.patch.curvatures):
             return self.thickness
         D, C = self.rigidity, self.axial_stiffness
         return math.sqrt(12 * (1 - self.poisson**2) * D / C) if D and C else USUAL_THICKNESS
@@ -173,13 +198,31 @@ class Plate:
     @property
     def inplane_edge(self) -> str:
         """How its edge is held in its plane, one of `INPLANE`."""
-        return self.inplane or ("hoop" if self.patch.base_curvature else "held")
+        usual = "hoop" if self.patch.arc_curvature else "held"
+        return self.inplane or ("diaphragm" if isinstance(self.patch.radius, tuple) else usual)
 
     @property
     def stretches(self) -> bool:
         """Whether it is a flat rectangle or strip of known thickness, as `Stretching` needs."""
-        flat = type(self.patch) is Patch and not self.patch.base_curvature
+        flat = type(self.patch) is Patch and not any(self.patch.curvatures)
         return flat and self.thickness is not None
+
+    @property
+    def theory_error(self) -> float:
+        """Standard deviation of a force by the theory of shallow skins, as a share of it.
+
+        1 / (R k)^2 of the longest wave times its share of bending, twice where the edges are
+        diaphragms, four times where they are free, not where they are held: a saddle's, mostly,
+        which bends without stretching (`tests/truths/koiter.py`).
+        """
+        times = {"diaphragm": 2.0, "free": 4.0}.get(self.inplane_edge, 0.0)
+        if not self.patch.is_shallow or not times:
+            return 0.0
+        k2, (Hx, Hy) = (np.pi / np.array([self.patch.a, self.patch.b])) ** 2, self.patch.curvatures
+        stretch = (1 - self.poisson**2) * self.membrane_stiffness * (k2 @ (Hy, Hx)) ** 2
+        bend, rest = self.rigidity * k2.sum() ** 4, self.tension * k2.sum() ** 3 + stretch
+        rest += self.foundation * k2.sum() ** 2
+        return float(times * self.patch.steepness * bend / (bend + rest))
 
     def modulus(self, h: float) -> float:
         """Young's modulus E = 12 (1 - nu^2) D / h^3 in Pa of a sheet of thickness `h` in m."""
@@ -201,22 +244,40 @@ class Plate:
             )
 
     def compliance(self, basis: Basis) -> Compliance:
-        """The compliance by Ritz's method; in closed form for sines on a flat skin.
+        """The compliance by Ritz's method; in closed form where it does not mix sines.
 
-        There it is 4 / (a b (D k^4 + T k^2 + k_f)) with k^2 = k_i^2 + k_j^2 (Eq. 9, extended).
+        There it is 4 / (a b K) with K = D k^4 + T k^2 + k_f and k^2 = k_i^2 + k_j^2 (Eq. 9,
+        extended), of a shallow skin with diaphragms E h (k_i^2 / Ry + k_j^2 / Rx)^2 / k^4 more
+        (Reissner; Marguerre), less T (1 / Rx^2 + 1 / Ry^2) under the pressure that makes T.
         """
         if basis.patch != self.patch:
             raise Refusal(f"the plate is on {self.patch}, the basis on {basis.patch}; use one")
-        if isinstance(basis, SineBasis) and not self.patch.base_curvature:
-            k2 = basis.laplacian.ravel()
+        if isinstance(basis, SineBasis) and not self.mixes_sines:
+            k2, (Hx, Hy) = basis.laplacian.ravel(), self.patch.curvatures
             area = self.patch.a * self.patch.b / (2 if self.patch.strip else 4)
             stiffness = self.rigidity * k2**2 + self.tension * k2 + self.foundation
+            if self.patch.is_shallow:
+                ki, kj = basis.wavenumbers
+                stretch = np.add.outer(ki**2 * Hy, kj**2 * Hx).ravel() / k2
+                stiffness += (1 - self.poisson**2) * self.membrane_stiffness * stretch**2
+                stiffness -= self.tension * (Hx**2 + Hy**2)
+                self._check_held(bool((stiffness > 0).all()))
             values: Array = 1 / (area * stiffness)
         else:
             values = self._by_ritz(basis)
-            if isinstance(basis, ModeBasis):
+            if isinstance(basis, ModeBasis) and not any(self.patch.curvatures):
                 values = _unmixed(values)
-        return self._over_fluid(values, basis) if self.fluid else Compliance(values)
+        if self.fluid and not isinstance(basis, CapBasis):
+            return self._over_fluid(values, basis)
+        return Compliance(values)
+
+    def compliance_by_wave(self, basis: CapBasis) -> Array:
+        """The compliance (M, Ni, Ni) of a cap on the functions of each number m of waves around."""
+        shell = cap_shell(self, basis)
+        found = self._inverse(shell.stiffness, shell.bare)
+        if self.fluid:
+            found[0] = Compliance(found[0], shell.volume).after(np.eye(basis.Ni))
+        return found
 
     def _over_fluid(self, values: Array, basis: Basis) -> Compliance:
         if isinstance(basis, ProductBasis):
@@ -230,12 +291,23 @@ class Plate:
         return Compliance(values, None if isochoric else volume)
 
     @property
+    def mixes_sines(self) -> bool:
+        """Whether a load that is a sine each way moves it in others too.
+
+        A shallow skin that hardly stretches over the longest wave moves as a flat one.
+        """
+        if not self.patch.is_shallow or self.inplane_edge == "diaphragm":
+            return bool(self.patch.arc_curvature)
+        stretch = self.membrane_stiffness * self.patch.steepness**2  # times k^4, over H^2
+        return stretch > _HARDLY * self.rigidity * max(map(abs, self.patch.curvatures)) ** 2
+
+    @property
     def _is_shell(self) -> bool:
         """Whether f alone does not tell how far it moves along itself.
 
         The planar arc and a bent drum head are inextensible: v_x = H f.
         """
-        return bool(self.patch.base_curvature and self.rigidity) and not self.patch.strip
+        return bool(self.patch.arc_curvature and self.rigidity) and not self.patch.strip
 
     def sheet(self, sliding: bool = False) -> Sheet:
         """The bent sheet that it is; `sliding` edges let v go however they are held in plane."""
@@ -253,7 +325,8 @@ class Plate:
 
     def _stiffness(self, basis: Basis) -> tuple[Array, Array]:
         """Stiffness matrix (N, N) in N/m, and the same without its negative terms, for scaling."""
-        nu, H, overlap = self.poisson, self.patch.base_curvature, overlaps(basis)
+        nu, (Hx, Hy), overlap = self.poisson, self.patch.curvatures, overlaps(basis)
+        H = math.hypot(Hx, Hy)
         xx, yy, xy = (2, 0), (0, 2), (1, 1)
         # Of modes, half the time it takes is theirs.
         squares = overlap((0, 0), (0, 0)) if H or self.foundation else 0.0
@@ -273,6 +346,9 @@ class Plate:
         if self._is_shell:
             whole += self.membrane_stiffness * H**2 * squares
             negative += self._tangential(basis).relief
+        elif self.patch.is_shallow:
+            in_plane = self.membrane_stiffness, nu, self.inplane_edge
+            whole += shallow_stiffness(self.patch, *in_plane, basis)
         elif self.patch.strip:
             both = overlap(xx, (0, 0))
             whole += self.rigidity * H**4 * squares
@@ -280,20 +356,30 @@ class Plate:
         return whole - negative, whole
 
     def _by_ritz(self, basis: Basis) -> Array:
-        """Inverse (N, N) of the stiffness, scaled so that it is well conditioned."""
+        """Inverse (N, N) of the stiffness."""
+        if isinstance(basis, CapBasis):
+            return cap_shell(self, basis).by_function(self.compliance_by_wave(basis))
         K, bare = self._stiffness(basis)
-        inextensible = self.patch.base_curvature and not self._is_shell
+        inextensible = self.patch.arc_curvature and not self._is_shell
         W = np.eye(basis.size) if basis.free is None or not inextensible else basis.free
-        scale = np.sqrt(np.diag(W.T @ bare @ W))
-        values, vectors = np.linalg.eigh(W.T @ K @ W / np.multiply.outer(scale, scale))
-        if not values[0] > 1e-13 * values[-1]:
+        return W @ self._inverse(W.T @ K @ W, W.T @ bare @ W) @ W.T
+
+    def _inverse(self, K: Array, bare: Array) -> Array:
+        """Inverse (..., N, N) of stiffnesses, scaled by `bare` so that it is well conditioned."""
+        scale = np.sqrt(np.einsum("...ii->...i", bare))
+        values, vectors = np.linalg.eigh(K / (scale[..., None] * scale[..., None, :]))
+        self._check_held(bool((values[..., 0] > 1e-13 * values[..., -1]).all()))
+        V = vectors / scale[..., None]
+        return (V / values[..., None, :]) @ np.swapaxes(V, -1, -2)
+
+    @staticmethod
+    def _check_held(held: bool) -> None:
+        if not held:
             raise Refusal(
                 "the skin moves as a whole without bending: expected edges that hold it; pin the "
                 "ends of the arc, use an opening angle below 180 degrees, springs below an elastic "
                 "rim, or foam below the skin"
             )
-        V = W @ (vectors / scale[:, None])
-        return (V / values) @ V.T
 
     def curvature(self, basis: Basis) -> Callable[[Array], Array]:
         """The map from positions (P, 2) in m to the curvature (3, P, N) in 1/m per m of functions.
@@ -301,6 +387,8 @@ class Plate:
         That of the skin under loads along its normal: a bent one stretches under them, and its
         tangential displacements follow from its stiffness.
         """
+        if isinstance(basis, CapBasis):
+            return cap_shell(self, basis).curvature_at
         if self._is_shell:
             return self._tangential(basis).curvature_at
         return partial(curvature_at, basis)
@@ -321,3 +409,10 @@ class Plate:
             self.check(load)
             force += load.modal(basis)
         return self.compliance(basis)(force)
+
+
+@lru_cache(4)
+def cap_shell(plate: Plate, basis: CapBasis) -> CapShell:
+    """The shell that a plate on a cap is, on the functions of a `basis`."""
+    support = plate.tension, plate.foundation, plate.inplane_edge == "diaphragm"
+    return CapShell(basis, plate.rigidity, plate.membrane_stiffness, plate.poisson, *support)

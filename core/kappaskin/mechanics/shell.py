@@ -131,7 +131,7 @@ class _Arc:
 
     def _strains(self) -> Array:
         """Strains (3, 9, X, n) by powers of q: e_x, e_y, g, k_x, k_y, t, f_x, f_y, f."""
-        H, F, V, U = self._sheet.patch.base_curvature, self.f, self.v, self.u
+        H, F, V, U = self._sheet.patch.arc_curvature, self.f, self.v, self.u
         f, v, u = self._fields
         S = np.zeros((3, 9, len(self.x), self.size))
         S[0, 0, :, F], S[0, 0, :, V] = -H * f[0], v[1]
@@ -146,7 +146,7 @@ class _Arc:
     def _law(self) -> Array:
         sheet = self._sheet
         C, D, nu, T = sheet.C, sheet.D, sheet.nu, sheet.T
-        squares = sheet.k_f - T * sheet.patch.base_curvature**2
+        squares = sheet.k_f - T * sheet.patch.arc_curvature**2
         law = np.diag([C, C, C * (1 - nu) / 2, D, D, 2 * D * (1 - nu), T, T, squares])
         law[0, 1] = law[1, 0] = nu * C
         law[3, 4] = law[4, 3] = nu * D
@@ -165,7 +165,7 @@ class Tangential:
             raise TypeError(f"a bent skin has products of functions, got {type(basis).__name__}")
         Ni, Nj = basis.shape
         a, b = sheet.patch.a, sheet.patch.b
-        self._basis, self._H = basis, sheet.patch.base_curvature
+        self._basis, self._H = basis, sheet.patch.arc_curvature
         self._arc = arc = _Arc(sheet, self._along, 2 * Ni + 16)
         waves = Nj if isinstance(basis, SineBasis) else 2 * Nj + 16
         self._q = np.pi / b * np.arange(1.0, waves + 1)
@@ -207,6 +207,56 @@ class Tangential:
         cos = np.cos(np.multiply.outer(positions[:, 1], self._q))
         twist = (turned @ (cos[:, :, None] * self._share)).reshape(xy.shape)
         return np.stack([xx + self._H**2 * f, yy, xy + self._H / 2 * twist])
+
+
+# A shallow skin (Marguerre): strains e_x = u_x - f / Rx, e_y = v_y - f / Ry, g = u_y + v_x with u
+# along x and v along y, and the bending of a plate. Stretching adds the energy of the u and v that
+# make it least.
+
+_IN_PLANE = 16  # functions of u and v along a side, more than f has
+
+
+def shallow_stiffness(patch: Patch, C: float, nu: float, inplane: str, basis: Basis) -> Array:
+    """What stretching adds to the stiffness (N, N) in N/m of the functions of a `basis`.
+
+    `C` = E h / (1 - nu^2) in N/m; `inplane` is one of `held`, `diaphragm` and `free`.
+    """
+    if not isinstance(basis, ProductBasis):
+        raise TypeError(f"a shallow skin has products of functions, got {type(basis).__name__}")
+    sides = (patch.a, basis.Ni), (patch.b, basis.Nj)
+    rules = [gauss(side, 2 * count + 2 * _IN_PLANE) for side, count in sides]
+    fixed, loose = list[Array](), list[Array]()  # by x and by y, with derivatives (2, X, n)
+    for (points, _), (side, count) in zip(rules, sides, strict=True):
+        fixed.append(_once(side, count + _IN_PLANE, points))
+        loose.append(np.dstack([_lines(side, points), fixed[-1]]))
+    across = fixed if inplane == "held" else loose
+    along_edge = loose if inplane == "free" else fixed
+    u, v = (across[0], along_edge[1]), (along_edge[0], across[1])
+    maps, shear = basis.on_grid(rules[0][0], rules[1][0]), (1 - nu) / 2
+    f: tuple[Array, Array] = maps.X, maps.Y
+    (u_x, u_y), (v_x, v_y) = (((X[1], Y[0]), (X[0], Y[1])) for X, Y in (u, v))
+
+    def product(one: tuple[Array, Array], other: tuple[Array, Array]) -> Array:
+        (_, x), (_, y) = rules
+        along_x, along_y = (one[0].T * x) @ other[0], (one[1].T * y) @ other[1]
+        found = np.einsum("ij,kl->ikjl", along_x, along_y)
+        return found.reshape(len(along_x) * len(along_y), -1)
+
+    K_u = product(u_x, u_x) + shear * product(u_y, u_y)
+    K_v = product(v_y, v_y) + shear * product(v_x, v_x)
+    mixed = nu * product(u_x, v_y) + shear * product(u_y, v_x)
+    stiffness: Array = np.block([[K_u, mixed], [mixed.T, K_v]])
+    Hx, Hy = patch.curvatures
+    coupled = np.hstack([(Hx + nu * Hy) * product(f, u_x), (Hy + nu * Hx) * product(f, v_y)])
+    if inplane == "free":  # of two translations and a rotation, which strain nothing
+        strained = np.isin(np.arange(len(stiffness)), [0, 1, len(K_u)], invert=True)
+        stiffness, coupled = stiffness[np.ix_(strained, strained)], coupled[:, strained]
+    scale: Array = 1 / np.sqrt(np.diag(stiffness))
+    coupled *= scale
+    stiffness *= np.multiply.outer(scale, scale)
+    relief: Array = coupled @ np.linalg.solve(stiffness, coupled.T)
+    own = (Hx**2 + Hy**2 + 2 * nu * Hx * Hy) * product(f, f)
+    return C * (own - relief)
 
 
 _MOST_FUNCTIONS, _MOST_WAVES = 96, 160
@@ -313,7 +363,7 @@ class Shell:
         They are the factors of sin(q y), sin(q y) and cos(q y). A gage along a diagonal reads the
         mean of (xx + yy) / 2 + xy or - xy; the twist is half of what the two differ by.
         """
-        H, q = self._sheet.patch.base_curvature, self._q[:, None]
+        H, q = self._sheet.patch.arc_curvature, self._q[:, None]
         s, w = _along_gage(gage_length)
         f, _, fxx, _, _ = self._arc.rows(np.add.outer(s, x))
         straight = self._arc.rows(x)[0]

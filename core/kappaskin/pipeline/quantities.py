@@ -45,8 +45,13 @@ class ErrorBars:
         return np.hypot(noise * self._unit, self._undecided).reshape(self._shape)
 
     def of_slopes(self, position: Array, noise: float) -> Array:
-        """Standard deviations (2,) of the slopes along x and y at `position` (2,) in m."""
-        unit, undecided = self._of(self.basis.jet(*position.tolist())[1:3])
+        """Standard deviations (2,) of the slopes along x and y at `position` (2,) in m.
+
+        On a cap along the axes of its elements.
+        """
+        x, y = position.tolist()
+        slopes = self.basis.patch.base(x, y).covariant[1:3] @ self.basis.jet(x, y)
+        unit, undecided = self._of(slopes)
         return np.hypot(noise * unit, undecided)
 
 
@@ -90,7 +95,7 @@ class Quantities:
     def at_rest(self, name: str) -> float:
         """The value of a skin at rest, in SI units."""
         of = self._colours[name].at_rest
-        return 0.0 if of is None else of(self.layout.patch.base_curvature)
+        return 0.0 if of is None else of(np.array([*self.layout.patch.curvatures, 0.0]))
 
     def on_surface(self, name: str, estimate: Estimate) -> Array:
         """The values (ny, nx) in SI units; NaN off the skin and where they are not known."""
@@ -139,7 +144,7 @@ class Quantities:
     @cached_property
     def _slopes(self) -> list[ValueMap]:
         """The derivatives along x and y; on a bent skin the integral along the arc too."""
-        orders = [(1, 0), (0, 1)] + [(-1, 0)] * bool(self.layout.patch.base_curvature)
+        orders = [(1, 0), (0, 1)] + [(-1, 0)] * bool(self.layout.patch.arc_curvature)
         return [self.basis.on_grid(*self.grid, *order) for order in orders]
 
     def reading(self, quantity: str, direction: float, estimate: Estimate) -> Array:
@@ -149,12 +154,16 @@ class Quantities:
             return estimate.surface
         if quantity == "slope":
             p, q, *along = (of(estimate.coefficients) for of in self._slopes)
-            return c * sum((self.layout.patch.base_curvature**2 * v for v in along), p) + s * q
+            return c * sum((self.layout.patch.arc_curvature**2 * v for v in along), p) + s * q
         xx, yy, xy = (self.change(name, estimate) for name in COMPONENTS)
         return xy if quantity == "twist" else c * c * xx + s * s * yy + 2 * c * s * xy
 
     def form_at_elements(self, curvature: Array) -> Array:
         """The curvature form (3, P) in 1/m as the elements read it, where slopes are small."""
-        patch = self.layout.patch
-        form = curvature + np.array([[patch.base_curvature], [0.0], [0.0]])
-        return np.where([[False], [True], [True]], 0.0, form) if patch.strip else form
+        form = curvature + self._elements_at_rest
+        return np.where([[False], [True], [True]], 0.0, form) if self.layout.patch.strip else form
+
+    @cached_property
+    def _elements_at_rest(self) -> Array:
+        """The curvature form (3, P) in 1/m of the skin at rest at its elements."""
+        return self.layout.patch.local(self.layout.positions).curvature

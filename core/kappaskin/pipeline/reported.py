@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
-from kappaskin._text import NO_FORCE
 from kappaskin.errors import Refusal
-from kappaskin.estimation import Fit
+from kappaskin.estimation import Fit, propagated_covariance
 from kappaskin.frames import COMPONENTS, Array, Estimate
 from kappaskin.sensing import Sensor, SensorLayout
 
@@ -96,7 +95,8 @@ class Reported:
         To first order, from what the readings' noise makes of the displacement f and its slopes
         there, and of the place x, y itself, as if these were independent:
             dr = r_x dx + r_y dy - n0 df,    |dn| = |d(f_x, f_y) + K [metric] (dx, dy)|,
-        where [r_x r_y] = [t e] [metric] and n0 is the normal of the skin at rest.
+        where [r_x r_y] = [t e] [metric] and n0 is the normal of the skin at rest. On a cap the
+        slopes are those along the axes of its elements.
         """
         if self._in_space is not None:
             return self._in_space
@@ -106,18 +106,22 @@ class Reported:
         x, y = self.contact.position.tolist()
         x_sd, y_sd = self.contact.position_sd.tolist()
         # Cached: the geometry there was computed of it.
-        variances = self.fit.jet(x, y)[1].diagonal()[:3].tolist()
+        base, covariance = patch.base(x, y), self.fit.jet(x, y)[1]
+        if base.slopes:
+            covariance = propagated_covariance(base.covariant, covariance)
+        variances = covariance.diagonal()[:3].tolist()
         f_sd, *slopes_sd = (math.sqrt(v) if v >= 0 else math.nan for v in variances)
         t, e, normal = geometry.frame.tolist()
-        (L, m), (_, k) = geometry.metric.tolist()
+        (L, m), (o, k) = geometry.metric.tolist()
         (xx, xy), (_, yy) = geometry.curvature_form.tolist()
-        angle = (x - patch.a / 2) * patch.base_curvature
-        n0 = math.sin(angle), 0.0, math.cos(angle)
         spread = [
-            math.hypot(L * t[i] * x_sd, (m * t[i] + k * e[i]) * y_sd, n0[i] * f_sd)
+            math.hypot(
+                (L * t[i] + o * e[i]) * x_sd, (m * t[i] + k * e[i]) * y_sd, base.normal[i] * f_sd
+            )
             for i in range(3)
         ]
-        tilt = L * xx * x_sd, L * xy * x_sd, (m * xx + k * xy) * y_sd, (m * xy + k * yy) * y_sd
+        tilt_x = (L * xx + o * xy) * x_sd, (L * xy + o * yy) * x_sd
+        tilt = *tilt_x, (m * xx + k * xy) * y_sd, (m * xy + k * yy) * y_sd
         self._in_space = spread, [*normal, math.hypot(*slopes_sd, *tilt)]
         return self._in_space
 
@@ -186,7 +190,7 @@ class SkinColour:
     The `symbol` is HTML, the `tip` has the equation, and `unknown` says why there may be no value.
     `on_surface` gets the values (ny, nx) on the surface's points; without it there are values at
     the elements only. `of_elements` gets these (P,); without it they are those of the surface.
-    `at_rest` gets the value of a skin at rest from its curvature, zero if left out, from which
+    `at_rest` gets the value of a skin at rest from its xx, yy, xy, zero if left out, from which
     colours of what is `signed` go both ways. They reach as far as `least` at least, on the screen's
     scale, or for a length as that share of the skin's longer side; those of one `group` may share
     a range.
@@ -200,7 +204,7 @@ class SkinColour:
     tip: str
     on_surface: Getter | None = None
     of_elements: Getter | None = None
-    at_rest: Callable[[float], float] | None = None
+    at_rest: Callable[[Array], float] | None = None
     unknown: str = ""
     signed: bool = True
     least: float = 0.5
@@ -559,7 +563,7 @@ def _invariant(
                 symbol,
                 tip,
                 of_elements=lambda r: of(_skin(r).form_at_elements(r.estimate.curvature)),
-                at_rest=lambda H: float(of(np.array([H, 0.0, 0.0]))),
+                at_rest=lambda form: float(of(form)),
                 least=least,
                 group=group,
             ),
@@ -838,7 +842,36 @@ _CONTACT = (
             (
                 "force_is_lower_bound",
                 "whether the force leaves out a stretch that may change it by more than its error "
-                "bar: the skin's thickness is not given, and 0.25 mm is assumed for this",
+                "bar: of a flat skin whose thickness is not given, for which 0.25 mm is assumed, "
+                "or a curved one that stiffens",
+            ),
+        ),
+    ),
+    ReportedQuantity(
+        "force_is_upper_bound",
+        "",
+        "whether the skin softens and needs less force",
+        "contact.force_is_upper_bound",
+        kind="?",
+        keys=(
+            (
+                "force_is_upper_bound",
+                "whether a curved skin is pressed so deep that it softens, by which the force "
+                "changes by more than its error bar; the error bar contains the change",
+            ),
+        ),
+    ),
+    ReportedQuantity(
+        "snaps_through",
+        "",
+        "whether the skin snaps through, where there is no force",
+        "contact.snaps_through",
+        kind="?",
+        keys=(
+            (
+                "snaps_through",
+                "whether a curved skin is pressed so deep that it snaps through; the force is "
+                "null then",
             ),
         ),
     ),
@@ -873,14 +906,14 @@ _CONTACT = (
         half_width="contact.force_95",
         keys=(("force_N", "of the contact, above zero where it presses"),),
         labels_shown=("Force",),
-        at_rim=NO_FORCE,
         shown=("N", 1.0, 4),
         header=HeaderNumber(
             "force",
             20,
             "Force of the point load that fits best, with its error bar; \u2265: a lower bound, as "
             "the skin may stretch: its thickness is not given, and 0.25 mm would change the force "
-            "by more than the error bar.",
+            "by more than the error bar; \u2264: an upper bound, as a curved skin softens where it "
+            "is pressed in deep.",
         ),
     ),
     ReportedQuantity(
@@ -1234,10 +1267,9 @@ def readouts_of(quantity: ReportedQuantity, reported: Reported) -> list[Readout]
     ]
     found: list[Readout] = []
     for part, label in enumerate(quantity.labels_shown):
-        if quantity.at_rim and reported.contact.near_rim:
-            found.append(
-                Readout(label, math.nan, math.nan, math.nan, unit, digits, quantity.at_rim)
-            )
+        words = quantity.at_rim if reported.contact.near_rim else ""
+        if words := reported.contact.no_force if quantity.name == "force" else words:
+            found.append(Readout(label, math.nan, math.nan, math.nan, unit, digits, words))
             continue
         value, sd, half_width = (scale * float(each[part % len(each)]) for each in numbers)
         found.append(Readout(label, value, sd, half_width, unit, digits))

@@ -78,6 +78,7 @@ STATUS_NUMBERS = (
     "width_x_m",
     "width_y_m",
     "base_curvature_per_m",
+    "base_curvature_y_per_m",
 )
 """The numbers of a message about the source, besides its timestamp; null without a sensor."""
 
@@ -229,7 +230,7 @@ class SourceState:
         numbers = (
             round(self.rate, 1),
             round(age, 6) if math.isfinite(age) else None,
-            *((patch.a, patch.b, patch.base_curvature) if patch else (None, None, None)),
+            *((patch.a, patch.b, *patch.curvatures) if patch else (None,) * 4),
         )
         fields = {
             "kind": "status",

@@ -86,7 +86,7 @@ def effects_of(scene: Scene) -> dict[str, Effect]:
         there.append(GageLength(layout.gage_length))
     if dead := tuple(layout.dead):
         there.append(DeadElements(dead))
-    if layout.senses_curvature and not (plate.patch.base_curvature or scene.laid):
+    if layout.senses_curvature and not (any(plate.patch.curvatures) or scene.laid):
         there.append(FiniteSlopeEffect())
     electronics = scene.transduction
     if scene.moves and not isinstance(electronics, DigitalReadings):

@@ -61,7 +61,7 @@ from kappaskin.sensing import (
     SensorLayout,
     Transduction,
 )
-from kappaskin.skin import Disk, Patch, Polygon
+from kappaskin.skin import Cap, Disk, Patch, Polygon
 
 TABLE_1_NOISE = 0.40 / math.sqrt(3)
 """RMS of the noise of Table 1 in 1/m: uniform between -0.40 and 0.40."""
@@ -166,7 +166,7 @@ def scene_of(top: TomlTable, file: Path, trust: Trust = False) -> Scene:
     reference = SCENE.value(top, "reference", default=usual_reference(plate.patch))
     basis = partial(basis_for, plate.patch, edge, *reference)
     with top.blamed("reference"):
-        _check_functions(plate.patch, edge, reference, len(layout))
+        _check_functions(plate, edge, reference, len(layout))
         basis()
     if len(top.tables("touch")) > _MOST_TOUCHES:
         raise top.refusal(
@@ -227,6 +227,9 @@ def read_skin(table: TomlTable) -> tuple[Plate, str]:
 def _patch(table: TomlTable, shape: str) -> Patch:
     if shape == "disk":
         return Disk(SKIN.value(table, "rim_radius"))
+    if shape == "cap":
+        radius = table.get("radius", float)
+        return Cap(radius, *(SKIN.value(table, key) for key in ("angle", "stretch")))
     if shape == "polygon":
         return Polygon(SKIN.value(table, "outline"))
     a, b = SKIN.value(table, "size")
@@ -236,8 +239,17 @@ def _patch(table: TomlTable, shape: str) -> Patch:
 def read_elements(table: TomlTable, patch: Patch) -> SensorLayout:
     """The elements in the table [elements] of a file."""
     with table.blamed():
+        given = [key for key in ("positions", "rings", "spiral") if key in table]
+        if len(given) > 1:
+            raise table.refusal(f"expected one pattern, got {' and '.join(given)}", given[1])
         if "positions" in table:
             layout = SensorLayout.scattered(patch, ELEMENTS.value(table, "positions"))
+        elif "rings" in table:
+            check_elements(sum(rings := ELEMENTS.value(table, "rings")))
+            layout = SensorLayout.on_rings(patch, rings)
+        elif "spiral" in table:
+            check_elements(count := ELEMENTS.value(table, "spiral"))
+            layout = SensorLayout.in_spiral(patch, count)
         else:
             grid = ELEMENTS.value(table, "grid")
             check_elements(*grid)
@@ -486,10 +498,10 @@ def check_elements(m: int, n: int = 1) -> None:
         raise Refusal(f"expected at most {_MOST_ELEMENTS} elements, got {m} x {n}; take fewer")
 
 
-def _check_functions(patch: Patch, edge: str, counts: tuple[int, int], elements: int) -> None:
+def _check_functions(plate: Plate, edge: str, counts: tuple[int, int], elements: int) -> None:
     """Refuse more functions of the true shape than can be computed in a few seconds."""
-    whole = isinstance(patch, Disk | Polygon)
-    mix = whole or patch.base_curvature or edge != "hinged"
+    whole = isinstance(plate.patch, Disk | Polygon)
+    mix = whole or plate.mixes_sines or edge != "hinged"
     most = _MOST_THAT_MIX if mix else _MOST_FUNCTIONS
     most = min(most, _MOST_VALUES // (3 * elements))
     if min(counts) > 0 and counts[0] * counts[1] > most:

@@ -113,7 +113,7 @@ class Simulator:
             self._sensed = sloped[0].sensed(self._basis, layout, plate)
         else:
             self._sensed = _linear(layout, self._basis, plate)
-        flat = isinstance(self._basis, SineBasis) and not self._basis.patch.base_curvature
+        flat = isinstance(self._basis, SineBasis) and not any(self._basis.patch.curvatures)
         self._told = (slice(_TOLD), slice(_TOLD)) if flat else ()
 
     def _truth(self, time: float) -> Truth:
@@ -218,7 +218,7 @@ def _same_elements(layout: SensorLayout, other: SensorLayout) -> bool:
 
 def _linear(layout: SensorLayout, basis: Basis, plate: Plate) -> Callable[[Array], Array]:
     """Coefficients (Ni, Nj) to readings (C,) of the elements; on a grid along x, then y."""
-    product = isinstance(basis, ProductBasis) and not basis.patch.base_curvature
+    product = isinstance(basis, ProductBasis) and not basis.patch.arc_curvature
     averaged = layout.gage_length or any(layout.cell)
     if product and layout.shape and not (layout.reads or averaged):
         x, y = layout.positions[: layout.shape[0], 0], layout.positions[:: layout.shape[0], 1]

@@ -1,6 +1,10 @@
 """The skin: its own coordinates, its outline, and surfaces on it."""
 
+from kappaskin.skin.patch import Base as Base
+from kappaskin.skin.patch import Cap as Cap
 from kappaskin.skin.patch import Disk as Disk
+from kappaskin.skin.patch import LocalGeometry as LocalGeometry
+from kappaskin.skin.patch import Meridian as Meridian
 from kappaskin.skin.patch import Outline as Outline
 from kappaskin.skin.patch import Patch as Patch
 from kappaskin.skin.patch import Polygon as Polygon

@@ -1,10 +1,12 @@
-"""Skins at rest: rectangles, arcs, cylinders, disks and polygons in their own coordinates."""
+"""Skins at rest: rectangles, cylinders, disks, polygons and caps in their own coordinates."""
 
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, NamedTuple, cast
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 
 from kappaskin.errors import Refusal
@@ -145,6 +147,60 @@ _MARGIN = 1e-3  # of a side: how near its rim a point may be and still move with
 _CORNER = 0.02  # of an edge: how near to its ends no place is looked for along it
 _CELLS = 64  # along each side of a raster that shows quickly whether a point is far inside
 _ROUNDING = 1e-12  # of a side: a point on the rim as computed may stand this far outside
+_STEEPEST = 0.01  # 1 / (R k)^2 of the lowest wave: what shallow shell theory may neglect
+
+
+Number = Any  # a float, or an array
+Numbers = tuple[Number, ...]
+Vector = tuple[Number, Number, Number]
+
+
+class Base(NamedTuple):
+    """A skin at rest at one place, each number, or at many, each an array.
+
+    Its point in m and outward normal in space, orthonormal tangents e_x and e_y, and its curvature
+    xx, yy and xy in 1/m along these. On a cap also, on other skins empty: the rows of the matrix
+    `slopes` (2, 2) from derivatives along x and y to those along e_x and e_y, those of the matrix
+    (3, 5) from f_x, f_y, f_xx, f_xy, f_yy to the second ones, and by how much e_x turns to e_y
+    along each of them, in 1/m.
+    """
+
+    point: Vector
+    along: Vector
+    across: Vector
+    normal: Vector
+    curvature: Vector
+    slopes: tuple[Numbers, ...] = ()
+    second: tuple[Numbers, ...] = ()
+    turning: Numbers = ()
+
+    @property
+    def covariant(self) -> Array:
+        """As that of `LocalGeometry`, (..., 6, 6)."""
+        found = np.zeros((*np.shape(self.point[0]), 6, 6))
+        found[...] = np.eye(6)
+        for i, row in enumerate(self.slopes + self.second, 1):
+            for j, each in enumerate(row, 1):
+                found[..., i, j] = each
+        return found
+
+
+_FLAT = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LocalGeometry:
+    """The skin at rest around each of P places.
+
+    `frame` (P, 2, 3): orthonormal tangents e_x and e_y in space. `curvature` (3, P) in 1/m: the
+    curvature form xx, yy, xy along them, positive where the skin is convex seen from outside.
+    `covariant` (P, 6, 6): from a function's derivatives f, f_x, f_y, f_xx, f_xy, f_yy in the skin's
+    coordinates to its covariant ones along e_x and e_y, in that order.
+    """
+
+    frame: Array
+    curvature: Array
+    covariant: Array
 
 
 @dataclass(frozen=True)
@@ -152,16 +208,19 @@ class Patch:
     """A rectangular skin of `a` by `b` metres, held along its edges.
 
     At rest it is flat, or bent along x to `radius` in m: a cylinder skin whose arc has the length
-    a. A `strip` is held at its two ends in x only and nothing varies along y: a planar curve.
+    a. Two radii are those along x and y, of either sign: a shallow dome, saddle or trough, and
+    where only the first is finite and above zero, the cylinder again. A `strip` is held at its two
+    ends in x only and nothing varies along y: a planar curve.
 
     In space, x runs along the arc, whose highest point is at (a/2, y, 0); the outward normal there
     is (0, 0, 1). Displacement is positive inward, as a load presses; curvature is positive where
-    the skin is convex seen from outside, so that pressing in adds f_xx (Eq. 3) to 1/radius.
+    the skin is convex seen from outside, so that pressing in adds f_xx (Eq. 3) to 1/radius. A
+    shallow skin is an arc along x carried along an arc along y, highest at (a/2, b/2, 0) of a dome.
     """
 
     a: float
     b: float
-    radius: float = math.inf
+    radius: float | tuple[float, float] = math.inf
     strip: bool = False
 
     def __post_init__(self) -> None:
@@ -171,27 +230,74 @@ class Patch:
                 f"expected a patch with two sides above zero in metres, {least:g} to {most:g}, "
                 f"got {self.a} x {self.b}; give lengths such as 0.1 x 0.1"
             )
-        if not self.radius >= self.a / (2 * math.pi):  # NaN too
+        if isinstance(self.radius, tuple) and not self.arc_curvature:
+            self._check_shallow(self.radius)
+        elif not self.radii[0] >= self.a / (2 * math.pi):  # NaN too
             raise Refusal(
                 f"an arc of {self.a:g} m is a full circle at radius {self.a / 2 / math.pi:.4g} "
                 f"m: expected a larger base radius, or infinity for a flat skin, got {self.radius}"
+            )
+
+    def _check_shallow(self, radii: tuple[float, float]) -> None:
+        if self.strip or any(math.isnan(R) or not R for R in radii):
+            raise Refusal(
+                "expected two radii other than zero in m, or infinity, of a skin that is no strip; "
+                f"got {list(radii)}, strip {self.strip}"
+            )
+        if self.steepness > _STEEPEST:
+            least = min(map(abs, radii)) * math.sqrt(self.steepness / _STEEPEST)
+            raise Refusal(
+                f"shallow shell theory neglects 1/(R k)^2, {self.steepness:.2%} of the longest "
+                f"wave on a skin of {self.a:g} x {self.b:g} m with radii of {radii[0]:g} and "
+                f"{radii[1]:g} m: expected at most {_STEEPEST:.0%}, which are radii of at least "
+                f"{least:.3g} m; for a steeper skin use a cap"
             )
 
     @property
     def name(self) -> str:
         """A short description for messages."""
         what = f"{'strip' if self.strip else 'patch'} of {self.a:g} x {self.b:g} m"
-        return f"{what} bent to {self.radius:g} m" if self.base_curvature else what
+        if self.is_shallow:
+            return f"{what} bent to {self.radii[0]:g} and {self.radii[1]:g} m"
+        return f"{what} bent to {self.radii[0]:g} m" if self.arc_curvature else what
 
     @property
-    def base_curvature(self) -> float:
-        """1 / radius in 1/m; zero when flat."""
-        return 1 / self.radius
+    def radii(self) -> tuple[float, float]:
+        """Radius of curvature along x and y in m; infinite where it is straight."""
+        return self.radius if isinstance(self.radius, tuple) else (self.radius, math.inf)
+
+    @cached_property
+    def curvatures(self) -> tuple[float, float]:
+        """Curvature at rest along x and y in 1/m; zero when flat."""
+        return 1 / self.radii[0], 1 / self.radii[1]
+
+    @property
+    def arc_curvature(self) -> float:
+        """1 / radius in 1/m of a cylinder skin; zero when flat, and of a shallow skin."""
+        Rx, Ry = self.radii
+        return 1 / Rx if math.isinf(Ry) and Rx > 0 else 0.0
+
+    @property
+    def is_shallow(self) -> bool:
+        """Whether it is a dome, a saddle or a trough, bent as shallow shell theory has it."""
+        return any(self.curvatures) and not self.arc_curvature
+
+    @property
+    def steepness(self) -> float:
+        """1 / (R k)^2 of the longest wave: by how much shallow shell theory is in error."""
+        k = math.pi * math.hypot(1 / self.a, 1 / self.b)
+        return (max(map(abs, self.curvatures)) / k) ** 2
+
+    @property
+    def rise(self) -> float:
+        """Height in m between its highest and lowest points at rest."""
+        ends = self.at_rest(np.array([[0, 0], [self.a, 0], [0, self.b], [self.a, self.b]]) / 2)[0]
+        return float(np.ptp(ends[:, 2]))
 
     @property
     def opening(self) -> float:
-        """The angle of the arc, a / radius in rad; zero when flat."""
-        return self.a / self.radius
+        """The angle of the arc of a cylinder skin, a / radius in rad; else zero."""
+        return self.a * self.arc_curvature
 
     def grid(self, nx: int, ny: int) -> tuple[Array, Array]:
         """Evenly spaced x (nx,) and y (ny,) in m, edges included."""
@@ -236,16 +342,42 @@ class Patch:
 
     def at_rest(self, positions: Array) -> tuple[Array, Array]:
         """Points (..., 3) in m and outward unit normals (..., 3) of the skin at rest."""
-        points, normals = np.zeros((2, *positions.shape[:-1], 3))
-        points[..., :2] = positions
-        if not self.base_curvature:
-            normals[..., 2] = 1.0
-            return points, normals
-        angle = (positions[..., 0] - self.a / 2) / self.radius
-        normals[..., 0], normals[..., 2] = np.sin(angle), np.cos(angle)
-        points[..., 0] = self.a / 2 + self.radius * normals[..., 0]
-        points[..., 2] = -2 * self.radius * np.sin(angle / 2) ** 2
-        return points, normals
+        base = self.base(positions[..., 0], positions[..., 1])
+        each = np.broadcast_arrays(*base.point, *base.normal)
+        return np.stack(each[:3], axis=-1), np.stack(each[3:], axis=-1)
+
+    def base(self, x: Number, y: Number) -> Base:
+        """The skin at rest at x, y in m: numbers, or arrays of one shape."""
+        Hx, Hy = self.curvatures
+        if not (Hx or Hy):
+            return Base((x, y, 0.0), *_FLAT)
+        sin, cos = (math.sin, math.cos) if isinstance(x, float) else (np.sin, np.cos)
+        u, v = x - self.a / 2, y - self.b / 2
+        sx, cx, sy, cy = sin(Hx * u), cos(Hx * u), sin(Hy * v), cos(Hy * v)
+        px, py, pz = x, y, 0.0
+        if Hx:
+            px, pz = self.a / 2 + sx / Hx, -2 * sin(Hx * u / 2) ** 2 / Hx
+        if Hy:
+            py, pz = self.b / 2 + sy / Hy, pz - 2 * sin(Hy * v / 2) ** 2 / Hy
+        # The arcs' tangents (cx, 0, -sx) and (0, cy, -sy) meet at a right angle only along the
+        # middles.
+        up = 1 / (1 - (sx * sy) ** 2) ** 0.5
+        ny, nz = cx * sy * up, cx * cy * up
+        across, normal = (-sx * ny, cy * up, -cx * ny), (sx * cy * up, ny, nz)
+        return Base((px, py, pz), (cx, 0.0, -sx), across, normal, (Hx, Hy, 0.0))
+
+    def local(self, positions: Array) -> LocalGeometry:
+        """The frames, curvature and covariant derivatives at `positions` (P, 2) in m."""
+        base, P = self.base(*positions.T), len(positions)
+        frame = np.zeros((P, 2, 3))
+        for k in range(3):
+            frame[:, 0, k], frame[:, 1, k] = base.along[k], base.across[k]
+        form = np.stack([np.broadcast_to(each, P) for each in base.curvature])
+        return LocalGeometry(frame, form, base.covariant)
+
+    def around(self, x: float, y: float, offsets: Array) -> Array:
+        """Positions (Q, 2) in m that lie from (x, y) as far along the skin as `offsets` (Q, 2)."""
+        return np.array([x, y]) + offsets
 
 
 @dataclass(frozen=True, init=False)
@@ -286,6 +418,179 @@ class Disk(Patch):
             return []
         out = (1 - 2 * _MARGIN) * r / away
         return [(r + out * (x - r), r + out * (y - r), share)]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Meridian:
+    """The meridian of a cap at some distances from its pole along it.
+
+    `radius` in m of the parallel there, and its `slope` per distance; `curvatures` (2, ...) in 1/m
+    along the meridian and along the parallel, and their `changes` in 1/m^2 per distance. `angle` in
+    rad of the spheroid: its parallels have the radius R sin(angle).
+    """
+
+    radius: Array
+    slope: Array
+    curvatures: Array
+    changes: Array
+    angle: Array
+
+
+_STRETCHES = (0.2, 5.0)
+_LEVEL = 0.2  # of what the pole moves by across itself, along the axis, the rim does
+_NEAR_POLE = 1e-7  # of the arc to the rim: so far from the pole azimuths have a value
+
+
+@dataclass(frozen=True, init=False)
+class Cap(Disk):
+    """A domed skin: a cap of a sphere of `radius` in m, held along its rim.
+
+    Of a spheroid with `stretch` other than 1: its equator has the `radius`, and it is `stretch`
+    times as long along its axis. At the rim its normal is turned by `angle` in rad from that at the
+    pole; pi/2 makes a hemisphere.
+
+    Positions are azimuthal equidistant: the pole is in the middle of the box, and a place lies as
+    far from there as along the skin, and in its azimuth. `rim_radius` is that distance of the rim.
+    In space the pole is at (a/2, b/2, 0), and the outward normal there is (0, 0, 1).
+    """
+
+    angle: float
+    stretch: float
+
+    def __init__(self, radius: float, angle: float = math.pi / 2, stretch: float = 1.0) -> None:
+        least, most = _STRETCHES
+        if not (0 < radius < math.inf and least <= stretch <= most):
+            raise Refusal(
+                f"expected a cap with a radius above zero in metres and a stretch from {least:g} "
+                f"to {most:g}, got {radius} and {stretch}"
+            )
+        if not 0 < angle <= math.pi / 2 * (1 + _ROUNDING):
+            raise Refusal(
+                "expected a cap whose rim is turned by an angle above zero, at most pi/2 (a "
+                f"hemisphere), got {angle} rad"
+            )
+        for name, value in (("angle", min(angle, math.pi / 2)), ("stretch", stretch)):
+            object.__setattr__(self, name, value)
+        rim = math.atan2(math.sin(self.angle), stretch * math.cos(self.angle))
+        super().__init__(radius * float(scipy.special.ellipeinc(rim, 1 - stretch**2)))
+        object.__setattr__(self, "radius", radius)
+
+    @property
+    def name(self) -> str:
+        of = f" stretched {self.stretch:g} times" if self.stretch != 1 else ""
+        return f"cap of radius {self.equator:g} m{of} with {math.degrees(self.angle):g} degrees"
+
+    @property
+    def equator(self) -> float:
+        """Radius in m of its equator."""
+        return self.radius if isinstance(self.radius, float | int) else self.radius[0]
+
+    @property
+    def radii(self) -> tuple[float, float]:
+        """Radius of curvature in m along x and y at the pole."""
+        R = self.equator / self.stretch
+        return R, R
+
+    @property
+    def is_shallow(self) -> bool:
+        return False
+
+    @property
+    def rise(self) -> float:
+        rim = self.at_rest(np.array([[self.a, self.b / 2]]))[0]
+        return -float(rim[0, 2])
+
+    @property
+    def is_hemisphere(self) -> bool:
+        return math.isclose(self.angle, math.pi / 2)
+
+    def _angle(self, distance: Number) -> Number:
+        """The `angle` of the `meridian` at a `distance` in m from the pole."""
+        m, t = 1 - self.stretch**2, distance / self.equator
+        for _ in range(8 if m else 0):  # Newton's method
+            arc = cast("Number", scipy.special.ellipeinc(t, m))
+            t = t - (arc - distance / self.equator) / (1 - m * np.sin(t) ** 2) ** 0.5
+        return t
+
+    @property
+    def moves_as_a_whole(self) -> bool:
+        """Whether its rim moves along itself where it moves along its axis, or nearly so."""
+        return self.stretch == 1 and math.cos(self.angle) < _LEVEL
+
+    def meridian(self, distance: Array) -> Meridian:
+        """The meridian at each `distance` (...) in m from the pole along the skin."""
+        R, k, t = self.equator, self.stretch, self._angle(distance)
+        m, sin, cos = 1 - k**2, np.sin(t), np.cos(t)
+        L = np.sqrt(1 - m * sin**2)  # the arc, over R, per angle
+        curvatures = np.stack([k / L**3, k / L]) / R
+        changes = np.stack([3 * k / L**6, k / L**4]) * (m * sin * cos) / R**2
+        return Meridian(R * sin, cos / L, curvatures, changes, t)
+
+    def base(self, x: Number, y: Number) -> Base:
+        one, R, k, pole = isinstance(x, float), self.equator, self.stretch, self.rim_radius
+        of_sin, of_cos = (math.sin, math.cos) if one else (np.sin, np.cos)
+        u, v = x - pole, y - pole
+        least, s = _NEAR_POLE * pole, (u * u + v * v) ** 0.5
+        far = max(s, least) if one else np.maximum(s, least)
+        t = self._angle(far)
+        sin, cos = of_sin(t), of_cos(t)
+        # In space e_s = (r' c, r' n, -k2 r) along the meridian and e_t = (-n, c, 0) around meet
+        # e_x = c e_s - n e_t and e_y = n e_s + c e_t; what is left of c^2 + n^2 = 1 at the pole,
+        # where the azimuth has no value, vanishes there.
+        c, n, L = u / far, v / far, (1 - (1 - k**2) * sin * sin) ** 0.5
+        r, slope, k1, k2 = R * sin, cos / L, k / (R * L**3), k / (R * L)
+        g, cc, nn, cn = r / far, c * c, n * n, c * n
+        out, flat, bend = k2 * r, slope - 1, k1 - k2
+        fall = 2 * R * k * of_sin(t * s / far / 2) ** 2
+        # With M = 1 + (1/g - 1) e_t e_t' the slopes are M f_i, the second derivatives
+        #     M F M + p (e_s e_t' + e_t e_s') f_t + q e_t e_t' f_s
+        # where F are those of the coordinates, p = (1 - r'/g) / r and q = (r' - 1/g) / r.
+        near, p, q = 1 / g - 1, (1 - slope / g) / r, (slope - 1 / g) / r
+        mxx, mxy, myy = 1 + near * nn, -near * cn, 1 + near * cc
+        on_s, on_t = (q * c, q * n), (-p * n, p * c)
+        second = tuple(
+            (*(st * of_t + tt * of_s for of_s, of_t in zip(on_s, on_t, strict=True)), *of_second)
+            for st, tt, of_second in (
+                (-2 * cn, nn, (mxx * mxx, 2 * mxx * mxy, mxy * mxy)),
+                (cc - nn, -cn, (mxx * mxy, mxx * myy + mxy * mxy, mxy * myy)),
+                (2 * cn, cc, (mxy * mxy, 2 * mxy * myy, myy * myy)),
+            )
+        )
+        return Base(
+            (pole + g * u, pole + g * v, -fall),
+            (1 + flat * cc, flat * cn, -out * c),
+            (flat * cn, 1 + flat * nn, -out * n),
+            (out * c, out * n, slope),
+            (1 / R, 1 / R, 0.0) if k == 1 else (k2 + bend * cc, k2 + bend * nn, bend * cn),
+            ((mxx, mxy), (mxy, myy)),
+            second,
+            (-flat / r * n, flat / r * c),
+        )
+
+    def places(self, points: Array) -> Array:
+        """Positions (..., 2) in m of `points` (..., 3) of the skin in space, or just off it."""
+        pole, R, k = self.rim_radius, self.equator, self.stretch
+        x, y = points[..., 0] - pole, points[..., 1] - pole
+        r = np.hypot(x, y)
+        t = np.arctan2(r, points[..., 2] / k + R)
+        s = R * scipy.special.ellipeinc(t, 1 - k**2)
+        out = np.where(r > 0, s / np.where(r > 0, r, 1.0), 1.0)
+        return np.stack([pole + out * x, pole + out * y], axis=-1)
+
+    def around(self, x: float, y: float, offsets: Array) -> Array:
+        """Positions (Q, 2) in m that lie from (x, y) as far along the skin as `offsets` (Q, 2).
+
+        Along circles of the skin's curvature there: of a spheroid nearly.
+        """
+        at = np.array([[x, y]])
+        ((point,), (normal,)), local = self.at_rest(at), self.local(at)
+        xx, yy, xy = local.curvature[:, 0]
+        squares: Array = np.sum(offsets**2, axis=1)
+        forms: Array = offsets**2 @ np.array([xx, yy]) + 2 * xy * offsets[:, 0] * offsets[:, 1]
+        H = np.where(squares > 0, forms, xx) / np.where(squares > 0, squares, 1.0)
+        turn = H * np.sqrt(squares)
+        along: Array = (np.sinc(turn / np.pi)[:, None] * offsets) @ local.frame[0]
+        return self.places(point + along - (2 * np.sin(turn / 2) ** 2 / H)[:, None] * normal)
 
 
 @dataclass(frozen=True, init=False)

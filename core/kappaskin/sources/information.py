@@ -14,7 +14,7 @@ from kappaskin.errors import Refusal, SourceError
 from kappaskin.mechanics import Plate
 from kappaskin.scenes import PARTS, check_elements, check_sides
 from kappaskin.sensing import QUANTITIES, DigitalReadings, Sensor, SensorLayout, Transduction
-from kappaskin.skin import Disk, Patch, Polygon
+from kappaskin.skin import Cap, Disk, Patch, Polygon
 from kappaskin.sources.description import described_sensor, described_text
 
 _SKIN, _ELEMENTS = PARTS["skin"], PARTS["elements"]
@@ -43,9 +43,10 @@ SENSOR = Part(
         "size": _SKIN.key("size"),
         "base_curvature": Key(
             "Base curvature",
-            "Curvature of the skin at rest along x: one over its radius.",
+            "Curvature at rest along x of a skin bent to an arc: one over its radius. Of a shallow "
+            "skin, a dome or saddle, the two along x and y.",
             _PER_METRE,
-            kind=float,
+            kind=float | tuple[float, float],
             default=0.0,
         ),
         "strip": Key(
@@ -59,6 +60,13 @@ SENSOR = Part(
             "For a skin that is not a rectangle: `disk`, or x, y of each corner, in order.",
             _METRE,
             kind=str | tuple[tuple[float, float], ...],
+            default=None,
+        ),
+        "cap": Key(
+            "Cap",
+            "For a domed skin: the radius of its equator in m, the angle from pole to rim in rad "
+            "and the stretch, 1 of a sphere.",
+            kind=tuple[float, float, float],
             default=None,
         ),
         **{
@@ -110,13 +118,16 @@ def sensor_to_json(sensor: Sensor) -> str:
     if sensor.description:
         return described_text(sensor)
     layout, patch, wired = sensor.layout, sensor.layout.patch, sensor.channel_map
+    both = patch.curvatures
     owners = (layout, patch, sensor.plate, sensor)
     values = {
         name: getattr(one, name) for one in owners for name in SENSOR.keys if hasattr(one, name)
     }
     values |= {
         "size": (patch.a, patch.b),
+        "base_curvature": both if isinstance(patch.radius, tuple) else patch.arc_curvature,
         "outline": _outline(patch),
+        "cap": (patch.equator, patch.angle, patch.stretch) if isinstance(patch, Cap) else None,
         "grid": layout.shape,
         "positions": None if layout.shape else layout.positions.tolist(),
         "dead_channels": np.flatnonzero(~layout.live.ravel()).tolist(),
@@ -139,8 +150,8 @@ def sensor_to_json(sensor: Sensor) -> str:
 
 
 def _outline(patch: Patch) -> Any:
-    """The corners of a polygon, or "disk"; None for a rectangle."""
-    if isinstance(patch, Disk):
+    """The corners of a polygon, or "disk"; None for a rectangle and a cap."""
+    if type(patch) is Disk:
         return "disk"
     return patch.vertices if isinstance(patch, Polygon) else None
 
@@ -186,15 +197,24 @@ def _sensor(table: TomlTable) -> Sensor:
 
 def _patch(values: dict[str, Any]) -> Patch:
     size, H, outline = values["size"], values["base_curvature"], values["outline"]
+    if values["cap"] is not None:
+        cap = Cap(*values["cap"])
+        if H or values["strip"] or outline is not None or not np.allclose(size, (cap.a, cap.b)):
+            raise Refusal(
+                f"expected a {cap.name}, of size {[cap.a, cap.b]} and without base_curvature, "
+                f"strip and outline, got size {[*size]}, base curvature {H}"
+            )
+        return cap
     if outline is None:
-        return Patch(*size, radius=1 / H if H else math.inf, strip=values["strip"])
+        Rx, *Ry = (1 / one if one else math.inf for one in np.ravel(H).tolist())
+        return Patch(*size, radius=(Rx, Ry[0]) if Ry else Rx, strip=values["strip"])
     if isinstance(outline, str) and outline != "disk":
         raise Refusal(f"expected the outline 'disk' or a list of corners, got {outline!r:.80}")
     patch = Disk(size[0] / 2) if outline == "disk" else Polygon(outline)
     if H or values["strip"] or size != (patch.a, patch.b):
         raise Refusal(
             f"expected a flat {patch.name}, of size {[patch.a, patch.b]}, got size {[*size]}, base "
-            f"curvature {H:g} and strip {values['strip']}"
+            f"curvature {H} and strip {values['strip']}"
         )
     return patch
 

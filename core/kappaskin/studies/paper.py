@@ -133,7 +133,7 @@ def _row(table: int, case: LoadCase, noise: bool, paper: dict[str, float | None]
     if noise:
         row["e_max_sd_mm"] = float(e.std(ddof=1))
         row["covered_95"] = float(np.mean(covered(fit, case.scene.basis, case.truth)))
-    elif not case.scene.plate.patch.base_curvature:
+    elif not case.scene.plate.patch.arc_curvature:
         e, rms = case.errors(case.fit(case.on_slopes()))
         row |= {"slopes_e_max_mm": float(e[0]), "slopes_rms_mm": float(rms[0])}
     return row

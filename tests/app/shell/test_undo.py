@@ -113,7 +113,7 @@ def test_another_skin_is_seen_from_where_the_last_one_was(here: MainWindow, unti
     camera = (0.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.7, 0.7, 30.0, 0.0, 0.0)
     here.history.change("Turn", -1, camera=camera)
     here.requests.set("shape", "cylinder")
-    until(lambda: here.membrane.skin.patch.base_curvature > 0)
+    until(lambda: here.membrane.skin.patch.arc_curvature > 0)
     assert here.history.settings.camera == camera
     at, focus = _camera(here)[:3], _camera(here)[3:6]
     side = here.membrane.skin.side

@@ -172,7 +172,7 @@ def test_another_skin_is_drawn_bent_and_undone_flat_again(
     qtbot.keyClick(box, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     assert window.history.settings == was
     _met(window, until)
-    assert not window.membrane.skin.patch.base_curvature
+    assert not window.membrane.skin.patch.arc_curvature
 
 
 @pytest.mark.full

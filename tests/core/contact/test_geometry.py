@@ -17,17 +17,47 @@ from kappaskin import (
     Setup,
     Simulator,
     SineBasis,
+    basis_for,
     load_scene,
     local_geometry,
 )
 from kappaskin.bases import ORDERS
-from kappaskin.contact import surface_geometry
+from kappaskin.contact import CurvatureFormMap, surface_geometry
 from kappaskin.estimation.fit import DenseUncertainty
+from kappaskin.skin import Base, Cap
 from navier import HingedPlate, Load
 
 FLAT = Patch(0.1, 0.08)
 BENT = Patch(0.1, 0.08, 0.045)
+SADDLE = Patch(0.1, 0.08, (0.25, -0.3))
 HERE = np.array([[0.031, 0.052], [0.07, 0.01], [0.05, 0.04], [0.0, 0.08]])
+
+
+class Turned:
+    """A patch with its coordinates turned by `angle` around its middle."""
+
+    def __init__(self, patch, angle):
+        self._patch, (c, s) = patch, (math.cos(angle), math.sin(angle))
+        self._middle, self._turn = np.array([patch.a, patch.b]) / 2, np.array([[c, -s], [s, c]])
+
+    def _turned(self, positions):
+        return self._middle + (positions - self._middle) @ self._turn.T
+
+    def at_rest(self, positions):
+        return self._patch.at_rest(self._turned(positions))
+
+    def base(self, x, y):
+        base = self._patch.base(*np.moveaxis(self._turned(np.stack([x, y], axis=-1)), -1, 0))
+        turn, (p, q, r) = self._turn, base.curvature
+        (xx, xy), (_, yy) = turn.T @ np.array([[p, r], [r, q]]) @ turn
+        axes = np.array(np.broadcast_arrays(*base.along, *base.across)).reshape(2, 3, *np.shape(x))
+        along, across = np.tensordot(turn.T, axes, 1)
+        return Base(base.point, tuple(along), tuple(across), base.normal, (xx, yy, xy))
+
+
+TURNED = Turned(BENT, 0.4)
+BALL = Cap(0.045, 1.2)
+SIDES = np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
 
 
 @dataclass
@@ -200,7 +230,13 @@ def by_differences(surface, x, y, h=2e-5):
         rx = (position(x + h, y) - position(x - h, y)) / (2 * h)
         ry = (position(x, y + h) - position(x, y - h)) / (2 * h)
         n = np.cross(rx, ry) / np.linalg.norm(np.cross(rx, ry))
-        first = rx / np.linalg.norm(rx)
+        first = rx
+        if isinstance(surface.patch, Cap):  # along the axis that elements read by
+            rest = [surface.patch.at_rest(np.array([x, y]) + h * e)[0] for e in SIDES]
+            steps = np.stack([rest[0] - rest[1], rest[2] - rest[3]], axis=1) / (2 * h)
+            axis = surface.patch.local(np.array([[x, y]])).frame[0, 0]
+            first = np.column_stack([rx, ry]) @ np.linalg.lstsq(steps, axis)[0]
+        first = first / np.linalg.norm(first)
         return np.array([first, np.cross(n, first), n]), np.column_stack([rx, ry])
 
     E, r = frame(x, y)
@@ -212,10 +248,22 @@ def by_differences(surface, x, y, h=2e-5):
     return E, metric, K, T
 
 
-@pytest.mark.parametrize("patch", [FLAT, BENT], ids=["flat", "bent"])
+@pytest.mark.parametrize(
+    ("patch", "place"),
+    [
+        (FLAT, (0.061, 0.033)),
+        (BENT, (0.061, 0.033)),
+        (TURNED, (0.061, 0.033)),
+        (SADDLE, (0.05, 0.04)),
+        (Turned(SADDLE, 0.4), (0.05, 0.04)),
+        (BALL, (0.071, 0.033)),
+        (BALL, (0.054, 0.054)),
+    ],
+    ids=["flat", "bent", "askew", "saddle", "saddle askew", "cap", "pole"],
+)
 @pytest.mark.parametrize("seed", range(5))
-def test_frame_metric_and_forms_are_what_montana_defines(patch, seed):
-    surface, (x, y) = steep(seed, patch), (0.061, 0.033)
+def test_frame_metric_and_forms_are_what_montana_defines(patch, place, seed):
+    surface, (x, y) = steep(seed, patch), place
 
     ours = surface.geometry(np.array([x, y]))
 
@@ -334,13 +382,17 @@ def test_an_umbilic_point_has_directions_and_error_bars():
     np.testing.assert_allclose(flat.directions @ flat.directions.swapaxes(1, 2), [np.eye(2)] * 3)
 
 
-def test_one_point_and_many_points_are_answered_alike():
+@pytest.mark.parametrize("patch", [BENT, BALL], ids=["bent", "cap"])
+def test_one_point_and_many_points_are_answered_alike(patch):
     basis, c = sine_surface(BENT)
+    if patch is BALL:
+        basis = basis_for(BALL, "hinged", 4, 3)
     covariance = np.diag(np.linspace(1, 2, 12)) * 1e-8
 
-    many = surface_geometry(basis, c, HERE, DenseUncertainty(lambda: covariance).covariance_of)
+    places = HERE[:3]
+    many = surface_geometry(basis, c, places, DenseUncertainty(lambda: covariance).covariance_of)
 
-    for p, here in enumerate(HERE):
+    for p, here in enumerate(places):
         one = surface_geometry(basis, c, here, DenseUncertainty(lambda: covariance).covariance_of)
         for field in fields(one):
             ours, theirs = getattr(one, field.name), getattr(many, field.name)[p]
@@ -373,7 +425,7 @@ def test_the_error_bars_are_the_scatter_of_noisy_shapes(name):
     np.testing.assert_allclose(values.mean(axis=0), without_noise, atol=0.1 * told.min())
 
 
-@pytest.mark.parametrize("patch", [FLAT, BENT], ids=["flat", "bent"])
+@pytest.mark.parametrize("patch", [FLAT, BENT, SADDLE], ids=["flat", "bent", "saddle"])
 def test_the_error_bars_are_those_of_how_the_curvature_changes_with_each_coefficient(patch):
     basis, c = sine_surface(patch)
     step = 1e-7
@@ -394,6 +446,98 @@ def test_the_error_bars_are_those_of_how_the_curvature_changes_with_each_coeffic
     expected = np.einsum("npi,npj->pij", changes, changes)
     np.testing.assert_allclose(told, expected, rtol=1e-6, atol=1e-6 * expected.max())
     assert np.abs(form(c)).max() > 10  # steep enough for every term to count
+
+
+@pytest.mark.parametrize(
+    "patch", [TURNED, Turned(SADDLE, 0.4), BALL], ids=["bent", "saddle", "cap"]
+)
+def test_the_error_bars_hold_along_axes_that_are_not_those_of_the_base(patch):
+    surface, step = steep(3, patch), np.array([1e-6, 1e-6, 1e-6, 1e-3, 1e-3, 1e-3])
+    jet = np.array(surface.values(0.061, 0.033))
+
+    def form(jet):
+        return Surface(patch, lambda x, y: jet).geometry(np.array([0.061, 0.033])).curvature_form
+
+    changes = [(form(jet + d) - form(jet - d)).ravel()[[0, 3, 1]] / 2 for d in np.diag(step)]
+    told = surface_geometry(
+        surface, np.ones((1, 1)), np.array([0.061, 0.033]), lambda rows: np.diag(step**2)
+    ).covariance
+
+    expected = np.transpose(changes) @ changes
+    np.testing.assert_allclose(told, expected, rtol=1e-6, atol=1e-6 * expected.max())
+
+
+def test_a_dome_at_rest_has_its_own_curvature_and_pressed_in_evenly_a_greater_one():
+    dome = Patch(0.1, 0.08, (0.25, 0.4))
+    pressed = polynomial(np.full((1, 1), 0.005), patch=dome).geometry(HERE)
+    rest = polynomial(np.zeros((1, 1)), patch=dome).geometry(HERE)
+
+    np.testing.assert_allclose(rest.curvature_form, [np.diag([4, 2.5])] * 4, rtol=1e-13)
+    points, normals = dome.at_rest(HERE)
+    np.testing.assert_allclose(rest.position, points, atol=1e-15)
+    np.testing.assert_allclose(rest.normal, normals, atol=1e-15)
+    np.testing.assert_allclose(pressed.curvature_form, [np.diag([1 / 0.245, 1 / 0.395])] * 4)
+    np.testing.assert_allclose(pressed.position, points - 0.005 * normals, atol=1e-15)
+
+
+def test_a_cap_at_rest_has_its_own_curvature_and_pressed_in_evenly_a_greater_one():
+    rest = polynomial(np.zeros((1, 1)), patch=BALL).geometry(HERE[:3])
+    pressed = polynomial(np.full((1, 1), 0.005), patch=BALL).geometry(HERE[:3])
+
+    np.testing.assert_allclose(rest.curvature_form, [np.eye(2) / 0.045] * 3, atol=1e-12)
+    np.testing.assert_allclose(pressed.curvature_form, [np.eye(2) / 0.040] * 3, atol=1e-12)
+    points, normals = BALL.at_rest(HERE[:3])
+    np.testing.assert_allclose(pressed.position, points - 0.005 * normals, atol=1e-15)
+    np.testing.assert_allclose(pressed.normal, normals, atol=1e-15)
+    # Of the sphere: the lengths of the coordinates, which are azimuthal equidistant.
+    area = np.linalg.det(rest.metric)
+    s = np.linalg.norm(HERE[:3] - BALL.rim_radius, axis=1) / 0.045
+    np.testing.assert_allclose(area, np.sin(s) / s, rtol=1e-12)
+
+
+@pytest.mark.parametrize("stretch", [1.5, 0.6])
+def test_a_spheroid_pressed_in_slightly_has_the_forms_of_its_surface(stretch):
+    cap = Cap(0.045, 1.2, stretch)
+    steeper = steep(1, cap)
+    surface = Surface(cap, lambda x, y: [0.01 * each for each in steeper.values(x, y)])
+    x, y = cap.rim_radius + 0.017, cap.rim_radius - 0.021
+
+    ours = surface.geometry(np.array([x, y]))
+
+    # Its own curvature changes from place to place, of which the forms neglect f times the change.
+    E, metric, K, T = by_differences(surface, x, y)
+    np.testing.assert_allclose(ours.frame, E, atol=1e-6)
+    np.testing.assert_allclose(ours.metric, metric, atol=1e-6)
+    np.testing.assert_allclose(ours.curvature_form, K, atol=1e-4 * np.abs(K).max())
+    np.testing.assert_allclose(ours.torsion_form, T, atol=1e-3 * np.abs(K).max())
+
+
+def test_the_curl_of_the_torsion_of_a_cap_is_the_gaussian_curvature():
+    surface, h, (x, y) = steep(1, BALL), 1e-5, (0.071, 0.033)
+
+    def turning(x, y):
+        g = surface.geometry(np.array([x, y]))
+        return g.torsion_form @ g.metric
+
+    curl = turning(x + h, y)[1] - turning(x - h, y)[1] - turning(x, y + h)[0] + turning(x, y - h)[0]
+    g = surface.geometry(np.array([x, y]))
+    assert -curl / (2 * h) == pytest.approx(g.gaussian * np.linalg.det(g.metric), rel=1e-4)
+
+
+@pytest.mark.parametrize("cap", [BALL, Cap(0.045, 1.2, 1.5)], ids=["sphere", "spheroid"])
+def test_the_curvature_on_a_grid_of_a_cap_is_that_of_each_of_its_places(cap):
+    basis = basis_for(cap, "hinged", 5, 5)
+    c = np.random.default_rng(0).normal(0, 3e-4, (5, 5))
+    x, y = cap.grid(9, 8)
+    places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    on = cap.contains(places)
+
+    form = CurvatureFormMap(basis, x, y)(c).reshape(3, -1)
+
+    told = surface_geometry(basis, c, places[on], lambda rows: np.zeros((len(rows), 6, 6)))
+    K = told.curvature_form[:, [0, 1, 0], [0, 1, 1]].T
+    np.testing.assert_allclose(form[:, on], K, atol=1e-4 * np.abs(K).max())
+    assert np.isnan(form[:, ~on]).all()
 
 
 def test_readings_that_are_missing_widen_the_error_bars():

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from deflected import DeflectedSkin, sines
+from deflected import DeflectedSkin, ShallowSkin, sines
 from kappaskin import (
+    Cap,
     Disk,
     LeastSquares,
     Patch,
@@ -24,6 +25,7 @@ from kappaskin import (
     local_geometry,
 )
 from kappaskin.estimation import METHODS, FiniteSlopeLeastSquares, slope_warning
+from kappaskin.sensing import NormalCurvature
 
 SQUARE = Patch(0.1, 0.1)
 TENS = SensorLayout.regular(SQUARE, 10, 10)
@@ -136,6 +138,8 @@ SKINS = {
     "half round, clamped": (ARC, "clamped", 6, 6),
     "slightly bent": (Patch(0.04, 0.03, 0.03), "hinged", 6, 6),
     "slightly bent, sliding": (Patch(0.04, 0.03, 0.03), "sliding", 6, 6),
+    "dome": (Patch(0.04, 0.03, (0.09, 0.12)), "hinged", 6, 6),
+    "saddle, clamped": (Patch(0.04, 0.03, (0.09, -0.12)), "clamped", 6, 6),
     "arc": (Patch(np.pi * 12.9e-3, 1.0, 12.9e-3, strip=True), "hinged", 8, 1),
 }
 
@@ -160,7 +164,7 @@ def smooth_shape(basis, slope, seed=0):
     places = np.column_stack([np.tile(x, 61), np.repeat(y, 61)])
     places = places[patch.contains(places)]
     p, q = (basis.at(places, *order) @ c.ravel() for order in ((1, 0), (0, 1)))
-    if H := patch.base_curvature:
+    if H := patch.arc_curvature:
         p = p + H**2 * basis.at(places, -1, 0) @ c.ravel()
     return c * slope / np.sqrt(p**2 + q**2).max()
 
@@ -177,12 +181,14 @@ def dent_at(fit, place, slope):
 def in_space(basis, c):
     """The skin with coefficients `c` as a surface in space."""
     patch = basis.patch
-    if isinstance(basis, SineBasis) and not patch.strip:
+    if isinstance(basis, SineBasis) and not (patch.strip or patch.is_shallow):
         return DeflectedSkin(patch.a, sines(patch.a, patch.b, c), patch.radius)
 
     def f(x, y, dx=0, dy=0):
         return basis.at(np.column_stack([x, y]), dx, dy) @ c.ravel()
 
+    if patch.is_shallow:
+        return ShallowSkin(patch.a, f, radii=patch.radii)
     return DeflectedSkin(patch.a, f, patch.radius)
 
 
@@ -210,7 +216,7 @@ def test_steep_skins_come_back_to_a_hundred_thousandth_in_six_steps(name, slope)
     assert peak_error(basis, answer.coefficients, c) < 1e-5
 
 
-@pytest.mark.parametrize("name", ["flat", "half round", "slightly bent"])
+@pytest.mark.parametrize("name", ["flat", "half round", "slightly bent", "dome"])
 def test_dents_of_contacts_come_back_wherever_they_are(name):
     basis, layout = skin_of(name)
     fit = FiniteSlopeLeastSquares(basis, layout)
@@ -223,7 +229,7 @@ def test_dents_of_contacts_come_back_wherever_they_are(name):
         assert peak_error(basis, answer.coefficients, c) < 1e-5
 
 
-@pytest.mark.parametrize("name", ["flat", "half round, clamped", "arc"])
+@pytest.mark.parametrize("name", ["flat", "half round, clamped", "arc", "dome", "saddle, clamped"])
 def test_the_prediction_is_what_gages_read_of_the_surface_in_space(name):
     basis, layout = skin_of(name)
     c = smooth_shape(basis, 0.8)
@@ -234,7 +240,7 @@ def test_the_prediction_is_what_gages_read_of_the_surface_in_space(name):
     np.testing.assert_allclose(predicted[layout.live], expected[layout.live], rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["flat", "disk, clamped", "half round"])
+@pytest.mark.parametrize("name", ["flat", "disk, clamped", "half round", "saddle, clamped"])
 @pytest.mark.parametrize("slope", [0.05, 1.0])
 def test_the_covariance_is_that_of_the_problem_linearised_at_the_solution(name, slope):
     basis, layout = skin_of(name)
@@ -336,7 +342,7 @@ def test_next_to_no_signal_is_least_squares(name, signal):
     answer, plain = FiniteSlopeLeastSquares(basis, layout)(K), LeastSquares(basis, layout)(K)
 
     # On a bent skin readings are known to the rounding of its curvature at rest.
-    rounding = 1e-14 * basis.patch.base_curvature * np.abs(plain.unit_sd).max()
+    rounding = 1e-14 * basis.patch.arc_curvature * np.abs(plain.unit_sd).max()
     scale = np.abs(plain.coefficients).max()
     np.testing.assert_allclose(
         answer.coefficients, plain.coefficients, rtol=0, atol=1e-6 * scale + 10 * rounding
@@ -404,7 +410,7 @@ OTHERS = {
     ),
 }
 SD = {"height": 1e-5, "slope": 1e-3, "curvature": 0.2, "twist": 0.2}
-BENT = ["flat", "flat, clamped", "half round, clamped", "slightly bent"]
+BENT = ["flat", "flat, clamped", "half round, clamped", "slightly bent", "saddle, clamped"]
 every_other = pytest.mark.parametrize("kind", OTHERS)
 
 
@@ -422,6 +428,32 @@ def read_of(basis, layout, c):
         np.array([each[q][r] for r, q in enumerate(reads.quantity)]),
         np.array([SD[q] for q in reads.quantity]),
     )
+
+
+CAPS = {"sphere": Cap(0.016, 1.2), "spheroid": Cap(0.016, 1.2, 1.5)}
+
+
+@pytest.mark.parametrize("kind", ["rosettes", "one gage", "xx, yy and xy"])
+@pytest.mark.parametrize("name", CAPS)
+def test_readings_of_a_cap_change_as_its_jacobian_has_it_and_give_the_shape_back(name, kind):
+    basis = basis_for(CAPS[name], "hinged", 4, 5)
+    layout = SensorLayout.regular(CAPS[name], 14, 12)
+    layout = OTHERS[kind](layout) if kind in OTHERS else layout
+    c = np.random.default_rng(1).normal(size=basis.shape) * 2e-4
+    fit, sensed = FiniteSlopeLeastSquares(basis, layout), NormalCurvature(basis, layout)
+    steps = 1e-7 * np.eye(basis.size).reshape(-1, *basis.shape)
+    by_differences = (sensed(c + steps) - sensed(c - steps)).reshape(basis.size, -1) / 2e-7
+
+    jacobian = np.einsum("qr,qrn->nr", sensed.surface(c.ravel()).jacobian(), sensed.maps)
+
+    assert 0.3 < np.max(sensed.surface(c.ravel()).slope) < 1.4
+    np.testing.assert_allclose(jacobian, by_differences, atol=1e-6 * np.abs(jacobian).max())
+    first = layout.operator(basis) @ c.ravel()
+    small = sensed(1e-5 * c).ravel()
+    np.testing.assert_allclose(small, 1e-5 * first, atol=1e-9 * np.abs(first).max())
+    answer = fit(sensed(c))
+    assert answer.converged
+    assert peak_error(basis, answer.coefficients, c) < 1e-5
 
 
 @every_other
@@ -456,7 +488,7 @@ def test_steep_skins_come_back_from_any_readings(name, slope, kind):
 
 
 @every_other
-@pytest.mark.parametrize("name", ["flat", "half round, clamped"])
+@pytest.mark.parametrize("name", ["flat", "half round, clamped", "saddle, clamped"])
 def test_the_covariance_of_any_readings_is_that_of_the_linearised_problem(name, kind):
     basis, layout = other_skin(name, kind)
     W = np.eye(basis.size) if basis.free is None else basis.free

@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import (
+    Cap,
     DiscLoad,
     Disk,
     Fast,
@@ -474,13 +475,39 @@ def test_a_cylinder_skin_is_not_read_as_a_flat_one(saved) -> None:
     assert not np.allclose(bent["coefficients"], flat["coefficients"], rtol=1e-2)
 
 
+def test_the_two_radii_of_a_dome_come_from_the_file(saved) -> None:
+    x, y = POSITIONS.T
+    waves = [(i, j) for i in range(1, NI + 1) for j in range(1, NJ + 1)]
+    w = np.stack([np.sin(i * np.pi * x / A) * np.sin(j * np.pi * y / B) for i, j in waves], axis=1)
+    read = (M + np.concatenate([w / 0.5**2, w / 0.4**2, 0 * w])) @ TRUTH[0]
+
+    found = reconstruct(saved(radius=[0.5, -0.4], curvature=read.reshape(3, P)), (NI, NJ))
+
+    assert np.allclose(found["coefficients"].ravel(), TRUTH[0], rtol=0, atol=1e-15)
+
+
+def test_a_cap_comes_from_the_file(saved) -> None:
+    cap = Cap(0.008, 1.2)
+    layout = SensorLayout.in_spiral(cap, 40)
+    basis = basis_for(cap, "clamped", NI, NJ)
+    read = layout.operator(basis) @ TRUTH[0]
+    of = {"size": [cap.a, cap.b], "radius": 0.008, "angle": 1.2, "positions": layout.positions}
+
+    found = reconstruct(saved(**of, curvature=read.reshape(3, -1)), (NI, NJ), edge="clamped")
+
+    np.testing.assert_allclose(found["coefficients"].ravel(), TRUTH[0], rtol=0, atol=1e-14)
+
+
 @pytest.mark.parametrize(
     ("changes", "arguments", "reason"),
     [
+        ({"angle": 1.2}, {}, "one radius, angle and stretch of a cap, and no outline"),
+        ({"angle": 1.2, "radius": 0.008}, {}, "size 0.0192 x 0.0192 m, twice from pole to rim"),
         ({"radius": 0.01}, {}, "is a full circle at radius"),
         ({"radius": -1.0}, {}, "is a full circle at radius"),
         ({"radius": np.nan}, {}, "is a full circle at radius"),
-        ({"radius": [1.0, 2.0]}, {}, r"one radius in m, got shape \(2,\)"),
+        ({"radius": [1.0, 2.0, 3.0]}, {}, r"one radius in m or two, got shape \(3,\)"),
+        ({"radius": [0.1, 2.0]}, {}, "expected at most 1%, which are radii of at least"),
         ({"size": [0.1]}, {}, r"positions of shape \(P, 1\)"),
         ({"inplane": "glued"}, {"contact": True}, "inplane among held, diaphragm, free"),
         ({"inplane": 1.0}, {}, "expected inplane to be one text, got float64"),

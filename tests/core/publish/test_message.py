@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import Disk, Patch, Plate, PointLoad, Scene, SensorLayout, Setup, load_scene
+from kappaskin import Cap, Disk, Patch, Plate, PointLoad, Scene, SensorLayout, Setup, load_scene
 from kappaskin.contact import surface_geometry
 from kappaskin.estimation import METHODS
 from kappaskin.pipeline.reported import UNKNOWN
@@ -30,10 +30,19 @@ PRESSED = load_scene("off-centre")
 FLOATS = st.floats(allow_nan=True, allow_infinity=True)
 
 
-def bent() -> Scene:
-    patch, noise = Patch(0.04, 0.03, 12.9e-3), (GaussianNoise(0.3),)
-    layout = SensorLayout.regular(patch, 10, 10)
+def bent(patch: Patch) -> Scene:
+    noise, layout = (GaussianNoise(0.3),), SensorLayout.regular(patch, 10, 10)
     return Scene("bent", Plate(patch), layout, effects=noise).touched_by(PointLoad(0.014, 0.017, 1))
+
+
+SKINS = {
+    "flat": PRESSED,
+    "bent": bent(Patch(0.04, 0.03, 12.9e-3)),
+    "dome": bent(Patch(0.04, 0.03, (0.1, 0.08))),
+    "saddle": bent(Patch(0.04, 0.03, (-0.1, 0.08))),
+    "cap": bent(Cap(0.016, 1.2)),
+}
+on_each_skin = pytest.mark.parametrize("scene", SKINS.values(), ids=SKINS)
 
 
 def refuse(constant: str) -> float:
@@ -48,7 +57,7 @@ def vector(told: dict[str, object], name: str) -> np.ndarray:
     return np.array([told[f"{name}_{axis}"] for axis in "xyz"])
 
 
-@pytest.mark.parametrize("scene", [PRESSED, bent()], ids=["flat", "bent"])
+@on_each_skin
 def test_a_contact_says_what_the_estimate_says(messages_of, scene: Scene) -> None:
     (made,) = messages_of(scene)
     told, touch, geometry = read(made.contact), made.estimate.contact, made.estimate.geometry
@@ -69,7 +78,7 @@ def test_a_contact_says_what_the_estimate_says(messages_of, scene: Scene) -> Non
         assert along == pytest.approx(geometry.directions[k], abs=1e-6)
 
 
-@pytest.mark.parametrize("scene", [PRESSED, bent()], ids=["flat", "bent"])
+@on_each_skin
 def test_error_bars_are_what_noise_does_to_the_geometry(messages_of, scene: Scene) -> None:
     (made,) = messages_of(scene)
     told, basis, touch = read(made.contact), made.pipeline.basis, made.estimate.contact
@@ -237,6 +246,23 @@ def test_the_state_of_the_source_is_json_with_every_number_promised() -> None:
     )
     assert (there["source"], there["rate_per_s"], there["width_x_m"]) == ("sim", 500.0, 0.1)
     assert set(there) == set(told)
+
+
+@pytest.mark.parametrize(
+    ("patch", "curvatures"),
+    [
+        (Patch(0.1, 0.1), (0.0, 0.0)),
+        (Patch(0.04, 0.03, 0.04), (25.0, 0.0)),
+        (Patch(0.1, 0.1, (0.5, -0.4)), (2.0, -2.5)),
+    ],
+    ids=["flat", "cylinder", "saddle"],
+)
+def test_the_state_of_the_source_has_both_curvatures_of_the_skin(patch, curvatures) -> None:
+    sensor = Scene("", Plate(patch), SensorLayout.regular(patch, 4, 4)).sensor()
+
+    told = read(SourceState("streaming", "sim", "", sensor, 500.0, 0.0).encoded())
+
+    assert (told["base_curvature_per_m"], told["base_curvature_y_per_m"]) == curvatures
 
 
 # The guide

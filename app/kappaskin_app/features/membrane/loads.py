@@ -55,7 +55,8 @@ class DrawnLoads:
         return centres
 
     def _show_footprints(self, loads: Sequence[Load], skin: DrawnSkin, lift: float) -> None:
-        lines = [line for line in map(footprint, loads) if line is not None]
+        found = (footprint(load, skin.patch) for load in loads)
+        lines = [line for line in found if line is not None]
         self._line_actor.visibility = bool(lines)
         if lines:
             points, _ = skin.place(np.concatenate(lines), lift)
@@ -72,4 +73,5 @@ def put_upright(actor: pv.Actor, skin: DrawnSkin, position: Array, above: float 
     if shown:
         points, out = skin.place(position[None], above)
         actor.position = tuple(points[0])
-        actor.orientation = (0.0, np.degrees(np.arctan2(out[0, 0], out[0, 2])), 0.0)
+        x, y, z = out[0]  # turned about y first, then about x
+        actor.orientation = tuple(np.degrees([np.arctan2(-y, z), np.arcsin(x), 0.0]))
