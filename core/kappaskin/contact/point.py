@@ -52,6 +52,7 @@ def _waves(count: int) -> Array:
 _SIGNIFICANT = 30.0  # drop of chi-squared below which a contact may be noise found by searching
 _SEARCHED = 33  # points searched along each side
 _NODES = 64  # of them whose normal equations are kept
+_TRIED = 2  # loads on a cap that a step is taken from, before one is refined
 _FUNCTIONS = 15  # along each side, of the shape searched for
 _STEPS = 20  # of Gauss-Newton at most; 1 or 2 do but for the last millimetres at the rim
 _WORTH = 2.0  # variances of the noise: after a step that gains less, another one is not worth it
@@ -209,6 +210,9 @@ class PointContact:
             return NO_CONTACT
         self._rows[4] = self._readings = K
         if tables.weights is None and self._stretched is None and not len(self._free):
+            if self._nodes is not None:  # what explains most may lead to less
+                best = explained.argpartition(-_TRIED)[-_TRIED:].tolist()
+                node = min(best, key=lambda each: self._first(each).left)
             (x, y, s), here = self._places[node].tolist(), self._first(node)
         else:
             x, y, s = self._peak(explained, node)
