@@ -24,8 +24,8 @@ LIMITS = {
     # studies: summed; sources: interpreter, lines of other formats, a sensor's description, inputs,
     # readings that a program pushes; live: the loop of a program; recording: foreign and importing,
     # files of other programs; _plugins. Recognition of a board's lines, and the dialog of it.
-    # The strip chart.
-    "modules": 352,
+    # The strip chart. mechanics: caps.
+    "modules": 353,
     # Shells and plates that stretch, a load's size, slopes on shells, revisions of estimates;
     # ovals beside objects, and whether an object fits; errors told beforehand, of calibrations on
     # other paths, and of effects that act on one another.
@@ -46,7 +46,8 @@ LIMITS = {
     # Numbers by their error bars, names of objects that last; recordings with one key, what may be
     # done with them, and exports by purpose.
     # A source that streams until the requested one answers; the list of devices.
-    "statements": 44_287,
+    # Skins that curve both ways: caps and their functions, readings, contacts and large deflection.
+    "statements": 45_600,
     # _files: one way to read and write files; _text: text from outside; _plugins: what other
     # packages add. For all rooms and the app.
     "loose modules of core": 11,
