@@ -3,11 +3,14 @@
 Run `python tests/guide_keys.py` when a key came, went or changed.
 """
 
+import math
+from dataclasses import replace
 from pathlib import Path
 from types import UnionType
 from typing import Any, get_args, get_origin
 
 from kappaskin._schema import Key, Part
+from kappaskin._toml import REQUIRED
 from kappaskin.pipeline import SETUP
 from kappaskin.scenes import PARTS
 from kappaskin.sources.description import LINE, READINGS, TOP
@@ -85,7 +88,10 @@ def _table(part: Part, of_kinds: bool = False) -> str:
     if of_kinds or part is not PARTS["effects"]:
         for kind in part.kinds:
             for key in _known(part, kind):
-                rows.setdefault(_row(key, part.key(key, kind)), []).append(kind)
+                declared = part.key(key, kind)
+                if key in part.kinds[kind].needs and declared.default == math.inf:
+                    declared = replace(declared, default=REQUIRED)
+                rows.setdefault(_row(key, declared), []).append(kind)
     there = any(rows.values())
     head = ("key", *(("of",) if there else ()), "value", "unit", "default", "meaning")
     lines = [_line(head), "|---" * len(head) + "|"]
@@ -136,6 +142,8 @@ def _kind(kind: Any) -> str:
     if get_origin(kind) is not tuple:
         return _WORDS[kind]
     first, *others = get_args(kind)
+    if len(others) == 2:
+        return f"three {_kind(first)}s"
     if others != [...]:
         return f"pair of {_kind(first)}s"
     return "list of pairs" if get_origin(first) is tuple else f"list of {_kind(first)}s"

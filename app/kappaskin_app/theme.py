@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QObject
+from PySide6.QtCore import QEvent, QObject, QTimer
 from PySide6.QtGui import QColor, QFont, QFontDatabase, QGuiApplication, QPalette
 from PySide6.QtWidgets import QApplication, QWidget
 
@@ -84,6 +84,7 @@ DARK = Theme(
     alert="#ff9a90",
     disabled="#8a939e",
 )
+_LATER = 20  # ms, after which hidden widgets follow
 THEMES = {"light": LIGHT, "dark": DARK}
 FAINT, ALERT = QPalette.ColorRole.PlaceholderText, QPalette.ColorRole.BrightText
 """The roles of a theme's colours `faint` and `alert` in its palette."""
@@ -147,16 +148,20 @@ def apply_look(theme: Theme, percent: float = 100.0, colours: str = "standard") 
         QApplication.setFont(font)
 
 
-class _LookFollower(QObject):
-    """Calls `show` when the palette or font of a widget changes."""
+class _LookFollower(QTimer):
+    """Calls `show` when the palette or font of a widget changes; of a hidden one a while later."""
 
     def __init__(self, widget: QWidget, show: Callable[[], object]) -> None:
-        super().__init__(widget)
+        super().__init__(widget, singleShot=True, interval=_LATER)  # pyright: ignore[reportCallIssue]
         self._show = show
+        self.timeout.connect(show)
         widget.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() in (QEvent.Type.PaletteChange, QEvent.Type.FontChange):
+            self.start()
+        if self.isActive() and isinstance(watched, QWidget) and watched.isVisible():
+            self.stop()
             self._show()
         return False
 
@@ -164,7 +169,8 @@ class _LookFollower(QObject):
 def follow_look(widget: QWidget, show: Callable[[], object]) -> None:
     """Call `show` now, and again when the theme or the font changes.
 
-    `widget` has no style sheet: Qt sends one with a style sheet no such events.
+    That is once the window is drawn, or the widget shown, where it is hidden. `widget` has no style
+    sheet: Qt sends one with a style sheet no such events.
     """
     _LookFollower(widget, show)
     show()

@@ -27,6 +27,8 @@ NONE = "\N{EN DASH}"
 """What is shown where nothing is known."""
 NO_FORCE = "edge: no force"
 """What is shown instead of the force of a contact near a held edge, which does not determine it."""
+SNAPS = "snaps through: no force"
+"""What is shown instead of the force where a curved skin snaps through."""
 ONE_SIGMA = "\N{PLUS-MINUS SIGN}1 \u03c3"
 """The error bars of commands, files and messages: one standard deviation."""
 _EXACT = 1e-9  # of a value, or of its unit: a smaller error is of rounding

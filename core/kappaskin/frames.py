@@ -7,6 +7,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from kappaskin._text import NO_FORCE, SNAPS
+
 Array = NDArray[np.float64]
 Counts = NDArray[np.int32]
 Mask = NDArray[np.bool_]
@@ -75,8 +77,9 @@ class Contact:
     reliable position and force.
     `size` and `size_sd` in m^2 are the squared radius of the disc that the load is spread over;
     NaN where the skin does not tell it. `force_is_lower_bound` says that the skin may stretch, by
-    which the force would change by more than its error bar (`kappaskin.contact.LowerBound`). The
-    force is NaN where the skin's material is unknown; the size is then that of the contact's area.
+    which the force would change by more than its error bar (`kappaskin.contact.LargeDeflection`);
+    `force_is_upper_bound` likewise that a curved skin softens. Where it `snaps_through` the force
+    is NaN, as where the skin's material is unknown; the size is then that of the contact's area.
     Every number is NaN when the readings hold no contact that stands out of the noise.
     """
 
@@ -92,10 +95,23 @@ class Contact:
     size: float = math.nan
     size_sd: float = math.nan
     force_is_lower_bound: bool = False
+    force_is_upper_bound: bool = False
+    snaps_through: bool = False
 
     @property
     def present(self) -> bool:
         return math.isfinite(self.position.item(0))
+
+    @property
+    def force_bound(self) -> str:
+        """What stands before the force: a sign where it is a lower or an upper bound."""
+        least = "\N{GREATER-THAN OR EQUAL TO} " if self.force_is_lower_bound else ""
+        return "\N{LESS-THAN OR EQUAL TO} " if self.force_is_upper_bound else least
+
+    @property
+    def no_force(self) -> str:
+        """Why there is no force, in words; empty where there may be one."""
+        return NO_FORCE if self.near_rim else SNAPS if self.snaps_through else ""
 
     @property
     def position_95(self) -> Array:

@@ -18,7 +18,9 @@ from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.theme import (
     ALERT,
     COLOUR_MAPS,
+    DARK,
     FAINT,
+    LIGHT,
     LIGHT_INK,
     OUT,
     SATURATED,
@@ -218,11 +220,14 @@ def test_a_label_of_a_role_has_its_colour_in_each_theme(qapp: QApplication, role
         assert label.palette().color(label.foregroundRole()).name() == wanted
 
 
-def test_what_follows_the_look_is_called_at_once_and_at_each_change(qapp: QApplication) -> None:
+def test_what_follows_the_look_is_called_at_once_and_at_each_change(
+    qapp: QApplication, until
+) -> None:
     seen: list[Theme] = []
     widget = QWidget()
     follow_look(widget, lambda: seen.append(current()))
     assert seen == [current()]
+    widget.show()
     for theme in THEMES.values():
         apply_look(theme)
         qapp.processEvents()
@@ -231,7 +236,15 @@ def test_what_follows_the_look_is_called_at_once_and_at_each_change(qapp: QAppli
     count = len(seen)
     qapp.processEvents()
     assert len(seen) == count + 1
-    apply_look(seen[-1])
+    widget.hide()
+    apply_look(DARK if seen[-1] is LIGHT else LIGHT)
+    qapp.processEvents()
+    assert len(seen) == count + 1
+    widget.show()
+    assert seen[count + 1 :] == [current()]
+    widget.close()
+    apply_look(seen[count])
+    until(lambda: seen[count + 2 :] == [current()])
 
 
 @pytest.fixture(scope="module")

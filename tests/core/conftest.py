@@ -28,6 +28,8 @@ SKINS = {
     "strip": Patch(0.1, 0.02, strip=True),
     "bent": Patch(0.04, 0.03, 12.9e-3),
     "arc": Patch(0.03, 0.02, 12.9e-3, strip=True),
+    "dome": Patch(0.1, 0.08, (0.3, 0.25)),
+    "saddle": Patch(0.1, 0.08, (0.4, -0.3)),
     "disk": Disk(0.05),
     "square": Polygon([(0, 0), (0.1, 0), (0.1, 0.1), (0, 0.1)]),
     "triangle": Polygon([(0, 0), (0.1, 0), (0.05, 0.05 * math.sqrt(3))]),

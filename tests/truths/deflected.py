@@ -159,5 +159,5 @@ class ShallowSkin(DeflectedSkin):
             e - fy * n,
             -Hx * fx * t - (Hx + fxx + Hx**2 * f) * n,
             -Hy * fy * e - (Hy + fyy + Hy**2 * f) * n,
-            -fxy * n,
+            -(Hx * fy * t + Hy * fx * e) / 2 - fxy * n,
         )

@@ -18,6 +18,7 @@ import numpy as np
 
 from argyris import ArgyrisPlate
 from kappaskin import (
+    Cap,
     LeastSquares,
     Patch,
     Plate,
@@ -43,6 +44,7 @@ from koiter import Panel
 from navier import HingedPlate, Load
 from objects import objects_table
 from planned import effects_table
+from revolution import RevolvedShell, Spheroid
 from sanders import CylinderShell
 from sweeps import sweeps_table
 from von_karman import StretchingPlate
@@ -81,6 +83,7 @@ class Case:
     truth: Callable[[SensorLayout], Callable[[Load], np.ndarray]]
     load: Callable[[np.ndarray], Load]
     gage_length: float = 0.0
+    edge: str = "hinged"
     low: float = 0.2
     high: float = 0.8
     noise: float = NOISE
@@ -96,8 +99,8 @@ class Case:
 def coverage(case, frames, seed=0) -> Figures:
     """The figures of `frames` presses at random places, each with its own noise."""
     rng, layout = np.random.default_rng(seed), case.layout
-    read, contact = case.truth(layout), PointContact(case.skin, layout)
-    fit = LeastSquares(basis_for(case.skin.patch, "hinged", 8, 8), layout)
+    read, contact = case.truth(layout), PointContact(case.skin, layout, case.edge)
+    fit = LeastSquares(basis_for(case.skin.patch, case.edge, 8, 8), layout)
     loads = [case.load(share) for share in rng.uniform(case.low, case.high, (frames, 2))]
     rows, limits = [], []
     for load in loads:
@@ -258,6 +261,76 @@ STRETCHED = [
     _stretched_case("free, 2.5 thicknesses", "free", 0.042),
 ]
 
+# Caps of 60 elements, even by area, pressed anywhere from the pole to three quarters of the arc by
+# about 100 noises of all readings: by less than a tenth of their thickness
+
+
+@dataclass(frozen=True, eq=False)
+class CapCase(Case):
+    """A case on a cap."""
+
+    @property
+    def layout(self):
+        cap, k = self.skin.patch, np.arange(60)
+        s = cap.rim_radius * _even((k + 0.5) / 60, cap.angle) / cap.angle
+        azimuth = k * pi * (3 - sqrt(5))
+        return SensorLayout.scattered(cap, _on_cap(cap, s, azimuth))
+
+
+def _even(share, angle):
+    """The angle from the pole within which a `share` of a sphere's cap of an `angle` lies."""
+    return np.arccos(1 - share * (1 - np.cos(angle)))
+
+
+def _on_cap(cap, s, azimuth):
+    return cap.rim_radius + np.stack([s * np.cos(azimuth), s * np.sin(azimuth)], -1)
+
+
+@cache
+def _revolved(cap, edge):
+    surface = Spheroid(cap.radius, cap.stretch * cap.radius)
+    shell = RevolvedShell(surface, cap.rim_radius, edge=edge)
+    return cache(lambda elements: shell.reader(np.frombuffer(elements).reshape(-1, 2)))
+
+
+def _cap_case(name, cap, edge, force, **width):
+    def truth(layout):
+        x, y = (layout.positions - cap.rim_radius).T
+        azimuth = np.arctan2(y, x)
+        read = _revolved(cap, edge)(np.stack([np.hypot(x, y), azimuth], -1).tobytes())
+        c, s = np.cos(azimuth), np.sin(azimuth)
+
+        def turned(load):  # from the meridian to x, as the elements are
+            out = replace(load, x=load.x - cap.rim_radius, y=load.y - cap.rim_radius)
+            xx, yy, xy = read(out)
+            return np.stack(
+                [
+                    c**2 * xx - 2 * c * s * xy + s**2 * yy,
+                    s**2 * xx + 2 * c * s * xy + c**2 * yy,
+                    c * s * (xx - yy) + (c**2 - s**2) * xy,
+                ]
+            )
+
+        return turned
+
+    def load(share):
+        far = cap.rim_radius * _even(share[0], 0.75 * cap.angle) / cap.angle
+        return Load(*_on_cap(cap, far, 2 * pi * share[1]), force, **width)
+
+    return CapCase(name, Plate(cap), truth, load, edge=edge, low=0, high=1, bound=False)
+
+
+FINGERTIP, PAD, LONG_FINGER = Cap(8e-3), Cap(20e-3, 0.6), Cap(8e-3, stretch=1.4)
+CAPS = [
+    _cap_case("fingertip, disc of 1 mm", FINGERTIP, "clamped", 2.1, radius=1e-3),
+    _cap_case("fingertip, disc of 2 mm", FINGERTIP, "clamped", 4.4, radius=2e-3),
+    _cap_case("fingertip, disc of 3 mm", FINGERTIP, "clamped", 8.7, radius=3e-3),
+    _cap_case("fingertip, Gaussian of 1 mm", FINGERTIP, "clamped", 4.4, sd=1e-3),
+    _cap_case("shallow cap, disc of 1 mm", PAD, "hinged", 1.0, radius=1e-3),
+    _cap_case("shallow cap, disc of 3 mm", PAD, "hinged", 2.6, radius=3e-3),
+    _cap_case("spheroid, disc of 2 mm", LONG_FINGER, "clamped", 4.4, radius=2e-3),
+]
+
 # Shapes: the bands of the surface, of estimators with functions that end where the truth does not
 
 
@@ -376,7 +449,7 @@ def accused(frames, seed=0) -> int:
     return count
 
 
-CASES: Sequence[Case] = (*FLAT, *BENT, *SHALLOW, *STRETCHED, WEAK)
+CASES: Sequence[Case] = (*FLAT, *BENT, *SHALLOW, *CAPS, *STRETCHED, WEAK)
 
 
 def table(frames=1000, name=""):

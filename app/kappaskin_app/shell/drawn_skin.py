@@ -15,6 +15,8 @@ _NEAREST = 0.7  # of the base radius, so that no skin is drawn through its own a
 
 
 _SEAM = 1e-9  # of a side: or a line passes between two triangles
+_ITERATIONS = 12  # until a place on a bent skin is found to rounding
+_STEP = 1e-5  # of the shorter side, of differences along the skin at rest
 
 
 @dataclass(frozen=True)
@@ -50,8 +52,10 @@ class DrawnSkin:
         self._shown: Indices | None = None
         if not self.on.all():
             grid, self._shown = snapped_to_rim(patch, grid, self.on)
-        self._rest, self._out = self.at_rest(grid.reshape(-1, 2))
-        self.shares: Array = grid.reshape(-1, 2) / (patch.a, patch.b)
+        positions = grid.reshape(-1, 2)
+        self._rest, self._out = self.at_rest(positions)
+        self._areas, self._leans = self._normal_terms(positions)
+        self.shares: Array = positions / (patch.a, patch.b)
         """Where each point (points, 2) is, as shares of the sides."""
         self.height: Array = np.zeros((ny, nx))
         """How far out each point is drawn, in mm."""
@@ -60,6 +64,29 @@ class DrawnSkin:
         """Points of the skin at rest at `positions`, and its outward normals there."""
         points, out = self.patch.at_rest(positions)
         return MM * points, out
+
+    def _slopes_at_rest(self, positions: Array) -> tuple[Array, Array]:
+        """How points, and in 1/mm normals, at rest change along x and y, each (2, k, 3)."""
+        step = _STEP * min(self.patch.a, self.patch.b) * np.eye(2)[:, None]
+        ahead, behind = self.at_rest(positions + step), self.at_rest(positions - step)
+        along, turning = (
+            (one - other) / (2 * MM * step.max()) for one, other in zip(ahead, behind, strict=True)
+        )
+        return along, turning
+
+    def _normal_terms(self, positions: Array) -> tuple[Array, Array]:
+        """The normal of the drawn surface by powers of the height h, and of its slopes.
+
+        With the tangents T at rest, a surface at h has T_x + h N_x + h_x N and likewise along y.
+        Their product is N (a + b h + c h^2) - h_x (P + h Q) - h_y (R + h S): a, b, c (3, k),
+        and P, Q and R, S (2, 2, k, 3).
+        """
+        (x, y), (turn_x, turn_y) = self._slopes_at_rest(positions)
+        out = self._out
+        both = np.cross(turn_x, y) + np.cross(x, turn_y)
+        areas = np.stack([np.cross(x, y), both, np.cross(turn_x, turn_y)])
+        leans = np.stack([np.cross([y, turn_y], out), np.cross(out, [x, turn_x])])
+        return np.vecdot(areas, out), leans
 
     @property
     def side(self) -> float:
@@ -76,7 +103,7 @@ class DrawnSkin:
         """How far in mm the skin may be drawn from where it rests."""
         patch = self.patch
         side = patch.a if patch.strip else min(patch.a, patch.b)
-        return MM * min(_DEEPEST * side, _NEAREST * patch.radius)
+        return MM * min(_DEEPEST * side, _NEAREST * min(map(abs, patch.radii)))
 
     @property
     def bounds(self) -> tuple[Array, Array]:
@@ -119,18 +146,12 @@ class DrawnSkin:
         return self._rest[which] + self._out[which] * h[:, None]
 
     def shading(self) -> Array:
-        """Unit normals (points, 3) of the drawn surface, in one pass of differences.
-
-        A surface at the height h above an arc of curvature H has the tangents
-        (1 + h H) T + h_x N and Y + h_y N; their product is the normal.
-        """
-        h = self.height
-        h_y, h_x = (d.ravel() for d in np.gradient(h, self.cell[1] * MM, self.cell[0] * MM))
-        wider = 1 + h.ravel() * self.patch.arc_curvature / MM
-        sine, _, cosine = self._out.T  # N = (sine, 0, cosine), so that T = (cosine, 0, -sine)
-        normals = np.stack(
-            [wider * sine - h_x * cosine, -wider * h_y, wider * cosine + h_x * sine], axis=-1
-        )
+        """Unit normals (points, 3) of the drawn surface, in one pass of differences."""
+        slopes = np.gradient(self.height, self.cell[1] * MM, self.cell[0] * MM)[::-1]
+        h, (a, b, c) = self.height.ravel(), self._areas
+        normals: Array = self._out * (a + h * (b + h * c))[:, None]
+        for slope, (level, raised) in zip(slopes, self._leans, strict=True):
+            normals -= slope.ravel()[:, None] * (level + h[:, None] * raised)
         normals /= np.sqrt(np.einsum("pi,pi->p", normals, normals))[:, None]
         return normals
 
@@ -154,13 +175,12 @@ class DrawnSkin:
         nearest = int(self.nearest(position[None])[0])
         q, p = divmod(nearest, self.on.shape[1])
         (out,) = self.at_rest(position[None])[1]
+        along, turning = (slopes[:, 0] for slopes in self._slopes_at_rest(position[None]))
         rows, columns = (slice(max(at - 1, 0), at + 2) for at in (q, p))
-        along, across = self.height[q, columns], self.height[rows, p]
-        h_x = (along[-1] - along[0]) / ((len(along) - 1) * self.cell[0] * MM)
-        h_y = (across[-1] - across[0]) / ((len(across) - 1) * self.cell[1] * MM)
-        wider = 1 + self.height[q, p] * self.patch.arc_curvature / MM
-        x = wider * np.array([out[2], 0.0, -out[0]]) + h_x * out
-        return x, np.array([0.0, 1.0, 0.0]) + h_y * out
+        lines = self.height[q, columns], self.height[rows, p]
+        rises = [(h[-1] - h[0]) / ((len(h) - 1) * MM) for h in lines] / self.cell
+        x, y = along + self.height[q, p] * turning + rises[:, None] * out
+        return x, y
 
     @cached_property
     def _triangles(self) -> Indices:
@@ -170,44 +190,48 @@ class DrawnSkin:
     def hit(self, near: Array, far: Array) -> Array | None:
         """Where the line of sight from `near` to `far` first meets the drawn skin, (2,) in m.
 
-        None where it passes it by. Moeller and Trumbore's way, for all triangles at once.
+        None where it passes it by.
         """
-        a, b, c = np.moveaxis(self.points()[self._triangles], 1, 0)
+        places, shares = self._met(near, far, self.points())
+        return places[np.argmin(shares)] if len(places) else None
+
+    def seen_at(self, near: Array, far: Array, height: float, beside: Array) -> Array:
+        """Where the line of sight from `near` to `far` meets the skin `height` mm out, (2,) in m.
+
+        Of several crossings the one next to `beside`; of none, where the line passes closest.
+        """
+        places, _ = self._met(near, far, self.points(height=np.full(self.on.size, height)))
+        position = min(
+            places, key=lambda place: float(np.linalg.norm(place - beside)), default=beside
+        )
+        towards = (far - near) / np.linalg.norm(far - near)
+        across = np.eye(3) - np.multiply.outer(towards, towards)
+        for _ in range(_ITERATIONS):
+            points, out = self.at_rest(position[None])
+            along, turning = (slopes[:, 0] for slopes in self._slopes_at_rest(position[None]))
+            tangents = (along + height * turning) @ across
+            off = (points[0] + height * out[0] - near) @ across
+            # Newton's way: to where the line meets the skin, or is nearest to what bends away.
+            bent = 0.0 if len(places) else np.linalg.norm(off) * np.abs(turning).max()
+            steepness = tangents @ tangents.T + bent * np.eye(2)
+            position = position - np.linalg.lstsq(steepness, tangents @ off)[0] / MM
+        return position
+
+    def _met(self, near: Array, far: Array, points: Array) -> tuple[Array, Array]:
+        """Where a line meets the surface of `points`: positions (k, 2) in m, shares (k,) of it.
+
+        Moeller and Trumbore's way, for all triangles at once.
+        """
+        a, b, c = np.moveaxis(points[self._triangles], 1, 0)
         along, ab, ac, start = far - near, b - a, c - a, near - a
         p, q = np.cross(along, ac), np.cross(start, ab)
         area = np.vecdot(ab, p)
         area[area == 0] = np.nan  # seen edge-on
         u, v = np.vecdot(start, p) / area, np.vecdot(along[None], q) / area
         met = np.flatnonzero((u >= -_SEAM) & (v >= -_SEAM) & (u + v <= 1 + _SEAM))
-        if not len(met):
-            return None
-        first = met[np.argmin(np.vecdot(ac[met], q[met]) / area[met])]
-        share = np.array([1 - u[first] - v[first], u[first], v[first]])
-        sides = self.patch.a, self.patch.b
-        return share @ self.shares[self._triangles[first]] * sides
-
-    def seen_at(self, near: Array, far: Array, height: float, beside: Array) -> Array:
-        """Where the line of sight from `near` to `far` meets the skin `height` mm out, (2,) in m.
-
-        Of two crossings the one next to `beside`; of none, where the line passes closest.
-        """
-        patch, along = self.patch, far - near
-        if not patch.arc_curvature:
-            share = (height - near[2]) / along[2] if abs(along[2]) > 1e-9 else 0.0
-            return (near + share * along)[:2] / MM
-        radius = MM * patch.radius
-        centre = np.array([MM * patch.a / 2, -radius])
-        start, d = near[[0, 2]] - centre, along[[0, 2]]
-        # |start + share d| = radius + height, in the plane that the arc lies in.
-        middle = -(start @ d) / max(d @ d, 1e-12)
-        off = (start @ start - (radius + height) ** 2) / max(d @ d, 1e-12)
-        half = np.sqrt(max(middle**2 - off, 0.0))
-        crossings = [near + share * along for share in (middle - half, middle + half)]
-        found = [
-            np.array([patch.a / 2 + patch.radius * np.arctan2(x - centre[0], z + radius), y / MM])
-            for x, y, z in crossings
-        ]
-        return min(found, key=lambda position: float(np.linalg.norm(position - beside)))
+        weights = np.stack([1 - u[met] - v[met], u[met], v[met]], axis=1)
+        corners = self.shares[self._triangles[met]] * (self.patch.a, self.patch.b)
+        return np.vecdot(weights[..., None], corners, axis=1), np.vecdot(ac, q)[met] / area[met]
 
 
 NO_SKIN = DrawnSkin(Patch(0.1, 0.1), 2, 2)

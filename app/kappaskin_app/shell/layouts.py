@@ -28,7 +28,7 @@ class FullScreen(Protocol):
 
     def enter(self) -> None: ...
 
-    def leave(self) -> None: ...
+    def leave(self, arrange: Callable[[], object] | None = None) -> None: ...
 
 
 class Layouts(QObject):
@@ -127,7 +127,9 @@ class Layouts(QObject):
     def choose(self, name: str) -> None:
         """Apply the layout of this name."""
         layout = self.own[name] if name in self.own else self.ready(name)
-        if self.now != layout:
+        if self.full_screen is not None and self.full_screen.on and name != self._full:
+            self.full_screen.leave(partial(self.apply, layout))
+        elif self.now != layout:
             self.apply(layout)
         if name == self._full and self.full_screen is not None:
             self.full_screen.enter()

@@ -98,7 +98,7 @@ def reference_on(plate: Plate, edge: str, case: str = "") -> tuple[int, int]:
         return ready.reference
     if patch.strip:
         return _REFERENCE, 1
-    if type(patch) is not Patch or patch.arc_curvature or plate.stretches:
+    if type(patch) is not Patch or plate.mixes_sines or plate.stretches:
         return _REFERENCE, _REFERENCE
     count = _RESOLVED if edge == "hinged" else _RESOLVED_MIXED
     return count, count

@@ -115,7 +115,8 @@ def _slow(settings: Settings) -> _Slow | None:
     except Refusal:
         return None
     # Rectangles and arcs have sines or beams: the others' functions are computed first.
-    return skin if type(skin[0].patch) is not Patch else None
+    patch, mixed = skin[0].patch, skin[0].mixes_sines
+    return skin if type(patch) is not Patch or (patch.is_shallow and mixed) else None
 
 
 RECORDED = "replay:"
@@ -459,20 +460,22 @@ class Session(QObject):
         """Poll the engine, and emit new estimates and the status."""
         if self.closed:
             return  # called by a picture drawn while closing
-        now = time.monotonic()
+        now, connections = time.monotonic(), self.status.connections
         if reports := now >= self._next_status:
             self._next_status = now + _STATUS
             self.engine.revive()
-            was, self.status = self.status, self.engine.status()
+            self.status = self.engine.status()
             self._lost_since = min(self._lost_since, now) if self._lost else math.inf
-            if self.status.connections != was.connections:
+            if self.status.connections != connections:
                 self.estimate = None  # the estimate was of the last sensor
                 self._set_up()
             arrived = self.status.reported > self._seek_time + _ARRIVES
             if arrived or self._seek_target == self.status.playing.at:
                 self._seek_target = None
             self._follow_source()
-        estimate = self.engine.latest(self.status)
+        # Views begin anew with another sensor: its first estimate is shown in a turn of its own.
+        another = self.status.connections != connections
+        estimate = None if another else self.engine.latest(self.status)
         if estimate is not None and (estimate.generation, estimate.sequence) == self._shown:
             estimate = None
         if estimate is not None:

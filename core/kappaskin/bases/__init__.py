@@ -6,9 +6,9 @@ from functools import partial
 from kappaskin.bases.basis import ORDERS as ORDERS
 from kappaskin.bases.basis import Basis as Basis
 from kappaskin.bases.basis import CurvatureMap as CurvatureMap
-from kappaskin.bases.basis import PointMap as PointMap
 from kappaskin.bases.basis import ValueMap as ValueMap
 from kappaskin.bases.basis import covariant_at as covariant_at
+from kappaskin.bases.basis import covariant_maps as covariant_maps
 from kappaskin.bases.basis import curvature_at as curvature_at
 from kappaskin.bases.basis import hoop_at as hoop_at
 from kappaskin.bases.modes import CapBasis as CapBasis

@@ -181,6 +181,14 @@ class PointMap:
         return np.dot(flat, self.values).astype(float).take(self.column, axis=-1)
 
 
+def covariant_maps(basis: Basis, x: Array, y: Array) -> list[ValueMap]:
+    """The maps from coefficients to what `covariant_at` gives, on the grid of `x` and `y`."""
+    if not isinstance(basis.patch, Cap):
+        return [basis.on_grid(x, y, *order) for order in ORDERS]
+    jets = covariant_at(basis, np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))]))
+    return [PointMap.of(lambda _, jet=jet: jet, x, y) for jet in jets]
+
+
 class CurvatureMap:
     """A map from coefficients to the change of one curvature component on a grid."""
 

@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, ClassVar, cast
 
 import numpy as np
 import scipy
@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from kappaskin.bases.argyris import PlateModes
 
 
-_MOST = 1024  # modes: more take minutes to make
-
-
 @dataclass(frozen=True)
 class ModeBasis(FunctionBasis):
     """Ni x Nj functions of a whole skin; their mean square is 1/4, as that of sines.
@@ -32,10 +29,12 @@ class ModeBasis(FunctionBasis):
     Of a flat skin they are the first modes by frequency.
     """
 
+    MOST: ClassVar = 1024  # more take minutes to make
+
     def __post_init__(self) -> None:
-        if not (self.Ni > 0 and self.Nj > 0 and self.size <= _MOST):
+        if not (self.Ni > 0 and self.Nj > 0 and self.size <= self.MOST):
             raise Refusal(
-                f"expected 1 x 1 to {_MOST} functions on a {self.patch.name}, got "
+                f"expected 1 x 1 to {self.MOST} functions on a {self.patch.name}, got "
                 f"{self.Ni} x {self.Nj}"
             )
 
@@ -140,6 +139,8 @@ class CapBasis(RoundBasis):
     slope.
     """
 
+    MOST: ClassVar = 8192
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if not isinstance(self.patch, Cap):
@@ -179,9 +180,8 @@ def _jacobi(r: Array, m: NDArray[np.intp], count: int, k: int) -> Array:
     x = 2 * r**2 - 1
     P, rest = list[Array](), list[Array]()  # P(2 t - 1), (1 - t)^k, and derivatives by t = r^2
     for d in range(3):
-        rising = np.prod([i + 2 * k + m + 1 + e for e in range(d)], axis=0) * (i >= d)
-        jacobi = scipy.special.eval_jacobi(np.maximum(i - d, 0), 2 * k + d, m + d, x)
-        P.append(rising * jacobi)
+        rising = np.prod([i + 2 * k + m + 1 + e for e in range(d)], axis=0)
+        P.append(rising * _polynomials(2 * k + d, m[:, 0] + d, count, x[..., 0], d))
         rest.append((-1.0) ** d * math.perm(k, d) * ((1 - x) / 2) ** max(k - d, 0))
     G, G1 = rest[0] * P[0], rest[1] * P[0] + rest[0] * P[1]
     G2 = rest[2] * P[0] + 2 * rest[1] * P[1] + rest[0] * P[2]
@@ -220,6 +220,22 @@ _TURNS = np.array([q - p for p, q in _STEPS])
 _SUMS = np.array([[sum(order)] for order in ORDERS])
 
 
+def _polynomials(a: int, b: NDArray[np.intp], count: int, x: Array, skipped: int) -> Array:
+    """Jacobi polynomials P_i^(a, b) (Q, M, count) at `x` (Q, 1), for each of `b` (M,).
+
+    After as many zeros as are `skipped`. By their three-term recurrence.
+    """
+    found = np.zeros((len(x), len(b), count + 2))
+    own = found[..., skipped:]
+    own[..., 0], own[..., 1] = 1.0, a + 1 + (a + b + 2) * (x - 1) / 2
+    for i in range(2, count - skipped):
+        c = 2 * i + a + b
+        ahead = (c - 1) * (c * (c - 2) * x + (a - b) * (a + b)) * own[..., i - 1]
+        behind = 2 * (i + a - 1) * (i + b - 1) * c * own[..., i - 2]
+        own[..., i] = (ahead - behind) / (2 * i * (i + a + b) * (c - 2))
+    return found[..., :count]
+
+
 class _PolarFunctions:
     """Functions on the disk of radius 1, their radial parts as Chebyshev series.
 
@@ -237,6 +253,7 @@ class _PolarFunctions:
         parts: Callable[[Array], Array],
     ) -> None:
         self.m, self._columns, self.fineness = m, columns, fineness
+        self._turns, self._which = np.unique(m, return_inverse=True)
         self._degrees = np.arange(fineness // 2 + 33)  # resolve k r, then to rounding
         nodes = np.pi * (self._degrees + 0.5) / len(self._degrees)
         to_series = 2 / len(nodes) * np.cos(np.multiply.outer(self._degrees, nodes))
@@ -253,7 +270,8 @@ class _PolarFunctions:
         for step, factor in enumerate(_BY_STEPS[ORDERS.index(order)]):
             if factor:
                 values += factor * turn ** _TURNS[step] * (polynomials @ self._series[step])
-        return self._parts(values * np.exp(1j * np.multiply.outer(np.angle(z), self.m)))
+        turns = np.exp(1j * np.multiply.outer(np.angle(z), self._turns))
+        return self._parts(values * turns[:, self._which])
 
     def jet(self, z: complex, R: float) -> Array:
         """All derivatives (6, N) at one point, z = x + i y on the disk of radius 1, of radius R."""

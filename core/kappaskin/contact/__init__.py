@@ -12,8 +12,8 @@ from kappaskin.contact.imprint import object_finder as object_finder
 from kappaskin.contact.intrinsic import ForceTorqueSensor as ForceTorqueSensor
 from kappaskin.contact.intrinsic import IntrinsicContact as IntrinsicContact
 from kappaskin.contact.intrinsic import Wrench as Wrench
+from kappaskin.contact.large_deflection import LargeDeflection as LargeDeflection
 from kappaskin.contact.load_detection import LoadDetector as LoadDetector
-from kappaskin.contact.lower_bound import LowerBound as LowerBound
 from kappaskin.contact.objects import KINDS as KINDS
 from kappaskin.contact.objects import NO_OBJECT as NO_OBJECT
 from kappaskin.contact.objects import ContactObject as ContactObject

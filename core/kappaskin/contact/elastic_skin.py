@@ -14,7 +14,7 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import Plate
 from kappaskin.sensing import SensorLayout
-from kappaskin.skin import Patch
+from kappaskin.skin import Cap, Patch
 
 # A thin skin touches a rigid object only where it can press without being bent further than the
 # object is: a sphere on a ring, inside which the skin takes the sphere's curvature; a straight edge
@@ -149,6 +149,11 @@ class ElasticSkin:
         patch = plate.patch
         if patch.strip:
             raise Refusal("object recognition needs a 2-D skin; this one is a strip")
+        if isinstance(patch, Cap):
+            raise Refusal(
+                "object recognition needs a flat skin, a cylinder or a shallow one; this one is a "
+                "cap, whose contact still has its curvatures"
+            )
         if not plate.rigidity:
             raise Refusal("object recognition needs a rigidity above zero; this skin has none")
         layout.check_curvature_sensor("objects")
@@ -173,6 +178,10 @@ class ElasticSkin:
         """Places (k, 2) in m all over the skin."""
         self.under = self._read(self._felt(self.grid))
         """Curvature (k, R) in 1/m of all channels for 1 N at each of them."""
+
+    def sag(self, offsets: Array) -> Array:
+        """By how much in m the skin at rest falls at `offsets` (..., 2) in m from a place."""
+        return offsets**2 @ np.array(self.patch.curvatures) / 2
 
     def _on_skin(self, points: Array) -> Array:
         if self._corners is not None:

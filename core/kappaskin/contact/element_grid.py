@@ -10,7 +10,7 @@ from kappaskin.frames import Array
 from kappaskin.mechanics import Compliance
 from kappaskin.sensing import SensorLayout, gage_multipliers
 
-_SECOND = (2, 0), (0, 2), (1, 1)  # orders of the derivatives that flat skins read (Eqs. 3-5)
+_SECOND = (2, 0), (0, 2), (1, 1)  # orders of the derivatives that skins read (Eqs. 3-5)
 _ROUNDING = 1e-15  # of the largest: a part as small is none
 
 ModalProjection = Callable[[Array], Array]

@@ -5,11 +5,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kappaskin.bases import ORDERS, Basis, PointMap, ValueMap, covariant_at
+from kappaskin.bases import ORDERS, Basis, covariant_maps
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Fit, propagated_covariance
 from kappaskin.frames import Array, Contact, LocalGeometry
-from kappaskin.skin import Base, Cap, Patch
+from kappaskin.skin import Base, Patch
 
 Number = Any  # a float, or an array of P
 Jet = list[Number]  # the displacement f and its derivatives f_x, f_y, f_xx, f_xy, f_yy
@@ -68,18 +68,19 @@ class CurvatureFormMap:
     """A map from coefficients to the curvature form on the grid of `x` (nx,), `y` (ny,) in m."""
 
     def __init__(self, basis: Basis, x: Array, y: Array) -> None:
-        self._maps: list[ValueMap] = [basis.on_grid(x, y, *order) for order in ORDERS]
-        self._base_curvature = (*basis.patch.curvatures, 0.0)
-        if isinstance(basis.patch, Cap):
-            grid = np.meshgrid(x, y)
-            self._base_curvature = basis.patch.base(*grid).curvature
-            jets = covariant_at(basis, np.stack(grid, axis=-1).reshape(-1, 2))
-            self._maps = [PointMap.of(lambda _, jet=jet: jet, x, y) for jet in jets]
+        self._maps = covariant_maps(basis, x, y)
+        self._base = basis.patch.base(*np.meshgrid(x, y)).curvature
 
     def __call__(self, coefficients: Array) -> Array:
         """xx, yy and xy of K (3, ny, nx) in 1/m for `coefficients` (Ni, Nj); NaN off the skin."""
         jet: Jet = [derivative(coefficients) for derivative in self._maps]
-        return np.stack(_curvature_form(_surface(jet, self._base_curvature)))
+        return np.stack(_curvature_form(_surface(jet, self._base)))
+
+    @property
+    def at_rest(self) -> Array:
+        """xx, yy and xy (3, 1, 1) or (3, ny, nx) in 1/m of the skin at rest."""
+        at_rest = np.stack(np.broadcast_arrays(*self._base))
+        return at_rest if at_rest.ndim > 1 else at_rest[:, None, None]
 
 
 def _geometry(patch: Patch, positions: Array, jet: Jet, covariance: Array) -> LocalGeometry:

@@ -105,7 +105,7 @@ def _inside_ring(skin: ElasticSkin, forces: PointForces) -> tuple[float, Array]:
     out = forces.points - centre
     rise = _rise(skin, forces, centre[None], forces.points[None])[0]
     # A bent skin is bent back by its own curvature too.
-    rise -= skin.patch.arc_curvature / 2 * out[:, 0] ** 2
+    rise -= skin.sag(out)
     columns = np.column_stack([np.sum(out**2, axis=1) / 2, -out])
     weight = np.sqrt(np.abs(forces.weights))[:, None]
     solved = cast("Array", np.linalg.lstsq(weight * columns, weight[:, 0] * rise)[0])
@@ -119,12 +119,12 @@ def ring_pattern(skin: ElasticSkin, sphere: Optimum) -> Array:
     that no point is pressed in less deep than the sphere is.
     """
     q = sphere.parameters[-1]
-    if q < (_WIDE * skin.half_wave) ** 2 and not skin.patch.arc_curvature:
+    if q < (_WIDE * skin.half_wave) ** 2 and not any(skin.patch.curvatures):
         return ROUND
     p = _resolved(skin, sphere)
     curvature, tilt = _inside_ring(skin, sphere.contact(p))
     out = math.sqrt(p[-1]) * _PLACES
-    gap = curvature / 2 * np.sum(out**2, axis=1) + skin.patch.arc_curvature / 2 * out[:, 0] ** 2
+    gap = curvature / 2 * np.sum(out**2, axis=1) + skin.sag(out)
     share = skin.pressed(p[:2] + out, gap - out @ tilt, abs(p[2])) / abs(p[2])
     on = share > _NOTHING / 10
     share, unit = share[on] / share[on].sum(), _PLACES[on]
@@ -202,7 +202,7 @@ def fitted_cylinder(skin: ElasticSkin, cylinder: Optimum) -> Hypothesis:
     """The cylinder, with the curvature of the skin along the stronger of its two arcs."""
     parameters, contact = _resolved(skin, cylinder), cylinder.contact
     inside = _inside_arcs(skin, contact(parameters))
-    base = skin.patch.arc_curvature * math.sin(parameters[3]) ** 2
+    base = 2 * float(skin.sag(np.array([math.sin(parameters[3]), math.cos(parameters[3])])))
     forces = contact(cylinder.parameters)
     of_ends = [float(forces.weights[part].sum()) for part in (slice(ARC), slice(ARC, 2 * ARC))]
     strong = int(abs(of_ends[1]) > abs(of_ends[0]))
@@ -236,6 +236,12 @@ class Hypotheses:
     noise: float
     readings: int
     weighted: "WeightedReadings"
+
+    @property
+    def plane(self) -> Hypothesis:
+        """What a plane presses as: on a dome as a sphere, on others as a cylinder."""
+        is_dome = min(self.weighted.skin.patch.curvatures) > 0
+        return self.sphere if is_dome else self.cylinder
 
 
 def fit_hypotheses(
@@ -346,7 +352,7 @@ class WeightedReadings:
     def shaped(self, sphere: Optimum) -> Optimum:
         """The sphere, its ring of forces as the bending of the skin shapes it."""
         sphere = self.again(sphere, ring(ring_pattern(self.skin, sphere)), 4)
-        for _ in range(2 if self.skin.patch.arc_curvature else 1):  # further from a circle
+        for _ in range(2 if any(self.skin.patch.curvatures) else 1):  # further from a circle
             again = self.again(sphere, ring(ring_pattern(self.skin, sphere)), 4)
             if again.cost > _WORSE * sphere.cost:  # the pattern has tipped over to another
                 break
@@ -416,17 +422,19 @@ _ALIGNED = 0.1  # rad between a plane's contact and the axis of a bent skin
 def log_likelihoods(skin: ElasticSkin, all_of: Hypotheses) -> dict[str, float]:
     """Logarithms of the marginal likelihoods of all kinds, up to a common constant."""
     sphere, cylinder = cast("Width", all_of.sphere.width), cast("Width", all_of.cylinder.width)
+    of_sphere = laplace_integral(all_of.sphere.best, all_of)
+    of_sphere += _beyond_bound(all_of.sphere.best, sphere)
     of_cylinder = laplace_integral(all_of.cylinder.best, all_of) + length_prior(
         skin, all_of.cylinder.best
     )
     of_cylinder += _beyond_bound(all_of.cylinder.best, cylinder) - _unexplained(all_of, cylinder)
     return {
-        "sphere": laplace_integral(all_of.sphere.best, all_of)
-        + _beyond_bound(all_of.sphere.best, sphere)
-        + radius_prior(skin, sphere),
+        "sphere": of_sphere + radius_prior(skin, sphere),
         "edge": laplace_integral(all_of.edge.best, all_of) + length_prior(skin, all_of.edge.best),
         "cylinder": of_cylinder + radius_prior(skin, cylinder),
-        "plane": of_cylinder + plane_prior(skin, all_of.cylinder.best, cylinder),
+        "plane": of_sphere + _flat_share(sphere)
+        if all_of.plane is all_of.sphere
+        else of_cylinder + plane_prior(skin, all_of.cylinder.best, cylinder),
     }
 
 
@@ -482,10 +490,16 @@ def radius_prior(skin: ElasticSkin, width: Width) -> float:
 def plane_prior(skin: ElasticSkin, best: Optimum, width: Width) -> float:
     """Log correction for a plane: a cylinder without curvature along the axis of a bent skin.
 
-    Minus infinity on a flat skin, where a large plane touches only the edges.
+    Minus infinity on a flat or hollow skin, where a large plane touches only the edges.
     """
-    if not skin.patch.arc_curvature:
+    Hx, Hy = skin.patch.curvatures
+    if not max(Hx, Hy) > 0 or min(Hx, Hy) < 0:
         return -math.inf
-    turn = math.remainder(best.parameters[3] - math.pi / 2, math.pi)
+    turn = math.remainder(best.parameters[3] - (math.pi / 2 if Hx > Hy else 0.0), math.pi)
     aligned = -0.5 * turn**2 / (best.covariance[3, 3] + _ALIGNED**2)
-    return aligned + _line(width.sd, width.likelihood(width.of_curvature(np.zeros(1))))
+    return aligned + _flat_share(width)
+
+
+def _flat_share(width: Width) -> float:
+    """Log correction for an object without curvature, of that `width`."""
+    return _line(width.sd, width.likelihood(width.of_curvature(np.zeros(1))))

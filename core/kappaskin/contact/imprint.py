@@ -23,6 +23,7 @@ from kappaskin.estimation import Estimator, Fit, LeastSquares, PatternCache
 from kappaskin.frames import Array, Contact, LocalGeometry, Mask
 from kappaskin.mechanics import Plate
 from kappaskin.sensing import SensorLayout
+from kappaskin.skin import Cap
 
 CHANCE = 1e-6
 """Share of frames without a contact in which one is found by chance."""
@@ -49,7 +50,7 @@ class Imprints:
 
     A contact is found where the shape explains more of the readings than noise does in one frame of
     a million, and more than a level and slopes of each quantity do. It is the dent that is deepest
-    and most concave, m = -(K_xx + K_yy) / 2 with the curvature form K of the deflected skin. It
+    and most concave, m = -(K_xx + K_yy) / 2 with what the curvature form K has changed by. It
     lies in the mean of places weighted by m^4, in the region where m is at least half of its mean;
     its area is that of an even ellipse of the same mean squares, and the curvature form at the
     contact the mean over it. Standard deviations have besides the noise what weights of m, an
@@ -65,6 +66,7 @@ class Imprints:
         self._plate = None if layout.reads else Contacts(plate, layout, edge)
         x, y = patch.grid(*(min(_POINTS * count + 1, _MOST) for count in (Ni, Nj)))
         self._form, self._depth = CurvatureFormMap(basis, x, y), basis.on_grid(x, y)
+        self._rest = self._form.at_rest
         self._places = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
         self._half_wave = patch.a / Ni if patch.strip else math.sqrt(patch.a * patch.b / (Ni * Nj))
         self._cell = math.sqrt((x[1] - x[0]) * (y[1] - y[0]))
@@ -142,7 +144,8 @@ class Imprints:
 
         By the curvature `form` (3, ny, nx) in 1/m and the `depth` (ny, nx) in m.
         """
-        m = (self._basis.patch.arc_curvature - form[0] - form[1]) / 2
+        change = form - self._rest
+        m = -(change[0] + change[1]) / 2
         inward = (depth > 0) & (m > 0)
         if not inward.any():
             return None
@@ -161,8 +164,8 @@ class Imprints:
         other, coarse, _ = self._centred(m, region, 1)
         others = pressed.ravel()[~inward.ravel() & (away > 1)].max(initial=0.0)
         single = bool(others < _SECOND * pressed.flat[peak])
-        xx, yy, _ = self._form_over(form, 2 * away)[0].tolist()
-        single = single and (self._basis.patch.arc_curvature - xx - yy) / 2 > level
+        xx, yy, _ = self._form_over(change, 2 * away)[0].tolist()
+        single = single and -(xx + yy) / 2 > level
         outside = m.ravel()[(away > _OUTSIDE[0]) & (away < _OUTSIDE[1])]
         turns = float(np.nansum(outside)) < 0
         concave, moved = float(m[region].mean()), math.dist(place, other)
@@ -182,7 +185,11 @@ class Imprints:
         scaled = cast("Array", off @ np.linalg.inv(squares))
         away = np.vecdot(scaled, off) / 4
         det: Array = np.linalg.det(squares)
-        return place, 4 * det.item() ** (1 / len(squares)), away
+        size = 4 * det.item() ** (1 / len(squares))
+        if slopes := self._basis.patch.base(*place.tolist()).slopes:
+            (xx, xy), (_, yy) = slopes
+            size /= xx * yy - xy * xy  # of areas: a cap's coordinates are wider around than it is
+        return place, size, away
 
     def _form_over(self, form: Array, away: Array) -> tuple[Array, float]:
         """Mean (3,) of the curvature `form` (3, ny, nx) where `away` (G,) is below 1; its scatter.
@@ -280,7 +287,7 @@ class ImprintObjects:
         self._fit, self._plate = estimator, None
         if estimator.has_memory:
             self._fit = LeastSquares(estimator.basis, layout, estimator.sigma)
-        if not layout.reads:
+        if not (layout.reads or isinstance(plate.patch, Cap)):
             self._plate = ObjectFinder(plate, layout, edge)
         elif plate.patch.strip:
             raise Refusal("object recognition needs a 2-D skin; this one is a strip")

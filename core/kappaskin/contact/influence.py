@@ -7,12 +7,13 @@ from typing import Protocol, cast
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
-from kappaskin.bases import Basis, ProductBasis, SineBasis, basis_for
+from kappaskin.bases import Basis, CapBasis, ProductBasis, SineBasis, basis_for
 from kappaskin.frames import Array
-from kappaskin.mechanics import Compliance, Plate, Shell
+from kappaskin.mechanics import CapWaves, Compliance, Plate, Shell
 from kappaskin.sensing import Readings, SensorLayout
-from kappaskin.skin import Patch
+from kappaskin.skin import Cap, Patch
 
 
 class Influence(Protocol):
@@ -22,6 +23,8 @@ class Influence(Protocol):
     """The load in N that the readings are of."""
     sized: bool
     """Whether they depend on the size of the load; else they are those of a point load."""
+    nodes: tuple[Array, NDArray[np.float32]] | None
+    """Loads to search among, x, y and s (S, 3) each, and their readings (S, C); None for a grid."""
 
     def at(self, x: float, y: float, s: float) -> None:
         """Write the readings in 1/m of a load at (x, y) in m into the first row of `out` (4, C).
@@ -51,6 +54,10 @@ def influence_of(
     On strips, disks, polygons and drum heads it is that of a basis of so many `functions` each way;
     that of heights and slopes, which are bounded under a load, is one of more.
     """
+    if isinstance(plate.patch, Cap):
+        if layout.senses_curvature_only:
+            return (_OfDirections if layout.reads else _OfCap)(plate, layout, edge, out)
+        return _OfFunctions(plate, layout, edge, _FINE, out)
     if type(plate.patch) is not Patch or plate.patch.strip or not _is_stiff(plate):
         return _OfFunctions(plate, layout, edge, functions, out)
     if layout.reads and layout.senses_curvature_only and not layout.gage_length:
@@ -82,7 +89,7 @@ _PLACES, _SHARES = np.vstack([[0.0, 0.0], _RING]), np.array([1 / 4] + 6 * [1 / 8
 class _OfFunctions:
     """As the functions of a basis follow it; heights and slopes depend on the size of a load."""
 
-    unit = 1.0
+    unit, nodes = 1.0, None
 
     def __init__(
         self, plate: Plate, layout: SensorLayout, edge: str, functions: int, out: Array
@@ -276,10 +283,21 @@ _CUBICS = np.linalg.inv(np.vander(np.arange(4.0), increasing=True).T).T
 _BESIDE = 2.5  # of a load's squared radius: an element as far off does not lie under it
 
 
+def _trust(t: Array, s: float, share: float) -> Array | None:
+    """`Influence.trust` of elements at squared distances `t` (P,) in m^2 from the load."""
+    if t.min() > _BESIDE * s:
+        return None
+    under = t * (-2 / s)
+    np.exp(under, under)
+    under *= share
+    under += 1
+    return np.reciprocal(under, under)
+
+
 class _OfPlate:
     """A plate's or a shell's: in closed form what grows without bound, and a table of the rest."""
 
-    sized = True
+    sized, nodes = True, None
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str, out: Array) -> None:
         self.unit = 8 * math.pi * plate.rigidity
@@ -325,14 +343,7 @@ class _OfPlate:
         self._out += self._both.dot(self._block(i, j))
 
     def trust(self, s: float, share: float) -> Array | None:
-        t = self._disc.t
-        if t.min() > _BESIDE * s:
-            return None
-        under = t * (-2 / s)
-        np.exp(under, under)
-        under *= share
-        under += 1
-        return np.reciprocal(under, under)
+        return _trust(self._disc.t, s, share)
 
     def gives(self, x: float, y: float) -> float:
         i, j, u, v = self._among_nodes(x, y)
@@ -347,14 +358,19 @@ class _OfDirections:
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str, out: Array) -> None:
         self._rows, self._out = np.zeros((4, 3 * len(layout))), out
-        self._of = _OfPlate(plate, layout.of_curvature, edge, self._rows)
-        self.unit = self._of.unit
+        of_skin = _OfCap if isinstance(plate.patch, Cap) else _OfPlate
+        self._of = of_skin(plate, layout.of_curvature, edge, self._rows)
+        self.unit, self.nodes = self._of.unit, None
         reads, P = cast("Readings", layout.reads), len(layout)
         c, s = reads.along.T
         twist = reads.quantity == "twist"
         self._parts = np.where(twist, 0.0, [c * c, s * s, 2 * c * s])
         self._parts[2, twist] = 1.0
         self._channels = layout.element + P * np.arange(3)[:, None]
+        if self._of.nodes is not None:
+            places, read = self._of.nodes
+            parts = self._parts.astype(np.float32)
+            self.nodes = places, np.einsum("cr,ncr->nr", parts, read[:, self._channels])
 
     def at(self, x: float, y: float, s: float) -> None:
         self._of.at(x, y, s)
@@ -365,6 +381,125 @@ class _OfDirections:
 
     def gives(self, x: float, y: float) -> float:
         return self._of.gives(x, y)
+
+
+class _OfCap:
+    """A cap's: a table of what a load over discs of several radii makes, summed until it stands."""
+
+    sized = True
+
+    def __init__(self, plate: Plate, layout: SensorLayout, edge: str, out: Array) -> None:
+        self._cap = cap = cast("Cap", plate.patch)
+        self.unit = 8 * math.pi * plate.rigidity
+        self._table, self._steps, self._gives = _on_cap(plate, edge, layout.positions.tobytes())
+        self._positions, self._out = layout.positions, out
+        inverse = np.linalg.inv(cap.local(layout.positions).covariant[:, 1:3, 1:3])
+        self._tangents = np.swapaxes(inverse, 1, 2)  # from steps along x and y
+        self._last = [n - 4 for n in self._table.shape[:3]]
+        self._block, self._weights = lru_cache(16)(self._block_at), np.empty((4, 4, 16))
+        self.t = np.empty(len(layout))
+        self.nodes = self._searched()
+
+    def _searched(self) -> tuple[Array, NDArray[np.float32]]:
+        """`nodes`: rings of the table, as far apart as the places on them."""
+        table, (step_t, step_r, step) = self._table, self._steps
+        found = list[tuple[int, int, int]]()
+        for i in range(1, table.shape[2], _RINGS):
+            radius = float(self._cap.meridian(np.array((i - 1) * step)).radius)
+            around = max(round(2 * math.pi * radius / (_RINGS * step)), 1)
+            turns = np.linspace(1, table.shape[0] - 2, around, endpoint=False).astype(int).tolist()
+            found += [(turn, size, i) for turn in turns for size in _SEARCHED_SIZES]
+        turn, size, ring = np.array(found).T
+        angle, away = (turn - 1) * step_t, (ring - 1) * step
+        offset = away * np.stack([np.cos(angle), np.sin(angle)])
+        s = ((size - 1.5) * step_r) ** 2
+        return np.column_stack([*(self._cap.rim_radius + offset), s]), table[turn, size, ring]
+
+    def _block_at(self, i: int, j: int, k: int) -> Array:
+        return self._table[i : i + 4, j : j + 4, k : k + 4].reshape(64, -1)
+
+    def at(self, x: float, y: float, s: float) -> None:
+        r, dx, dy = math.sqrt(s), x - self._cap.rim_radius, y - self._cap.rim_radius
+        away = np.einsum("pij,pj->pi", self._tangents, self._positions - (x, y))
+        self.t = np.vecdot(away, away)
+        step, d = self._steps, math.hypot(dx, dy)
+        if d < (near := _AT_POLE * step[2]):
+            dx, dy, d = (dx, dy, d) if d else (near, 0.0, near)
+            dx, dy, d = dx * near / d, dy * near / d, near
+        places = (
+            math.atan2(dy, dx) % (2 * math.pi) / step[0] + 1,
+            r / step[1] + 1.5,
+            d / step[2] + 1,
+        )
+        first = [min(int(at) - 1, most) for at, most in zip(places, self._last, strict=True)]
+        (turn, turn_t), (size, size_r), (along, along_s) = (
+            np.dot(((1.0, u, u * u, u * u * u), (0.0, 1 / h, 2 * u / h, 3 * u * u / h)), _CUBICS)
+            for u, h in ((at - i, h) for at, i, h in zip(places, first, step, strict=True))
+        )
+        W, cos, sin = self._weights, dx / d, dy / d
+        here = np.outer(size, along).ravel()
+        outward, around = np.outer(turn, np.outer(size, along_s)), np.outer(turn_t / d, here)
+        np.outer(turn, here, W[0])
+        W[1] = cos * outward - sin * around
+        W[2] = sin * outward + cos * around
+        np.outer(turn, np.outer(size_r / (2 * r), along), W[3])
+        self._out[:] = W.reshape(4, 64).astype(np.float32).dot(self._block(*first))
+
+    def trust(self, s: float, share: float) -> Array | None:
+        return _trust(self.t, s, share)
+
+    def gives(self, x: float, y: float) -> float:
+        d = math.hypot(x - self._cap.rim_radius, y - self._cap.rim_radius)
+        at = np.linspace(0, self._cap.rim_radius, len(self._gives))
+        return float(np.interp(d, at, self._gives))
+
+
+_WAVES = 28  # functions along the meridian of a cap that a load is followed by
+_ON_CAP = 64  # steps of the table of a cap across its box
+_AT_POLE = 1e-3  # of a step: nearer, it is taken for a place so far away
+_RINGS = 2  # steps between the places searched
+_SEARCHED_SIZES = 3, 6, 10  # of the table: radii of 1.5, 4.5 and 8.5 steps
+_SIZES = 0.2  # of the box: the largest radius of a load
+
+
+@lru_cache(2)
+def _on_cap(plate: Plate, edge: str, places: bytes) -> tuple[Array, tuple[float, ...], Array]:
+    """Readings (T, Q, S, C) in 1/m of 8 pi D on discs, the steps, and displacements in m per N.
+
+    By azimuth from -1 step, radius of the disc from -3/2 steps, and distance from the pole from -1
+    step; the steps are in rad, m and m. The displacements under a point load are at even distances
+    from the pole to the rim.
+    """
+    cap = cast("Cap", plate.patch)
+    layout = SensorLayout.scattered(cap, np.frombuffer(places).reshape(-1, 2))
+    a, rim = cap.rim_radius, float(cap.meridian(np.array(cap.rim_radius)).radius)
+    basis = cast(
+        "CapBasis", basis_for(cap, edge, _WAVES, 2 * math.ceil(_WAVES * np.pi * rim / a) + 1)
+    )
+    compliance, waves = plate.compliance_by_wave(basis), CapWaves(basis)
+    M, C = layout.operator(basis, plate).reshape(-1, *basis.shape), 3 * len(layout)
+    for j in range(basis.Nj):
+        M[..., j] = M[..., j] @ compliance[(j + 1) // 2]
+    cos, sin = waves.rows(8 * math.pi * plate.rigidity * M.reshape(C, -1))
+    n = _ON_CAP
+    turns, sizes, steps = math.ceil(np.pi * rim / a * n), math.ceil(_SIZES * n), n // 2
+    step_t, step = 2 * np.pi / turns, a / steps
+    radii = np.abs(np.arange(sizes + 4) - 1.5) * step
+    along = waves.along((np.arange(steps + 2) - 1.0) * step)
+    felt = waves.k * np.where(radii > 0, radii, 1.0)[:, None, None]
+    felt = 2 * scipy.special.j1(felt) / felt
+    by_m = np.empty((2, cos.shape[1], len(radii), len(along), C), np.float32)
+    for m in range(cos.shape[1]):
+        shapes = (felt[:, None, m] * along[:, m]).reshape(-1, basis.Ni).astype(np.float32)
+        for part, rows in enumerate((cos, sin)):
+            by_m[part, m] = (shapes @ rows[:, m].T.astype(np.float32)).reshape(by_m.shape[2:])
+    t = (np.arange(turns + 3) - 1) * step_t
+    turn = np.multiply.outer(t, np.arange(cos.shape[1]))
+    around = np.hstack([np.cos(turn), np.sin(turn)]).astype(np.float32)
+    table = (around @ by_m.reshape(around.shape[1], -1)).reshape(len(t), *by_m.shape[2:])
+    f = basis.along(np.linspace(0, 1, n + 1))[0]
+    gives = np.einsum("qmi,mij,qmj->q", f, compliance, f, optimize=True)
+    return table, (step_t, step, step), gives
 
 
 @lru_cache(4)

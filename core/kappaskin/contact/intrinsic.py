@@ -15,12 +15,14 @@ import numpy as np
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics import LineLoad, Load
-from kappaskin.skin import Patch
+from kappaskin.skin import Base, Cap, Patch
 
 _SIGNIFICANT = 10.0  # times its noise that a force must have, or first-order error bars fail
 _LEAST = 1e-6  # N: less is no force, even to a sensor without noise
 _VAGUE = 0.25  # of the skin's side: an error bar beyond which a contact has no place
 _BESIDE = 3.0  # standard deviations that a contact may seem to lie beside the skin
+_STEPS = 40  # of Newton's method
+_SETTLED = 1e-12  # of a side
 _PIECES = 24  # of a line load, at the points of Gauss: exact to rounding
 
 
@@ -109,7 +111,7 @@ def _across(r: Array | tuple[float, float, float]) -> Array:
 
 
 class IntrinsicContact:
-    """Finds the contact on a patch, flat or bent, that explains a wrench: `find(wrench)`.
+    """Finds the contact on a skin, flat or bent, that explains a wrench: `find(wrench)`.
 
     With the contact at c, the outward normal n and the torque q n, F = p and M = c x p + q n.
 
@@ -117,12 +119,14 @@ class IntrinsicContact:
     cylinder, about a point of its axis, c = R n + y e_y, and with the tangent t across the axis
         M.e_y = R p.t,    M.t = y p.n - R p_y,    M.n = -y p.t + q.
     The first has two solutions on opposite sides of the cylinder, of which one presses and the
-    other pulls.
+    other pulls. On a skin that bends both ways, Newton's method begins where the axis of the wrench
+    meets the plane z = 0, or the sphere that a cap has at its pole.
     """
 
     def __init__(self, patch: Patch, sensor: ForceTorqueSensor) -> None:
         self.patch, self.sensor = patch, sensor
         self._side = np.array([patch.a, patch.b])
+        self._bent = any(patch.curvatures) and not patch.arc_curvature
         noise = (sensor.force_noise, sensor.moment_noise)
         self._variance = np.repeat(np.square(noise), 3)
         self._least = max(_LEAST, _SIGNIFICANT * sensor.force_noise)
@@ -135,13 +139,14 @@ class IntrinsicContact:
             raise Refusal(f"expected force and moment of shape (3,), got {F.shape} and {M.shape}")
         if not (np.isfinite(F).all() and np.isfinite(M).all()):
             return _no_touch("the force/torque sensor reports NaN or infinity")
-        flat = math.isinf(self.patch.radius)
-        most = -float(F[2]) if flat else math.hypot(F[0], F[2])
+        arc = self.patch.arc_curvature
+        most = math.hypot(F[0], F[2]) if arc else math.sqrt(F @ F) if self._bent else -float(F[2])
         if not most > self._least:
             return self._no_press(most)
         place = self._place(F, M + _across(self.sensor.origin) @ F, most)
         if place is None:
-            return _no_touch("the force passes beside the skin's cylinder")
+            what = "cylinder" if arc else "surface"
+            return _no_touch(f"the force passes beside the skin's {what}")
         return self._judged(place, F, M)
 
     def _no_press(self, pressure: float) -> IntrinsicEstimate:
@@ -152,9 +157,11 @@ class IntrinsicContact:
 
         None where there is none. `most` in N is the largest normal force.
         """
-        R, middle = self.patch.radius, self.patch.a / 2
-        if math.isinf(R):
+        if self._bent:
+            return self._found(F, M)
+        if not (H := self.patch.arc_curvature):
             return np.array([-M[1], M[0]]) / F[2]
+        R, middle = 1 / H, self.patch.a / 2
         about_axis = M - _across((middle, 0.0, -R)) @ F
         # p.t = p_x cos - p_z sin = M_y / R, on the side where p.n = p_x sin + p_z cos < 0.
         across = about_axis[1] / (R * most)
@@ -166,21 +173,50 @@ class IntrinsicContact:
         n = np.array([math.sin(angle), 0.0, math.cos(angle)])
         return np.array([middle + R * angle, (about_axis @ t + R * F[1]) / (F @ n)])
 
+    def _found(self, F: Array, M: Array) -> Array | None:
+        """As `_place`, on a skin that bends both ways."""
+        along, axis = F / math.sqrt(F @ F), _across(F) @ M / (F @ F)
+        if isinstance(self.patch, Cap):
+            middle = np.array([self.patch.rim_radius, self.patch.rim_radius, -self.patch.radii[0]])
+            axis = axis + (middle - axis) @ along * along
+            beside = np.sum((axis - middle) ** 2)
+            axis = axis - math.sqrt(max(middle[2] ** 2 - beside, 0.0)) * along
+            place = self.patch.places(axis)
+        else:
+            place = (axis - axis[2] / (F[2] or math.inf) * F)[:2]
+        for _ in range(_STEPS):
+            place = np.clip(place, -self._side / 2, 1.5 * self._side)
+            base = self.patch.base(*place.tolist())
+            c, n = np.array(base.point), np.array(base.normal)
+            torque = float((M - _across(c) @ F) @ n)
+            left = M - _across(c) @ F - torque * n
+            J = np.column_stack([*_moves(base, F, torque), n])
+            try:
+                step = np.linalg.solve(J, left)[:2]
+            except np.linalg.LinAlgError:
+                return None
+            place = place + np.clip(step, -self._side / 4, self._side / 4)
+            if (np.abs(step) < _SETTLED * self._side).all():
+                return place
+        return None
+
     def _judged(self, place: Array, F: Array, M: Array) -> IntrinsicEstimate:
         """The contact at `place` (2,) in m, or the reason why it is none."""
-        at, n = self.patch.at_rest(place)
-        arm, t = at - self.sensor.origin, np.array([n[2], 0.0, -n[0]])
-        pressure, traction = -float(F @ n), np.array([F @ t, F[1]])
+        base = self.patch.base(*place.tolist())
+        arm, n = np.array(base.point) - self.sensor.origin, np.array(base.normal)
+        pressure, traction = -float(F @ n), np.array([base.along, base.across]) @ F
         if not pressure > self._least:
             return self._no_press(pressure)
         torque = float((M - _across(arm) @ F) @ n)
-        sd = self._spread(arm, n, t, F, torque)
+        sd = self._spread(arm, base, F, torque)
         if (sd[:2] > _VAGUE * self._side).any():
             x, y = 1e3 * sd[:2]
             return _no_touch(
                 f"{pressure:.3g} N determine the position only to +-{x:.3g} and {y:.3g} mm"
             )
         inside = np.clip(place, 0, self._side)
+        if type(self.patch) is not Patch and not self.patch.contains(place[None])[0]:
+            inside = np.array(self.patch.inward(*place.tolist()))
         # A rounding error beside the skin is none, even of a sensor without noise.
         if (np.abs(place - inside) > _BESIDE * sd[:2] + 1e-9 * self._side).any():
             x, y = 1e3 * place
@@ -189,17 +225,38 @@ class IntrinsicContact:
             inside, sd[:2], pressure, float(sd[2]), traction, sd[3:5], torque, float(sd[5])
         )
 
-    def _spread(self, arm: Array, n: Array, t: Array, F: Array, torque: float) -> Array:
+    def _spread(self, arm: Array, base: Base, F: Array, torque: float) -> Array:
         """Standard deviations (6,) of x, y, pressure, traction and torque, to first order.
 
         d(F, M) = J d(x, y, p, q), and what is told changes by L d(x, y, p, q).
         """
-        H, e_y = self.patch.arc_curvature, np.array([0.0, 1.0, 0.0])
         J, L = np.zeros((6, 6)), np.eye(6)
+        along, n, (xx, yy, xy) = np.array([base.along, base.across]), base.normal, base.curvature
         J[:3, 2:5] = np.eye(3)
-        J[3:, 0] = _across(t) @ F + torque * H * t
-        J[3:, 1], J[3:, 5] = _across(e_y) @ F, n
-        J[3:, 2:5] = _across(arm)
-        L[2:5, 0] = -H * (F @ t), -H * (F @ n), 0.0
-        L[2:5, 2:5] = -n, t, e_y
+        J[3:, :2] = np.column_stack(_moves(base, F, torque))
+        J[3:, 2:5], J[3:, 5] = _across(arm), n
+        # The frame turns by the base's curvature b and, on a cap, around its normal:
+        # n_i = b_ij e_j and e_j,i = -b_ij n +- turning_i e_k.
+        b, tangential, u = (
+            np.array([[xx, xy], [xy, yy]]),
+            along @ F,
+            np.array(base.turning or (0, 0)),
+        )
+        turned = -b * (F @ n) + np.multiply.outer((tangential[1], -tangential[0]), u)
+        L[2:5, :2] = np.vstack([-b @ tangential, turned]) @ _steps(base)
+        L[2:5, 2:5] = -np.array(n), *along
         return np.sqrt(np.square(L @ np.linalg.inv(J)) @ self._variance)
+
+
+def _steps(base: Base) -> Array:
+    """What steps in x and y are along e_x and e_y, (2, 2)."""
+    return np.linalg.inv(base.slopes).T if base.slopes else np.eye(2)
+
+
+def _moves(base: Base, F: Array, torque: float) -> tuple[Array, Array]:
+    """How the moment of a force and of a `torque` in N m changes with x and y, in N."""
+    along, (xx, yy, xy) = np.array([base.along, base.across]), base.curvature
+    turned = np.array([[xx, xy], [xy, yy]]) @ along
+    moves = [_across(e) @ F + torque * n for e, n in zip(along, turned, strict=True)]
+    both: Array = _steps(base).T @ np.array(moves)
+    return both[0], both[1]

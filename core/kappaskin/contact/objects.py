@@ -32,6 +32,7 @@ _INEXACT = 0.02  # of a curvature: what a ring or arcs leave out of a real conta
 # On a bent skin, of its curvature and the object's: 0.02 to 0.07 of shells from 0.25 to 2 mm thick,
 # but 0.23 where the arcs are narrower than a half wave.
 _INEXACT_BENT = 0.08
+_LONG = 2.0  # half waves: on a bent skin, two ends that are nearer may be one
 _QUIET = 1e-4  # of the largest reading: no skin is quieter
 _SEEN = 2.6  # standard deviations: a width below is only an upper bound, or noise passes for one
 _LEAST, _DEEPEST = 1e-12, 10.0  # of a side: displacements beyond show no shape of an object
@@ -183,7 +184,7 @@ class ObjectFinder:
         if type(patch) is not Patch:
             fine = _COARSE
         else:
-            fine = _FINE if edge == "hinged" and not patch.arc_curvature else _FINE_MIXED
+            fine = _FINE if edge == "hinged" and not plate.mixes_sines else _FINE_MIXED
         self._coarse = ElasticSkin(plate, layout, edge, _COARSE)
         self._skin = self._coarse
         if fine != _COARSE:
@@ -213,21 +214,22 @@ def _judged(skin: ElasticSkin, all_of: Hypotheses, noise: float) -> ContactObjec
     total = sum(math.exp(weight - most) for weight in weights.values())
     probability = {kind: math.exp(weights[kind] - most) / total for kind in KINDS}
     kind = max(KINDS, key=probability.__getitem__)
-    found = {"sphere": all_of.sphere, "edge": all_of.edge}.get(kind, all_of.cylinder)
+    found = getattr(all_of, kind)
     reach = float(scipy.special.stdtrit(all_of.readings - len(found.best.parameters), 0.975))
     width = found.width or cast("Width", all_of.cylinder.width)
     radius, radius_95 = _radius(skin, width, reach)
     fits = all_of.noise <= _WELL * noise
     known = probability[kind] >= _SURE
-    flat = not skin.patch.arc_curvature
+    flat = not any(skin.patch.curvatures)
     if flat:
         fits = fits and all_of.weighted.chance(found.best) >= _LEVEL
-    if kind != "sphere":
+    if found is not all_of.sphere:
         oval = all_of.weighted.oval(all_of.cylinder.best, all_of.edge.best)
         if flat:
             known = known and weights[kind] - oval_likelihood(skin, all_of, oval) >= _ODDS
         else:  # arcs are too rough to be weighed against it, as they leave more than noise
             fits = fits and found.best.squares <= _WELL**2 * oval.squares
+            known = known and found.best.parameters[4] > (_LONG * skin.half_wave) ** 2
     known = known and not (kind == "plane" and math.isnan(radius))  # flattened, not just touched
     return ContactObject(
         kind if known and fits else "",
@@ -240,7 +242,7 @@ def _judged(skin: ElasticSkin, all_of: Hypotheses, noise: float) -> ContactObjec
         radius_95,
         *_axis(found, radius_95, reach),
         *_length(found, reach),
-        *_face(skin, kind, width, reach),
+        *_face(skin, "sphere" if found is all_of.sphere else kind, width, reach),
         fits,
     )
 
@@ -267,7 +269,7 @@ def _length(found: Hypothesis, reach: float) -> tuple[float, float]:
 
 def _radius(skin: ElasticSkin, width: Width, reach: float) -> tuple[float, tuple[float, float]]:
     """The radius in m and its interval of `reach` standard deviations."""
-    bent = skin.patch.arc_curvature
+    bent = max(map(abs, skin.patch.curvatures))
     low, high = width.q - reach * width.sd, max(width.q, 0.0) + reach * width.sd
     flattest, best = width.curvature(high), width.curvature(width.q)
     resolved = not bent or width.q > skin.half_wave**2

@@ -77,7 +77,7 @@ NO_CONTACT = Contact(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Tables:
-    """What depends on which readings are used: T'T (ny, nx), their weights, and `spare` ones.
+    """What depends on which readings are used: T'T (S,), their weights, and `spare` ones.
 
     The weights (3 P,) are 1 where used, else 0; None where all are used. `free` (d, 3 P) are
     orthonormal directions of them that may be anything.
@@ -113,7 +113,8 @@ class PointContact:
     best P for readings K is T'K / T'T, and what it explains of their sum of squares is
     (T'K)^2 / T'T. In every frame a point load is searched for on a grid, so that no jump of the
     contact is missed: T = M t there, with t = compliance times what each function of `basis` feels
-    (Eqs. 2, 9), and T'K is one map from M'K. Gauss-Newton steps in x, y, s and P refine it with
+    (Eqs. 2, 9), and T'K is one map from M'K; on a cap, where a skin bends close around a load
+    only, at `Influence.nodes`, of several sizes. Gauss-Newton steps in x, y, s and P refine it with
     the `Influence`, which no number of functions cuts short. What readings right under the load
     depend on how it is spread is added to their variance. Along the `free` directions (d, R), as
     those of a drift, the readings may be anything: they are fitted beside the load. So are, unless
@@ -148,13 +149,18 @@ class PointContact:
         self._readings = self._none = np.zeros(len(self._M))
         x, y = self.patch.grid(_SEARCHED + 2, 3 if strip else _SEARCHED + 2)
         self._x, self._y = x[1:-1], y[1:-1]
-        self._map = self.basis.on_grid(self._x, self._y)
-        points = np.stack(np.meshgrid(self._x, self._y), -1).reshape(-1, 2)
-        self._still = np.flatnonzero(~self.patch.moves(points))
         side = self.patch.a if strip else min(self.patch.a, self.patch.b)
         self._start, self._least, self._largest = (
             (share * side) ** 2 for share in (_START, _LEAST, _LARGEST)
         )
+        self._nodes = self._influence.nodes
+        if self._nodes is None:
+            points = np.stack(np.meshgrid(self._x, self._y), -1).reshape(-1, 2)
+            self._places = np.column_stack([points, np.full(len(points), self._start)])
+            self._map = self.basis.on_grid(self._x, self._y)
+        else:
+            self._places = self._nodes[0]
+        self._still = np.flatnonzero(~self.patch.moves(self._places[:, :2]))
         self._at_node = lru_cache(_NODES)(self._node)
         self._cache = PatternCache[_Tables]()
         self._whole = self._cache(self._live, self._tables)
@@ -174,8 +180,14 @@ class PointContact:
     def _tables(self, used: Mask) -> _Tables:
         """The tables for the readings `used` (3 P,)."""
         M, free = self._M[used], orthonormal(np.where(used, self._free, 0.0))
-        hidden = free[:, used] @ M
-        norm = _squares_on_grid(self.basis, M.T @ M - hidden.T @ hidden, self._x, self._y)
+        if self._nodes is None:
+            hidden = free[:, used] @ M
+            norm = _squares_on_grid(
+                self.basis, M.T @ M - hidden.T @ hidden, self._x, self._y
+            ).ravel()
+        else:
+            T = self._nodes[1][:, used]
+            norm = np.sum(T**2, axis=1) - np.sum((T @ free[:, used].T) ** 2, axis=1)
         norm[norm <= 0] = math.inf  # a load that these readings do not see explains nothing
         weights = None if used.all() else used.astype(float)
         return _Tables(norm, weights, max(len(M) - len(free) - self._unknowns, 1), free)
@@ -187,25 +199,39 @@ class PointContact:
         """
         read = curvature.ravel()
         K, tables = self._used(read if self._scale is None else read * self._scale)
-        explained = self._map(self._modal(K).reshape(self.basis.shape))
+        explained = self._searched(K)
         explained *= explained
         explained /= tables.norm
         explained.put(self._still, 0.0)
-        row, column = divmod(int(explained.argmax()), len(self._x))
+        node = int(explained.argmax())
         variance, self.rest, self.along = float(fit.noise) ** 2, K, self._none
-        if not explained[row, column] > _threshold(float(cast("float", fit.spare))) * variance:
+        if not explained[node] > _threshold(float(cast("float", fit.spare))) * variance:
             return NO_CONTACT
         self._rows[4] = self._readings = K
         if tables.weights is None and self._stretched is None and not len(self._free):
-            x, y, here = self._x.item(column), self._y.item(row), self._first(row, column)
+            (x, y, s), here = self._places[node].tolist(), self._first(node)
         else:
-            x = _parabola_peak(self._x, explained[row], column)
-            y = _parabola_peak(self._y, explained[:, column], row)
-            x, y = self.patch.inward(x, y)
+            x, y, s = self._peak(explained, node)
             if self._stretched is not None:
                 self._stretched.begin(x, y, float(fit.jet(x, y)[0][0]))
-            here = self._linearised(x, y, self._start, 0.0, tables, variance)
-        return self._refined(x, y, here, tables, variance, fit, most)
+            here = self._linearised(x, y, s, 0.0, tables, variance)
+        return self._refined(x, y, s, here, tables, variance, fit, most)
+
+    def _searched(self, K: Array) -> Array:
+        """T'K (S,) of the loads searched for."""
+        if self._nodes is None:
+            return self._map(self._modal(K).reshape(self.basis.shape)).ravel()
+        return self._nodes[1].dot(K.astype(np.float32)).astype(float)
+
+    def _peak(self, explained: Array, node: int) -> tuple[float, float, float]:
+        """x, y and s of the load that explains most: between the points, where they are a grid."""
+        x, y, s = self._places[node].tolist()
+        if self._nodes is None:
+            row, column = divmod(node, len(self._x))
+            on_grid = explained.reshape(len(self._y), -1)
+            x = _parabola_peak(self._x, on_grid[row], column)
+            y = _parabola_peak(self._y, on_grid[:, column], row)
+        return *self.patch.inward(x, y), s
 
     def _used(self, K: Array) -> tuple[Array, _Tables]:
         """The readings, 0 where missing, less their part along `free`, and the tables."""
@@ -220,14 +246,15 @@ class PointContact:
             self._rows[5 : 5 + len(tables.free)] = tables.free
         return known, tables
 
-    def _first(self, row: int, column: int) -> _Linearised:
-        """As `_linearised`, where all readings are used, at a point of the grid."""
-        rows, first, inverse = self._at_node(row, column)
+    def _first(self, node: int) -> _Linearised:
+        """As `_linearised`, where all readings are used, at a load searched for."""
+        rows, first, inverse = self._at_node(node)
         K, self.linear = self._readings, rows
-        return self._step(self._start, first, inverse, rows.dot(K), float(K.dot(K)), None)
+        s: float = self._places.item(node, 2)
+        return self._step(s, first, inverse, rows.dot(K), float(K.dot(K)), None)
 
-    def _node(self, row: int, column: int) -> tuple[Array, float, Array]:
-        self._influence.at(self._x.item(column), self._y.item(row), self._start)
+    def _node(self, node: int) -> tuple[Array, float, Array]:
+        self._influence.at(*self._places[node].tolist())
         rows = self._rows[: self._unknowns].copy()
         H = rows.dot(rows.T)
         return rows, H.item(0, 0), _inverse(H)
@@ -236,13 +263,14 @@ class PointContact:
         self,
         x: float,
         y: float,
+        s: float,
         here: _Linearised,
         tables: _Tables,
         variance: float,
         fit: Fit,
         most: float,
     ) -> Contact:
-        a, b, s, force = _FURTHEST * self.patch.a, _FURTHEST * self.patch.b, self._start, 0.0
+        a, b, force = _FURTHEST * self.patch.a, _FURTHEST * self.patch.b, 0.0
         hopeless = False
         for _ in range(_STEPS):
             if hopeless := here.left - _HOPE * here.gain > most:

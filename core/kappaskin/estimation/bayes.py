@@ -25,7 +25,7 @@ def prior_root(basis: Basis) -> Array:
 
     For sines on a flat skin it is the diagonal of 1 / (k_i^2 + k_j^2)^2, so scaled.
     """
-    if isinstance(basis, SineBasis) and not basis.patch.arc_curvature:
+    if isinstance(basis, SineBasis) and not any(basis.patch.curvatures):
         # The squares of sines average 1/2, along x and along y.
         sd: Array = 1 / basis.laplacian.ravel() ** 2
         squares = sd @ sd / (2 if basis.patch.strip else 4)

@@ -10,11 +10,12 @@ from typing import ClassVar, Generic, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
-from kappaskin.bases import Basis, ValueMap, curvature_at
+from kappaskin.bases import Basis, ValueMap, covariant_maps, curvature_at
 from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation.fit import Fit, Uncertainty
 from kappaskin.frames import Array, Mask
 from kappaskin.sensing import SensorLayout
+from kappaskin.skin import Cap
 
 _SETS = 8  # that are cached: those used last
 _Made = TypeVar("_Made")
@@ -211,6 +212,8 @@ class Estimator(ABC):
         """The slopes along x and along y as sums of terms, on a grid that shows the finest."""
         patch, (Ni, Nj) = self.basis.patch, self.basis.shape
         at = patch.grid(*(min(4 * count + 1, _FINEST) for count in (Ni, Nj)))
+        if isinstance(patch, Cap):
+            return [[(1.0, values)] for values in covariant_maps(self.basis, *at)[1:3]]
         terms = [[(1.0, (1, 0))], [(1.0, (0, 1))]]
         if H := patch.arc_curvature:
             terms[0].append((H**2, (-1, 0)))

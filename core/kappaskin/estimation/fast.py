@@ -514,7 +514,7 @@ class Fast(Estimator):
 
 
 def _sines(basis: Basis, layout: SensorLayout) -> SineBasis:
-    """`basis` as sines on a flat skin; raises a `Refusal` for any other basis."""
+    """`basis` as sines on no cylinder skin; raises a `Refusal` for any other basis."""
     if not isinstance(basis, SineBasis):
         raise Refusal(
             f"expected sines (a hinged rectangle) for the fast transforms, got "
@@ -522,8 +522,8 @@ def _sines(basis: Basis, layout: SensorLayout) -> SineBasis:
         )
     if basis.patch.arc_curvature:
         raise Refusal(
-            f"expected a flat skin for the fast transforms, got a {basis.patch.name}: on a "
-            "bent skin the functions are not orthogonal; use least-squares"
+            f"expected a flat skin or a shallow one for the fast transforms, got a "
+            f"{basis.patch.name}: on an arc the functions are not orthogonal; use least-squares"
         )
     if basis.patch != layout.patch:
         raise Refusal(f"the layout is on {layout.patch}, the basis on {basis.patch}; use one")

@@ -1,5 +1,6 @@
 """Mechanics: the shape of a skin under loads and under rigid objects."""
 
+from kappaskin.mechanics.cap import CapWaves as CapWaves
 from kappaskin.mechanics.height_maps import HeightMap as HeightMap
 from kappaskin.mechanics.height_maps import Mesh as Mesh
 from kappaskin.mechanics.indentation import Indentation as Indentation

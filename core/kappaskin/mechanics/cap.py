@@ -26,6 +26,9 @@ from kappaskin.skin import Meridian
 # polynomials of r^2: U = A + B and V = A - B. Nothing presses the skin along itself: they are those
 # of the least energy for a given F. No wave m mixes with another.
 
+# A load spread evenly over a disc of radius r feels of a wave of a membrane over the cap, which has
+# -(f_;ss + f_;tt) = k^2 f, 2 J1(k r) / (k r) times its value in the middle: exactly on a plane.
+
 _MORE = 12  # functions of u and v along the meridian, more than f has
 _AT_POLE = 1e-6  # of the arc to the rim: nearer, nothing depends on u and v
 
@@ -52,14 +55,16 @@ class CapShell:
         rho, weights = gauss(1.0, 2 * self._count + len(self._m) + 24)
         a = basis.cap.rim_radius
         along = basis.cap.meridian(a * rho)
-        S = self._strains(rho, along)
+        S, area = self._strains(rho, along), a * weights * along.radius
+        self.volume: Array = 2 * np.pi * area @ S[8, :, 0, : basis.Ni]
+        """The integral (Ni,) in m^2 of the functions that are alike all around."""
         law = np.zeros((len(rho), 9, 9))
         law[:] = np.diag([C, C, C * (1 - nu) / 2, D, D, 2 * D * (1 - nu), T, T, k_f])
         law[:, 0, 1] = law[:, 1, 0] = nu * C
         law[:, 3, 4] = law[:, 4, 3] = nu * D
-        bare = self._integral(S, law, a * weights * along.radius)
+        bare = self._integral(S, law, area)
         law[:, 8, 8] -= T * np.sum(along.curvatures**2, axis=0)
-        K = self._integral(S, law, a * weights * along.radius) if T else bare
+        K = self._integral(S, law, area) if T else bare
         f, t = slice(0, basis.Ni), slice(basis.Ni, None)
         alone = np.einsum("mtt->mt", K[:, t, t])
         alone[alone == 0] = 1.0  # of no v at m = 0
@@ -172,3 +177,46 @@ class CapShell:
         for j in range(Nj):
             found[:, j, :, j] = blocks[(j + 1) // 2]
         return found.reshape(Ni * Nj, Ni * Nj)
+
+
+class CapWaves:
+    """The waves of a membrane over a cap with a fixed rim, made of the functions of a `basis`."""
+
+    def __init__(self, basis: CapBasis) -> None:
+        a, m = basis.cap.rim_radius, np.arange(basis.Nj // 2 + 1)
+        rho, weights = gauss(1.0, 2 * basis.Ni + len(m) + 24)
+        radius = basis.cap.meridian(a * rho).radius[:, None, None]
+        self._basis, self._m = basis, m
+        f, f_s, _ = np.sqrt(a * weights[:, None, None] * radius) * basis.along(rho)
+
+        def products(g: Array) -> Array:
+            return np.moveaxis(g, 0, 2) @ np.moveaxis(g, 0, 1)
+
+        gram = products(f)
+        slopes = products(f_s / a) + products(m[:, None] * f / radius)
+        inverse = np.linalg.inv(np.linalg.cholesky(gram))
+        squares, turned = np.linalg.eigh(inverse @ slopes @ np.swapaxes(inverse, 1, 2))
+        self.k: Array = np.sqrt(squares)
+        """Wave numbers (M, Ni) in 1/m, for each number m of waves around."""
+        self._shapes: Array = np.swapaxes(inverse, 1, 2) @ turned
+        self._shares: Array = gram @ self._shapes
+
+    def along(self, distance: Array) -> Array:
+        """Each wave along a meridian (Q, M, Ni), at each `distance` (Q,) in m from the pole.
+
+        It may be negative: on the other side.
+        """
+        f = self._basis.along(np.abs(distance) / self._basis.cap.rim_radius)[0]
+        odd = (distance[:, None] < 0) & (self._m % 2 == 1)
+        return np.where(odd, -1, 1)[..., None] * np.einsum("qmi,mik->qmk", f, self._shapes)
+
+    def rows(self, M: Array) -> tuple[Array, Array]:
+        """Rows M (C, N) on the functions as rows (C, M, Ni) on the waves as cos m t and sin m t."""
+        (Ni, Nj), C = self._basis.shape, len(M)
+        by_m = np.zeros((C, Ni, 2 * len(self._m)))
+        by_m[..., 0], by_m[..., 2 : Nj + 1] = (
+            M.reshape(C, Ni, Nj)[..., 0],
+            M.reshape(C, Ni, Nj)[..., 1:],
+        )
+        cos, sin = (np.einsum("cim,mik->cmk", by_m[..., k::2], self._shares) for k in (0, 1))
+        return cos, sin

@@ -100,7 +100,8 @@ class PlacedObject:
 
     def keel(self, patch: Patch) -> Array:
         """Points (k, 2) in m of its keel, as far as they lie on the skin."""
-        points = _turned(self.object_.keel(), self.turn) + self.place
+        x, y = self.place.tolist()
+        points = patch.around(x, y, _turned(self.object_.keel(), self.turn))
         return points[patch.moves(points)]
 
     def over(self, patch: Patch, points: Array) -> tuple[Array, Array]:
@@ -108,10 +109,10 @@ class PlacedObject:
 
         The slant is the cosine between the normals at `points` (P, 2) in m and at its place.
         """
-        (origin,), (up,) = patch.at_rest(self.place[None])
+        base = patch.base(*self.place.tolist())
         space, normals = patch.at_rest(points)
-        away = space - origin
-        across = np.column_stack([away @ [up[2], 0.0, -up[0]], away[:, 1]])
+        away, up = space - base.point, np.array(base.normal)
+        across = away @ np.array([base.along, base.across]).T
         return self.object_.height(_turned(across, -self.turn)) - away @ up, normals @ up
 
     def meets(self, patch: Patch) -> bool:

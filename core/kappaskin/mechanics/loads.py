@@ -3,13 +3,14 @@
 import math
 from abc import ABC, abstractmethod
 from dataclasses import Field, dataclass, fields, replace
+from functools import lru_cache
 from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from kappaskin.bases import Basis, SineBasis
+from kappaskin.bases import Basis, CapBasis, SineBasis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.skin import Patch, Polygon
@@ -148,6 +149,8 @@ _INSIDE = 1 - 1e-9  # of a load's size: one that touches an edge is on the patch
 class DistributedLoad(CentredLoad, ABC):
     """A force in N distributed about (x, y) in m, symmetric about the two axes through it.
 
+    Its size is along the skin.
+
     By the symmetry, the mean of sin(k x) sin(l y) under the load is the product at its centre times
     the mean of cos(k x) cos(l y) about it: a multiplier per function (Eq. 9, extended).
     """
@@ -161,21 +164,27 @@ class DistributedLoad(CentredLoad, ABC):
         """Points (P, 2) in m on its rim, relative to its centre."""
 
     @abstractmethod
-    def _quadrature(self, count: int) -> tuple[Array, Array]:
+    def quadrature(self, count: int) -> tuple[Array, Array]:
         """Points (Q, 2) in m, relative to its centre, and weights (Q,) whose sum is one.
 
         Exact to rounding for functions with up to `count` half waves across the load.
         """
 
     def check(self, patch: Patch) -> None:
-        check_on(self, patch, self.centre() + _INSIDE * self._rim())
+        check_on(self, patch, patch.around(self.x, self.y, _INSIDE * self._rim()))
 
     def modal(self, basis: Basis) -> Array:
         if isinstance(basis, SineBasis):
             k, l = np.meshgrid(*basis.wavenumbers, indexing="ij")
             return PointLoad(self.x, self.y, self.force).modal(basis) * self._wave(k, l)
-        points, weights = self._quadrature(max(basis.shape))
-        felt = weights @ basis.at(self.centre() + points)
+        if isinstance(basis, CapBasis) and isinstance(self, DiscLoad | GaussianLoad):
+            felt = _on_cap(replace(self, x=0.0, y=0.0, force=1.0), basis)(self.x, self.y)
+            if felt is not None:
+                return self.force * felt
+        points, weights = self.quadrature(max(basis.shape))
+        on_cap = isinstance(basis, CapBasis)
+        at = basis.cap.around(self.x, self.y, points) if on_cap else self.centre() + points
+        felt = weights @ basis.at(at)
         if np.isnan(felt).any():  # a notch in the outline that passes between the rim's points
             raise Refusal(f"expected a load completely on the skin, got {self}; make it smaller")
         return self.force * felt.reshape(basis.shape)
@@ -226,7 +235,7 @@ class DiscLoad(DistributedLoad):
     def _rim(self) -> Array:
         return self.radius * _circle(64)
 
-    def _quadrature(self, count: int) -> tuple[Array, Array]:
+    def quadrature(self, count: int) -> tuple[Array, Array]:
         t, w = _gauss(count)
         radius = (1 + t) / 2
         return _rings(self.radius * radius, 2 * radius * w)
@@ -254,7 +263,7 @@ class GaussianLoad(DistributedLoad):
     def _rim(self) -> Array:
         return 4 * self.sd * _circle(64)
 
-    def _quadrature(self, count: int) -> tuple[Array, Array]:
+    def quadrature(self, count: int) -> tuple[Array, Array]:
         t, w = _gauss(count)
         radius = 2 * (1 + t)  # in standard deviations
         share = w * radius * np.exp(-(radius**2) / 2)
@@ -283,7 +292,55 @@ class RectangleLoad(DistributedLoad):
         round_it = np.vstack([np.column_stack([along, one]), np.column_stack([one, along])])
         return round_it * (self.width / 2, self.height / 2)
 
-    def _quadrature(self, count: int) -> tuple[Array, Array]:
+    def quadrature(self, count: int) -> tuple[Array, Array]:
         t, w = _gauss(count)
         x, y = np.meshgrid(self.width / 2 * t, self.height / 2 * t)
         return np.column_stack([x.ravel(), y.ravel()]), np.multiply.outer(w, w).ravel()
+
+
+class _RoundOnCap:
+    """What a round load feels of the functions of a cap, by a series in its distance from the pole.
+
+    Turned about the pole it feels as much of cos m t, and by its symmetry nothing of sin m t, from
+    the azimuth of its centre. The series are Chebyshev's, from the pole to where it meets the rim.
+    """
+
+    def __init__(self, load: DiscLoad | GaussianLoad, basis: CapBasis) -> None:
+        size = load.radius if isinstance(load, DiscLoad) else 4 * load.sd
+        self._rim, (Ni, Nj) = basis.cap.rim_radius, basis.shape
+        self._reach, self._shape = self._rim - size, basis.shape
+        self._degrees = np.arange(2 * Ni + Nj // 2 + 10)
+        if self._reach <= 0:
+            return
+        # A disc has fewer waves across it than a Gaussian, whose weight is no polynomial.
+        waves = math.ceil(max(basis.shape) * size / self._rim)
+        points, weights = load.quadrature(waves - 8 * isinstance(load, DiscLoad))
+        half = points[:, 1] >= -1e-9 * size
+        points, weights = (
+            points[half],
+            np.where(points[:, 1] > 1e-9 * size, 2, 1)[half] * weights[half],
+        )
+        nodes = np.pi * (self._degrees + 0.5) / len(self._degrees)
+        far = self._rim + self._reach * (1 - 1e-12) * (1 + np.cos(nodes)) / 2
+        felt = [weights @ basis.at(basis.cap.around(at, self._rim, points)) for at in far.tolist()]
+        to_series = 2 / len(nodes) * np.cos(np.multiply.outer(self._degrees, nodes))
+        to_series[0] /= 2
+        self._series = to_series @ np.array(felt)
+
+    def __call__(self, x: float, y: float) -> Array | None:
+        """The means (Ni, Nj) under the load at (x, y) in m; None where it goes over the rim."""
+        u, v = x - self._rim, y - self._rim
+        far = math.hypot(u, v)
+        if far > self._reach * (1 + 1e-9) or self._reach <= 0:
+            return None
+        turn, t = math.atan2(v, u), math.acos(min(2 * far / self._reach - 1, 1.0))
+        felt = (np.cos(t * self._degrees) @ self._series).reshape(self._shape)
+        m = (np.arange(self._shape[1]) + 1) // 2
+        felt[:, 2::2] = felt[:, 1 : self._shape[1] - 1 : 2] * np.sin(m[2::2] * turn)
+        felt[:, 1::2] *= np.cos(m[1::2] * turn)
+        return felt
+
+
+@lru_cache(8)
+def _on_cap(load: DiscLoad | GaussianLoad, basis: CapBasis) -> _RoundOnCap:
+    return _RoundOnCap(load, basis)

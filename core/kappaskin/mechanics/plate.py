@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -267,7 +267,17 @@ class Plate:
             values = self._by_ritz(basis)
             if isinstance(basis, ModeBasis) and not any(self.patch.curvatures):
                 values = _unmixed(values)
-        return self._over_fluid(values, basis) if self.fluid else Compliance(values)
+        if self.fluid and not isinstance(basis, CapBasis):
+            return self._over_fluid(values, basis)
+        return Compliance(values)
+
+    def compliance_by_wave(self, basis: CapBasis) -> Array:
+        """The compliance (M, Ni, Ni) of a cap on the functions of each number m of waves around."""
+        shell = cap_shell(self, basis)
+        found = self._inverse(shell.stiffness, shell.bare)
+        if self.fluid:
+            found[0] = Compliance(found[0], shell.volume).after(np.eye(basis.Ni))
+        return found
 
     def _over_fluid(self, values: Array, basis: Basis) -> Compliance:
         if isinstance(basis, ProductBasis):
@@ -310,10 +320,6 @@ class Plate:
         v_held = held in ("hoop", "held") and not sliding
         return Sheet(self.patch, *of_sheet, *below, v_held, held in ("diaphragm", "held"))
 
-    def _cap(self, basis: CapBasis) -> CapShell:
-        support = self.tension, self.foundation, self.inplane_edge == "diaphragm"
-        return CapShell(basis, self.rigidity, self.membrane_stiffness, self.poisson, *support)
-
     def _tangential(self, basis: Basis) -> Tangential:
         return Tangential(self.sheet(isinstance(basis, SineBasis) and basis.sliding), basis)
 
@@ -352,8 +358,7 @@ class Plate:
     def _by_ritz(self, basis: Basis) -> Array:
         """Inverse (N, N) of the stiffness."""
         if isinstance(basis, CapBasis):
-            cap = self._cap(basis)
-            return cap.by_function(self._inverse(cap.stiffness, cap.bare))
+            return cap_shell(self, basis).by_function(self.compliance_by_wave(basis))
         K, bare = self._stiffness(basis)
         inextensible = self.patch.arc_curvature and not self._is_shell
         W = np.eye(basis.size) if basis.free is None or not inextensible else basis.free
@@ -383,7 +388,7 @@ class Plate:
         tangential displacements follow from its stiffness.
         """
         if isinstance(basis, CapBasis):
-            return self._cap(basis).curvature_at
+            return cap_shell(self, basis).curvature_at
         if self._is_shell:
             return self._tangential(basis).curvature_at
         return partial(curvature_at, basis)
@@ -404,3 +409,10 @@ class Plate:
             self.check(load)
             force += load.modal(basis)
         return self.compliance(basis)(force)
+
+
+@lru_cache(4)
+def cap_shell(plate: Plate, basis: CapBasis) -> CapShell:
+    """The shell that a plate on a cap is, on the functions of a `basis`."""
+    support = plate.tension, plate.foundation, plate.inplane_edge == "diaphragm"
+    return CapShell(basis, plate.rigidity, plate.membrane_stiffness, plate.poisson, *support)

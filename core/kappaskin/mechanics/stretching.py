@@ -1,7 +1,7 @@
-"""Stretching: the forces by which a thin flat plate resists as its middle surface stretches."""
+"""Stretching: the forces by which a thin skin resists as its middle surface stretches."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
 
 import numpy as np
@@ -24,6 +24,10 @@ from kappaskin.mechanics.plate import Plate
 # and S, the membrane compliance, is factored once. How the edge is held says which F may be:
 #     held: any;   diaphragm: F = 0 along the edge, or x y, a uniform shear;
 #     free: F and its slope vanish along the edge.
+# A shallow skin (Marguerre) has the slopes s = (Hx (x - a/2), Hy (y - b/2)) at rest: in e stand the
+# products of the slopes w_x + s_x and w_y + s_y, less those of s. That is e = (w_x^2 / 2 - Hx w,
+# w_y^2 / 2 - Hy w, w_x w_y) for displacements u - s_x w, v - s_y w, alike along the edge, where w
+# is zero. What it resists to first order is in the plate's compliance, and left out here.
 # The F_m are products of polynomials: 1, t, 1 - t^2, t - t^3, and twice integrated Legendre
 # polynomials, which vanish with their slopes at both ends. With eight more along a side than w has
 # functions, the force under a point load is right to 3e-4 of itself.
@@ -36,24 +40,28 @@ _LEAST_STIFF = 1e-3  # of the stiffness in bending
 _ROUNDING = 1e-13  # of the largest eigenvalue
 _SLACK = 1e-10  # of the energy, for rounding
 _STEPS = 100
+_ON_PATH, _CORRECTIONS = 1e-6, 20  # of the force that a linear skin needs; at most so many
 
 
 _Solver = Callable[[Array], Array]
 
 
 class Stretching:
-    """The stretching of a flat rectangular plate or strip of known thickness.
+    """The stretching of a flat rectangular plate or strip of known thickness, or a shallow skin.
 
     Deflections are coefficients (Ni, Nj) in m of a `basis` of products; forces are modal ones in N.
-    What the plate resists by bending, tension and foam is not in `force` and `tangent`.
+    What the plate resists by bending, tension and foam, and a shallow skin by stretching in
+    proportion to its deflection, is not in `force` and `tangent`.
     """
 
     def __init__(self, plate: Plate, basis: Basis) -> None:
-        h, patch = plate.thickness, plate.patch
-        if h is None or not plate.stretches or not isinstance(basis, ProductBasis):
+        h, patch = plate.sheet_thickness, plate.patch
+        known = plate.stretches or (patch.is_shallow and plate.rigidity)
+        if not h or not known or not isinstance(basis, ProductBasis):
             raise Refusal(
-                "stretching needs a flat rectangular plate or strip whose thickness is given, got "
-                f"a {patch.name} with thickness {h} m and base curvature {patch.arc_curvature:g}"
+                "stretching needs a shallow skin with a rigidity above zero in N m, or a flat "
+                "rectangular plate or strip whose thickness is given, got a "
+                f"{patch.name} with thickness {h} m and rigidity {plate.rigidity:g} N m"
             )
         if basis.patch != patch:
             raise Refusal(f"the plate is on {patch}, the basis on {basis.patch}; use one")
@@ -71,6 +79,12 @@ class Stretching:
         numbers = np.arange(m * n).reshape(2, m // 2, 2, n // 2)
         self._order = numbers.swapaxes(1, 2).reshape(4, -1)
         self._stiffness = self._inverse(self._membrane_compliance(A, B, wx, wy, h))
+        Hx, Hy = patch.curvatures
+        self._sx: Array = np.multiply.outer(Hx * (x - patch.a / 2), np.ones_like(y))
+        self._sy: Array = np.multiply.outer(np.ones_like(x), Hy * (y - patch.b / 2))
+        self._linear = np.zeros((basis.size, basis.size))
+        if patch.is_shallow:
+            self._linear = self.tangent(np.zeros(basis.shape))
         self._last: tuple[Array, ...] = ()
         self._solve: _Solver | None = None
 
@@ -118,24 +132,36 @@ class Stretching:
         found[self._order] = self._stiffness @ b[self._order]
         return found
 
-    def _membrane(self, q: Array) -> tuple[Array, Array, Array]:
-        """Slopes w_x and w_y (Gx, Gy), and the weighted membrane forces (3, Gx, Gy) in N m."""
-        wx, wy = self._dX @ q @ self._Y.T, self._X @ q @ self._dY.T
-        strains = np.stack([wx * wx / 2, wy * wy / 2, wx * wy]) * self._weights
+    def _membrane(self, q: Array) -> tuple[Array, Array, Array, float]:
+        """Slopes along x and y (Gx, Gy), weighted membrane forces (3, Gx, Gy) in N m, energy in J.
+
+        The slopes are those at rest and of the deflection.
+        """
+        sx, sy = self._sx, self._sy
+        wx, wy = self._dX @ q @ self._Y.T + sx, self._X @ q @ self._dY.T + sy
+        strains = np.stack([(wx * wx - sx * sx) / 2, (wy * wy - sy * sy) / 2, wx * wy - sx * sy])
+        strains *= self._weights
         m, n = self._A.shape[1], self._B.shape[1]
         b = (self._A @ strains @ self._B.swapaxes(1, 2)).sum(axis=0)
         c = self._relieved(b.reshape(-1, 1)).reshape(m, n)
-        return wx, wy, (self._A.swapaxes(1, 2) @ c @ self._B) * self._weights
+        N = (self._A.swapaxes(1, 2) @ c @ self._B) * self._weights
+        return wx, wy, N, float(b.ravel() @ c.ravel()) / 2
+
+    def _energy(self, q: Array) -> tuple[float, Array]:
+        """The energy in J of the deflection `q` (Ni, Nj) in m, and its derivatives, `force`."""
+        wx, wy, (Nx, Ny, Nxy), energy = self._membrane(q)
+        in_x, in_y = Nx * wx + Nxy * wy, Ny * wy + Nxy * wx
+        force = self._dX.T @ in_x @ self._Y + self._X.T @ in_y @ self._dY
+        linear = (self._linear @ q.ravel()).reshape(q.shape)
+        return energy - float(np.vdot(q, linear)) / 2, force - linear
 
     def force(self, q: Array) -> Array:
         """Modal forces (Ni, Nj) in N that hold the membrane of the deflection `q` (Ni, Nj) in m."""
-        wx, wy, (Nx, Ny, Nxy) = self._membrane(q)
-        in_x, in_y = Nx * wx + Nxy * wy, Ny * wy + Nxy * wx
-        return self._dX.T @ in_x @ self._Y + self._X.T @ in_y @ self._dY
+        return self._energy(q)[1]
 
     def tangent(self, q: Array) -> Array:
         """Derivatives (N, N) in N/m of `force` by the coefficients, at the deflection `q`."""
-        wx, wy, (Nx, Ny, Nxy) = self._membrane(q)
+        wx, wy, (Nx, Ny, Nxy), _ = self._membrane(q)
         pairs, in_x, in_y = self._pairs, wx * self._weights, wy * self._weights
         shear = _sandwich(pairs["dX X"], Nxy, pairs["Y dY"])
         held = _sandwich(pairs["dX dX"], Nx, pairs["Y Y"]) + shear + shear.T
@@ -145,7 +171,7 @@ class Stretching:
         by += _sandwich(pairs["1 X"], in_y, pairs["1 dY"])
         by += _sandwich(pairs["2 dX"], in_y, pairs["2 Y"])
         by += _sandwich(pairs["2 X"], in_x, pairs["2 dY"])
-        return held + by.T @ self._relieved(by)
+        return held + by.T @ self._relieved(by) - self._linear
 
     @cached_property
     def _pairs(self) -> dict[str, Array]:
@@ -166,9 +192,8 @@ class Stretching:
         there = values > _ROUNDING * values[-1]
         return vectors[:, there] * np.sqrt(values[there])
 
-    # With q = L p the energy is p'p/2 + q'f(q)/4 - F'q, for f is of the third degree. Where the
-    # membrane is compressed its Hessian I + L'KL may be indefinite. One Hessian serves as long as
-    # it brings the gradient down.
+    # With q = L p the energy is p'p/2 - F'q and that of the membrane. Where that is compressed the
+    # Hessian I + L'KL may be indefinite. One Hessian serves as long as it brings the gradient down.
     def __call__(self, modal: Array) -> Array:
         """Coefficients (Ni, Nj) in m under modal forces (Ni, Nj) in N, by Newton's method.
 
@@ -180,9 +205,8 @@ class Stretching:
 
         def state(p: Array) -> tuple[float, Array, Array]:
             q = (L @ p).reshape(shape)
-            f = self.force(q)
-            energy = p @ p / 2 + np.vdot(q, f) / 4 - target @ p
-            return float(energy), p + L.T @ f.ravel() - target, q
+            energy, f = self._energy(q)
+            return float(energy + p @ p / 2 - target @ p), p + L.T @ f.ravel() - target, q
 
         p = min((*self._last, self._first(target)), key=lambda p: state(p)[0])
         (energy, gradient, q), before = state(p), math.inf
@@ -210,6 +234,33 @@ class Stretching:
             return linear
         root = math.sqrt(3 * ratio)
         return linear * (2 / root * math.sinh(math.asinh(1.5 * root) / 3))
+
+    def path(self, modal: Array, depths: Iterable[float]) -> Iterator[tuple[float, Array]]:
+        """The force in N, and coefficients (Ni, Nj) in m, at one after the other of `depths` in m.
+
+        A depth is the displacement under the load, which has the modal forces `modal` (Ni, Nj) per
+        N. The path ends before the depth where no load holds the skin: it snaps through.
+        """
+        L, shape = self._root, modal.shape
+        target, force = L.T @ modal.ravel(), 0.0
+        p = 0 * target
+        for depth in depths:
+            size = abs(depth) / float(target @ target) * float(np.linalg.norm(target))
+            for _ in range(_CORRECTIONS):
+                q = (L @ p).reshape(shape)
+                left = force * target - p - L.T @ self.force(q).ravel()
+                further = depth - float(target @ p)
+                H = np.eye(len(p)) + L.T @ self.tangent(q) @ L
+                if np.linalg.norm(left) + abs(further) * size / abs(depth) < _ON_PATH * size:
+                    break
+                step, more = np.linalg.solve(H, np.stack([left, target], axis=1)).T
+                change = (further - float(target @ step)) / float(target @ more)
+                p, force = p + step + change * more, force + change
+            else:
+                return
+            if not np.linalg.eigvalsh(H)[0] > 0:
+                return
+            yield force, q
 
     def deflection(self, loads: Iterable[Load]) -> Array:
         """Coefficients (Ni, Nj) in m of the deflection under all `loads` at once."""

@@ -17,8 +17,8 @@ from kappaskin.calibration import Calibration, Corrector, DriftMonitor, Rest, Ta
 from kappaskin.contact import (
     NO_CONTACT,
     NO_GEOMETRY,
+    LargeDeflection,
     LoadDetector,
-    LowerBound,
     contacts_of,
 )
 from kappaskin.errors import RankDeficient, Refusal
@@ -140,7 +140,7 @@ class Pipeline:
         known = setup.calibration and setup.calibration.weights
         plate = known.plate(sensor.plate) if known else sensor.plate
         self._contacts = contacts_of(plate, sensor.layout, self.basis, edge, sensor.sigma)
-        self._bounded = LowerBound(plate, edge, known.deepest if known else 0.0)
+        self._bounded = LargeDeflection(plate, edge, known.deepest if known else 0.0)
         self.left_out = Exclusion.none(sensor, self._whole, self._ideal())
         self._no_shape = np.full(self.basis.shape, np.nan)
         self._unknown = np.full((setup.ny, setup.nx), np.nan)

@@ -45,8 +45,13 @@ class ErrorBars:
         return np.hypot(noise * self._unit, self._undecided).reshape(self._shape)
 
     def of_slopes(self, position: Array, noise: float) -> Array:
-        """Standard deviations (2,) of the slopes along x and y at `position` (2,) in m."""
-        unit, undecided = self._of(self.basis.jet(*position.tolist())[1:3])
+        """Standard deviations (2,) of the slopes along x and y at `position` (2,) in m.
+
+        On a cap along the axes of its elements.
+        """
+        x, y = position.tolist()
+        slopes = self.basis.patch.base(x, y).covariant[1:3] @ self.basis.jet(x, y)
+        unit, undecided = self._of(slopes)
         return np.hypot(noise * unit, undecided)
 
 
@@ -155,6 +160,10 @@ class Quantities:
 
     def form_at_elements(self, curvature: Array) -> Array:
         """The curvature form (3, P) in 1/m as the elements read it, where slopes are small."""
-        patch = self.layout.patch
-        form = curvature + np.array([*patch.curvatures, 0.0])[:, None]
-        return np.where([[False], [True], [True]], 0.0, form) if patch.strip else form
+        form = curvature + self._elements_at_rest
+        return np.where([[False], [True], [True]], 0.0, form) if self.layout.patch.strip else form
+
+    @cached_property
+    def _elements_at_rest(self) -> Array:
+        """The curvature form (3, P) in 1/m of the skin at rest at its elements."""
+        return self.layout.patch.local(self.layout.positions).curvature

@@ -19,7 +19,7 @@ from kappaskin.contact import (
     ContactObject,
     Contacts,
     Imprints,
-    LowerBound,
+    LargeDeflection,
     as_one,
     contacts_of,
     object_finder,
@@ -36,7 +36,7 @@ from kappaskin.estimation import (
 from kappaskin.frames import Array, Contact, LocalGeometry
 from kappaskin.mechanics import Plate
 from kappaskin.sensing import SensorLayout
-from kappaskin.skin import Disk, Patch, Polygon
+from kappaskin.skin import Cap, Disk, Patch, Polygon
 
 _NEEDED = (
     "size (2,) in m, positions (P, 2) in m and curvature (T, 3, P) or (3, P) in 1/m, or values "
@@ -53,6 +53,8 @@ _NAMES = (
     *_READ,
     "sigma",
     "radius",
+    "angle",
+    "stretch",
     "outline",
     *_SKIN,
     "inplane",
@@ -170,6 +172,20 @@ def _patch(path: Path, size: Array, radius: Array, outline: Array | None) -> Pat
     return Patch(float(size[0]), 1.0 if strip else float(size[1]), bent, strip)
 
 
+def _cap(path: Path, found: dict[str, Array]) -> Cap:
+    """The cap of one `radius`, `angle` and `stretch`, and of the `size` (2,) of its box."""
+    sizes = [found.get(name, np.array(1.0)) for name in ("radius", "angle", "stretch")]
+    if "radius" not in found or any(each.size != 1 for each in sizes) or "outline" in found:
+        raise Refusal(f"{path}: expected one radius, angle and stretch of a cap, and no outline")
+    cap, size = Cap(*(float(each.item()) for each in sizes)), found["size"]
+    if size.shape != (2,) or not np.allclose(size, (cap.a, cap.b)):
+        raise Refusal(
+            f"{path}: expected size {cap.a:g} x {cap.b:g} m, twice from pole to rim along a "
+            f"{cap.name}, got {size}"
+        )
+    return cap
+
+
 def _layout(path: Path, patch: Patch, positions: Array) -> SensorLayout:
     across = 1 if patch.strip else 2
     if positions.ndim == 1 and patch.strip:
@@ -276,7 +292,10 @@ def reconstruct(
     found, texts = _read(readings)
     name, sigma = "values" if "values" in found else "curvature", found.get("sigma")
     radius = found.get("radius", np.array(np.inf))
-    patch = _patch(readings, found["size"], radius, found.get("outline"))
+    if "angle" in found:
+        patch = _cap(readings, found)
+    else:
+        patch = _patch(readings, found["size"], radius, found.get("outline"))
     layout = _layout(readings, patch, found["positions"])
     if name == "values":
         layout = _reading(readings, layout, found, texts)
@@ -301,7 +320,7 @@ def reconstruct(
     if not (contact or objects):
         return out
     plate = _plate(patch, found, str(texts.get("inplane", np.array("")).item()))
-    bounded = LowerBound(plate, edge)
+    bounded = LargeDeflection(plate, edge)
     fits = _fits(method, functions, layout, frames, sigma if layout.reads else None)
     read = [each.readings for each in fits]
     pairs, drifts = list[tuple[Contact, Contact]](), np.zeros(len(fits))
@@ -321,7 +340,8 @@ def reconstruct(
         there.append(contacts_in.geometry(fits[frame], contacts[-1]))
     out["drift"] = drifts
     out |= _contacts(there, contacts, forces="rigidity" in found)
-    out |= _pairs(pairs, forces="rigidity" in found)
+    both = [(bounded(one), bounded(other)) for one, other in pairs]
+    out |= _pairs(both, forces="rigidity" in found)
     if objects:
         whole = [as_one(*pair) for pair in pairs]
         out |= _objects(_found_objects(plate, layout, edge, fits, read, whole))
@@ -367,11 +387,13 @@ def _contacts(
     `load_radius` (T,) and the ends of its 95 % interval `load_radius_95` (T, 2) in m; `normal`
     (T, 3), `curvature_form` (T, 2, 2), `torsion_form` (T, 2) and `principal` (T, 2) in 1/m; with
     `forces` also `force` and `force_sd` (T,) in N. `single`, `near_rim` and, with `forces`,
-    `force_is_lower_bound` (T,) say whether to trust them (`Contact`). All readings weigh the same.
+    `force_is_lower_bound`, `force_is_upper_bound` and `snaps_through` (T,) say whether to trust
+    them (`Contact`). All readings weigh the same.
     """
     names = ["displacement", "displacement_sd", "single", "near_rim"]
     names += ["load_radius", "load_radius_95"]
-    names += ["force", "force_sd", "force_is_lower_bound"] if forces else []
+    bounds = ["force_is_lower_bound", "force_is_upper_bound", "snaps_through"]
+    names += ["force", "force_sd", *bounds] if forces else []
     out = {
         "contact": np.stack([contact.position for contact in contacts]),
         "contact_sd": np.stack([contact.position_sd for contact in contacts]),

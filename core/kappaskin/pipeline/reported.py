@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
-from kappaskin._text import NO_FORCE
 from kappaskin.errors import Refusal
 from kappaskin.estimation import Fit, propagated_covariance
 from kappaskin.frames import COMPONENTS, Array, Estimate
@@ -843,7 +842,36 @@ _CONTACT = (
             (
                 "force_is_lower_bound",
                 "whether the force leaves out a stretch that may change it by more than its error "
-                "bar: the skin's thickness is not given, and 0.25 mm is assumed for this",
+                "bar: of a flat skin whose thickness is not given, for which 0.25 mm is assumed, "
+                "or a curved one that stiffens",
+            ),
+        ),
+    ),
+    ReportedQuantity(
+        "force_is_upper_bound",
+        "",
+        "whether the skin softens and needs less force",
+        "contact.force_is_upper_bound",
+        kind="?",
+        keys=(
+            (
+                "force_is_upper_bound",
+                "whether a curved skin is pressed so deep that it softens, by which the force "
+                "changes by more than its error bar; the error bar contains the change",
+            ),
+        ),
+    ),
+    ReportedQuantity(
+        "snaps_through",
+        "",
+        "whether the skin snaps through, where there is no force",
+        "contact.snaps_through",
+        kind="?",
+        keys=(
+            (
+                "snaps_through",
+                "whether a curved skin is pressed so deep that it snaps through; the force is "
+                "null then",
             ),
         ),
     ),
@@ -878,14 +906,14 @@ _CONTACT = (
         half_width="contact.force_95",
         keys=(("force_N", "of the contact, above zero where it presses"),),
         labels_shown=("Force",),
-        at_rim=NO_FORCE,
         shown=("N", 1.0, 4),
         header=HeaderNumber(
             "force",
             20,
             "Force of the point load that fits best, with its error bar; \u2265: a lower bound, as "
             "the skin may stretch: its thickness is not given, and 0.25 mm would change the force "
-            "by more than the error bar.",
+            "by more than the error bar; \u2264: an upper bound, as a curved skin softens where it "
+            "is pressed in deep.",
         ),
     ),
     ReportedQuantity(
@@ -1239,10 +1267,9 @@ def readouts_of(quantity: ReportedQuantity, reported: Reported) -> list[Readout]
     ]
     found: list[Readout] = []
     for part, label in enumerate(quantity.labels_shown):
-        if quantity.at_rim and reported.contact.near_rim:
-            found.append(
-                Readout(label, math.nan, math.nan, math.nan, unit, digits, quantity.at_rim)
-            )
+        words = quantity.at_rim if reported.contact.near_rim else ""
+        if words := reported.contact.no_force if quantity.name == "force" else words:
+            found.append(Readout(label, math.nan, math.nan, math.nan, unit, digits, words))
             continue
         value, sd, half_width = (scale * float(each[part % len(each)]) for each in numbers)
         found.append(Readout(label, value, sd, half_width, unit, digits))

@@ -8,7 +8,7 @@ import time
 from contextlib import suppress
 from typing import Any, cast
 
-from kappaskin._text import NO_FORCE, ONE_SIGMA, printable, with_error
+from kappaskin._text import NO_FORCE, ONE_SIGMA, SNAPS, printable, with_error
 from kappaskin.errors import Refusal
 from kappaskin.publish.message import LARGEST, VERSION, EstimateMessage, SourceState
 from kappaskin.publish.publishing import Receiver, Target, reason
@@ -250,12 +250,14 @@ def _words(message: JsonMessage) -> str:
         also = cast("JsonMessage", second)
         x, y = (_figure(also, key, 1e3, ".2f") for key in ("x_m", "y_m"))
         doubt = f"  second x {x} mm  y {y} mm  force {_figure(also, 'force_N', 1, '.4f')} N"
-    rim = message.get("near_rim")
-    force = NO_FORCE if rim else f"force {bar('force', 'N', 1, 'N')}"
+    snaps = SNAPS if message.get("snaps_through") else ""
+    force = NO_FORCE if message.get("near_rim") else snaps
+    force = force or f"force {bar('force', 'N', 1, 'N')}"
     least = "  force is a lower bound" if message.get("force_is_lower_bound") else ""
+    most = "  force is an upper bound" if message.get("force_is_upper_bound") else ""
     return (
         f"{head}  x {bar('x', 'm', 1e3, 'mm')}  y {bar('y', 'm', 1e3, 'mm')}  "
         f"{force}  moved {bar('displacement', 'm', 1e3, 'mm')}  "
         f"curvature {bar('curvature_1', 'per_m', 1, '1/m')}, "
-        f"{bar('curvature_2', 'per_m', 1, '1/m')}{doubt}{least}  {tail}"
+        f"{bar('curvature_2', 'per_m', 1, '1/m')}{doubt}{least}{most}  {tail}"
     )

@@ -161,6 +161,8 @@ bool single                # whether one point load explains the readings
 bool near_rim              # too near a held edge for place and force to be trusted
 bool converged
 bool force_is_lower_bound  # the skin may stretch and need more force
+bool force_is_upper_bound  # the skin softens and needs less force
+bool snaps_through         # where the skin snaps through there is no force
 int64 spare                # readings more than a point load needs
 float64 noise              # 1/m, standard deviation of a reading
 float64[2] position        # m, on the skin
@@ -186,6 +188,8 @@ uint64 sequence
 float64 device_time               # s, on the device's clock, when the scan began
 bool second_near_rim              # too near a held edge for place and force to be trusted
 bool second_force_is_lower_bound  # the skin may stretch and need more force
+bool second_force_is_upper_bound  # the skin softens and needs less force
+bool second_snaps_through         # where the skin snaps through there is no force
 int64 second_spare                # readings more than two loads need
 float64[2] second_position        # m, on the skin
 float64[2] second_position_sd     # m
@@ -245,7 +249,7 @@ FRAME = "skin"
 """The coordinate frame of all messages that have one."""
 
 _LINE = struct.Struct("<4sd?3xI")
-_CONTACT = struct.Struct("<4siII5s7xQ4d5?3xq40d")
+_CONTACT = struct.Struct("<4siII5s7xQ4d7?xq40d")
 _HEAD = b"\0\1\0\0"
 
 
@@ -264,7 +268,7 @@ def pack_contact(
 ) -> bytes:
     """The message `CONTACT` of the frame `FRAME`: as `cdr.encode` makes it, at a third of the cost.
 
-    Its fields in their order: four `times`, five `flags`, and from the noise on 40 `numbers`.
+    Its fields in their order: four `times`, seven `flags`, and from the noise on 40 `numbers`.
     """
     name = FRAME.encode() + b"\0"
     head = _HEAD, *divmod(stamp, 10**9), len(name), name

@@ -275,7 +275,7 @@ def _contact(estimate: Estimate, stamp: int) -> bytes:
         (estimate.device_time, estimate.host_time, estimate.taken, estimate.taken_sd),
         (
             *(contact.present, contact.single, contact.near_rim, estimate.converged),
-            contact.force_is_lower_bound,
+            *(contact.force_is_lower_bound, contact.force_is_upper_bound, contact.snaps_through),
         ),
         contact.spare,
         (

@@ -61,7 +61,7 @@ from kappaskin.sensing import (
     SensorLayout,
     Transduction,
 )
-from kappaskin.skin import Disk, Patch, Polygon
+from kappaskin.skin import Cap, Disk, Patch, Polygon
 
 TABLE_1_NOISE = 0.40 / math.sqrt(3)
 """RMS of the noise of Table 1 in 1/m: uniform between -0.40 and 0.40."""
@@ -227,6 +227,9 @@ def read_skin(table: TomlTable) -> tuple[Plate, str]:
 def _patch(table: TomlTable, shape: str) -> Patch:
     if shape == "disk":
         return Disk(SKIN.value(table, "rim_radius"))
+    if shape == "cap":
+        radius = table.get("radius", float)
+        return Cap(radius, *(SKIN.value(table, key) for key in ("angle", "stretch")))
     if shape == "polygon":
         return Polygon(SKIN.value(table, "outline"))
     a, b = SKIN.value(table, "size")
@@ -236,8 +239,17 @@ def _patch(table: TomlTable, shape: str) -> Patch:
 def read_elements(table: TomlTable, patch: Patch) -> SensorLayout:
     """The elements in the table [elements] of a file."""
     with table.blamed():
+        given = [key for key in ("positions", "rings", "spiral") if key in table]
+        if len(given) > 1:
+            raise table.refusal(f"expected one pattern, got {' and '.join(given)}", given[1])
         if "positions" in table:
             layout = SensorLayout.scattered(patch, ELEMENTS.value(table, "positions"))
+        elif "rings" in table:
+            check_elements(sum(rings := ELEMENTS.value(table, "rings")))
+            layout = SensorLayout.on_rings(patch, rings)
+        elif "spiral" in table:
+            check_elements(count := ELEMENTS.value(table, "spiral"))
+            layout = SensorLayout.in_spiral(patch, count)
         else:
             grid = ELEMENTS.value(table, "grid")
             check_elements(*grid)

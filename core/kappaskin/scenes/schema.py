@@ -48,7 +48,7 @@ from kappaskin.sensing import (
     Multiplexer,
     SensorLayout,
 )
-from kappaskin.skin import Disk, Patch, Polygon
+from kappaskin.skin import Cap, Disk, Patch, Polygon
 
 _SECOND = Unit.same("s")
 _MM, _UM = Unit("m", "mm", 1e-3), Unit("m", "\N{MICRO SIGN}m", 1e-6)
@@ -125,6 +125,25 @@ SKIN = Part(
             _MM,
             example=0.05,
         ),
+        "angle": Key(
+            "Angle",
+            "Of a cap: angle from the pole to the rim, where its normal is turned by so much. A "
+            "hemisphere has 90\N{DEGREE SIGN}.",
+            _DEGREE,
+            0.0,
+            math.pi / 2,
+            kind=float,
+            default=math.pi / 2,
+        ),
+        "stretch": Key(
+            "Stretch",
+            "Of a cap: how many times longer than its radius its axis is; 1 is a sphere.",
+            least=0.2,
+            most=5.0,
+            kind=float,
+            default=1.0,
+            example=1.2,
+        ),
         "edge": Key(
             "Edge",
             "Boundary condition along the rim. Hinged: the skin rotates freely; sliding: the ends "
@@ -192,9 +211,10 @@ SKIN = Part(
             "Boundary condition in the plane of the skin. Held: no displacement; diaphragm: no "
             "force across the edge, no displacement along it; free: neither force nor shear; hoop, "
             "of a bent skin: the hoop displacement is held, the axial one free. Of a bent skin it "
-            "is that of the straight edges. Held unless given, hoop for a bent skin.",
+            "is that of the straight edges. Held unless given, hoop for a bent skin, diaphragm for "
+            "one of two radii. A cap is held, or below a hemisphere a diaphragm.",
             choices=tuple((one, one.capitalize()) for one in INPLANE),
-            example="diaphragm",
+            example="held",
         ),
     },
     (Plate, Scene, Patch),
@@ -202,6 +222,13 @@ SKIN = Part(
         "rectangle": PartKind("Rectangle", Patch, {"size": [0.1, 0.1]}, ("radius",)),
         "strip": PartKind("Strip", Patch, {"size": [0.1, 0.02]}, ("radius",)),
         "disk": PartKind("Disk", Disk, {"rim_radius": 0.05}),
+        "cap": PartKind(
+            "Cap",
+            Cap,
+            {"radius": 0.008},
+            ("angle", "stretch"),
+            {"radius": Key("Radius", "Radius of the cap, of its equator.", _MM, 0.0, kind=float)},
+        ),
         "polygon": PartKind(
             "Polygon",
             Polygon,
@@ -228,6 +255,23 @@ ELEMENTS = Part(
             _MM,
             kind=tuple[tuple[float, float], ...],
             example=[[0.03, 0.03], [0.07, 0.03], [0.03, 0.07], [0.07, 0.07]],
+        ),
+        "rings": Key(
+            "Rings",
+            "Of a disk or cap: number of elements on each ring from the middle outwards. The rings "
+            "are evenly far apart; a first ring of 1 is in the middle.",
+            least=1,
+            kind=tuple[int, ...],
+            example=[1, 6, 12, 18],
+            offered=False,
+        ),
+        "spiral": Key(
+            "Spiral",
+            "Of a disk or cap: number of elements on a Fibonacci spiral, one to each equal area.",
+            least=1,
+            kind=int,
+            example=60,
+            offered=False,
         ),
         "dead": Key(
             "Dead",
@@ -261,7 +305,7 @@ ELEMENTS = Part(
         ),
     },
     (SensorLayout,),
-    either=(("grid", "positions"),),
+    either=(("grid", "positions", "rings", "spiral"),),
 )
 
 READINGS = Part(

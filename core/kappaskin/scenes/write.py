@@ -35,7 +35,7 @@ from kappaskin.scenes.schema import (
 )
 from kappaskin.scenes.stimulus import Indenter, Motion, MotionPath, MotionStep, Orbit, Stimulus
 from kappaskin.sensing import DigitalReadings, SensorLayout, Transduction
-from kappaskin.skin import Disk, Patch, Polygon
+from kappaskin.skin import Cap, Disk, Patch, Polygon
 
 _MOST_CELLS = 2**20  # of a grid that is looked for
 
@@ -87,6 +87,10 @@ def _skin(scene: Scene) -> dict[str, Any]:
 
 def _patch(patch: Patch) -> dict[str, Any]:
     match patch:
+        case Cap():
+            each = {key: float(getattr(patch, key)) for key in ("angle", "stretch")}
+            more = {key: value for key, value in each.items() if value != SKIN.key(key).default}
+            return {"shape": "cap", "radius": float(patch.equator), **more}
         case Disk():
             return {"shape": "disk", "rim_radius": float(patch.rim_radius)}
         case Polygon():

@@ -9,11 +9,11 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from kappaskin.bases import Basis, SineBasis, curvature_at, gauss, hoop_at
+from kappaskin.bases import Basis, SineBasis, covariant_at, curvature_at, gauss, hoop_at
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Array, Indices, Mask
 from kappaskin.mechanics import Plate
-from kappaskin.skin import Cap, Patch
+from kappaskin.skin import Cap, Disk, Patch
 
 _POINTS = 12  # exact to rounding for waves as short as the gage
 
@@ -22,18 +22,28 @@ _POINTS = 12  # exact to rounding for waves as short as the gage
 # in the limit of short ones is f_xy. Each alone mixes the modes: it sees sin(k x) sin(l y) as
 # waves of k + l and of k - l. What they differ by does not: with h = L / sqrt(8) it is the twist
 #     k l cos(k x) cos(l y)   times   (cos(k h) sinc(l h) + sinc(k h) cos(l h)) / 2.
+# A shallow skin has w Hx^2 more along x, that is xx times 1 - (Hx / k)^2, and along y alike. Along
+# the diagonals its mean is w (Hx^2 + Hy^2) / 2, which adds to the twist's factor
+#     (Hx^2 + Hy^2) / (4 k l)   times   sinc((k - l) h) - sinc((k + l) h).
 _DIAGONAL = 1 / math.sqrt(2)
 
 
 def gage_multipliers(sines: SineBasis, gage_length: float) -> Array:
-    """Factors (3, Ni, Nj) by which gages of `gage_length` in m read sines on a flat skin.
+    """Factors (3, Ni, Nj) by which gages of `gage_length` in m read sines on no cylinder skin.
 
-    xx: sinc(k_i L / 2) and yy: sinc(k_j L / 2), with sinc(t) = sin(t) / t; xy as derived above.
+    On a flat skin xx: sinc(k_i L / 2) and yy: sinc(k_j L / 2), with sinc(t) = sin(t) / t; xy as
+    derived above.
     """
     ki, kj = np.meshgrid(*sines.wavenumbers, indexing="ij")
     L, h = gage_length, gage_length * _DIAGONAL / 2
     twist = np.cos(ki * h) * _sinc(kj * h) + _sinc(ki * h) * np.cos(kj * h)
-    return np.stack([_sinc(ki * L / 2), _sinc(kj * L / 2), twist / 2])
+    xx, yy, xy = _sinc(ki * L / 2), _sinc(kj * L / 2), twist / 2
+    if sines.patch.is_shallow:
+        squares = np.square(sines.patch.curvatures)
+        xx, yy = xx * (1 - squares[0] / ki**2), yy * (1 - squares[1] / kj**2)
+        aslant = _sinc((ki - kj) * h) - _sinc((ki + kj) * h)
+        xy = xy + squares.sum() / (4 * ki * kj) * aslant
+    return np.stack([xx, yy, xy])
 
 
 def _sinc(t: Array) -> Array:
@@ -55,7 +65,7 @@ def _along(basis: Basis, positions: Array, L: float, curvature: ValuesAt, t: Arr
     """
     if not L:
         return _normal(curvature(positions), t)
-    if basis.patch.arc_curvature:
+    if any(basis.patch.curvatures):
         return _over_gage(lambda places: _normal(curvature(places), t), positions, L, t)
     half = L / 2 * t
     return (_slope(basis, positions + half, t) - _slope(basis, positions - half, t)) / L
@@ -100,6 +110,12 @@ def _over_cell(values: ValuesAt, positions: Array, cell: tuple[float, float]) ->
 
 _SHORTEST = 1e-6  # m: the mean over a shorter gage is lost in rounding
 _ROUNDING = 1e-9  # of a depth: gages as long as the element distance end on the rim
+
+
+def _round(patch: Patch) -> Disk:
+    if not isinstance(patch, Disk):
+        raise Refusal(f"expected a disk or a cap, got a {patch.name}; give a grid or positions")
+    return patch
 
 
 def _channels(patch: Patch, elements: int) -> Mask:
@@ -324,6 +340,45 @@ class SensorLayout:
             raise Refusal(f"expected positions of shape (P, 2) in m, got {points.shape}")
         return cls(patch, points, _channels(patch, len(points)))
 
+    @classmethod
+    def on_rings(cls, patch: Patch, counts: Iterable[int]) -> "SensorLayout":
+        """Elements on rings about the middle of a disk or a cap, as many on each as `counts` say.
+
+        The rings are evenly far apart, the last one half as far from the rim. A first ring of one
+        element is in the middle; every other ring is turned by half of its step.
+        """
+        rim, each = _round(patch).rim_radius, list(counts)
+        if not each or min(each) < 1:
+            raise Refusal(f"expected at least one element on each ring, got {each or 'no ring'}")
+        begin = 0.0 if each[0] == 1 else 0.5
+        far: Array = rim * (np.arange(len(each), dtype=float) + begin) / (len(each) - 0.5 + begin)
+        turns = [(np.arange(n) + k % 2 / 2) / n for k, n in enumerate(each)]
+        return cls._about_middle(patch, np.repeat(far, each), np.concatenate(turns))
+
+    @classmethod
+    def in_spiral(cls, patch: Patch, count: int) -> "SensorLayout":
+        """`count` elements on a Fibonacci spiral of a disk or a cap: one to each equal area.
+
+        Each is turned by the golden angle from the one before. The last ones are half the mean
+        distance of two elements from the rim.
+        """
+        rim, N = _round(patch).rim_radius, count
+        if N < 1:
+            raise Refusal(f"expected at least one element on a spiral, got {N}")
+        far: Array = np.linspace(0.0, rim, 4097)
+        around: Array = patch.meridian(far).radius if isinstance(patch, Cap) else far
+        area: Array = np.concatenate([[0.0], np.cumsum(around[1:] + around[:-1])]) * np.pi * far[1]
+        within = float(np.interp(rim - math.sqrt(area[-1] / N) / 2, far, area))
+        places: Array = np.interp((np.arange(N, dtype=float) + 0.5) / N * within, area, far)
+        return cls._about_middle(patch, places, np.arange(N) * (3 - math.sqrt(5)) / 2)
+
+    @classmethod
+    def _about_middle(cls, patch: Patch, far: Array, turns: Array) -> "SensorLayout":
+        """Elements so `far` (P,) in m from the middle along the skin, after `turns` (P,) from x."""
+        around = 2 * np.pi * turns
+        x, y = patch.a / 2 + far * np.cos(around), patch.b / 2 + far * np.sin(around)
+        return cls.scattered(patch, np.column_stack([x, y]))
+
     def reading(
         self,
         element: ArrayLike,
@@ -533,7 +588,9 @@ class SensorLayout:
             if name == "twist":
                 return gages[2]
             along_y = int(abs(math.sin(direction)) > _DIAGONAL)
-            return over_cell if name == "height" or (name == "slope" and not L) else gages[along_y]
+            if name == "curvature":
+                return gages[along_y]
+            return _sinc((ki, kj)[along_y] * L / 2) if name == "slope" and L else over_cell
 
         return np.stack([factors(*kind) for kind in self.kinds])
 
@@ -641,42 +698,46 @@ class SensorLayout:
 # Both are of two unit vectors u and v, which are t and t, or x and y: II_uv / sqrt(I_uu I_vv). What
 # shear takes off is (1 - u.v) H I_dy / 2. Heights and slopes are of first order by definition:
 # their u and v, p, q and w are zero.
-# A shallow skin's tangential displacements are neglected, of both curvatures Hx and Hy:
-#     r_x = (1, 0, -p)     r_xx = (-Hx p, 0, -Hx - p_x)     r_xy = (0, 0, -p_y)
-#     r_y = (0, 1, -q)     r_yy = (0, -Hy q, -Hy - q_y)     r_x x r_y = (p, q, 1) = W n,
-# c^2 Hx + s^2 Hy are taken off along t, and (1 - u.v) (Hx + Hy) I_xy / 2 by shear.
+# On a shallow skin and a cap no tangential displacement is in it, but the curvature b of the base
+# has xx, yy and xy. With b (p, q) = (k, l)
+#     r_x = (1, 0, -p)     r_xx = (-p b_xx, -p b_xy, -b_xx - p_x)     r_x x r_y = (p, q, 1) = W n,
+#     r_y = (0, 1, -q)     r_yy = (-q b_xy, -q b_yy, -b_yy - q_y)     r_xy between what both give:
+# b_xx + p k, b_yy + q l and b_xy + (p l + q k) / 2 are added to W II, so that tilting a sphere
+# bends it nowhere; b_tt is taken off along t, and (1 - u.v) (b_xx + b_yy) I_xy / 2 by shear.
 
 
 class DeflectedSurface:
     """What R readings are on the deflected surface, from the `jet` (Q, ..., R) of each.
 
     That is the reading of first order, p and q as derived above; on a cylinder skin also w, w_y,
-    q_y and p_y. `forms` (3, 3, R) are what of dd, dy and yy is in uu, vv and uv. `curvatures` in
-    1/m are those of the skin at rest along x and y.
+    q_y and p_y. `forms` (3, 3, R) are what of dd, dy and yy is in uu, vv and uv. `base` (3, 1)
+    or (3, R) in 1/m is the curvature xx, yy, xy at rest; empty where that is flat.
     """
 
-    def __init__(self, jet: Array, forms: Array, curvatures: tuple[float, float]) -> None:
-        self._jet, self._forms, (Hx, Hy) = jet, forms, curvatures
-        self._Hx, self._Hy, self._is_arc, is_bent = Hx, Hy, len(jet) > 3, bool(Hx or Hy)
+    def __init__(self, jet: Array, forms: Array, base: Array) -> None:
+        self._jet, self._forms, self._base = jet, forms, base
+        self._is_arc, self._is_bent = len(jet) > 3, len(base) > 0
         first, p, q = jet[:3]
         dd, dy, yy, m = p * p, p * q, q * q, q
         if self._is_arc:
             w, wy, qy, py = jet[3:]
             dd, dy = (p - w * q) ** 2 + w * w * (w * w - 1), dy - w * (w * w + yy)
             yy, m, in_y = yy + w * w, q - p * w, qy - p * wy
-            in_d = Hx * (1 + p * p) - w * (2 * py - w * in_y)
+            in_d = base[0] * (1 + p * p) - w * (2 * py - w * in_y)
             first = first + self._mixed(2, in_d, -w * in_y, -p * wy)
-        elif is_bent:
-            first = first + forms[2, 0] * (Hx * (1 + dd)) + forms[2, 2] * (Hy * (1 + yy))
+        elif self._is_bent:
+            bx, by, bxy = base
+            k, o = bx * p + bxy * q, bxy * p + by * q
+            first = first + self._mixed(2, bx + p * k, bxy + (p * o + q * k) / 2, by + q * o)
         self._first, self._area = first, 1 + p * p + m * m  # W II_uv and W^2
         self._lengths = [1 + self._mixed(k, dd, dy, yy) for k in range(2)]  # I_uu and I_vv
         self._length = np.sqrt(self._lengths[0]) * np.sqrt(self._lengths[1])
         self._scale = 1 / (np.sqrt(self._area) * self._length)
         self._second = self._ratio = self._scale * first
-        if is_bent:
-            self._sheared = (Hx + Hy) / 2 * (1 - forms[2, 0] - forms[2, 2]) / self._length
+        if self._is_bent:
+            shear = (base[0] + base[1]) / 2 * (1 - forms[2, 0] - forms[2, 2])
+            self._sheared = shear / self._length
             self._ratio = self._second - self._sheared * dy
-        self._of_base = Hx * forms[2, 0] + Hy * forms[2, 2] if is_bent else None
 
     def _mixed(self, k: int, dd: Array, dy: Array, yy: Array) -> Array:
         form = self._forms[k]
@@ -685,7 +746,10 @@ class DeflectedSurface:
     @property
     def readings(self) -> Array:
         """What is read, (..., R)."""
-        return self._ratio if self._of_base is None else self._ratio - self._of_base
+        if not self._is_bent:
+            return self._ratio
+        xx, yy, xy = self._base
+        return self._ratio - self._mixed(2, xx, xy, yy)
 
     @property
     def slope(self) -> Array:
@@ -696,7 +760,7 @@ class DeflectedSurface:
         """How the readings of one frame change with their jet, (Q, R)."""
         found, rates = np.zeros_like(self._jet), self._rates()
         found[0] = self._scale
-        if self._of_base is not None:
+        if self._is_bent:
             own = [1, 3, 4, 5, 6] if self._is_arc else [1, 2]
             found[own] = self._scale * self._of_second_form()
             found[1 : 1 + len(rates[1])] -= self._sheared * rates[1]
@@ -724,14 +788,22 @@ class DeflectedSurface:
         )
 
     def _of_second_form(self) -> Array:
-        """How W II_uv changes with p, w, w_y, q_y and p_y, (5, R); of a shallow skin p, q."""
+        """How W II_uv changes with p, w, w_y, q_y and p_y, (5, R); without w with p and q."""
         if not self._is_arc:
-            p, q = self._jet[1:3]
-            of_x, of_y = self._Hx * self._forms[2, 0], self._Hy * self._forms[2, 2]
-            return np.array([2 * p * of_x, 2 * q * of_y])
+            (p, q), (xx, yy, xy) = self._jet[1:3], self._base
+            mean = (xx + yy) / 2
+            with_p = self._mixed(2, 2 * xx * p + xy * q, xy * p + mean * q, xy * q)
+            with_q = self._mixed(2, xy * p, mean * p + xy * q, 2 * yy * q + xy * p)
+            return np.array([with_p, with_q])
         _, p, _, w, wy, qy, py = self._jet
         in_y, none, square = qy - p * wy, np.zeros_like(p), w * w
-        in_dd = [2 * self._Hx * p - square * wy, 2 * (w * in_y - py), -square * p, square, -2 * w]
+        in_dd = [
+            2 * self._base[0] * p - square * wy,
+            2 * (w * in_y - py),
+            -square * p,
+            square,
+            -2 * w,
+        ]
         in_dy, in_yy = [w * wy, -in_y, w * p, -w, none], [-wy, none, -p, none, none]
         return self._mixed(2, *np.array([in_dd, in_dy, in_yy]))
 
@@ -751,9 +823,9 @@ class NormalCurvature:
         dtype: DTypeLike = np.float64,
         plate: Plate | None = None,
     ) -> None:
-        places, H = layout.positions, basis.patch.arc_curvature
-        at = [basis.at(places, 1, 0), basis.at(places, 0, 1)]
-        if H:
+        places, patch = layout.positions, basis.patch
+        at = list(covariant_at(basis, places)[1:3])
+        if H := patch.arc_curvature:
             v, *turns = plate.hoop(basis, places) if plate else hoop_at(basis, places)
             curvature = plate.curvature(basis)(places) if plate else curvature_at(basis, places)
             at = [at[0] + H * v, at[1], *turns, *curvature[1:]]
@@ -771,7 +843,9 @@ class NormalCurvature:
         self._element, self._curved = layout.element, curved[layout.kind]
         self._all_curved = bool(self._curved.all())
         self._columns = np.concatenate([self._first, *self._at]).T
-        self.frame_shape, self._curvatures = layout.frame_shape, basis.patch.curvatures
+        self.frame_shape, self._base = layout.frame_shape, np.empty((0, 1), dtype)
+        if any(patch.curvatures):
+            self._base = patch.local(places).curvature[:, layout.element].astype(dtype)
 
     @property
     def maps(self) -> Array:
@@ -785,7 +859,7 @@ class NormalCurvature:
         if not self._all_curved:
             at *= self._curved
         jet = np.moveaxis(np.concatenate([values[..., None, :R], at], axis=-2), -2, 0)
-        return DeflectedSurface(jet, self._forms, self._curvatures)
+        return DeflectedSurface(jet, self._forms, self._base)
 
     def __call__(self, coefficients: Array) -> Array:
         """Readings (..., 3, P) in 1/m, or (..., R), for `coefficients` (..., Ni, Nj)."""

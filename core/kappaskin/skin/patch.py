@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import scipy
@@ -472,16 +472,17 @@ class Cap(Disk):
     @property
     def name(self) -> str:
         of = f" stretched {self.stretch:g} times" if self.stretch != 1 else ""
-        return f"cap of radius {self._equator:g} m{of} with {math.degrees(self.angle):g} degrees"
+        return f"cap of radius {self.equator:g} m{of} with {math.degrees(self.angle):g} degrees"
 
     @property
-    def _equator(self) -> float:
+    def equator(self) -> float:
+        """Radius in m of its equator."""
         return self.radius if isinstance(self.radius, float | int) else self.radius[0]
 
     @property
     def radii(self) -> tuple[float, float]:
         """Radius of curvature in m along x and y at the pole."""
-        R = self._equator / self.stretch
+        R = self.equator / self.stretch
         return R, R
 
     @property
@@ -499,15 +500,15 @@ class Cap(Disk):
 
     def _angle(self, distance: Number) -> Number:
         """The `angle` of the `meridian` at a `distance` in m from the pole."""
-        m, t = 1 - self.stretch**2, distance / self._equator
+        m, t = 1 - self.stretch**2, distance / self.equator
         for _ in range(8 if m else 0):  # Newton's method
-            steep = (1 - m * np.sin(t) ** 2) ** 0.5
-            t = t - (scipy.special.ellipeinc(t, m) - distance / self._equator) / steep
+            arc = cast("Number", scipy.special.ellipeinc(t, m))
+            t = t - (arc - distance / self.equator) / (1 - m * np.sin(t) ** 2) ** 0.5
         return t
 
     def meridian(self, distance: Array) -> Meridian:
         """The meridian at each `distance` (...) in m from the pole along the skin."""
-        R, k, t = self._equator, self.stretch, self._angle(distance)
+        R, k, t = self.equator, self.stretch, self._angle(distance)
         m, sin, cos = 1 - k**2, np.sin(t), np.cos(t)
         L = np.sqrt(1 - m * sin**2)  # the arc, over R, per angle
         curvatures = np.stack([k / L**3, k / L]) / R
@@ -515,7 +516,7 @@ class Cap(Disk):
         return Meridian(R * sin, cos / L, curvatures, changes, t)
 
     def base(self, x: Number, y: Number) -> Base:
-        one, R, k, pole = isinstance(x, float), self._equator, self.stretch, self.rim_radius
+        one, R, k, pole = isinstance(x, float), self.equator, self.stretch, self.rim_radius
         of_sin, of_cos = (math.sin, math.cos) if one else (np.sin, np.cos)
         u, v = x - pole, y - pole
         least, s = _NEAR_POLE * pole, (u * u + v * v) ** 0.5
@@ -557,7 +558,7 @@ class Cap(Disk):
 
     def places(self, points: Array) -> Array:
         """Positions (..., 2) in m of `points` (..., 3) of the skin in space, or just off it."""
-        pole, R, k = self.rim_radius, self._equator, self.stretch
+        pole, R, k = self.rim_radius, self.equator, self.stretch
         x, y = points[..., 0] - pole, points[..., 1] - pole
         r = np.hypot(x, y)
         t = np.arctan2(r, points[..., 2] / k + R)

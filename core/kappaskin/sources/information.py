@@ -14,7 +14,7 @@ from kappaskin.errors import Refusal, SourceError
 from kappaskin.mechanics import Plate
 from kappaskin.scenes import PARTS, check_elements, check_sides
 from kappaskin.sensing import QUANTITIES, DigitalReadings, Sensor, SensorLayout, Transduction
-from kappaskin.skin import Disk, Patch, Polygon
+from kappaskin.skin import Cap, Disk, Patch, Polygon
 from kappaskin.sources.description import described_sensor, described_text
 
 _SKIN, _ELEMENTS = PARTS["skin"], PARTS["elements"]
@@ -60,6 +60,13 @@ SENSOR = Part(
             "For a skin that is not a rectangle: `disk`, or x, y of each corner, in order.",
             _METRE,
             kind=str | tuple[tuple[float, float], ...],
+            default=None,
+        ),
+        "cap": Key(
+            "Cap",
+            "For a domed skin: the radius of its equator in m, the angle from pole to rim in rad "
+            "and the stretch, 1 of a sphere.",
+            kind=tuple[float, float, float],
             default=None,
         ),
         **{
@@ -111,14 +118,16 @@ def sensor_to_json(sensor: Sensor) -> str:
     if sensor.description:
         return described_text(sensor)
     layout, patch, wired = sensor.layout, sensor.layout.patch, sensor.channel_map
+    both = patch.curvatures
     owners = (layout, patch, sensor.plate, sensor)
     values = {
         name: getattr(one, name) for one in owners for name in SENSOR.keys if hasattr(one, name)
     }
     values |= {
         "size": (patch.a, patch.b),
-        "base_curvature": patch.curvatures if isinstance(patch.radius, tuple) else 1 / patch.radius,
+        "base_curvature": both if isinstance(patch.radius, tuple) else patch.arc_curvature,
         "outline": _outline(patch),
+        "cap": (patch.equator, patch.angle, patch.stretch) if isinstance(patch, Cap) else None,
         "grid": layout.shape,
         "positions": None if layout.shape else layout.positions.tolist(),
         "dead_channels": np.flatnonzero(~layout.live.ravel()).tolist(),
@@ -141,8 +150,8 @@ def sensor_to_json(sensor: Sensor) -> str:
 
 
 def _outline(patch: Patch) -> Any:
-    """The corners of a polygon, or "disk"; None for a rectangle."""
-    if isinstance(patch, Disk):
+    """The corners of a polygon, or "disk"; None for a rectangle and a cap."""
+    if type(patch) is Disk:
         return "disk"
     return patch.vertices if isinstance(patch, Polygon) else None
 
@@ -188,6 +197,14 @@ def _sensor(table: TomlTable) -> Sensor:
 
 def _patch(values: dict[str, Any]) -> Patch:
     size, H, outline = values["size"], values["base_curvature"], values["outline"]
+    if values["cap"] is not None:
+        cap = Cap(*values["cap"])
+        if H or values["strip"] or outline is not None or not np.allclose(size, (cap.a, cap.b)):
+            raise Refusal(
+                f"expected a {cap.name}, of size {[cap.a, cap.b]} and without base_curvature, "
+                f"strip and outline, got size {[*size]}, base curvature {H}"
+            )
+        return cap
     if outline is None:
         Rx, *Ry = (1 / one if one else math.inf for one in np.ravel(H).tolist())
         return Patch(*size, radius=(Rx, Ry[0]) if Ry else Rx, strip=values["strip"])

@@ -10,7 +10,10 @@ from kappaskin_app.shell.drawn_skin import DrawnSkin
 
 FLAT = Patch(0.1, 0.06)
 ARC = Patch(0.04, 0.03, 0.0129)
-PATCHES = pytest.mark.parametrize("patch", [FLAT, ARC], ids=["flat", "arc"])
+DOME, SADDLE = Patch(0.05, 0.04, (0.15, 0.12)), Patch(0.05, 0.04, (0.15, -0.12))
+PATCHES = pytest.mark.parametrize(
+    "patch", [FLAT, ARC, DOME, SADDLE], ids=["flat", "arc", "dome", "saddle"]
+)
 
 
 class Disk(Patch):
@@ -115,7 +118,7 @@ def test_what_lies_on_the_skin_is_placed_on_it(patch: Patch) -> None:
 
 
 @given(
-    st.sampled_from([FLAT, ARC, Patch(0.05, 0.02, 0.2)]),
+    st.sampled_from([FLAT, ARC, Patch(0.05, 0.02, 0.2), DOME, SADDLE]),
     st.tuples(st.floats(0, 1), st.floats(0, 1)),
     st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.1, 1)),
     st.floats(-2, 2),

@@ -113,14 +113,31 @@ def test_a_spread_load_asks_for_its_size_by_its_name(
 
 
 def test_only_a_bent_skin_asks_for_a_radius_and_says_how_far_it_opens(panels) -> None:
-    shape = panels.shape
+    shape, facts = panels.shape, panels.shape.facts
     panels.show_settings(Settings())
     assert not shape.form.isRowVisible(shape.editor("base_radius"))
-    assert not shape.form.isRowVisible(shape.opening)
+    assert not any(shape.form.isRowVisible(fact) for fact in facts.values())
     panels.show_settings(Settings(shape="cylinder", side_x=0.03, base_radius=0.02))
     assert shape.form.isRowVisible(shape.editor("base_radius"))
-    assert shape.form.isRowVisible(shape.opening)
-    assert shape.opening.text() == "85.9\N{DEGREE SIGN}"
+    assert facts["Opening angle"].text() == "85.9\N{DEGREE SIGN}"
+    assert facts["Rise"].text() == "5.37 mm, 18 % of the side"
+    assert not shape.form.isRowVisible(facts["Model error"])
+
+
+def test_a_dome_asks_for_two_radii_and_says_how_shallow_it_is(panels) -> None:
+    shape, facts = panels.shape, panels.shape.facts
+    dome = Settings(shape="dome", side_x=0.06, side_y=0.04, radius_x=0.2, radius_y=-0.15)
+    panels.show_settings(dome)
+    shown = {name for name in shape.names if shape.has_row(name)}
+    assert shown == {"shape", "side_x", "side_y", "radius_x", "radius_y", "edge"}
+    texts = [facts[name].text() for name in ("Opening angle", "Rise", "Model error")]
+    assert texts == [
+        "17.2\N{DEGREE SIGN} \N{MULTIPLICATION SIGN} 15.3\N{DEGREE SIGN}",
+        "3.58 mm, 9 % of the side",
+        "0.50 %, at most 1 %",
+    ]
+    panels.show_settings(replace(dome, radius_x=0.05))  # refused, as the scene reports
+    assert not any(shape.form.isRowVisible(fact) for fact in facts.values())
 
 
 def test_a_load_can_be_placed_on_the_skin_only(panels) -> None:

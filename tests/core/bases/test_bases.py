@@ -372,7 +372,9 @@ def larger(patch, factor):
         return Disk(factor * patch.rim_radius)
     if isinstance(patch, Polygon):
         return Polygon(factor * np.array(patch.vertices))
-    return Patch(factor * patch.a, factor * patch.b, factor * patch.radius, patch.strip)
+    shallow = tuple(factor * R for R in patch.radii)
+    radius = factor * patch.radius if isinstance(patch.radius, float) else shallow
+    return Patch(factor * patch.a, factor * patch.b, radius, patch.strip)
 
 
 def test_on_a_skin_twice_as_large_the_same_functions_bend_less(held_skin):

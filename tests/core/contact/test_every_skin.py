@@ -89,8 +89,8 @@ def test_of_a_finer_shape_little_is_missed(held_skin):
     found = at_rest(fit, fit.basis.at(points) @ fit(K).coefficients.ravel(), points)
 
     missed = math.sqrt(weights @ (found - truth) ** 2 / (weights @ truth**2))
-    # A bent sheet gives locally, and its fit takes it as inextensible.
-    assert missed < {"long": 0.07, "bent": 0.2}.get(held_skin.name, 0.03)
+    # A bent sheet and a dome give locally, and the fit of the former takes it as inextensible.
+    assert missed < {"long": 0.07, "bent": 0.2, "dome": 0.25}.get(held_skin.name, 0.03)
 
 
 def contact(held_skin, curvature, plate):
@@ -117,7 +117,7 @@ def test_with_the_same_functions_the_contact_comes_back(held_skin):
 
 
 @pytest.mark.slow
-@pytest.mark.where(which=lambda held: is_rectangle(held) and not held.patch.arc_curvature)
+@pytest.mark.where(which=lambda held: is_rectangle(held) and not any(held.patch.curvatures))
 def test_on_a_flat_rectangle_a_finer_series_is_found(held_skin):
     """Of the table of what the edges make of a load.
 

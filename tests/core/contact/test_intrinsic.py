@@ -1,19 +1,25 @@
 """The contact from force and moment at the base, against contacts put there by hand."""
 
 import math
+import re
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import IntrinsicContact, LineLoad, Patch, PointLoad, Refusal
+from kappaskin import Cap, IntrinsicContact, LineLoad, Patch, PointLoad, Refusal
 from kappaskin.contact import ForceTorqueSensor, Wrench
 
 FLAT = Patch(0.04, 0.03)
 FINGER = Patch(math.pi * 12.9e-3, 0.03, radius=12.9e-3)  # half a cylinder
 SHALLOW = Patch(0.04, 0.03, radius=0.5)
+DOME, SADDLE = Patch(0.04, 0.03, (0.1, 0.09)), Patch(0.04, 0.03, (0.1, -0.09))
+CAP, SPHEROID = Cap(0.016, 1.2), Cap(0.016, 1.2, 1.5)
 SKINS = pytest.mark.parametrize("patch", [FLAT, FINGER, SHALLOW], ids=["flat", "finger", "shallow"])
+DOMED = pytest.mark.parametrize(
+    "patch", [DOME, SADDLE, CAP, SPHEROID], ids=["dome", "saddle", "cap", "spheroid"]
+)
 BASE = (0.021, -0.012, -0.03)
 EXACT = ForceTorqueSensor(BASE, 0.0, 0.0)
 NOISY = ForceTorqueSensor(BASE, 3e-3, 2e-5)
@@ -25,6 +31,9 @@ forces = st.tuples(st.floats(0.05, 20), st.floats(-5, 5), st.floats(-5, 5))
 def frame_at(patch, place):
     """Point, outward normal and the tangent across the axis, by rotating the flat ones."""
     x, y = place
+    if patch.is_shallow or isinstance(patch, Cap):
+        at, n = patch.at_rest(np.array(place))
+        return at, n, patch.local(np.array([place])).frame[0, 0]
     turn = 0.0 if math.isinf(patch.radius) else (x - patch.a / 2) / patch.radius
     n, t = (
         np.array([math.sin(turn), 0, math.cos(turn)]),
@@ -38,7 +47,7 @@ def frame_at(patch, place):
 def pressed(patch, place, pressure, traction=(0.0, 0.0), torque=0.0, base=BASE):
     """The wrench of a soft-finger contact, by its definition."""
     at, n, t = frame_at(patch, place)
-    p = -pressure * n + traction[0] * t + traction[1] * np.array([0, 1, 0])
+    p = -pressure * n + traction[0] * t + traction[1] * np.cross(n, t)
     return Wrench(p, np.cross(at - base, p) + torque * n)
 
 
@@ -67,6 +76,26 @@ def test_the_contact_and_its_force_come_back(patch, place, force, torque):
     np.testing.assert_allclose([touch.pressure, *touch.traction], force, rtol=0, atol=1e-9 * scale)
     assert touch.torque == pytest.approx(torque, abs=1e-9 * scale)
     assert not spreads(touch).any()
+
+
+@DOMED
+@given(
+    places,
+    st.floats(0.05, 20),
+    st.tuples(st.floats(-0.7, 0.7), st.floats(-0.7, 0.7)),
+    st.floats(-1e-3, 1e-3),
+)
+def test_the_contact_on_a_skin_that_bends_both_ways_comes_back(patch, place, force, pull, torque):
+    side = np.array([patch.a, patch.b])
+    where = 0.2 * side + 0.6 * np.array(place) * side
+    traction = np.array(pull) * force
+
+    touch = IntrinsicContact(patch, EXACT)(pressed(patch, where, force, traction, torque * force))
+
+    assert touch.reason == ""
+    np.testing.assert_allclose(touch.position, where, rtol=0, atol=1e-9)
+    np.testing.assert_allclose([touch.pressure, *touch.traction], [force, *traction], atol=1e-5)
+    assert touch.torque == pytest.approx(torque * force, abs=1e-8)
 
 
 def test_a_very_shallow_cylinder_answers_like_the_plane():
@@ -180,6 +209,40 @@ def test_the_error_bars_are_those_of_many_draws(patch, traction):
     np.testing.assert_allclose(draws.std(axis=0), spreads(told), rtol=0.05)
     bias = np.abs(draws.mean(axis=0) - numbers(told)) / spreads(told)
     assert bias.max() < 0.1
+
+
+@DOMED
+def test_the_error_bars_on_a_skin_that_bends_both_ways_are_those_of_small_changes(patch):
+    where = (0.35 * patch.a, 0.4 * patch.b)
+    wrench = pressed(patch, where, 0.5, (0.2, -0.1), 1e-3)
+    find = IntrinsicContact(patch, EXACT)
+    steps = 1e-6 * np.eye(6)
+
+    changes = [
+        numbers(find(Wrench(wrench.force + d[:3], wrench.moment + d[3:])))
+        - numbers(find(Wrench(wrench.force - d[:3], wrench.moment - d[3:])))
+        for d in steps
+    ]
+
+    noise = np.repeat([3e-3, 2e-5], 3)[:, None]
+    expected = np.sqrt(np.sum((np.array(changes) / 2e-6 * noise) ** 2, axis=0))
+    told = spreads(IntrinsicContact(patch, NOISY)(wrench))
+    # The tangents of a shallow skin along x and y are taken for orthogonal.
+    np.testing.assert_allclose(told, expected, rtol=0.02 if patch.is_shallow else 1e-4)
+
+
+@DOMED
+def test_a_force_beside_a_domed_skin_or_none_has_no_place(patch):
+    find, side = IntrinsicContact(patch, NOISY), np.array([patch.a, patch.b])
+    beside = np.array([0, 0, -1.0])
+    far = np.cross(np.array([*(1.5 * side), 0.0]) - BASE, beside)
+
+    for wrench in (
+        Wrench(beside, far),
+        pressed(patch, 0.4 * side, -0.5),
+        Wrench(np.zeros(3), np.zeros(3)),
+    ):
+        assert re.match("expected a normal force above|the force passes", find(wrench).reason)
 
 
 @SKINS

@@ -11,6 +11,7 @@ import pytest
 from scipy import linalg, optimize
 
 from kappaskin import (
+    Cap,
     Disk,
     LeastSquares,
     ObjectFinder,
@@ -29,6 +30,7 @@ from kappaskin import (
     load_scene,
     local_geometry,
 )
+from kappaskin.mechanics import Block, IndentationSolver, Sphere
 
 pytestmark = pytest.mark.slow
 
@@ -501,6 +503,44 @@ def test_a_touch_that_flattens_nothing_is_not_called_a_plane(finger):
     assert not any(o.kind == "plane" for o in finger.skin.finds(finger.curvature(light), 5))
 
 
+class Dome:
+    """A dome, pressed by rigid objects through the contact solver."""
+
+    def __init__(self):
+        patch = Patch(0.04, 0.03, (0.1, 0.08))
+        self.skin, basis = Skin(patch, Plate(patch)), basis_for(patch, "hinged", 48, 48)
+        self._press = IndentationSolver(Plate(patch), basis)
+        self._M = self.skin.layout.operator(basis)
+
+    def finds(self, rigid, force):
+        K = self._M @ self._press(rigid, 0.018, 0.016, 0.3, force=force).coefficients.ravel()
+        return self.skin.finds(K.reshape(3, -1), 5)
+
+
+@pytest.fixture(scope="module")
+def dome():
+    return Dome()
+
+
+def test_a_plate_on_a_dome_is_a_plane_and_a_ball_has_its_own_radius(dome):
+    for one in dome.finds(Block(0.1, 0.1), 3.0):
+        assert one.describe().startswith("plane; second guess")
+        assert one.radius_95 == (one.radius_95[0], math.inf)
+    for one in dome.finds(Sphere(0.04), 2.0):
+        assert one.describe().startswith("sphere, radius")
+        assert one.radius == pytest.approx(0.04, rel=0.1)
+        assert one.radius_95[0] < 0.04 < one.radius_95[1]
+        np.testing.assert_allclose(one.position, [0.018, 0.016], atol=1e-4)
+
+
+@pytest.mark.parametrize("radius", [0.002, 0.01])
+def test_a_ball_too_small_for_a_dome_to_show_has_an_upper_bound_and_no_other_name(dome, radius):
+    for one in dome.finds(Sphere(radius), 1.5):
+        assert not (one.sure and one.kind != "sphere")
+        assert one.radius_95[0] == 0
+        assert radius < one.radius_95[1]
+
+
 def test_one_line_describes_it():
     rod, ball = PAPER.find(noisy(RODS[0])), PAPER.find(noisy(BALLS[0]))
 
@@ -585,6 +625,7 @@ def test_a_skin_that_cannot_tell_is_refused():
         (Plate(strip), (20, 1), "needs a 2-D skin; this one is a strip"),
         (drum, (10, 10), "needs a rigidity above zero; this skin has none"),
         (Plate(patch), (60, 40), "at most 2000 elements, got 2400"),
+        (Plate(Cap(0.008)), (8, 8), "this one is a cap"),
     ):
         with pytest.raises(Refusal, match=why):
             ObjectFinder(plate, SensorLayout.regular(plate.patch, *elements))

@@ -39,7 +39,11 @@ def test_squares_of_readings_on_a_grid_are_those_at_each_place(plate, layout, ba
 
 
 @pytest.mark.parametrize("gage_length", [0.0, 0.009])
-@pytest.mark.parametrize("patch", [OBLONG, Patch(0.1, 0.02, strip=True)], ids=["plate", "strip"])
+@pytest.mark.parametrize(
+    "patch",
+    [OBLONG, Patch(0.1, 0.02, strip=True), Patch(0.1, 0.07, (0.3, -0.25))],
+    ids=["plate", "strip", "saddle"],
+)
 def test_readings_on_a_grid_meet_the_functions_as_by_the_whole_matrix(patch, gage_length):
     across = (1, 1) if patch.strip else (4, 5)
     layout = replace(SensorLayout.regular(patch, 6, across[0]), gage_length=gage_length)

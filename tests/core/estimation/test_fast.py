@@ -51,6 +51,7 @@ SETUPS = {
     "as many functions as elements along x": of(8, 7, 8, 5),
     "as many functions as elements": of(6, 5, 6, 5),
     "1:100": of(4, 40, 3, 30, Patch(0.01, 1.0)),
+    "dome": of(8, 7, 6, 5, Patch(0.12, 0.07, (0.3, 0.25))),
     "strip": of(9, 1, 7, 1, STRIP),
     "strip with rows": of(9, 4, 9, 1, STRIP),
 }

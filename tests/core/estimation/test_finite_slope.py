@@ -9,6 +9,7 @@ from scipy.optimize import least_squares
 
 from deflected import DeflectedSkin, ShallowSkin, sines
 from kappaskin import (
+    Cap,
     Disk,
     LeastSquares,
     Patch,
@@ -24,6 +25,7 @@ from kappaskin import (
     local_geometry,
 )
 from kappaskin.estimation import METHODS, FiniteSlopeLeastSquares, slope_warning
+from kappaskin.sensing import NormalCurvature
 
 SQUARE = Patch(0.1, 0.1)
 TENS = SensorLayout.regular(SQUARE, 10, 10)
@@ -426,6 +428,32 @@ def read_of(basis, layout, c):
         np.array([each[q][r] for r, q in enumerate(reads.quantity)]),
         np.array([SD[q] for q in reads.quantity]),
     )
+
+
+CAPS = {"sphere": Cap(0.016, 1.2), "spheroid": Cap(0.016, 1.2, 1.5)}
+
+
+@pytest.mark.parametrize("kind", ["rosettes", "one gage", "xx, yy and xy"])
+@pytest.mark.parametrize("name", CAPS)
+def test_readings_of_a_cap_change_as_its_jacobian_has_it_and_give_the_shape_back(name, kind):
+    basis = basis_for(CAPS[name], "hinged", 4, 5)
+    layout = SensorLayout.regular(CAPS[name], 14, 12)
+    layout = OTHERS[kind](layout) if kind in OTHERS else layout
+    c = np.random.default_rng(1).normal(size=basis.shape) * 2e-4
+    fit, sensed = FiniteSlopeLeastSquares(basis, layout), NormalCurvature(basis, layout)
+    steps = 1e-7 * np.eye(basis.size).reshape(-1, *basis.shape)
+    by_differences = (sensed(c + steps) - sensed(c - steps)).reshape(basis.size, -1) / 2e-7
+
+    jacobian = np.einsum("qr,qrn->nr", sensed.surface(c.ravel()).jacobian(), sensed.maps)
+
+    assert 0.3 < np.max(sensed.surface(c.ravel()).slope) < 1.4
+    np.testing.assert_allclose(jacobian, by_differences, atol=1e-6 * np.abs(jacobian).max())
+    first = layout.operator(basis) @ c.ravel()
+    small = sensed(1e-5 * c).ravel()
+    np.testing.assert_allclose(small, 1e-5 * first, atol=1e-9 * np.abs(first).max())
+    answer = fit(sensed(c))
+    assert answer.converged
+    assert peak_error(basis, answer.coefficients, c) < 1e-5
 
 
 @every_other

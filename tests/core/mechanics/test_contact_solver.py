@@ -10,8 +10,17 @@ from hypothesis import strategies as st
 from scipy import linalg
 from scipy.optimize import brentq, lsq_linear, nnls
 
-from kappaskin import Disk, Patch, Plate, PointLoad, Polygon, Refusal, basis_for
-from kappaskin.mechanics import Block, Cylinder, HeightMap, IndentationSolver, Punch, Sphere, Wedge
+from kappaskin import Cap, Disk, Patch, Plate, PointLoad, Polygon, Refusal, basis_for
+from kappaskin.mechanics import (
+    Block,
+    Cylinder,
+    HeightMap,
+    IndentationSolver,
+    PlacedObject,
+    Punch,
+    Sphere,
+    Wedge,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -240,7 +249,7 @@ def test_no_object_is_pulled_or_enters_any_skin(held_skin, make, place, depth):
     # What bears, bears everywhere on the skin; what does not, clears it.
     assert (answer.gap > -1e-9 * scale).all()
     assert np.abs(answer.gap[answer.forces > 0]).max(initial=0) < 1e-9 * scale
-    if not held_skin.patch.arc_curvature:
+    if not any(held_skin.patch.curvatures):
         c, sin = math.cos(turn), math.sin(turn)
         height = object_.height((answer.points - (x, y)) @ np.array([[c, -sin], [sin, c]]))
         gap = w + answer.compression - (depth * s - height)
@@ -369,6 +378,40 @@ def test_a_bent_skin_bears_along_the_push_what_the_object_bears():
     angle = (answer.points[:, 0] - 0.02) / 12.9e-3
     assert np.cos(angle) @ answer.forces == pytest.approx(3.0)
     np.testing.assert_allclose(answer.centre, [0.02, 0.015], rtol=1e-9)
+
+
+@pytest.mark.parametrize("place", [(0.5, 0.5), (0.62, 0.35)])
+def test_a_ball_stands_above_a_spherical_cap_by_what_both_fall_away(place):
+    cap = Cap(0.01, 1.3)
+    at = np.array(place) * cap.a
+    object_ = PlacedObject(Sphere(0.006), at, 0.4)
+    points = cap.around(*at, 0.003 * np.random.default_rng(0).uniform(-1, 1, (50, 2)))
+
+    height, slant = object_.over(cap, points)
+
+    normals = cap.at_rest(np.vstack([at, points]))[1]
+    cos = normals[1:] @ normals[0]
+    far2 = 0.01**2 * (1 - cos**2)
+    falls = 0.01 * (1 - cos) + 0.006 - np.sqrt(0.006**2 - far2)
+    np.testing.assert_allclose(height, falls, atol=1e-15)
+    np.testing.assert_allclose(slant, cos, rtol=1e-12)
+
+
+@pytest.mark.parametrize("patch", [Patch(0.04, 0.03, (0.1, 0.08)), Cap(0.02, 1.2)])
+def test_a_plate_on_a_dome_presses_around_where_it_stands(patch):
+    functions = (12, 13) if isinstance(patch, Cap) else (32, 32)
+    press = IndentationSolver(Plate(patch), basis_for(patch, "hinged", *functions))
+    at = np.array([0.5 * patch.a, 0.5 * patch.b])
+
+    middle, beside = (press(Block(0.02, 0.02), *where, force=1.0) for where in (at, 1.1 * at))
+
+    for pressed, where in ((middle, at), (beside, 1.1 * at)):
+        assert pressed.residual < 1e-9
+        assert pressed.forces.min() >= 0
+        np.testing.assert_allclose(pressed.centre, where, atol=4e-4)  # half a node
+    reach = np.linalg.norm(middle.points[middle.forces > 0] - at, axis=1)
+    assert 0 < reach.max() < 0.006  # of a plate of 20 mm
+    np.testing.assert_allclose(middle.nodal, middle.nodal[::-1, ::-1], atol=1e-9)
 
 
 def test_a_skin_over_a_fluid_keeps_its_volume_under_an_object():

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import (
+    Cap,
     DiscLoad,
     GaussianLoad,
     LineLoad,
@@ -16,6 +17,7 @@ from kappaskin import (
     RectangleLoad,
     Refusal,
     SineBasis,
+    basis_for,
 )
 
 PATCH = Patch(0.1, 0.05)
@@ -276,3 +278,29 @@ def test_a_load_of_no_size_is_refused_with_what_to_take_instead(kind, size):
 def test_a_rectangle_with_a_side_of_no_length_is_refused(sides):
     with pytest.raises(Refusal, match="size above zero in metres, got RectangleLoad"):
         RectangleLoad(0.05, 0.02, *sides)
+
+
+@pytest.mark.parametrize("kind", [(DiscLoad, 2e-3), (GaussianLoad, 5e-4)], ids=["disc", "Gaussian"])
+@pytest.mark.parametrize("Nj", [6, 7])
+@given(st.floats(0, 1), st.floats(0, 7))
+def test_a_round_load_is_felt_all_over_a_cap_as_by_quadrature(kind, Nj, share, turn):
+    made, size = kind
+    cap = Cap(8e-3, 1.4, 1.2)
+    basis = basis_for(cap, "clamped", 5, Nj)
+    far = share * (cap.rim_radius - (2e-3 if made is DiscLoad else 4 * size))
+    x, y = cap.rim_radius + far * np.cos(turn), cap.rim_radius + far * np.sin(turn)
+    load = made(x, y, size, 0.3)
+
+    felt = load.modal(basis)
+
+    points, weights = load.quadrature(12)
+    expected = 0.3 * weights @ basis.at(cap.around(x, y, points))
+    scale = np.abs(expected).max()
+    np.testing.assert_allclose(felt.ravel(), expected, rtol=0, atol=1e-9 * scale)
+
+
+def test_a_round_load_over_the_rim_of_a_cap_is_refused():
+    basis = basis_for(Cap(8e-3), "clamped", 5, 6)
+
+    with pytest.raises(Refusal, match="expected a load completely on the skin"):
+        DiscLoad(0.001, 0.0126, 2e-3).modal(basis)

@@ -121,9 +121,15 @@ def test_how_the_edge_is_held_matters_as_published():
 
 
 @pytest.mark.parametrize("inplane", INPLANE)
-@pytest.mark.parametrize("edge", ["hinged", "clamped", "elastic"])
-def test_the_tangent_is_the_derivative_of_the_force(inplane, edge):
-    plate = sheet(inplane, Patch(0.1, 0.08))
+@pytest.mark.parametrize(
+    ("edge", "radius"),
+    [
+        *(("hinged", np.inf), ("clamped", np.inf), ("elastic", np.inf)),
+        *(("hinged", (3, 4)), ("clamped", (1, -2))),
+    ],
+)
+def test_the_tangent_is_the_derivative_of_the_force(inplane, edge, radius):
+    plate = sheet(inplane, Patch(0.1, 0.08, radius))
     basis = basis_for(plate.patch, edge, 6, 5)
     stretching, q, dq = Stretching(plate, basis), *(some_deflection(basis, s) for s in (0, 1))
 
@@ -206,3 +212,52 @@ def test_a_cantilever_is_not_stretched_as_it_bends():
 
         assert bool(np.abs(force).max() > 1.0) == stretched
         assert stretched or not force.any()
+
+
+# Shallow skins
+
+
+DOME = Patch(0.1, 0.08, (3, 4))
+
+
+def test_a_light_touch_finds_a_shallow_skin_linear():
+    basis, load = SineBasis(DOME, 8, 8), [PointLoad(0.03, 0.06, 1e-5)]
+
+    c = Stretching(Plate(DOME), basis).deflection(load)
+
+    linear = Plate(DOME).deflection(load, basis)
+    np.testing.assert_allclose(c, linear, rtol=0, atol=1e-3 * np.abs(linear).max())
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_on_its_path_a_shallow_skin_carries_the_load_that_finds_it_there(sign):
+    basis, depths = SineBasis(DOME, 7, 7), sign * H * np.array([0.5, 1])
+    modal = PointLoad(0.04, 0.04).modal(basis)
+    stretching = Stretching(Plate(DOME), basis)
+
+    path = list(stretching.path(modal, depths))
+
+    assert np.vdot(modal, path[-1][1]) == pytest.approx(depths[-1])
+    for force, c in path:
+        found = stretching(force * modal)
+        np.testing.assert_allclose(found, c, rtol=0, atol=1e-4 * np.abs(c).max())
+
+
+def test_pressed_in_a_dome_softens_and_pulled_out_it_stiffens():
+    basis = SineBasis(DOME, 7, 7)
+    modal, stretching = PointLoad(0.05, 0.04).modal(basis), Stretching(Plate(DOME), basis)
+
+    (out, _), (slightly_out, _) = (next(stretching.path(modal, [d * H])) for d in (-1, -0.01))
+    (slightly_in, _), (far_in, _) = (next(stretching.path(modal, [d * H])) for d in (0.01, 1))
+
+    assert out / slightly_out > 150
+    assert far_in / slightly_in < 65
+
+
+def test_the_path_of_a_saddle_ends_where_it_snaps_through_that_of_a_flat_skin_does_not():
+    depths = H * np.arange(0.5, 5, 0.5)
+    for plate, ends in ((Plate(Patch(0.1, 0.1, (1, -3))), True), (sheet(), False)):
+        basis = SineBasis(plate.patch, 9, 9)
+        path = list(Stretching(plate, basis).path(PointLoad(0.05, 0.05).modal(basis), depths))
+        assert (len(path) < len(depths)) == ends
+        assert len(path) > 2

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import (
+    Cap,
     Disk,
     Estimate,
     LeastSquares,
@@ -24,6 +25,7 @@ from kappaskin import (
     load_scene,
     local_geometry,
 )
+from kappaskin.bases import ORDERS
 from kappaskin.frames import COMPONENTS
 from kappaskin.pipeline import ErrorBars, Quantities, curvature_invariant, skin_colours
 
@@ -112,6 +114,34 @@ def test_a_saddle_at_rest_keeps_both_its_bends_on_the_surface_and_at_the_element
         assert quantities.at_rest(name) == pytest.approx(expected)
         np.testing.assert_allclose(quantities.on_surface(name, still), expected)
         np.testing.assert_allclose(quantities.of_elements(name, still), expected)
+
+
+def test_a_spheroid_at_rest_keeps_its_bends_and_its_slopes_lie_along_its_axes(centre) -> None:
+    cap = Cap(0.016, 1.2, 1.5)
+    layout, basis = SensorLayout.regular(cap, 8, 8), basis_for(cap, "hinged", 4, 5)
+    quantities = Quantities(layout, basis, 9, 9)
+    still = replace(centre[1], coefficients=np.zeros((4, 5)), curvature=np.zeros((3, len(layout))))
+    form = cap.local(layout.positions).curvature
+    for name in ("first", "second", "gaussian"):
+        found = quantities.of_elements(name, still)
+        np.testing.assert_allclose(found, curvature_invariant(name, form), rtol=1e-6)
+    x, y = quantities.grid
+    on = cap.contains(np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)).reshape(9, 9)
+    assert (np.isfinite(quantities.on_surface("mean", still)) == on).all()
+
+    fit = LeastSquares(basis, layout)
+    c = np.random.default_rng(0).normal(0, 1e-4, (4, 5))
+    places = np.stack(np.meshgrid(*cap.grid(81, 81)), -1).reshape(-1, 2)
+    places = places[cap.contains(places)]
+    slopes = np.einsum("pij,jp->ip", cap.local(places).covariant, [
+        basis.at(places, *order) @ c.ravel() for order in ORDERS])[1:3]  # fmt: skip
+    assert fit.slope(c) == pytest.approx(np.hypot(*slopes).max(), rel=0.02)
+    bars = ErrorBars(fit, np.zeros((3, len(layout))), x, y)
+    place = places[200]
+    rows = cap.local(place[None]).covariant[0] @ basis.jet(*place.tolist())
+    covariance = fit(np.zeros((3, len(layout)))).uncertainty.covariance_of(rows[1:3])
+    expected = 0.3 * np.sqrt(np.diag(covariance))
+    np.testing.assert_allclose(bars.of_slopes(place, 0.3), expected, rtol=1e-9)
 
 
 def test_elements_tell_what_they_read_and_what_the_fit_left_of_it(centre) -> None:

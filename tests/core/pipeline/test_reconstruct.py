@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import (
+    Cap,
     DiscLoad,
     Disk,
     Fast,
@@ -485,9 +486,23 @@ def test_the_two_radii_of_a_dome_come_from_the_file(saved) -> None:
     assert np.allclose(found["coefficients"].ravel(), TRUTH[0], rtol=0, atol=1e-15)
 
 
+def test_a_cap_comes_from_the_file(saved) -> None:
+    cap = Cap(0.008, 1.2)
+    layout = SensorLayout.in_spiral(cap, 40)
+    basis = basis_for(cap, "clamped", NI, NJ)
+    read = layout.operator(basis) @ TRUTH[0]
+    of = {"size": [cap.a, cap.b], "radius": 0.008, "angle": 1.2, "positions": layout.positions}
+
+    found = reconstruct(saved(**of, curvature=read.reshape(3, -1)), (NI, NJ), edge="clamped")
+
+    np.testing.assert_allclose(found["coefficients"].ravel(), TRUTH[0], rtol=0, atol=1e-14)
+
+
 @pytest.mark.parametrize(
     ("changes", "arguments", "reason"),
     [
+        ({"angle": 1.2}, {}, "one radius, angle and stretch of a cap, and no outline"),
+        ({"angle": 1.2, "radius": 0.008}, {}, "size 0.0192 x 0.0192 m, twice from pole to rim"),
         ({"radius": 0.01}, {}, "is a full circle at radius"),
         ({"radius": -1.0}, {}, "is a full circle at radius"),
         ({"radius": np.nan}, {}, "is a full circle at radius"),

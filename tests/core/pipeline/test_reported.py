@@ -44,6 +44,8 @@ COLUMNS = [
     "single",
     "near_rim",
     "force_is_lower_bound",
+    "force_is_upper_bound",
+    "snaps_through",
     "spare",
     "position",
     "position_sd",
@@ -144,7 +146,10 @@ KEYS = [
 ]
 """Keys of the numbers in a message by UDP or Foxglove, which others read."""
 
-FLAGS = ["present", "single", "near_rim", "force_is_lower_bound", "shape_follows"]
+FLAGS = [
+    *("present", "single", "near_rim"),
+    *("force_is_lower_bound", "force_is_upper_bound", "snaps_through", "shape_follows"),
+]
 
 
 @pytest.fixture
@@ -170,7 +175,7 @@ def test_columns_have_the_types_that_they_always_had(made) -> None:
         **dict.fromkeys(("sequence", "setup", "spare"), "<i8"),
         **dict.fromkeys(("fresh", "converged", "present", "single", "near_rim"), "?"),
         "second_present": "?",
-        "force_is_lower_bound": "?",
+        **dict.fromkeys(("force_is_lower_bound", "force_is_upper_bound", "snaps_through"), "?"),
         "suspect": "|u1",
     }
 

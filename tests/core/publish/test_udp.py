@@ -318,6 +318,18 @@ def test_the_force_of_a_contact_near_the_rim_is_not_told(listener, message) -> N
     assert " N" not in said
 
 
+def test_a_force_that_a_curved_skin_softens_is_an_upper_bound_until_it_snaps(
+    listener, message
+) -> None:
+    soft = json.loads(message.contact) | {"force_is_lower_bound": False}
+    said = send(listener, json.dumps(soft | {"force_is_upper_bound": True}).encode())
+    assert "force is an upper bound" in said
+    assert "lower bound" not in said
+    said = send(listener, json.dumps(soft | {"snaps_through": True, "force_N": None}).encode())
+    assert "snaps through: no force" in said
+    assert " N" not in said
+
+
 def test_losses_are_told_by_gaps(listener) -> None:
     said = send(listener, *(numbered(n) for n in (5, 6, 9, 10, 0, 1)))
     assert said.count("2 messages lost") == 1

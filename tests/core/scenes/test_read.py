@@ -132,6 +132,26 @@ WRONG = {
     "an unknown effect": (HEAD + "[effects.creeep]\nshare = 0.1\n", "line 5: .*mean creep?"),
     "a wrong kind": (HEAD + "edge = 3\n", "line 5: skin.edge: expected a text, got 3"),
     "another edge": (HEAD + "edge = 'clampd'\n", "line 5: .*did you mean 'clamped'"),
+    "rings of a rectangle": (
+        HEAD + "[elements]\nrings = [1, 6]\n",
+        "line 5: elements: expected a disk or a cap, got a patch",
+    ),
+    "two patterns": (
+        HEAD + "[elements]\nrings = [1, 6]\nspiral = 9\n",
+        "line 7: elements.spiral: expected one pattern, got rings and spiral",
+    ),
+    "a cap of no radius": (
+        "format = 1\n[skin]\nshape = 'cap'\n",
+        "line 2: skin: expected radius = a number, got none",
+    ),
+    "a cap beyond a hemisphere": (
+        "format = 1\n[skin]\nshape = 'cap'\nradius = 0.008\nangle = 2\n",
+        "line 2: skin: expected a cap whose rim",
+    ),
+    "a dome too steep": (
+        "format = 1\n[skin]\nsize = [0.02, 0.02]\nradius = [0.01, 0.01]\n",
+        "line 2: skin: shallow shell theory neglects .* radii of at least 0.045 m",
+    ),
     "a negative size": ("format = 1\n[skin]\nsize = [-0.1, 0.1]\n", "line 2: skin: .*metres"),
     "one side": ("format = 1\n[skin]\nsize = [0.1]\n", "line 3: .*list of 2 numbers"),
     "no size": ("format = 1\n", "expected size = a list of 2 numbers, got none"),

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kappaskin import (
+    Cap,
     DiscLoad,
     Disk,
     GaussianLoad,
@@ -115,6 +116,22 @@ def test_the_radii_of_a_bent_skin_are_written_and_read(radius, written):
 
     assert f"\nradius = {written}  # m\n" in write_scene(scene)
     assert again(scene).plate == scene.plate
+
+
+@pytest.mark.parametrize(
+    ("cap", "written"),
+    [
+        (Cap(0.008), ""),
+        (Cap(0.008, 1.2), "angle = 1.2  # rad\n"),
+        (Cap(0.008, np.pi / 2, 1.3), "stretch = 1.3\n"),
+    ],
+)
+def test_a_cap_is_written_and_read(cap, written):
+    scene = Scene("cap", Plate(cap), SensorLayout.on_rings(cap, [1, 6, 12]), edge="clamped")
+
+    assert f'shape = "cap"\nradius = 0.008  # m\n{written}' in write_scene(scene)
+    assert again(scene).plate == scene.plate
+    np.testing.assert_array_equal(again(scene).layout.positions, scene.layout.positions)
 
 
 def test_a_scene_is_written_as_a_person_would_write_it():

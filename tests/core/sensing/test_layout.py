@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kappaskin import Patch, Refusal, SensorLayout, SineBasis
+from kappaskin import Cap, Disk, Patch, Refusal, SensorLayout, SineBasis
 
 PATCH = Patch(0.1, 0.05)
 
@@ -18,6 +18,59 @@ def test_regular_elements_sit_at_cell_centres_with_x_running_fastest():
     np.testing.assert_allclose(layout.positions[3 + 4 * 1], [0.0875, 0.0375])
     np.testing.assert_allclose(layout.positions[:4, 0], [0.0125, 0.0375, 0.0625, 0.0875])
     np.testing.assert_allclose(layout.positions[:4, 1], 0.0125)
+
+
+def from_the_middle(layout):
+    """Distance in m from the middle of a round skin, along it, and azimuth in turns."""
+    x, y = (layout.positions - (layout.patch.a / 2, layout.patch.b / 2)).T
+    return np.hypot(x, y), np.arctan2(y, x) / (2 * np.pi) % 1
+
+
+def test_rings_are_evenly_far_apart_and_their_elements_evenly_around():
+    far, turns = from_the_middle(SensorLayout.on_rings(Disk(0.07), [1, 4, 2, 8]))
+
+    np.testing.assert_allclose(far, np.repeat([0, 0.02, 0.04, 0.06], [1, 4, 2, 8]), atol=1e-12)
+    np.testing.assert_allclose(np.sort(turns[1:5]), [0.125, 0.375, 0.625, 0.875])
+    np.testing.assert_allclose(turns[5:7], [0, 0.5], atol=1e-12)
+    far, _ = from_the_middle(SensorLayout.on_rings(Disk(0.06), [3, 6, 9]))
+    np.testing.assert_allclose(far, np.repeat([0.01, 0.03, 0.05], [3, 6, 9]))
+
+
+@pytest.mark.parametrize("angle", [0.3, 1.2, np.pi / 2])
+def test_a_spiral_on_a_sphere_has_as_many_elements_on_every_equal_area(angle):
+    cap, N = Cap(0.008, angle), 400
+
+    far, turns = from_the_middle(SensorLayout.in_spiral(cap, N))
+
+    height = 1 - np.cos(far / 0.008)  # areas of a sphere are proportional to their heights
+    np.testing.assert_allclose(np.diff(height), height[-1] / (N - 0.5), rtol=2e-3)
+    np.testing.assert_allclose(np.diff(turns) % 1, 0.381966, atol=1e-6)
+    spacing = np.sqrt(2 * np.pi * (1 - np.cos(angle)) / N)
+    assert 0.4 * spacing < angle - far[-1] / 0.008 < 0.6 * spacing
+
+
+def test_a_spiral_on_a_flat_disk_is_evenly_dense():
+    far, _ = from_the_middle(SensorLayout.in_spiral(Disk(0.05), 100))
+
+    np.testing.assert_allclose(np.diff(far**2), far[-1] ** 2 / 99.5, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("made", "reason"),
+    [
+        (lambda: SensorLayout.on_rings(PATCH, [4]), "expected a disk or a cap, got a patch of"),
+        (lambda: SensorLayout.in_spiral(PATCH, 4), "expected a disk or a cap, got a patch of"),
+        (lambda: SensorLayout.on_rings(Disk(0.05), []), "one element on each ring, got no ring"),
+        (
+            lambda: SensorLayout.on_rings(Disk(0.05), [3, 0]),
+            r"one element on each ring, got \[3, 0",
+        ),
+        (lambda: SensorLayout.in_spiral(Disk(0.05), 0), "at least one element on a spiral, got 0"),
+    ],
+)
+def test_patterns_that_cannot_be_are_refused(made, reason):
+    with pytest.raises(Refusal, match=reason):
+        made()
 
 
 def test_all_three_channels_of_a_dead_element_are_dead():
@@ -204,7 +257,7 @@ def test_what_is_averaged_is_the_mean_of_what_points_read(patch, more):
 
 def test_a_slope_on_a_bent_skin_is_how_far_its_tangent_has_turned():
     """By the change of the tangent of the arc itself, f inward and v along it, v' = H f."""
-    basis, H = SineBasis(ROUND, 4, 3), ROUND.base_curvature
+    basis, H = SineBasis(ROUND, 4, 3), ROUND.arc_curvature
     layout = SensorLayout.scattered(ROUND, [(0.008, 0.007), (0.021, 0.011)])
     slopes = layout.reading([0, 1], "slope", 0.0).operator(basis)
     c = 1e-7 * np.random.default_rng(1).normal(size=basis.size)

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import Patch, Plate, Sensor, SensorLayout, SourceError, Transduction
+from kappaskin import Cap, Patch, Plate, Sensor, SensorLayout, SourceError, Transduction
 from kappaskin._toml import REQUIRED
 from kappaskin.sensing import Amplifier, Converter, HalfBridge, Multiplexer
 from kappaskin.sources import sensor_from_json, sensor_to_json
@@ -98,6 +98,17 @@ def test_the_radii_of_a_shallow_skin_survive(radii) -> None:
     sensor = sensor_on(SensorLayout.regular(Patch(0.1, 0.08, radii), 3, 2))
 
     assert same(sensor_from_json(sensor_to_json(sensor)), sensor)
+
+
+@pytest.mark.parametrize("cap", [Cap(0.008), Cap(0.008, 1.2, 1.3)], ids=["sphere", "spheroid"])
+def test_a_cap_survives(cap) -> None:
+    layout = SensorLayout.in_spiral(cap, 20)
+    sensor = sensor_on(layout, edge="clamped")
+
+    found = sensor_from_json(sensor_to_json(sensor))
+
+    assert same(found, sensor)
+    assert json.loads(sensor_to_json(sensor))["base_curvature"] == 0
 
 
 def test_every_outline_and_edge_survives(held_skin) -> None:
@@ -284,6 +295,11 @@ BAD = {
         said(outline="disk", size=[0.1, 0.1], base_curvature=5),
         "expected a flat disk .* curvature 5",
     ),
+    "cap of another size": (
+        said(cap=[0.008, 1.2, 1]),
+        r"cap of radius 0.008 m with 68.7549 degrees, of size \[0.0192, 0.0192\]",
+    ),
+    "cap beyond a hemisphere": (said(cap=[0.008, 2, 1]), "at most pi/2 .a hemisphere."),
     "base curvature of three": (
         said(base_curvature=[1, 2, 3]),
         "base_curvature: expected a number or a list of 2 numbers, got",

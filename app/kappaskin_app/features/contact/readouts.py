@@ -80,7 +80,7 @@ def _forces(*contacts: Contact) -> str:
     """The forces of two contacts, without error bars, for which there is no room."""
     off = Coverage.now.of
     texts = [
-        "edge" if of.near_rim else rounded(of.force, off(of.force_sd, of.force_95))[0]
+        of.no_force.partition(":")[0] or rounded(of.force, off(of.force_sd, of.force_95))[0]
         for of in contacts
     ]
     return NONE if NONE in texts else f"{', '.join(texts)} N"
@@ -210,8 +210,8 @@ class Readouts(QWidget):
             words = with_error(found.value, off, found.unit, found.digits, sign)
             if header.key == "force" and estimate.second.present:
                 words = _forces(estimate.contact, estimate.second)
-            if header.key == "force" and estimate.contact.force_is_lower_bound:
-                words = f"\N{GREATER-THAN OR EQUAL TO} {words}"
+            if header.key == "force":
+                words = estimate.contact.force_bound + words
             self._write(header.key, found.words or words)
 
     def _write(self, key: str, text: str) -> None:

@@ -26,7 +26,7 @@ from kappaskin_app.widgets.surface_map import SurfaceMap
 from kappaskin_app.widgets.text import length, round_up
 
 _NAMES = tuple(field for field in DesignSettings.__dataclass_fields__)
-_LENGTHS = tuple(f"design_{side}" for side in ("side_x", "side_y", "base_radius", "rim_radius"))
+_LENGTHS = tuple(f"design_{length}" for shape in SHAPES.values() for length in shape.lengths)
 _NOISE = ("design_noise", "design_height_noise", "design_slope_noise")
 _STEPS = 200  # of a slider
 _FACTOR = 4  # steps of a logarithmic slider, to the next number of two digits

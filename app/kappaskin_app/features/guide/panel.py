@@ -1,12 +1,13 @@
 """The guide panel: contents, the text of a page, back and forward."""
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
 
-from PySide6.QtCore import QSignalBlocker, Qt, QUrl
+from PySide6.QtCore import QSignalBlocker, Qt, QTimer, QUrl
 from PySide6.QtGui import (
     QBrush,
     QColor,
@@ -62,6 +63,7 @@ def pages() -> tuple[Page, ...]:
 _PRINTED = ("text", "output")  # fences around what a command prints
 _WIDEST = 88  # of the text, in letters M: longer lines are hard to follow
 _MARGIN, _CODE, _CELL, _ABOVE = 14, 10, 4, 8  # px
+_LATER = 100  # ms after which a page follows the look: once the rest of the window is drawn
 
 
 class GuidePanel(QWidget):
@@ -121,8 +123,7 @@ class GuidePanel(QWidget):
         row = listed.index(url.toLocalFile()) if url.toLocalFile() in listed else -1
         with QSignalBlocker(self.contents):
             self.contents.setCurrentIndex(row)
-        self.text.dress()
-        self.text.scroll_to(url.fragment())
+        self.text.show_page(url.fragment())
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
@@ -131,46 +132,49 @@ class GuidePanel(QWidget):
 
 
 class _Text(QTextBrowser):
-    """A page of Markdown, with a limited line length."""
+    """A page of Markdown, with a limited line length.
+
+    It is formatted before Qt lays it out: that takes longer, and is done part by part when idle.
+    """
 
     def __init__(self) -> None:
         super().__init__()
+        self._loaded: QTextDocument | None = None
+        self._sought: Callable[[], float] | None = None  # px to scroll to, once it is laid out
+        self._left: dict[str, int] = {}  # where each page was scrolled to
+        self._reading = QTimer(self, singleShot=True, interval=_LATER)  # pyright: ignore[reportCallIssue]
+        self._reading.timeout.connect(guarded(self._read_again))
         self.setAccessibleName("The page of the guide")
         self.setOpenExternalLinks(True)
         self.setLineWrapMode(QTextBrowser.LineWrapMode.FixedPixelWidth)
-        self.document().setDocumentMargin(_MARGIN)
+        self.setDocument(QTextDocument(self))
         # Else the bar is hidden and shown again with each page, and the page laid out twice more.
         self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOn)
-        follow_look(self, self._dress_anew)
+        self.verticalScrollBar().rangeChanged.connect(guarded(lambda *_: self._seek()))
+        follow_look(self, self._reading.start)
 
     def loadResource(self, kind: int, name: QUrl) -> object:
         """A resource of a page; pictures no wider than its lines."""
-        found = super().loadResource(kind, name)
-        if kind != QTextDocument.ResourceType.ImageResource:
+        if kind == QTextDocument.ResourceType.ImageResource:
+            picture = QPixmap(name.toLocalFile())
+            wide = min(picture.width(), self.lineWrapColumnOrWidth() - 3 * _MARGIN)
+            return picture.scaledToWidth(wide, Qt.TransformationMode.SmoothTransformation)
+        found, self._sought = super().loadResource(kind, name), None
+        before = self.document().baseUrl().toLocalFile()
+        self._left[before] = self.verticalScrollBar().value()
+        if kind != QTextDocument.ResourceType.MarkdownResource or not found:
             return found
-        picture, wide = QPixmap(name.toLocalFile()), self.lineWrapColumnOrWidth() - 3 * _MARGIN
-        if picture.width() <= wide:
-            return found
-        return picture.scaledToWidth(wide, Qt.TransformationMode.SmoothTransformation)
+        self._loaded = self._formatted(name, bytes(found).decode())
+        return " "  # which Qt writes into the document of the page before
 
-    def scroll_to(self, heading: str) -> None:
-        """Scroll to a heading, if there is one of this text."""
-        for block in _blocks(self.document()):
-            if heading and block.blockFormat().headingLevel() and block.text() == heading:
-                top = self.document().documentLayout().blockBoundingRect(block).top()
-                self.verticalScrollBar().setValue(round(top))
-
-    def _dress_anew(self) -> None:
-        at = self.verticalScrollBar().value()
-        self._fit()
-        self.reload()  # links have the colour of the palette with which they were read
-        self.verticalScrollBar().setValue(at)
-
-    def dress(self) -> None:
-        """Format code, headings and tables."""
-        document, theme = self.document(), current()
-        all_of_it = QTextCursor(document)
-        all_of_it.beginEditBlock()  # laid out once, at its end
+    def _formatted(self, name: QUrl, text: str) -> QTextDocument:
+        """A page with formatted code, headings and tables."""
+        document, theme, size = QTextDocument(self), current(), self.font().pointSizeF()
+        document.setBaseUrl(name)
+        document.setUndoRedoEnabled(False)
+        document.setDocumentMargin(_MARGIN)
+        document.setDefaultFont(self.font())
+        document.setMarkdown(text)
         for frame in document.rootFrame().childFrames():
             if isinstance(frame, QTextTable):
                 _rule(frame, theme)
@@ -179,8 +183,53 @@ class _Text(QTextBrowser):
                 _ground(block, theme)
             elif block.blockFormat().headingLevel():
                 _space(block)
-            _enlarge(block, self.font().pointSizeF())
-        all_of_it.endEditBlock()
+            if size % 1:  # Qt rounds that of code
+                _enlarge(block, size)
+        return document
+
+    def show_page(self, heading: str) -> None:
+        """Show what was loaded, from a heading on if there is one of this text."""
+        if self._loaded is not None:
+            self.document().deleteLater()
+            self.setDocument(self._loaded)
+            self._loaded = None
+        for block in _blocks(self.document()) if heading else ():
+            if block.blockFormat().headingLevel() and block.text() == heading:
+                self._sought = partial(self._top_of, block.blockNumber())
+        self._seek()
+
+    def _top_of(self, number: int) -> float:
+        """The top of a block in px, as far as it is laid out; 0 until then."""
+        return self.document().findBlockByNumber(number).layout().position().y()
+
+    def backward(self) -> None:
+        super().backward()
+        self._scroll_back()
+
+    def forward(self) -> None:
+        super().forward()
+        self._scroll_back()
+
+    def _scroll_back(self) -> None:
+        at = self._left.get(self.document().baseUrl().toLocalFile(), 0)
+        self._sought = (lambda: at) if at else None
+        self._seek()
+
+    def _seek(self) -> None:
+        """Scroll to what is sought; until it is laid out, the view stays as it was."""
+        if self._sought is not None:
+            top, bar = round(self._sought()), self.verticalScrollBar()
+            if 0 < top <= bar.maximum() or self.document().lastBlock().layout().lineCount():
+                self._sought = None
+                bar.setValue(top)
+        self.viewport().setUpdatesEnabled(self._sought is None)
+
+    def _read_again(self) -> None:
+        """Format the page in the look of now."""
+        if not self.source().isEmpty():
+            self._fit()
+            self.reload()  # links have the colour of the palette with which they were read
+            self._scroll_back()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -238,7 +287,7 @@ def _ground(block: QTextBlock, theme: Theme) -> None:
 
 
 def _enlarge(block: QTextBlock, size: float) -> None:
-    """Set the size of code in points: it does not follow the font of the application."""
+    """Set the size of code in points."""
     larger, cursor, at = QTextCharFormat(), QTextCursor(block), block.begin()
     larger.setFontPointSize(size)
     while not at.atEnd():

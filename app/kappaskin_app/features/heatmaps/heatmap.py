@@ -4,9 +4,19 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPainterPath, QPaintEvent, QPen
+from PySide6.QtGui import (
+    QColor,
+    QImage,
+    QMouseEvent,
+    QPainter,
+    QPainterPath,
+    QPaintEvent,
+    QPen,
+    QPolygonF,
+)
 from PySide6.QtWidgets import (
     QGridLayout,
     QHBoxLayout,
@@ -19,6 +29,7 @@ from PySide6.QtWidgets import (
 from kappaskin.estimation import FAULTS
 from kappaskin.frames import Array, Indices, Mask
 from kappaskin.sensing import SensorLayout
+from kappaskin.skin import Cap
 from kappaskin_app.shell.colouring import SHADES, Shade
 from kappaskin_app.theme import DARK_INK, WANTED, Colours, current, follow_look
 from kappaskin_app.widgets.colour_bar import ColourBar, LockButton
@@ -38,8 +49,38 @@ _LEGIBLE = 9  # px, height of the smallest letter
 _ROOM = 18.0  # px, side of the smallest cell with a ring around its letter
 
 
+_BEYOND = 3.0  # of a rim's radius: where points around a cap bound the cells at its rim
+
+
+def cells_of(layout: SensorLayout) -> list[Array]:
+    """For each element of a cap the corners (k, 2) in m of what is nearest to it on its map.
+
+    The cells at the rim end on it, or just outside. Other skins have none.
+    """
+    if not isinstance(layout.patch, Cap):
+        return []
+    rim, turns = layout.patch.rim_radius, np.arange(0, 2 * np.pi, 0.5)
+    offset = layout.positions - rim
+    far = np.linalg.norm(offset, axis=1, keepdims=True)
+    mirrored = offset * (2 * rim / np.maximum(far, 1e-6 * rim) - 1)
+    around = _BEYOND * rim * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
+    found = scipy.spatial.Voronoi(rim + np.concatenate([offset, mirrored, around]))
+    regions = found.point_region[: len(offset)]
+    return [found.vertices[found.regions[region]] for region in regions]
+
+
+def _square_side(layout: SensorLayout) -> float:
+    """Side in m of squares at the elements that hide none: the smallest distance of two."""
+    positions = layout.positions
+    if len(positions) < 2:
+        return 0.2 * layout.patch.a
+    distance = np.max(np.abs(positions[:, None] - positions[None]), axis=-1)
+    nearest = float(np.min(distance + np.where(np.eye(len(positions)), np.inf, 0.0)))
+    return max(0.9 * nearest, 0.02 * layout.patch.a)
+
+
 class CellGrid(QWidget):
-    """Elements as the cells of a regular grid, or as squares at scattered positions."""
+    """Elements as the cells of a regular grid or of a cap, else as squares at their positions."""
 
     pointed = Signal(int)
     chosen = Signal(int)
@@ -47,6 +88,7 @@ class CellGrid(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self._layout: SensorLayout | None = None
+        self._regions, self._side = list[Array](), 0.0
         self._colours: Colours = np.empty((0, 3), np.uint8)
         self._hovered, self._pressed, self._faded = -1, -1, False
         self._marks: tuple[list[int], ...] = ([], [])
@@ -60,17 +102,9 @@ class CellGrid(QWidget):
         return QSize(200, 200)
 
     def show_layout(self, layout: SensorLayout) -> None:
-        self._layout = layout
+        self._layout, self._regions = layout, cells_of(layout)
+        self._side = _square_side(layout)
         self._hovered, self._marks, self._faults, self._target = -1, ([], []), {}, -1
-
-    def _square_side(self) -> float:
-        """Side in m of squares at the elements that hide none: the smallest distance of two."""
-        positions = self._layout.positions if self._layout else np.empty((0, 2))
-        if len(positions) < 2 or self._layout is None:
-            return 0.2 * self._layout.patch.a if self._layout else 1.0
-        distance = np.max(np.abs(positions[:, None] - positions[None]), axis=-1)
-        nearest = float(np.min(distance + np.where(np.eye(len(positions)), np.inf, 0.0)))
-        return max(0.9 * nearest, 0.02 * self._layout.patch.a)
 
     def show_cells(self, rgb: Colours) -> None:
         self._colours = rgb
@@ -102,17 +136,6 @@ class CellGrid(QWidget):
         width, height = min(width, height * ratio), min(height, width / ratio)
         return QRectF((self.width() - width) / 2, (self.height() - height) / 2, width, height)
 
-    def _squares(self, area: QRectF) -> list[QRectF]:
-        """A square for each element of an irregular layout."""
-        layout = self._layout
-        if layout is None:
-            return []
-        side = self._square_side() * area.width() / layout.patch.a
-        return [
-            QRectF(c.x() - side / 2, c.y() - side / 2, side, side)
-            for c in (self.pixel_of(area, x, y) for x, y in layout.positions)
-        ]
-
     def pixel_of(self, area: QRectF, x: float, y: float) -> QPointF:
         patch = self._layout.patch if self._layout else None
         a, b = (patch.a, patch.b) if patch else (1.0, 1.0)
@@ -135,22 +158,41 @@ class CellGrid(QWidget):
                 )
             else:
                 painter.setPen(line)  # or values near zero vanish on a light background
-                for square, rgb in zip(self._squares(area), self._colours, strict=True):
+                if self._regions:
+                    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+                    painter.setClipPath(self._rim(area))
+                for element, rgb in enumerate(self._colours):
                     painter.setBrush(QColor(*(int(v) for v in rgb)))
-                    painter.drawRect(square)
+                    self._draw_cell(painter, area, element)
+                painter.setClipping(False)
                 painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.setOpacity(1.0)
             painter.setPen(line)
-            painter.drawRect(area)
+            painter.drawPath(self._rim(area))
             self._paint_marks(painter, area)
             self._paint_faults(painter, area)
             if self._target >= 0:
                 self._paint_target(painter, self._cell(area, self._target))
             if self._hovered >= 0:
-                cell = self._cell(area, self._hovered)
                 for colour, width in (("#16191d", 4), ("#ffffff", 2)):  # visible on every colour
                     painter.setPen(QPen(QColor(colour), width))
-                    painter.drawRect(cell)
+                    self._draw_cell(painter, area, self._hovered)
+
+    def _rim(self, area: QRectF) -> QPainterPath:
+        """The outline of the skin: a circle for a cap, else its rectangle."""
+        path = QPainterPath()
+        if self._regions:
+            path.addEllipse(area)
+        else:
+            path.addRect(area)
+        return path
+
+    def _draw_cell(self, painter: QPainter, area: QRectF, element: int) -> None:
+        if self._regions:
+            corners = self._regions[element].tolist()
+            painter.drawPolygon(QPolygonF([self.pixel_of(area, *corner) for corner in corners]))
+        else:
+            painter.drawRect(self._cell(area, element))
 
     def _paint_target(self, painter: QPainter, cell: QRectF) -> None:
         """Draw a frame wider than the cell around the element to press."""
@@ -190,16 +232,21 @@ class CellGrid(QWidget):
                 painter.drawEllipse(cell.center(), 0.42 * side, 0.42 * side)
 
     def _cell(self, area: QRectF, element: int) -> QRectF:
-        if self._layout is None or not self._layout.shape:
-            return self._squares(area)[element]
-        m, n = self._layout.shape
+        layout = self._layout
+        if layout is None:
+            return QRectF()
+        if not layout.shape:
+            side = self._side * area.width() / layout.patch.a
+            centre = self.pixel_of(area, *layout.positions[element].tolist())
+            return QRectF(centre.x() - side / 2, centre.y() - side / 2, side, side)
+        m, n = layout.shape
         q, p = divmod(element, m)
         width, height = area.width() / m, area.height() / n
         return QRectF(area.left() + p * width, area.bottom() - (q + 1) * height, width, height)
 
     def _element_at(self, at: QPointF) -> int:
         layout, area = self._layout, self.area_of_patch()
-        if layout is None or not area.contains(at):
+        if layout is None or not self._rim(area).contains(at):
             return -1
         position = [
             (at.x() - area.left()) / area.width() * layout.patch.a,

@@ -8,7 +8,7 @@ import pyvista as pv
 
 from kappaskin._text import with_error
 from kappaskin.frames import Array, Indices
-from kappaskin.skin import Distances
+from kappaskin.skin import Cap, Distances
 from kappaskin_app.shell.drawn_skin import MM, Direction, DrawnSkin
 from kappaskin_app.theme import WANTED, current, follow_look, grown
 from kappaskin_app.widgets.lettering import CAPTION
@@ -87,6 +87,7 @@ class Caption:
 
 
 _SIDE_LETTERS = 15  # px
+_AROUND = 129  # points of the line around a cap
 _LABEL_WIDTH = 5.2  # width of a label with its margin, of the letters' height
 _MOST_WIDTH = 0.2  # of the view's width, of one label
 
@@ -94,7 +95,8 @@ _MOST_WIDTH = 0.2  # of the view's width, of one label
 class Sides:
     """Labels of the corner 0 and of the sides along x and y.
 
-    For a skin smaller than its rectangle, lines show these sides.
+    For a flat skin smaller than its rectangle, lines show these sides. A cap has labels at the ends
+    of its axes, and a line around its rim.
     """
 
     def __init__(self, plotter: Any) -> None:
@@ -109,16 +111,25 @@ class Sides:
 
     def show_skin(self, skin: DrawnSkin) -> None:
         a, b = skin.patch.a, skin.patch.b
-        corners, _ = skin.at_rest(np.array([(0.0, 0.0), (a, 0.0), (0.0, b)]))
-        self._lines.points = corners
+        x, y = f"x {round(a * MM, 1):g} mm", f"y {round(b * MM, 1):g} mm"
+        if isinstance(skin.patch, Cap):
+            ends, texts = np.array([(0, b / 2), (a, b / 2), (a / 2, 0)]), ("x 0", x, "y 0")
+            shares = np.array([(-0.1, 0, 0), (0.1, 0, 0), (-0.02, -0.06, 0)])
+            turn = np.linspace(0, 2 * np.pi, _AROUND)
+            line = skin.patch.rim_radius * (1 + np.stack([np.cos(turn), np.sin(turn)], axis=-1))
+        else:
+            ends, texts = np.array([(0.0, 0.0), (a, 0.0), (0.0, b)]), ("0", x, y)
+            shares = np.array([(-0.04, -0.04, 0), (0, -0.06, 0), (0, 0.05, 0)])
+            line = ends[[1, 0, 2]]
+        self._lines.points = skin.at_rest(line)[0]
+        self._lines.lines = np.r_[len(line), : len(line)]
         self.actor.visibility = not skin.on.all()
-        beside = MM * np.array([(-0.04 * a, -0.04 * b, 0), (0, -0.06 * b, 0), (0, 0.05 * b, 0)])
-        texts = ("0", f"x {round(a * MM, 1):g} mm", f"y {round(b * MM, 1):g} mm")
-        for label, text, at in zip(self.labels, texts, corners + beside, strict=True):
+        places = skin.at_rest(ends)[0] + shares * (MM * np.array([a, b, 0]))
+        for label, text, at in zip(self.labels, texts, places, strict=True):
             label.input = text
             label.position = tuple(at)
         # A centred text would lie below a skin that rises steeply.
-        y_at = "right" if skin.patch.arc_curvature else "center"
+        y_at = "right" if any(skin.patch.curvatures) else "center"
         self.labels[2].prop.justification_horizontal = y_at
 
     def show_from(self, direction: Direction | None) -> None:

@@ -8,6 +8,7 @@ from PySide6.QtCore import QObject, QPointF, Signal
 from pyvistaqt import QtInteractor
 
 from kappaskin.frames import Array
+from kappaskin.skin import Cap
 from kappaskin_app.features.membrane.annotations import Sides
 from kappaskin_app.shell.drawn_skin import FROM_THE_LEFT, MM, NO_SKIN, Direction, DrawnSkin
 
@@ -45,7 +46,7 @@ def fit_camera(renderer: Any, skin: DrawnSkin, direction: Direction, label: floa
     seen = np.array([_in_view(renderer, *point) for point in _around(skin, _MARGIN)])
     least, most = seen.min(axis=0), seen.max(axis=0)
     across = [_in_view(renderer, *point)[0] for point in body]
-    before = label * (2.0 if skin.patch.arc_curvature else 1.2)
+    before = label * (2.0 if any(skin.patch.curvatures) else 1.2)
     after = 2.2 * label
     beside = (2.0 - before - after) / float(np.ptp(across))
     zoom = min(1.94 / float(np.max(most - least)), beside)
@@ -93,8 +94,12 @@ def _around(skin: DrawnSkin, share: float) -> Array:
     """Points (k, 3) in mm around the skin with a margin of this share."""
     a, b = skin.patch.a, skin.patch.b
     margin = share * skin.side
-    x = np.linspace(0, a, 9 if skin.patch.arc_curvature else 2)
-    points, out = skin.at_rest(np.stack(np.meshgrid(x, (0, b)), axis=-1).reshape(-1, 2))
+    curved = zip((a, b), skin.patch.curvatures, strict=True)
+    x, y = (np.linspace(0, length, 9 if H else 2) for length, H in curved)
+    places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    if isinstance(skin.patch, Cap):
+        places = places[skin.patch.contains(places)]
+    points, out = skin.at_rest(places)
     low, high = -_LOW * MM * min(a, b), 2 * margin
     corners = [(dx, dy, 0.0) for dx in (-margin, 2.5 * margin) for dy in (-margin, margin)]
     return np.concatenate([points + z * out + at for z in (low, high) for at in corners])

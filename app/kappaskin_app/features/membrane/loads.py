@@ -72,4 +72,5 @@ def put_upright(actor: pv.Actor, skin: DrawnSkin, position: Array, above: float 
     if shown:
         points, out = skin.place(position[None], above)
         actor.position = tuple(points[0])
-        actor.orientation = (0.0, np.degrees(np.arctan2(out[0, 0], out[0, 2])), 0.0)
+        x, y, z = out[0]  # turned about y first, then about x
+        actor.orientation = tuple(np.degrees([np.arctan2(-y, z), np.arcsin(x), 0.0]))

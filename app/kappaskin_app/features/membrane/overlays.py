@@ -105,11 +105,12 @@ class Directions:
         """Both ends (4 G, 3) in mm of each line, `step` (2, 2 G) in mm from its node."""
         h_y, h_x = np.gradient(skin.height, skin.cell[1] * MM, skin.cell[0] * MM)
         nodes = np.tile(self._nodes, 2)
-        slope = step[0] * h_x.ravel()[nodes] + step[1] * h_y.ravel()[nodes]
+        moved = np.einsum("ik,kij->kj", step, self._ways)
+        slope = moved[:, 0] * h_x.ravel()[nodes] + moved[:, 1] * h_y.ravel()[nodes]
         height = skin.height.ravel()[nodes] + lift
         ends: list[Array] = []
         for side in (-1, 1):
-            rest, out = skin.at_rest(self._positions + side * step.T / MM)
+            rest, out = skin.at_rest(self._positions + side * moved / MM)
             ends.append(rest + out * (height + side * slope)[:, None])
         return np.stack(ends, axis=1).reshape(-1, 3)
 
@@ -120,6 +121,8 @@ class Directions:
         chosen[stride // 2 :: stride, stride // 2 :: stride] = True
         self._nodes = np.flatnonzero(chosen & skin.on)
         self._positions = np.tile(skin.shares[self._nodes] * (skin.patch.a, skin.patch.b), (2, 1))
+        # From steps along the skin's frames to steps of its coordinates.
+        self._ways = skin.patch.local(self._positions).covariant[:, 1:3, 1:3]
         self._apart = stride * MM * float(skin.cell.min())
         if self.actor is not None:
             self._plotter.remove_actor(self.actor, render=False)
@@ -140,16 +143,21 @@ _LONG = 0.2  # of the skin's size
 _POINTS = 9  # of a line
 _RIM = 32  # points of the cone's rim
 _NORMAL = (31, 209, 122)  # as the contact's own mark
-_COLOURS = np.array([_NORMAL, DIVERGING[215], DIVERGING[40]], np.uint8)
+_COLOURS = np.array([_NORMAL, DIVERGING[215], DIVERGING[40], _NORMAL], np.uint8)
+_AROUND, _OUT, _FINE = 48, 14, 32  # points around, outward, and to find the extent
+_WAYS = 2 * np.pi * np.arange(_AROUND) / _AROUND
+_SIDES = np.stack([np.cos(_WAYS), np.sin(_WAYS)], axis=-1)
 
 
 class ContactFrame:
-    """Axes of the contact frame, and a cone of the normal's uncertainty."""
+    """Axes of the contact frame, a cone of the normal's and an ellipse of the place's error bar."""
 
     def __init__(self, plotter: Any) -> None:
-        points = np.arange(3 * _POINTS).reshape(3, -1)
-        lines = np.insert(points, 0, _POINTS, axis=1).ravel()
-        self._lines: Any = pv.PolyData(np.zeros((3 * _POINTS, 3)), lines=lines)
+        points = np.arange(3 * _POINTS + _AROUND)
+        axes, ellipse = points[: 3 * _POINTS].reshape(3, -1), points[3 * _POINTS :]
+        lines = np.insert(axes, 0, _POINTS, axis=1).ravel()
+        lines = np.r_[lines, _AROUND + 1, ellipse, ellipse[0]]
+        self._lines: Any = pv.PolyData(np.zeros((len(points), 3)), lines=lines)
         self._lines.cell_data["rgb"] = _COLOURS
         rim = 1 + np.arange(_RIM)
         faces = np.column_stack([np.full(_RIM, 3), np.zeros(_RIM, int), rim, 1 + rim % _RIM])
@@ -171,12 +179,14 @@ class ContactFrame:
         position: Array,
         angle: float,
         slope_sd: Array | None,
+        reach: Array,
         lift: float = 0.0,
     ) -> None:
         """Draw it at `position` (2,) in m, the first direction `angle` rad from x.
 
-        The directions lie on the skin, `lift` mm above it. `slope_sd` (2,) are the standard
-        deviations of the drawn slopes, None if unknown.
+        Directions and ellipse lie on the skin, `lift` mm above it. `slope_sd` (2,) are the standard
+        deviations of the drawn slopes, None if unknown; `reach` (2,) in m is the error bar of the
+        position.
         """
         (origin,), _ = skin.place(position[None])
         x, y = skin.tangents(position)
@@ -187,8 +197,10 @@ class ContactFrame:
         for turn in (angle, angle + np.pi / 2):
             # Along the skin: straight lines would be hidden where it is concave.
             along = length / MM * np.linspace(-0.5, 0.5, _POINTS)[:, None]
-            there = position + along * (np.cos(turn), np.sin(turn))
+            there = skin.patch.around(*position, along * (np.cos(turn), np.sin(turn)))
             lines.append(skin.place(there, lift)[0])
+        ellipse = skin.patch.around(*position, np.nan_to_num(reach) * _SIDES)
+        lines.append(skin.place(ellipse, lift)[0])
         self._lines.points[:] = np.concatenate(lines)
         self.actor.visibility = True
         self.cone.visibility = slope_sd is not None
@@ -200,10 +212,7 @@ class ContactFrame:
             self._cone.points[:] = np.vstack([origin, origin + rim])
 
 
-_AROUND, _OUT, _FINE = 48, 14, 32  # points around, outward, and to find the extent
 _ABOVE = 0.35  # of the skin's size: the highest part drawn
-_WAYS = 2 * np.pi * np.arange(_AROUND) / _AROUND
-_SIDES = np.stack([np.cos(_WAYS), np.sin(_WAYS)], axis=-1)
 
 
 class ObjectMesh:
@@ -249,9 +258,10 @@ def underside(stands: PlacedObject, skin: DrawnSkin, times: float) -> Array | No
     """
     reach = min(float(np.hypot(*stands.object_.extent)), skin.side / MM)
     shares = np.linspace(0.0, 1.0, _FINE)
-    places = stands.place + reach * shares[:, None, None] * _SIDES
-    height = stands.over(skin.patch, places.reshape(-1, 2))[0].reshape(_FINE, _AROUND)
-    depth = _depth(skin, places.reshape(-1, 2), height.ravel(), times)
+    offsets = (reach * shares[:, None, None] * _SIDES).reshape(-1, 2)
+    places = skin.patch.around(*stands.place, offsets)
+    height = stands.over(skin.patch, places)[0].reshape(_FINE, _AROUND)
+    depth = _depth(skin, places, height.ravel(), times)
     if not np.isfinite(depth):
         return None
     near = np.isfinite(height) & (times * MM * (height - depth) < _ABOVE * skin.size)
@@ -259,10 +269,10 @@ def underside(stands: PlacedObject, skin: DrawnSkin, times: float) -> Array | No
     if outermost.max() <= 0:
         return None
     far = reach * shares[np.maximum(outermost, 0)]
-    places = stands.place + np.linspace(0, 1, _OUT)[:, None, None] * far[:, None] * _SIDES
-    flat = places.reshape(-1, 2)
-    rise = np.nan_to_num(stands.over(skin.patch, flat)[0] - depth, posinf=0.0)
-    rest, out = skin.at_rest(flat)
+    offsets = np.linspace(0, 1, _OUT)[:, None, None] * far[:, None] * _SIDES
+    places = skin.patch.around(*stands.place, offsets.reshape(-1, 2))
+    rise = np.nan_to_num(stands.over(skin.patch, places)[0] - depth, posinf=0.0)
+    rest, out = skin.at_rest(places)
     return rest + out * (times * MM * rise)[:, None]
 
 
@@ -348,9 +358,10 @@ class Overlays:
         bars, slopes = self._colouring.error_bars(estimate), None
         if bars is not None:
             slopes = times * bars.of_slopes(contact.position, estimate.noise)
-        angle = float(estimate.geometry.angle)
-        membrane = self._membrane
-        self.frame.show(membrane.skin, contact.position, angle, slopes, membrane.lift)
+        angle, membrane = float(estimate.geometry.angle), self._membrane
+        half_widths = zip(contact.position_sd, contact.position_95, strict=True)
+        reach = np.array([Coverage.now.of(sd, half) for sd, half in half_widths])
+        self.frame.show(membrane.skin, contact.position, angle, slopes, reach, membrane.lift)
 
     def _recognised_object(self, estimate: Estimate) -> PlacedObject | None:
         """The recently recognised object at the present contact."""

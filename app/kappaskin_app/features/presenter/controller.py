@@ -2,7 +2,9 @@
 
 import math
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
 
 from PySide6.QtCore import QByteArray, QEvent, QObject, QRect, Qt, QTimer
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollBar, QToolBar, QWidget
@@ -31,9 +33,9 @@ _OLD = 1.0  # s after which a recognised object is discarded
 
 @dataclass(frozen=True)
 class _WindowState:
-    """State of the window before full screen."""
+    """State of the window before full screen; `arrange` puts its docks in their places."""
 
-    layout: QByteArray
+    arrange: Callable[[], object]
     place: QRect
     state: Qt.WindowState
     shown: list[QWidget]
@@ -56,7 +58,7 @@ class PresenterController(QObject):
         self._display, self._load = display, load
         self._before: _WindowState | None = None
         self._left: _WindowState | None = None
-        self._left_at = -math.inf
+        self._left_at, self._arranged = -math.inf, QByteArray()
         self._restoring = QTimer(self, singleShot=True)  # pyright: ignore[reportCallIssue]
         self._restoring.timeout.connect(guarded(self._restore))
         window.installEventFilter(self)
@@ -83,7 +85,8 @@ class PresenterController(QObject):
         window = self._window
         shown = [part for part in self._surroundings() if part.isVisible()]
         self._before = _WindowState(
-            *(window.saveState(), window.geometry(), window.windowState(), shown),
+            partial(window.restoreState, window.saveState()),
+            *(window.geometry(), window.windowState(), shown),
             {bar: bar.value() for dock in shown for bar in dock.findChildren(QScrollBar)},
         )
         with drawn_once(window):
@@ -95,11 +98,14 @@ class PresenterController(QObject):
         self._display.show_numbers_soon()
         self._display.centre.setFocus()  # for the keys that move and press
 
-    def leave(self) -> None:
-        """Restore the window."""
+    def leave(self, arrange: Callable[[], object] | None = None) -> None:
+        """Restore the window, with its docks where they were or where `arrange` puts them."""
         if self._before is None:
             return
         window, before = self._window, self._before
+        if arrange is not None:
+            rest = [part for part in before.shown if not isinstance(part, QDockWidget)]
+            before = replace(before, arrange=arrange, shown=rest)
         self._before = None
         self.sound.set_level(math.nan)
         with drawn_once(window):
@@ -109,8 +115,8 @@ class PresenterController(QObject):
                 window.setGeometry(before.place)
             for part in before.shown:
                 part.show()
-            window.restoreState(before.layout)
-        self._left, self._left_at = before, time.monotonic()
+            before.arrange()
+        self._left, self._left_at, self._arranged = before, time.monotonic(), window.saveState()
         self._restoring.start(0)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
@@ -122,7 +128,8 @@ class PresenterController(QObject):
     def _restore(self) -> None:
         """Restore the sizes of docks and the scrolled positions in a window of its old size."""
         if self._left is not None and not self.on:
-            self._window.restoreState(self._left.layout)
+            if self._window.saveState() != self._arranged:
+                self._left.arrange()
             for bar in self._window.findChildren(QScrollBar):  # without those deleted since
                 bar.setValue(self._left.scrolled.get(bar, bar.value()))
 

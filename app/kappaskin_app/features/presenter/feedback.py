@@ -39,7 +39,8 @@ class RadiusEstimate:
 class Feedback:
     """Feedback in SI units, each number with its error bar as all views show it; NaN if unknown.
 
-    The force of a contact `near_rim` is not determined, and it has no `radius`.
+    The force of a contact `near_rim` is not determined, and it has no `radius`. `bound` stands
+    before the force where it is one; `no_force` says why there is none.
     """
 
     force: float
@@ -52,7 +53,8 @@ class Feedback:
     length: float
     radius: RadiusEstimate | None
     near_rim: bool
-    force_is_lower_bound: bool = False
+    bound: str = ""
+    no_force: str = ""
 
 
 def feedback_of(estimate: Estimate, recognised: Recognised | None = None) -> Feedback | None:
@@ -89,7 +91,7 @@ def feedback_of(estimate: Estimate, recognised: Recognised | None = None) -> Fee
     return Feedback(
         *(force, force_off, displacement, displacement_off, (x, y), place_off),
         *(kind, length, _radius_estimate(estimate, recognised), contact.near_rim),
-        contact.force_is_lower_bound,
+        *(contact.force_bound, contact.no_force),
     )
 
 

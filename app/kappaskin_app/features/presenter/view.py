@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from kappaskin._text import NO_FORCE, rounded
+from kappaskin._text import rounded
 from kappaskin.scenes import Indenter, Scene
 from kappaskin_app.features.presenter.feedback import Feedback, RadiusEstimate
 from kappaskin_app.features.presenter.indicators import (
@@ -272,12 +272,11 @@ class PresenterView(QWidget):
                 figure.show_figure(NONE, why_none if figure is self.force else "")
             self.radius.show_figure(NONE, name=_RADIUS)
             return
-        least = "\N{GREATER-THAN OR EQUAL TO} " if feedback.force_is_lower_bound else ""
         force, off = _figure("N", feedback.force_off, feedback.force)
         if math.isfinite(feedback.force):
-            self.force.show_figure(least + force, off)
+            self.force.show_figure(feedback.bound + force, off)
         else:
-            self.force.show_figure(NONE, NO_FORCE if feedback.near_rim else "unknown")
+            self.force.show_figure(NONE, feedback.no_force or "unknown")
         depth, off = _figure("mm", 1e3 * feedback.displacement_off, 1e3 * feedback.displacement)
         self.displacement.show_figure(depth, off or "largest on the skin")
         x, y = (1e3 * value for value in feedback.position)

@@ -9,6 +9,7 @@ from kappaskin.estimation import ScanTradeoff
 from kappaskin.live import Status
 from kappaskin.mechanics import INPLANE
 from kappaskin.sensing import DigitalReadings, Sensor
+from kappaskin.skin import Patch
 from kappaskin_app.shell.badge import in_use
 from kappaskin_app.shell.form import Form, SimulationForm
 from kappaskin_app.shell.settings import Settings
@@ -18,7 +19,27 @@ from kappaskin_app.widgets.parts import Label
 from kappaskin_app.widgets.text import Coverage
 
 _PREPARING = "Computing this skin; the previous one is shown until then."
-_NUMBERS = ("side_x", "side_y", "base_radius", "rim_radius")
+_NUMBERS = ("side_x", "side_y", "base_radius", "radius_x", "radius_y", "rim_radius")
+_FACTS = (
+    ("Opening angle", "The angle of the arc: its length over its radius."),
+    ("Rise", "Height of the unloaded skin, from its lowest to its highest point."),
+    (
+        "Model error",
+        "1 / (R k)\u00b2 with the smallest radius R and the wave number k of the longest wave: the "
+        "relative error of shallow shell theory, which is refused above 1 %.",
+    ),
+)
+
+
+def _facts_of(patch: Patch) -> tuple[str, str, str]:
+    """Opening, rise and relative error of shallow shell theory, as far as `patch` has them."""
+    bent = [(L, H) for L, H in zip((patch.a, patch.b), patch.curvatures, strict=True) if H]
+    if not bent:
+        return "", "", ""
+    angles = [f"{math.degrees(side * abs(H)):.1f}\N{DEGREE SIGN}" for side, H in bent]
+    rise = f"{1e3 * patch.rise:.2f} mm, {patch.rise / min(L for L, _ in bent):.0%} of the side"
+    error = f"{100 * patch.steepness:.2f} %, at most 1 %" if patch.is_shallow else ""
+    return " \N{MULTIPLICATION SIGN} ".join(angles), rise.replace("%", " %"), error
 
 
 class ShapePanel(SimulationForm):
@@ -33,21 +54,25 @@ class ShapePanel(SimulationForm):
 
     def __init__(self) -> None:
         super().__init__("Shape", ("shape", *_NUMBERS, "edge"))
-        self.opening = Label()
-        self._opening_name = Label("Opening angle")
-        self._opening_name.setToolTip("The angle of the arc: its length over its radius.")
-        self.form.insertRow(len(_NUMBERS) + 1, self._opening_name, self.opening)
+        self.facts = {name: Label() for name, _ in _FACTS}
+        for row, (name, tip) in enumerate(_FACTS, len(_NUMBERS) + 1):
+            label = Label(name)
+            for widget in (label, self.facts[name]):
+                widget.setToolTip(tip)
+            self.form.insertRow(row, label, self.facts[name])
         self._refusal, self._preparing = "", False
 
     def show_settings(self, settings: Settings) -> None:
         super().show_settings(settings)
         lengths = set(SHAPES[settings.shape].lengths)
         self.show_rows({"shape", "edge"} | lengths)
+        facts = ("", "", "")
         with suppress(Refusal):  # a refusal is shown below
             self.offer("edge", edges_of(patch_of(settings)))
-        self.form.setRowVisible(self.opening, "base_radius" in lengths)
-        degrees = math.degrees(settings.side_x / settings.base_radius)
-        self.opening.setText(f"{degrees:.1f}\N{DEGREE SIGN}")
+            facts = _facts_of(patch_of(settings))
+        for fact, text in zip(self.facts.values(), facts, strict=True):
+            fact.setText(text)
+            self.form.setRowVisible(fact, bool(text))
 
     def show_refusal(self, text: str) -> None:
         """Show why the requested skin is refused; nothing if it is not."""

@@ -25,6 +25,9 @@ class _Rows:
         self._times: Array = np.empty(2 * most)
         self._values: Columns = np.empty((*shape, 2 * most), np.float32)
 
+    def clear(self) -> None:
+        self._end = 0  # new arrays would take 10 ms: the system clears their memory
+
     def append(self, times: Array, values: Array) -> None:
         """Append at most `most` rows: `times` (T,), `values` (..., T)."""
         if self._end + len(times) > len(self._times):
@@ -66,7 +69,12 @@ class Bins:
 
     def __init__(self, columns: int, width: float, most: int) -> None:
         self._width, self._rows = width, _Rows(most, 3, columns)
-        self._open = np.empty(0), np.empty((columns, 0))  # of a span that is not complete
+        self._none = np.empty(0), np.empty((columns, 0))
+        self._open = self._none  # of a span that is not complete
+
+    def clear(self) -> None:
+        self._rows.clear()
+        self._open = self._none
 
     def append(self, times: Array, values: Array) -> None:
         """Append `values` (columns, T) at `times` (T,) in s, which never decrease."""
@@ -97,12 +105,13 @@ class StripHistory:
     """
 
     def __init__(self, columns: int) -> None:
-        self.columns = columns
-        self.clear()
+        self.columns, self.last = columns, -np.inf
+        self._rows = _Rows(_MOST, columns)
+        self._bins = Bins(columns, _BIN, round(LONG / _BIN))
 
     def clear(self) -> None:
-        self._rows = _Rows(_MOST, self.columns)
-        self._bins = Bins(self.columns, _BIN, round(LONG / _BIN))
+        self._rows.clear()
+        self._bins.clear()
         self.last = -np.inf
 
     def append(self, times: Array, values: Array) -> None:

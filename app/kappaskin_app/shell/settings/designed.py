@@ -10,7 +10,7 @@ from kappaskin_app.shell.settings.form_fields import (
     Several,
     setting,
 )
-from kappaskin_app.shell.settings.scene import SHAPES
+from kappaskin_app.shell.settings.scene import SHAPES, radius_along
 
 PLACINGS = (
     ("scene", "Regular grid"),
@@ -46,6 +46,8 @@ class DesignSettings:
     design_base_radius: float = setting(
         12.9e-3, _length("Radius", "Radius of the arc of the unloaded skin.")
     )
+    design_radius_x: float = setting(0.15, radius_along("x"))
+    design_radius_y: float = setting(0.15, radius_along("y"))
     design_rim_radius: float = setting(
         0.05,
         _length(

@@ -39,6 +39,11 @@ def _strip(side_x: float, side_y: float, base_radius: float) -> Patch:
     return Patch(side_x, side_y, base_radius, strip=True)
 
 
+def _dome(side_x: float, side_y: float, radius_x: float, radius_y: float) -> Patch:
+    """A dome, or a saddle where one radius is negative; a radius of 0 is straight."""
+    return Patch(side_x, side_y, (radius_x or math.inf, radius_y or math.inf))
+
+
 def _hexagon(rim_radius: float) -> Patch:
     """A hexagon with corners `rim_radius` from its middle, one each on the left and right."""
     height = math.sqrt(3) / 2
@@ -61,6 +66,12 @@ SHAPES = {
         {"side_x": math.pi * _FINGERTIP, "side_y": 0.04, "base_radius": _FINGERTIP},
         {"force": 0.5, "exaggeration": 30.0},
     ),
+    "dome": Shape(
+        "Dome or saddle",
+        _dome,
+        {"side_x": 0.05, "side_y": 0.05, "radius_x": 0.15, "radius_y": 0.15},
+        {"force": 0.5, "exaggeration": 10.0},
+    ),
     "disk": Shape("Disk", Disk, {"rim_radius": 0.05}, _AS_TABLE_1, rate=200.0),
     "hexagon": Shape("Hexagon", _hexagon, {"rim_radius": 0.05}, _AS_TABLE_1, rate=100.0),
 }
@@ -73,6 +84,12 @@ _SKIN = PARTS["skin"]
 def _side(axis: str, more: str = "") -> Range:
     tip = f"Length of the skin along {axis}{more}. The loads keep their relative positions."
     return Range(f"Length along {axis}", tip, 0.005, 1.0, 0.001, *MILLIMETRES, decimals=1)
+
+
+def radius_along(axis: str) -> Range:
+    """The form field of a radius of a dome or saddle."""
+    tip = f"Radius of the unloaded skin along {axis}; negative: hollow from outside; 0: straight."
+    return Range(f"Radius along {axis}", tip, -1.0, 1.0, 0.001, *MILLIMETRES, decimals=1)
 
 
 def _elements(axis: str, letter: str) -> Range:
@@ -89,7 +106,8 @@ class Skin:
         Choice(
             "Shape",
             "The flat patch of the paper's Table 1; its fingertip, a half circle, curved along x "
-            "and straight along y; or a flat disk or hexagon. Selecting a shape sets its default "
+            "and straight along y; a shallow dome or saddle, curved along both; or a flat disk or "
+            "hexagon. Selecting a shape sets its default "
             "size, force and vertical exaggeration.",
             tuple((name, shape.label) for name, shape in SHAPES.items()),
         ),
@@ -108,6 +126,8 @@ class Skin:
             decimals=1,
         ),
     )
+    radius_x: float = setting(0.15, radius_along("x"))
+    radius_y: float = setting(0.15, radius_along("y"))
     rim_radius: float = setting(
         0.05,
         Range(

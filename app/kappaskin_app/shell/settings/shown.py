@@ -239,7 +239,7 @@ class View(ColourRanges):
             "Normal of the skin at the contact (green) and the two principal directions (orange, "
             "blue). The cone contains the normals whose slopes differ by one error bar "
             "(\N{PLUS-MINUS SIGN}1 \u03c3 or 95 %, menu View); it has the vertical "
-            "exaggeration of the skin.",
+            "exaggeration of the skin. The ellipse on the skin has the error bars of the position.",
         ),
     )
     show_object: bool = setting(

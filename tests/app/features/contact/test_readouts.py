@@ -1,5 +1,6 @@
 """The numbers of the header have room, whatever the letters."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -61,6 +62,25 @@ def test_a_force_that_leaves_out_a_stretch_is_shown_as_a_lower_bound(readouts: R
     readouts.show_estimate(estimate)
 
     assert readouts.text("force") == f"\N{GREATER-THAN OR EQUAL TO} {plain}"
+
+
+def test_the_force_of_a_skin_that_softens_is_an_upper_bound_and_none_where_it_snaps(
+    readouts: Readouts,
+) -> None:
+    estimate = _centre()
+    soft = replace(
+        estimate.contact, force_is_lower_bound=False, force_is_upper_bound=True, snaps_through=False
+    )
+    snaps = replace(soft, force_is_upper_bound=False, force=math.nan, snaps_through=True)
+
+    readouts.show_estimate(replace(estimate, contact=soft))
+    assert readouts.text("force").startswith("\N{LESS-THAN OR EQUAL TO} ")
+    assert readouts.text("force").endswith(" N")
+    readouts.show_estimate(replace(estimate, contact=snaps))
+    assert readouts.text("force") == "snaps through: no force"
+    assert "mm" in readouts.text("depth")
+    readouts.show_estimate(replace(estimate, contact=soft, second=snaps))
+    assert readouts.text("force").endswith(", snaps through N")
 
 
 def _centre():

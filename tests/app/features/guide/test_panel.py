@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 import pytest
-from PySide6.QtCore import QUrl
+from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QColor, QFont, QImage
 from PySide6.QtWidgets import QApplication
 
@@ -53,11 +53,33 @@ def test_a_page_that_is_none_of_the_guides_is_marked_as_none(shown: GuidePanel) 
     assert shown.contents.currentIndex() == -1
 
 
-def test_a_heading_is_brought_to_the_top(shown: GuidePanel, qapp: QApplication) -> None:
-    shown.read(page_called("record"), "Feed a robot")
-    qapp.processEvents()
-    at_top = shown.text.cursorForPosition(shown.text.viewport().rect().topLeft()).block()
-    assert "Feed a robot" in (at_top.text(), at_top.next().text())
+def _top(panel: GuidePanel) -> tuple[str, str]:
+    """The uppermost two paragraphs that are seen."""
+    block = panel.text.cursorForPosition(panel.text.viewport().rect().topLeft()).block()
+    return block.text(), block.next().text()
+
+
+@pytest.mark.parametrize("page", ["record", "scenes"])
+def test_a_heading_is_brought_to_the_top(shown: GuidePanel, qtbot, page: str) -> None:
+    heading = {"record": "Feed a robot", "scenes": "Every key"}[page]
+    shown.read(page_called(page), heading)
+    qtbot.waitUntil(lambda: heading in _top(shown))
+    assert shown.text.viewport().updatesEnabled()
+
+
+def test_back_and_another_theme_leave_a_page_where_it_was_read(shown: GuidePanel, qtbot) -> None:
+    shown.read(page_called("teach"), "11 Break it and mend it")
+    qtbot.waitUntil(lambda: "11 Break it and mend it" in _top(shown))
+    qtbot.keyClick(shown.text, Qt.Key.Key_PageDown)
+    at, bar = _top(shown), shown.text.verticalScrollBar()
+    qtbot.mouseClick(shown.back, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: shown.contents.currentText() == "Contents" and bar.value() == 0)
+    qtbot.mouseClick(shown.forward, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: _top(shown) == at)
+    with qtbot.waitSignal(shown.text.sourceChanged):
+        apply_look(DARK)
+    qtbot.waitUntil(lambda: _top(shown) == at)
+    assert shown.text.viewport().updatesEnabled()
 
 
 @pytest.mark.full
@@ -72,12 +94,12 @@ def test_pages_fit_into_the_window_and_pictures_into_their_lines(shown: GuidePan
     shown.resize(1270, 400)
 
 
-def test_code_is_as_large_as_the_letters_around_it(shown: GuidePanel, qapp: QApplication) -> None:
+def test_code_is_as_large_as_the_letters_around_it(shown: GuidePanel, qtbot) -> None:
     shown.read(page_called("connect"))
     before, larger = shown.font(), QFont(shown.font())
     larger.setPointSizeF(1.5 * before.pointSizeF())
-    shown.setFont(larger)
-    qapp.processEvents()
+    with qtbot.waitSignal(shown.text.sourceChanged):
+        shown.setFont(larger)
     for words in ("kappaskin doctor", "Ctrl+0"):
         code = shown.text.document().find(words)
         assert code.charFormat().fontPointSize() == larger.pointSizeF()

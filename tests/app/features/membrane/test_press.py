@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QMouseEvent, QWheelEvent
@@ -73,6 +74,34 @@ def test_the_left_button_on_the_skin_presses_there_and_drags(
     assert pressed.history.stack.count() == count + 1
     pressed.history.stack.undo()
     assert pressed.history.settings == settings
+
+
+@pytest.mark.parametrize("radius", [0.15, -0.15], ids=["dome", "saddle"])
+def test_the_flank_of_a_curved_skin_is_pressed_and_pointed_at_under_the_mouse(
+    window: MainWindow, qtbot, until, pixel_of, radius: float
+) -> None:
+    window.requests.set("shape", "dome")
+    window.history.change("Saddle", -1, load_case="point", force=0.02, radius_y=radius)
+    until(lambda: window.membrane.skin.patch.radius == (0.15, radius))
+    until(lambda: window.membrane.drag.handles.tolist() == [[0.025, 0.025]])
+    plotter, flank = window.membrane.plotter, np.array([0.0075, 0.0425])  # an element is there
+    at = pixel_of(window, flank)
+    move(window, at, held=Qt.MouseButton.NoButton)
+    until(lambda: window.selection.element == 81)
+    qtbot.mousePress(plotter, LEFT, pos=at)
+    pressed = window.history.settings
+    assert (pressed.x, pressed.y) == pytest.approx(flank, abs=3e-4)
+    move(window, at + QPoint(60, -10))
+    until(lambda: np.allclose(window.membrane.drag.handles[0], dragged(window)))
+    qtbot.mouseRelease(plotter, LEFT, pos=at + QPoint(60, -10))
+    (moved,) = window.membrane.drag.handles
+    assert (pixel_of(window, moved) - at - QPoint(60, -10)).manhattanLength() <= 6
+    until(lambda: np.allclose(window.session.estimate.true_contact, dragged(window)))
+
+
+def dragged(window: MainWindow) -> tuple[float, float]:
+    """Where the settings have the load, in m."""
+    return window.history.settings.x, window.history.settings.y
 
 
 def test_escape_returns_the_load_that_is_held(pressed, qtbot, pixel_of) -> None:

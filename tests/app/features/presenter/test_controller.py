@@ -69,6 +69,26 @@ def test_leaving_gives_the_window_back_as_it_was(window, until, qtbot) -> None:
     until(lambda: layout_of(window) == was)
 
 
+def test_a_layout_chosen_while_presenting_is_that_of_the_window(window, until, qtbot) -> None:
+    window.actions_by_name["layout-study"].trigger()
+    qtbot.wait(300)
+    wanted = layout_of(window)
+    window.actions_by_name["layout-teach"].trigger()
+    qtbot.wait(300)
+    assert layout_of(window) != wanted
+    qtbot.keyClick(window, Qt.Key.Key_F11)
+    until(lambda: window.presenter.on)
+
+    qtbot.keyClick(window, Qt.Key.Key_K, Qt.KeyboardModifier.ControlModifier)
+    line = window.menus.finder.line
+    until(lambda: line.isVisible())
+    qtbot.keyClicks(line, "study layout")
+    qtbot.keyClick(line, Qt.Key.Key_Return)
+    assert not window.presenter.on
+    qtbot.wait(300)  # in which a window manager may resize it
+    until(lambda: layout_of(window) == wanted)
+
+
 def test_shortcuts_work_while_presenting(demo, qtbot, until) -> None:
     theme = demo.history.settings.theme
     qtbot.keyClick(demo, Qt.Key.Key_T, Qt.KeyboardModifier.ControlModifier)

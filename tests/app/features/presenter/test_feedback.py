@@ -154,6 +154,17 @@ def test_a_contact_near_the_rim_has_no_force_and_no_radius() -> None:
     assert feedback.radius is None
     assert feedback.displacement == pytest.approx(np.nanmax(np.abs(estimate.surface)))
     assert math.isnan(feedback_of(rim, recognised).force)
+    assert feedback.no_force == "edge: no force"
+
+
+def test_a_skin_that_snaps_through_has_no_force_and_one_that_softens_a_bound() -> None:
+    estimate = _estimate()
+    soft = replace(estimate, contact=replace(estimate.contact, force_is_upper_bound=True))
+    snaps = replace(estimate, contact=replace(estimate.contact, snaps_through=True, force=math.nan))
+
+    assert feedback_of(soft).bound == "\N{LESS-THAN OR EQUAL TO} "
+    assert feedback_of(snaps).no_force == "snaps through: no force"
+    assert math.isnan(feedback_of(snaps, _recognised(estimate)).force)
 
 
 def test_an_object_of_a_doubtful_kind_has_a_radius_without_a_name() -> None:

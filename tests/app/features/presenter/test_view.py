@@ -24,7 +24,7 @@ LONGEST = Feedback(
     *(-12.345, 0.123, 0.03456, 0.00123, (0.1234, 0.1234), 0.00012, "cylinder", 0.06),
     RadiusEstimate("cylinder", 0.1234, (0.1121, 0.1345)),
     near_rim=False,
-    force_is_lower_bound=True,
+    bound="\N{GREATER-THAN OR EQUAL TO} ",
 )
 WHY = (
     "/dev/serial/by-id/usb-Kappaskin_SIM-0001: nothing has come for 2 s; is the cable plugged in, "
@@ -145,7 +145,7 @@ view = PresenterView(QWidget()); view.resize(1280, 720); view.present(True); vie
 assert view.devicePixelRatioF() == 1.5
 view.show_feedback(Feedback(-12.345, 0.123, 0.03456, 0.00123, (0.1234, 0.1234), 0.00012,
                    "cylinder", 0.06, RadiusEstimate("cylinder", 0.1234, (0.1121, 0.1345)),
-                   False, True))
+                   False, "\\N{{GREATER-THAN OR EQUAL TO}} "))
 view.strip.show_state("LIVE", "Second-generation fingertip, left hand", "1000 ms old")
 app.processEvents()
 print([w.text for b in view.indicators if b.isVisible() for w in b.words() if not w.fits])
@@ -181,12 +181,23 @@ def test_a_force_that_leaves_out_a_stretch_is_a_lower_bound(qtbot) -> None:
     assert view.force.value == "\N{GREATER-THAN OR EQUAL TO} \N{MINUS SIGN}12.35 N"
 
 
+def test_where_a_skin_snaps_through_the_reason_stands_for_the_force(qtbot) -> None:
+    view = view_of((1280, 720), qtbot)
+    snaps = "snaps through: no force"
+
+    view.show_feedback(replace(LONGEST, force=math.nan, force_off=math.nan, no_force=snaps))
+
+    assert (view.force.value, view.force.note) == ("\N{EN DASH}", snaps)
+    assert all(words.fits for words in view.force.words())
+
+
 def test_a_contact_near_the_rim_has_a_grey_place_and_no_force(qtbot) -> None:
     view = view_of((1280, 720), qtbot)
     view.show_feedback(LONGEST)
     view.show_graphics(LONGEST, 0.0)
     before = {words.text: view.place.ink(words) for words in view.place.words()}
-    rim = replace(LONGEST, near_rim=True, force=math.nan, force_off=math.nan, radius=None, kind="")
+    no_force = {"force": math.nan, "force_off": math.nan, "no_force": "edge: no force"}
+    rim = replace(LONGEST, near_rim=True, radius=None, kind="", **no_force)
 
     view.show_feedback(rim)
     view.show_graphics(rim, 0.1)
