@@ -1,6 +1,6 @@
 """A fresh machine, set up, and one task run on it: the app, every check or some, or benchmarks.
 
-    python3 packaging/start.py                     opens the app on a simulated skin
+    python3 packaging/start.py                     opens the app on a simulated fingertip
     python3 packaging/start.py app [ARGUMENTS]     opens the app, e.g. app --source sim:
     python3 packaging/start.py test [ARGUMENTS]    runs every check; ARGUMENTS go to pytest
     python3 packaging/start.py full                runs all that a release needs

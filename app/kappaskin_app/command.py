@@ -18,6 +18,7 @@ from kappaskin.cli import (
     of_sensor,
 )
 from kappaskin.errors import Refusal, lacking
+from kappaskin_app import DEFAULT_SOURCE
 
 app = App(name="app", help_format="markdown")
 demo = App(name="demo", help_format="markdown")
@@ -60,7 +61,7 @@ def run(
     file: Path | None = None,
     /,
     *,
-    source: SourceName = "sim:",
+    source: SourceName = DEFAULT_SOURCE,
     seconds: float | None = None,
     screenshot: Path | None = None,
     limit: Limit = "",

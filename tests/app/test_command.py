@@ -10,7 +10,10 @@ import psutil
 import pytest
 from PySide6.QtGui import QImage
 
+from kappaskin import Cap
+from kappaskin.cli import main
 from kappaskin_app.shell.badge import SIM, STALE, WAITING, colour_of
+from kappaskin_app.shell.simulation import scene_of, settings_for
 from kappaskin_app.shell.window_file import WindowFile, WindowState
 from kappaskin_app.theme import DARK
 
@@ -160,3 +163,13 @@ def test_a_window_loads_what_charts_need_in_another_thread_and_collects_garbage_
     program.write_text(_OPENED)
     done = subprocess.run([sys.executable, str(program)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_the_app_opens_on_a_fingertip_without_a_source(monkeypatch) -> None:
+    started: list[str] = []
+    monkeypatch.setattr("kappaskin_app.launch.launch", lambda source, *_: started.append(source))
+    assert main(["app"]) == 0
+    settings = settings_for(*started)
+    scene = scene_of(settings)
+    assert isinstance(scene.plate.patch, Cap)
+    assert (scene.plate.patch.radii, len(scene.layout)) == ((0.008, 0.008), 60)

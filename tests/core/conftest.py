@@ -13,7 +13,18 @@ from typing import NoReturn
 import numpy as np
 import pytest
 
-from kappaskin import Disk, Estimate, Patch, Pipeline, Polygon, Scene, Setup, Simulator, basis_for
+from kappaskin import (
+    Cap,
+    Disk,
+    Estimate,
+    Patch,
+    Pipeline,
+    Polygon,
+    Scene,
+    Setup,
+    Simulator,
+    basis_for,
+)
 from kappaskin.bases import Basis, edges_of
 from kappaskin.cli import main
 from kappaskin.publish.message import EstimateMessage, MessageHeader, epoch
@@ -31,6 +42,8 @@ SKINS = {
     "dome": Patch(0.1, 0.08, (0.3, 0.25)),
     "saddle": Patch(0.1, 0.08, (0.4, -0.3)),
     "disk": Disk(0.05),
+    "cap": Cap(0.004, 1.2),
+    "egg": Cap(0.004, stretch=1.3),
     "square": Polygon([(0, 0), (0.1, 0), (0.1, 0.1), (0, 0.1)]),
     "triangle": Polygon([(0, 0), (0.1, 0), (0.05, 0.05 * math.sqrt(3))]),
     "hexagon": Polygon(HEXAGON),
@@ -67,7 +80,7 @@ class Held:
         return f"{self.name}-{self.edge}"
 
 
-_MORE_OF_A_KIND = ("long", "square", "triangle", "hexagon")  # a flat skin, a polygon: flat, L
+_MORE_OF_A_KIND = ("long", "square", "triangle", "hexagon", "egg")  # of flat, L, cap
 ALL = [Held(name, edge) for name, patch in SKINS.items() for edge in edges_of(patch)]
 
 

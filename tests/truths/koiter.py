@@ -34,7 +34,8 @@ class Panel:
 
     Flexural `rigidity` D in N m and `thickness` h in m make E h = 12 (1 - nu^2) D / h^2. All edges
     are `hinged` or `clamped`, and in the plane of the skin `held`, a `diaphragm` (only what is
-    along the edge is held) or `free`.
+    along the edge is held) or `free`. A sphere whose edges are free slides on itself, and what is
+    nearly one nearly does: the mean displacement along it, and the rotation, are held.
     """
 
     a: float
@@ -178,20 +179,30 @@ class Panel:
                 )
                 B.append(part.reshape(6, len(weights), -1))
                 numbers.append((field * N * N + m[:, None] * N + n).ravel())
-            B = np.concatenate(B, axis=-1)
+            B, numbers = np.concatenate(B, axis=-1), np.concatenate(numbers)
             stress = np.einsum("st,tqn,q->sqn", self._law, B, weights, optimize=True)
             K = np.tensordot(B, stress, ((0, 1), (0, 1)))
-            K[np.diag(np.diag(K) == 0)] = 1  # along a straight line a free skin slides
+            if self.inplane == "free":
+                fixed = np.isin(numbers, self._slides)
+                K[fixed], K[:, fixed] = 0.0, 0.0
+                K[fixed, fixed] = 1.0
             scale = 1 / np.sqrt(np.diag(K))
             factor = cho_factor(K * scale * scale[:, None], overwrite_a=True)
-            blocks.append((np.concatenate(numbers), scale, factor))
+            blocks.append((numbers, scale, factor))
         return blocks
+
+    @property
+    def _slides(self):
+        """The numbers of u = 1, u = y and v = 1."""
+        return [0, 1, self.polynomials**2]
 
     def _solved(self, forces):
         """Coefficients (R, 3 N N) under `forces` (R, 3 N N)."""
         found = np.zeros_like(forces)
         for numbers, scale, factor in self._blocks:
             found[:, numbers] = cho_solve(factor, (forces[:, numbers] * scale).T).T * scale
+        if self.inplane == "free":
+            found[:, self._slides] = 0.0
         return found
 
     def _rule(self, count):
@@ -204,16 +215,18 @@ class Panel:
     def _plate(self):
         return HingedPlate(self.a, self.b, self.rigidity, self.modes)
 
-    def _known(self, load, x, y, pairs):
-        """Derivatives (6, ...) of what the plate's answer, and a lift that clamps it, give to f.
-
-        `pairs` makes values of their factors along x (G, n) and along y (G, n).
-        """
+    def _sharp(self, load, x, y, pairs):
+        """Derivatives (6, ...) of the plate's answer; `pairs` makes them of factors (G, n)."""
         c, (k, l) = self._plate.coefficients(load), self._plate.waves()
-        known = np.stack([pairs(_wave(k, x, dx) @ c, _wave(l, y, dy)) for dx, dy in ORDERS])
+        along = [_wave(k, x, dx) @ c for dx in range(3)]
+        return np.stack([pairs(along[dx], _wave(l, y, dy)) for dx, dy in ORDERS])
+
+    def _known(self, load, x, y, pairs):
+        """The same, with a lift that clamps it where the edges are clamped."""
+        known = self._sharp(load, x, y, pairs)
         if self.edge == "hinged":
             return known
-        lift, N = self._lift(c), self.polynomials
+        lift, N = self._lift(self._plate.coefficients(load)), self.polynomials
         X, Y = _polynomials("hinged", self.a, x, N), _polynomials("hinged", self.b, y, N)
         return known + np.stack([pairs(X[dx] @ lift, Y[dy]) for dx, dy in ORDERS])
 
@@ -243,30 +256,32 @@ class Panel:
 
         A hinged plate's own bending does the work of the load on all that vanishes at the edge.
         """
-        (x, wx), (y, wy), S, stress_of, along = self._grid
-        known = self._known(load, x, y, lambda X, Y: X @ Y.T)
-        stress = np.einsum("sdxy,dxy->sxy", S[:, F], known)
-        stress = np.einsum("stxy,txy->sxy", stress_of, stress)
-        c, (k, l) = self._plate.coefficients(load), self._plate.waves()
-        bent = [_wave(k, x, dx) @ c @ _wave(l, y, dy).T for dx, dy in ORDERS[3:]]
-        xx, xy, yy = (each * wx[:, None] * wy for each in bent)
+        (x, wx), (y, wy), law, along = self._grid
+
+        def product(X, Y):
+            return X @ Y.T
+
+        known = self._known(load, x, y, product)
+        work = np.einsum("idexy,exy->idxy", law, known)
+        sharp = known if self.edge == "hinged" else self._sharp(load, x, y, product)
+        xx, xy, yy = sharp[3:] * wx[:, None] * wy
         D, nu = self.rigidity, self.poisson
-        own = {3: D * (xx + nu * yy), 5: D * (yy + nu * xx), 4: 2 * D * (1 - nu) * xy}
+        work[F, 3] -= D * (xx + nu * yy)
+        work[F, 4] -= 2 * D * (1 - nu) * xy
+        work[F, 5] -= D * (yy + nu * xx)
         found = np.zeros((3, self.polynomials, self.polynomials))
         for field, (X, Y) in enumerate(along):
             for d, (dx, dy) in enumerate(ORDERS):
-                work = np.einsum("sxy,sxy->xy", S[:, field, d], stress)
-                if field == F:
-                    work = work - own.get(d, 0.0)
-                found[field] -= X[dx].T @ work @ Y[dy]
+                found[field] -= X[dx].T @ work[field, d] @ Y[dy]
         return found
 
     @cached_property
     def _grid(self):
         (x, wx), (y, wy) = self._rule(2 * self.polynomials + 48)
         S, W = self._strains(*np.meshgrid(x, y, indexing="ij"))
-        stress_of = self._law[..., None, None] * (wx[:, None] * wy * W)
-        return (x, wx), (y, wy), S, stress_of, [self._along(field, x, y) for field in range(3)]
+        weights = wx[:, None] * wy * W
+        law = np.einsum("st,sidxy,texy,xy->idexy", self._law, S, S[:, F], weights, optimize=True)
+        return (x, wx), (y, wy), law, [self._along(field, x, y) for field in range(3)]
 
 
 _gauss = cache(leggauss)

@@ -103,7 +103,12 @@ class RevolvedShell:
 
     def displacement(self, load, places):
         """Displacement (G,) in m at `places` (G, 2)."""
-        return self._reader(places, slice(0, 1))(load)[0]
+        return self.mover(places)(load)
+
+    def mover(self, places) -> Callable[[Load], np.ndarray]:
+        """The map from a load to displacement (G,) in m at `places` (G, 2)."""
+        read = self._reader(places, slice(0, 1))
+        return lambda load: read(load)[0]
 
     def reader(self, elements) -> Callable[[Load], np.ndarray]:
         """The map from a load to curvature xx, yy, xy (3, P) in 1/m at `elements` (P, 2)."""

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from math import pi, sqrt
+from math import inf, pi, sqrt
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from kappaskin import (
     Robust,
     SensorLayout,
     Simulator,
+    SineBasis,
     basis_for,
     estimator_for,
     load_scene,
@@ -39,6 +40,7 @@ from kappaskin.health import HealthMonitor
 from kappaskin.mechanics import DiscLoad
 from kappaskin.scenes.effects import UniformNoise
 from kappaskin.studies import Setting, costs
+from koiter import Panel
 from navier import HingedPlate, Load
 from objects import objects_table
 from planned import effects_table
@@ -86,10 +88,12 @@ class Case:
     high: float = 0.8
     noise: float = NOISE
     bound: bool = True
+    elements: tuple[int, int] = (10, 10)
 
     @property
     def layout(self):
-        return replace(SensorLayout.regular(self.skin.patch, 10, 10), gage_length=self.gage_length)
+        regular = SensorLayout.regular(self.skin.patch, *self.elements)
+        return replace(regular, gage_length=self.gage_length)
 
 
 def coverage(case, frames, seed=0) -> Figures:
@@ -190,6 +194,50 @@ BENT = [
     _bent_case("bent to 30 mm, disc of 2 mm", 47e-3, 40e-3, 30e-3, 1.0),
 ]
 
+# Skins that are bent both ways, on their true surface. A dome and a trough go in by less than a
+# thickness or two; a saddle, which bends without stretching, by two.
+
+
+@cache
+def _panel(sides, radii, inplane):
+    return Panel(*sides, *radii, inplane=inplane, polynomials=36, modes=300)
+
+
+def _shallow_case(name, sides, radii, force, mm, elements=(10, 10), inplane="diaphragm"):
+    def truth(layout):
+        return _panel(sides, radii, inplane).reader(layout.positions)
+
+    def load(share):
+        return Load(*(share * sides), force, radius=1e-3 * mm)
+
+    skin, name = Plate(Patch(*sides, radii), inplane=inplane), f"{name}, disc of {mm} mm"
+    return Case(name, skin, truth, load, bound=False, elements=elements)
+
+
+_FINGER, _PALM = (0.04, 0.04), (0.1, 0.1)  # sides in m
+SHALLOW = [
+    *(_shallow_case("dome of 40 mm", _FINGER, (0.1, 0.1), 1.0, mm) for mm in (1, 2, 3)),
+    *(_shallow_case("saddle of 40 mm", _FINGER, (0.1, -0.1), 0.12, mm) for mm in (1, 2, 3)),
+    _shallow_case("trough of 40 mm", _FINGER, (inf, 0.1), 0.4, 2),
+    _shallow_case("dome of 60 x 32 mm", (0.06, 0.032), (0.1, 0.1), 1.0, 2, (15, 8)),
+    _shallow_case("dome of 100 mm", _PALM, (0.3, 0.3), 0.5, 2),
+    _shallow_case("dome of 100 mm, held", _PALM, (0.3, 0.3), 0.5, 2, inplane="held"),
+    _shallow_case("saddle of 100 mm", _PALM, (0.3, -0.3), 0.1, 2),
+]
+
+
+def read_as_flat(case, frames=60, seed=0) -> float:
+    """The median share of the force that a contact has on a skin that is taken for a flat one."""
+    read, patch = case.truth(case.layout), Patch(case.skin.patch.a, case.skin.patch.b)
+    layout = SensorLayout.regular(patch, *case.elements)
+    contact, fit = PointContact(Plate(patch), layout), LeastSquares(SineBasis(patch, 8, 8), layout)
+    shares = []
+    for place in np.random.default_rng(seed).uniform(case.low, case.high, (frames, 2)):
+        load = case.load(place)
+        shares.append(contact(read(load), fit(read(load))).force / load.force)
+    return np.nanmedian(shares)
+
+
 # A flat skin 0.25 mm thick, which goes in by 0.9 and 1.7 of that in the middle, where it is held
 
 
@@ -238,6 +286,18 @@ def _on_cap(cap, s, azimuth):
     return cap.rim_radius + np.stack([s * np.cos(azimuth), s * np.sin(azimuth)], -1)
 
 
+def along_x(read, azimuth):
+    """Readings (3, P) along the meridian and the parallel as they are along the axes of a cap."""
+    (xx, yy, xy), c, s = read, np.cos(azimuth), np.sin(azimuth)
+    return np.stack(
+        [
+            c**2 * xx - 2 * c * s * xy + s**2 * yy,
+            s**2 * xx + 2 * c * s * xy + c**2 * yy,
+            c * s * (xx - yy) + (c**2 - s**2) * xy,
+        ]
+    )
+
+
 @cache
 def _revolved(cap, edge):
     surface = Spheroid(cap.radius, cap.stretch * cap.radius)
@@ -250,18 +310,10 @@ def _cap_case(name, cap, edge, force, **width):
         x, y = (layout.positions - cap.rim_radius).T
         azimuth = np.arctan2(y, x)
         read = _revolved(cap, edge)(np.stack([np.hypot(x, y), azimuth], -1).tobytes())
-        c, s = np.cos(azimuth), np.sin(azimuth)
 
-        def turned(load):  # from the meridian to x, as the elements are
+        def turned(load):
             out = replace(load, x=load.x - cap.rim_radius, y=load.y - cap.rim_radius)
-            xx, yy, xy = read(out)
-            return np.stack(
-                [
-                    c**2 * xx - 2 * c * s * xy + s**2 * yy,
-                    s**2 * xx + 2 * c * s * xy + c**2 * yy,
-                    c * s * (xx - yy) + (c**2 - s**2) * xy,
-                ]
-            )
+            return along_x(read(out), azimuth)
 
         return turned
 
@@ -401,7 +453,7 @@ def accused(frames, seed=0) -> int:
     return count
 
 
-CASES: Sequence[Case] = (*FLAT, *BENT, *CAPS, *STRETCHED, WEAK)
+CASES: Sequence[Case] = (*FLAT, *BENT, *SHALLOW, *CAPS, *STRETCHED, WEAK)
 
 
 def table(frames=1000, name=""):

@@ -108,8 +108,8 @@ class DrawnSkin:
     @property
     def bounds(self) -> tuple[Array, Array]:
         """From where to where (3,) in mm it may be drawn, along x, y and upwards in space."""
-        upwards = np.array([0.0, 0.0, self.deepest])
-        return self._rest.min(axis=0) - upwards, self._rest.max(axis=0) + upwards
+        upwards, drawn = np.array([0.0, 0.0, self.deepest]), self._rest[np.unique(self._triangles)]
+        return drawn.min(axis=0) - upwards, drawn.max(axis=0) + upwards
 
     # Its faces and lines, over the points of the grid.
 
@@ -231,7 +231,7 @@ class DrawnSkin:
         met = np.flatnonzero((u >= -_SEAM) & (v >= -_SEAM) & (u + v <= 1 + _SEAM))
         weights = np.stack([1 - u[met] - v[met], u[met], v[met]], axis=1)
         corners = self.shares[self._triangles[met]] * (self.patch.a, self.patch.b)
-        return np.vecdot(weights[..., None], corners, axis=1), np.vecdot(ac, q)[met] / area[met]
+        return np.einsum("kv,kvi->ki", weights, corners), np.vecdot(ac, q)[met] / area[met]
 
 
 NO_SKIN = DrawnSkin(Patch(0.1, 0.1), 2, 2)

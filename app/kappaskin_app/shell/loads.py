@@ -272,7 +272,7 @@ _POINTS = 41  # of every footprint, so that one polyline can show each of them
 _CORNERS = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)]) / 2
 
 
-def footprint(load: Load) -> Array | None:
+def footprint(load: Load, patch: Patch) -> Array | None:
     """Points (41, 2) in m along a line load, or on the outline of a distributed one; else None.
 
     The outline of a Gaussian is at two standard deviations, which includes 86 % of its force.
@@ -282,12 +282,13 @@ def footprint(load: Load) -> Array | None:
         ends = np.array([(load.x0, load.y0), (load.x1, load.y1)])
         return _between(along, ends)
     if isinstance(load, RectangleLoad):
-        corners = load.centre() + _CORNERS * (load.width, load.height)
-        return _between(4 * along, corners)
+        corners = _CORNERS * (load.width, load.height)
+        return patch.around(load.x, load.y, _between(4 * along, corners))
     if isinstance(load, DiscLoad | GaussianLoad):
         radius = load.radius if isinstance(load, DiscLoad) else 2 * load.sd
         turn = 2 * np.pi * along
-        return load.centre() + radius * np.column_stack([np.cos(turn), np.sin(turn)])
+        rim = radius * np.column_stack([np.cos(turn), np.sin(turn)])
+        return patch.around(load.x, load.y, rim)
     return None
 
 

@@ -50,7 +50,9 @@ from kappaskin_app.shell.loads import (
 from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.settings.scene import FREE_CASES, READY_CASES, SHAPES, Written
 
-_PLACING = ("load_case", "size", "size_y", "shape", "side_x", "side_y", "rim_radius")
+_BOXED = ("shape", "rim_radius", "cap_radius", "cap_angle", "cap_stretch")
+"""Settings that determine the bounding rectangle of a round skin."""
+_PLACING = ("load_case", "size", "size_y", "side_x", "side_y", *_BOXED)
 """Settings whose change can move a free load over the rim."""
 _TABLE_1 = ("shape", "side_x", "side_y", "edge", "tension", "foam", "fluid", "thickness")
 NO_ELEMENTS: dict[str, Any] = {"region_elements": (), "dead_elements": ()}
@@ -294,12 +296,13 @@ def with_consequences(settings: Settings, scene: Scene, name: str, value: Any) -
     if name == "design_shape":
         changed |= {f"design_{name}": length for name, length in SHAPES[value].lengths.items()}
         changed |= {"design_place": "scene"} if value == "strip" else {}
-    if name in ("shape", "rim_radius") and "side_x" not in changed:
+    if name in _BOXED and "side_x" not in changed:
         patch = patch_of(replace(settings, **changed))
-        changed |= {"side_x": patch.a, "side_y": patch.b}  # of the bounding rectangle
+        changed |= {"side_x": patch.a, "side_y": patch.b}
     if name == "shape":
         offered = edges_of(patch_of(replace(settings, **changed)))
-        changed |= {"edge": offered[0]} if settings.edge not in offered else {}
+        edge = changed.get("edge", settings.edge)
+        changed |= {"edge": edge if edge in offered else offered[0]}
         changed |= {"fit_edge": ""} if settings.fit_edge not in offered else {}
         changed |= {"inplane": ""}  # a bent skin and a flat one are held in other ways
     if name == "electronics":

@@ -68,10 +68,14 @@ def _left_out(estimate: Estimate) -> str:
     return f"element{'s' if len(out) > 1 else ''} {named} excluded"
 
 
+_STEEP = 0.14  # slope of shapes that are up to 1 % too flat
+
+
 def warnings(estimate: Estimate, strained: int, method: str, slope: float = 0.0) -> str:
     """Warnings of an estimate by a `method`.
 
-    `strained` is the number of elements over their strain limit, `slope` what the method neglects.
+    `strained` is the number of elements over their strain limit, `slope` what the method neglects:
+    it is no warning below 1 % of the shape.
     """
     parts = [_left_out(estimate)] if estimate.suspect.any() else []
     if not estimate.converged:
@@ -83,7 +87,7 @@ def warnings(estimate: Estimate, strained: int, method: str, slope: float = 0.0)
         parts.append(f"readings drifted by {by}, by temperature or a bent mount: tare at rest")
     if estimate.contact.near_rim:
         parts.append("contact near the rim: unreliable")
-    if slope:
+    if slope >= _STEEP:
         parts.append(slope_warning(slope, "select Finite slope"))
     words = "; ".join(parts)
     return words[:1].upper() + words[1:]

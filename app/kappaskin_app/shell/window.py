@@ -8,6 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent
 
 from kappaskin.live import Engine, ResumeInfo, Status
+from kappaskin_app import DEFAULT_SOURCE
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.menus import Menus
 from kappaskin_app.shell.parts import Parts
@@ -45,7 +46,7 @@ class MainWindow(Parts):
         trusted: frozenset[Path] = frozenset(),
     ) -> None:
         handed = engine.resumed if engine else None
-        if handed and source == "sim:":  # no other source was requested
+        if handed and source in ("sim:", DEFAULT_SOURCE):  # no other source was requested
             source = handed.requested.source or source
         super().__init__(settings_left(handed) if handed else settings_for(source), engine)
         self.session.trusted = trusted

@@ -185,7 +185,8 @@ class SkinScale(QWidget):
         self.bar, self.lock = ColourBar(), LockButton()
         self.bar.show_tint(Tint("sequential", (0.0, 1.0), "mm"))
         self.lock.wanted.connect(self.lock_wanted)
-        self._symbol = ""
+        self._shown = "", ""
+        self.what.setWordWrap(True)
         around = QVBoxLayout(self)
         around.setContentsMargins(0, 4, 0, 4)
         around.addWidget(self.what)
@@ -197,9 +198,9 @@ class SkinScale(QWidget):
         self.lock.setVisible(not unit)
         self.setFont(read_from_afar(unit))
 
-    def show_what(self, symbol: str, tip: str) -> None:
-        """Show the `symbol` in HTML of the quantity that colours the skin, with its tooltip."""
-        if symbol != self._symbol:
-            self._symbol = symbol
-            self.what.setText(f"<b>{symbol}</b>")
+    def show_what(self, name: str, symbol: str, tip: str) -> None:
+        """Show what colours the skin: name, `symbol` in HTML and tooltip."""
+        if (name, symbol) != self._shown:
+            self._shown = name, symbol
+            self.what.setText(name if name == symbol else f"{name}<br><b>{symbol}</b>")
             self.what.setToolTip(tip)

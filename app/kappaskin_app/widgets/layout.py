@@ -108,10 +108,11 @@ _GAP = 6  # px between two widgets, and between two lines
 
 
 class Flow(QLayout):
-    """A layout of widgets in lines, like words; at least as wide as the widest."""
+    """A layout of widgets in lines, `gap` px apart, like words; at least as wide as the widest."""
 
-    def __init__(self) -> None:
+    def __init__(self, gap: int = _GAP) -> None:
         super().__init__()
+        self._gap = gap
         self._items: list[QLayoutItem] = []
 
     # What Qt asks of a layout.
@@ -141,7 +142,7 @@ class Flow(QLayout):
         return size
 
     def sizeHint(self) -> QSize:
-        wide = sum(item.sizeHint().width() + _GAP for item in self._items)
+        wide = sum(item.sizeHint().width() + self._gap for item in self._items)
         return QSize(wide, self.minimumSize().height())
 
     def setGeometry(self, place: QRect) -> None:
@@ -157,23 +158,23 @@ class Flow(QLayout):
                 lines.append([])
                 x = 0
             lines[-1].append(item)
-            x += item.sizeHint().width() + _GAP
+            x += item.sizeHint().width() + self._gap
         top = place.y()
         for line in lines:
             high = max((item.sizeHint().height() for item in line), default=0)
             if move:
-                _put(line, QPoint(place.x(), top), high)
-            top += high + _GAP
-        return top - _GAP - place.y()
+                _put(line, QPoint(place.x(), top), high, self._gap)
+            top += high + self._gap
+        return top - self._gap - place.y()
 
 
-def _put(line: list[QLayoutItem], at: QPoint, high: int) -> None:
-    """Put the items of a line beside each other, vertically centred."""
+def _put(line: list[QLayoutItem], at: QPoint, high: int, gap: int) -> None:
+    """Put the items of a line beside each other, `gap` px apart, vertically centred."""
     x = at.x()
     for item in line:
         size = item.sizeHint()
         item.setGeometry(QRect(QPoint(x, at.y() + (high - size.height()) // 2), size))
-        x += size.width() + _GAP
+        x += size.width() + gap
 
 
 class BesideOrBelow(QBoxLayout):

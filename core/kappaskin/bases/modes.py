@@ -150,6 +150,21 @@ class CapBasis(RoundBasis):
     def cap(self) -> Cap:
         return cast("Cap", self.patch)
 
+    @property
+    def free(self) -> Array | None:
+        """On a hemisphere, or nearly one, those without a part that moves along its axis.
+
+        To move so changes no curvature, on a clamped one but at its rim, where what is finer than
+        the functions looks the same: of all shapes that explain the readings it is the least.
+        """
+        return self._bent if self.cap.moves_as_a_whole else None
+
+    @cached_property
+    def _bent(self) -> Array:
+        points, weights = self.quadrature()
+        moved = (weights * self.cap.at_rest(points)[1][:, 2]) @ self.at(points)
+        return np.linalg.qr(moved[:, None], mode="complete")[0][:, 1:]
+
     def _made(self) -> "_PolarFunctions":
         return _cap_functions(*self.shape, self.clamped)
 
@@ -225,7 +240,7 @@ def _polynomials(a: int, b: NDArray[np.intp], count: int, x: Array, skipped: int
 
     After as many zeros as are `skipped`. By their three-term recurrence.
     """
-    found = np.zeros((len(x), len(b), count + 2))
+    found = np.zeros((len(x), len(b), count + 3))
     own = found[..., skipped:]
     own[..., 0], own[..., 1] = 1.0, a + 1 + (a + b + 2) * (x - 1) / 2
     for i in range(2, count - skipped):

@@ -15,6 +15,8 @@ from kappaskin.mechanics import CapWaves, Compliance, Plate, Shell
 from kappaskin.sensing import Readings, SensorLayout
 from kappaskin.skin import Cap, Patch
 
+Single = NDArray[np.float32]
+
 
 class Influence(Protocol):
     """What C channels read of a load anywhere on a skin."""
@@ -23,7 +25,7 @@ class Influence(Protocol):
     """The load in N that the readings are of."""
     sized: bool
     """Whether they depend on the size of the load; else they are those of a point load."""
-    nodes: tuple[Array, NDArray[np.float32]] | None
+    nodes: tuple[Array, Single] | None
     """Loads to search among, x, y and s (S, 3) each, and their readings (S, C); None for a grid."""
 
     def at(self, x: float, y: float, s: float) -> None:
@@ -89,7 +91,8 @@ _PLACES, _SHARES = np.vstack([[0.0, 0.0], _RING]), np.array([1 / 4] + 6 * [1 / 8
 class _OfFunctions:
     """As the functions of a basis follow it; heights and slopes depend on the size of a load."""
 
-    unit, nodes = 1.0, None
+    unit = 1.0
+    nodes: tuple[Array, Single] | None = None
 
     def __init__(
         self, plate: Plate, layout: SensorLayout, edge: str, functions: int, out: Array
@@ -260,8 +263,10 @@ def _under_gaussian(d: Array, sd: float, gage_length: float) -> Array:
 
 
 _NODES = 41  # along the shorter side
-_MOST_BYTES = 64e6  # of a table
+_PER_DECAY = 2  # nodes at least over the distance that a load on a shallow skin is felt
+_MOST_BYTES = 64e6  # of a table; four times as many where that distance is short
 _SD = 0.02  # of the shorter side, of the Gaussian load that the table is summed for
+_SD_OF_DECAY = 0.3  # at most, of that distance
 _VANISHED = 5.3  # k sd, beyond which a Gaussian load moves less than 1e-6 of what a point load does
 _MOST_WAVES = 256  # along a side
 _MIXED, _MOST_MIXED = 24, 1500  # functions where a load mixes them: along the shorter side, in all
@@ -295,7 +300,8 @@ def _trust(t: Array, s: float, share: float) -> Array | None:
 class _OfPlate:
     """A plate's or a shell's: in closed form what grows without bound, and a table of the rest."""
 
-    sized, nodes = True, None
+    sized = True
+    nodes: tuple[Array, Single] | None = None
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str, out: Array) -> None:
         self.unit = 8 * math.pi * plate.rigidity
@@ -358,7 +364,8 @@ class _OfDirections:
         self._rows, self._out = np.zeros((4, 3 * len(layout))), out
         of_skin = _OfCap if isinstance(plate.patch, Cap) else _OfPlate
         self._of = of_skin(plate, layout.of_curvature, edge, self._rows)
-        self.unit, self.nodes = self._of.unit, None
+        self.unit = self._of.unit
+        self.nodes: tuple[Array, Single] | None = None
         reads, P = cast("Readings", layout.reads), len(layout)
         c, s = reads.along.T
         twist = reads.quantity == "twist"
@@ -368,7 +375,8 @@ class _OfDirections:
         if self._of.nodes is not None:
             places, read = self._of.nodes
             parts = self._parts.astype(np.float32)
-            self.nodes = places, np.einsum("cr,ncr->nr", parts, read[:, self._channels])
+            turned: Single = np.einsum("cr,ncr->nr", parts, read[:, self._channels])
+            self.nodes = places, turned
 
     def at(self, x: float, y: float, s: float) -> None:
         self._of.at(x, y, s)
@@ -396,24 +404,26 @@ class _OfCap:
         self._last = [n - 4 for n in self._table.shape[:3]]
         self._block, self._weights = lru_cache(16)(self._block_at), np.empty((4, 4, 16))
         self.t = np.empty(len(layout))
-        self.nodes = self._searched()
+        self.nodes: tuple[Array, Single] | None = self._searched()
 
-    def _searched(self) -> tuple[Array, NDArray[np.float32]]:
+    def _searched(self) -> tuple[Array, Single]:
         """`nodes`: rings of the table, as far apart as the places on them."""
         table, (step_t, step_r, step) = self._table, self._steps
         found = list[tuple[int, int, int]]()
         for i in range(1, table.shape[2], _RINGS):
             radius = float(self._cap.meridian(np.array((i - 1) * step)).radius)
             around = max(round(2 * math.pi * radius / (_RINGS * step)), 1)
-            turns = np.linspace(1, table.shape[0] - 2, around, endpoint=False).astype(int).tolist()
-            found += [(turn, size, i) for turn in turns for size in _SEARCHED_SIZES]
+            for n in range(around):
+                turn = 1 + n * (table.shape[0] - 3) // around
+                found += [(turn, size, i) for size in _SEARCHED_SIZES]
         turn, size, ring = np.array(found).T
         angle, away = (turn - 1) * step_t, (ring - 1) * step
         offset = away * np.stack([np.cos(angle), np.sin(angle)])
         s = ((size - 1.5) * step_r) ** 2
-        return np.column_stack([*(self._cap.rim_radius + offset), s]), table[turn, size, ring]
+        places: Array = np.column_stack([*(self._cap.rim_radius + offset), s])
+        return places, table[turn, size, ring]
 
-    def _block_at(self, i: int, j: int, k: int) -> Array:
+    def _block_at(self, i: int, j: int, k: int) -> Single:
         return self._table[i : i + 4, j : j + 4, k : k + 4].reshape(64, -1)
 
     def at(self, x: float, y: float, s: float) -> None:
@@ -461,43 +471,55 @@ _SIZES = 0.2  # of the box: the largest radius of a load
 
 
 @lru_cache(2)
-def _on_cap(plate: Plate, edge: str, places: bytes) -> tuple[Array, tuple[float, ...], Array]:
-    """Readings (T, Q, S, C) in 1/m of 8 pi D on discs, the steps, and displacements in m per N.
+def _on_cap(plate: Plate, edge: str, places: bytes) -> tuple[Single, tuple[float, ...], Array]:
+    """Readings (T, Q, S, C) in 1/m per N under discs, the steps, and displacements in m per N.
 
     By azimuth from -1 step, radius of the disc from -3/2 steps, and distance from the pole from -1
     step; the steps are in rad, m and m. The displacements under a point load are at even distances
     from the pole to the rim.
     """
     cap = cast("Cap", plate.patch)
-    layout = SensorLayout.scattered(cap, np.frombuffer(places).reshape(-1, 2))
-    a, rim = cap.rim_radius, float(cap.meridian(np.array(cap.rim_radius)).radius)
-    basis = cast(
-        "CapBasis", basis_for(cap, edge, _WAVES, 2 * math.ceil(_WAVES * np.pi * rim / a) + 1)
-    )
-    compliance, waves = plate.compliance_by_wave(basis), CapWaves(basis)
-    M, C = layout.operator(basis, plate).reshape(-1, *basis.shape), 3 * len(layout)
-    for j in range(basis.Nj):
-        M[..., j] = M[..., j] @ compliance[(j + 1) // 2]
-    cos, sin = waves.rows(8 * math.pi * plate.rigidity * M.reshape(C, -1))
-    n = _ON_CAP
-    turns, sizes, steps = math.ceil(np.pi * rim / a * n), math.ceil(_SIZES * n), n // 2
-    step_t, step = 2 * np.pi / turns, a / steps
-    radii = np.abs(np.arange(sizes + 4) - 1.5) * step
-    along = waves.along((np.arange(steps + 2) - 1.0) * step)
-    felt = waves.k * np.where(radii > 0, radii, 1.0)[:, None, None]
-    felt = 2 * scipy.special.j1(felt) / felt
-    by_m = np.empty((2, cos.shape[1], len(radii), len(along), C), np.float32)
-    for m in range(cos.shape[1]):
-        shapes = (felt[:, None, m] * along[:, m]).reshape(-1, basis.Ni).astype(np.float32)
-        for part, rows in enumerate((cos, sin)):
-            by_m[part, m] = (shapes @ rows[:, m].T.astype(np.float32)).reshape(by_m.shape[2:])
-    t = (np.arange(turns + 3) - 1) * step_t
-    turn = np.multiply.outer(t, np.arange(cos.shape[1]))
+    k, along, rows, gives = _waves_on_cap(plate, edge, places)
+    step, (_, M, _, C) = cap.a / _ON_CAP, rows.shape
+    radii = np.abs(np.arange(math.ceil(_SIZES * _ON_CAP) + 4) - 1.5) * step
+    turns = math.ceil(np.pi * _rim_share(cap) * _ON_CAP)
+    felt = np.multiply.outer(radii, k)
+    by_m = np.empty((2, M, len(radii), len(along), C), np.float32)
+    for m in range(M):
+        share: Array = 2 * scipy.special.j1(felt[:, None, m]) / felt[:, None, m]
+        shapes = share * along[:, m]
+        by_m[:, m] = (shapes.astype(np.float32) @ rows[:, m, None]).reshape(by_m[:, m].shape)
+    azimuths = 2 * np.pi / turns * np.arange(-1.0, turns + 2)
+    turn = np.multiply.outer(azimuths, np.arange(float(M)))
     around = np.hstack([np.cos(turn), np.sin(turn)]).astype(np.float32)
-    table = (around @ by_m.reshape(around.shape[1], -1)).reshape(len(t), *by_m.shape[2:])
-    f = basis.along(np.linspace(0, 1, n + 1))[0]
-    gives = np.einsum("qmi,mij,qmj->q", f, compliance, f, optimize=True)
-    return table, (step_t, step, step), gives
+    table = (around @ by_m.reshape(2 * M, -1)).reshape(len(around), *by_m.shape[2:])
+    return table, (2 * np.pi / turns, step, step), gives
+
+
+def _rim_share(cap: Cap) -> float:
+    """Radius of the rim in space over the arc to it."""
+    return float(cap.meridian(np.array(cap.rim_radius)).radius) / cap.rim_radius
+
+
+def _waves_on_cap(plate: Plate, edge: str, places: bytes) -> tuple[Array, Array, Single, Array]:
+    """Wave numbers (M, n), waves along the meridian (S, M, n), their readings, and displacements.
+
+    The readings (2, M, n, C) are of waves that go as a cosine around and as a sine.
+    """
+    cap = cast("Cap", plate.patch)
+    layout = SensorLayout.scattered(cap, np.frombuffer(places).reshape(-1, 2))
+    Nj = 2 * math.ceil(_WAVES * np.pi * _rim_share(cap)) + 1  # as fine around as along
+    basis = cast("CapBasis", basis_for(cap, edge, _WAVES, Nj))
+    compliance, waves = plate.compliance_by_wave(basis), CapWaves(basis)
+    M = layout.operator(basis, plate).reshape(-1, *basis.shape)
+    for j in range(Nj):
+        M[..., j] = M[..., j] @ compliance[(j + 1) // 2]
+    unit = 8 * math.pi * plate.rigidity
+    rows = np.moveaxis(np.stack(waves.rows(unit * M.reshape(len(M), -1))), 1, 3)
+    f = basis.along(np.linspace(0, 1, _ON_CAP + 1))[0]
+    gives: Array = np.einsum("qmi,mij,qmj->q", f, compliance, f, optimize=True)
+    along = waves.along(cap.a / _ON_CAP * np.arange(-1.0, _ON_CAP // 2 + 1))
+    return waves.k, along, rows.astype(np.float32), gives
 
 
 @lru_cache(4)
@@ -512,7 +534,7 @@ def _rest_of(
     """
     patch, positions = plate.patch, np.frombuffer(places).reshape(-1, 2)
     layout = replace(SensorLayout.scattered(patch, positions), gage_length=gage_length)
-    x, y = patch.grid(*_nodes(patch, len(positions)))
+    x, y = patch.grid(*_nodes(plate, len(positions)))
     is_shell = patch.arc_curvature and edge in _SINES
     of_skin = _of_shell if is_shell else _of_functions
     rest, gives, sd = of_skin(plate, layout, edge, x, y)
@@ -528,16 +550,41 @@ def _of_functions(
     plate: Plate, layout: SensorLayout, edge: str, x: Array, y: Array
 ) -> tuple[Array, Array, float]:
     """Readings (ny, nx, 3, P) under a Gaussian load at each node, and the rest of `_rest_of`."""
-    basis, along_x, along_y, sd = _summed(plate, edge, x, y)
-    compliance, unit = plate.compliance(basis), 8 * math.pi * plate.rigidity
-    T = np.empty((len(y), len(x), 3, len(layout)))
+    if edge in _SINES and not plate.mixes_sines:
+        sines, sd = _sines(plate)
+        return *_felt(plate, layout, sines, _means(sines, x, y, sd), x, y), sd
+    basis, sd = _mixed(plate.patch, edge)
+    if not plate.patch.is_shallow:
+        return *_felt(plate, layout, basis, _means(basis, x, y, sd), x, y), sd
+    # So few functions do not follow how a load fades on a skin that stretches. Sines do where the
+    # edges are diaphragms; what other edges change is smooth.
+    usual, sines = replace(plate, inplane="diaphragm"), SineBasis(plate.patch, *basis.shape)
+    fine, fine_gives, sd = _of_functions(usual, layout, "hinged", x, y)
+    (read, gives), (usual_read, usual_gives) = (
+        _felt(skin, layout, few, _means(few, x, y, sd), x, y)
+        for skin, few in ((plate, basis), (usual, sines))
+    )
+    return fine + (read - usual_read), fine_gives + (gives - usual_gives), sd
+
+
+def _felt(
+    plate: Plate,
+    layout: SensorLayout,
+    basis: ProductBasis,
+    means: tuple[Array, Array],
+    x: Array,
+    y: Array,
+) -> tuple[Array, Array]:
+    """Readings and displacements at each node, of functions with these `means` under a load."""
+    (along_x, along_y), compliance = means, plate.compliance(basis)
+    T, unit = np.empty((len(y), len(x), 3, len(layout))), 8 * math.pi * plate.rigidity
     for i in range(0, len(layout), _TOGETHER):
         here = slice(i, i + _TOGETHER)
         part = replace(layout, positions=layout.positions[here], live=layout.live[:, here])
         M = compliance.after(part.operator(basis, plate)).reshape(-1, *basis.shape)
         read = unit * (along_x @ (M @ along_y.T)).T
         T[..., here] = read.reshape(len(y), len(x), 3, len(part))
-    return T, _displacement(basis, compliance, x, y), sd
+    return T, _displacement(basis, compliance, x, y)
 
 
 def _of_shell(
@@ -551,45 +598,62 @@ def _of_shell(
     return unit * T.reshape(len(y), len(x), 3, len(layout)), gives, sd
 
 
-def _nodes(patch: Patch, elements: int) -> tuple[int, int]:
+def _decay(plate: Plate) -> float:
+    """Distance in m over which what stretching adds to a load on a shallow skin fades.
+
+    (D / (E h H^2))^(1/4), with the mean over all directions of H^2 = (c^2 / Ry + s^2 / Rx)^2.
+    """
+    Hx, Hy = plate.patch.curvatures if plate.patch.is_shallow else (0.0, 0.0)
+    square = (3 * Hx**2 + 3 * Hy**2 + 2 * Hx * Hy) / 8
+    stretch = (1 - plate.poisson**2) * plate.membrane_stiffness * square
+    return (plate.rigidity / stretch) ** 0.25 if stretch else math.inf
+
+
+def _nodes(plate: Plate, elements: int) -> tuple[int, int]:
     """Nodes along x and y: as near one another along both, and within the memory."""
-    near = min(patch.a, patch.b) / (_NODES - 1)
-    most = _MOST_BYTES / (2 * 8 * 3 * elements)
-    near = max(near, math.sqrt(patch.a * patch.b / most))
+    patch = plate.patch
+    least = math.sqrt(patch.a * patch.b * 2 * 8 * 3 * elements / _MOST_BYTES)
+    near = max(min(patch.a, patch.b) / (_NODES - 1), least)
+    near = min(near, max(_decay(plate) / _PER_DECAY, least / 2))
     nx, ny = (max(math.ceil(side / near * (1 - 1e-9)) + 1, 5) for side in (patch.a, patch.b))
     return nx, ny
 
 
-def _summed(
-    plate: Plate, edge: str, x: Array, y: Array
-) -> tuple[ProductBasis, Array, Array, float]:
-    """Functions, their means (nx, Ni), (ny, Nj) under Gaussians at the nodes, and the sd in m."""
-    patch = plate.patch
-    sides = patch.a, patch.b
-    if edge in _SINES and not plate.mixes_sines:
-        sd = max(_SD * min(sides), _VANISHED * max(sides) / (math.pi * _MOST_WAVES))
-        Ni, Nj = (math.ceil(_VANISHED * side / (math.pi * sd)) for side in sides)
-        sines = SineBasis(patch, Ni, Nj)
-        along_x, along_y = (
-            np.sin(np.multiply.outer(at, k)) * np.exp(-((sd * k) ** 2) / 2)
-            for at, k in zip((x, y), sines.wavenumbers, strict=True)
-        )
-        return sines, along_x, along_y, sd
-    # As fine along both sides, of as many functions as a matrix of them may have.
-    shorter = min(sides)
-    most = min(_MIXED, math.sqrt(_MOST_MIXED * shorter / max(sides)))
-    Ni, Nj = (math.ceil(most * side / shorter) for side in sides)
+def _sines(plate: Plate) -> tuple[SineBasis, float]:
+    """Sines that follow a Gaussian load, and its standard deviation in m."""
+    sides = plate.patch.a, plate.patch.b
+    sd = min(_SD * min(sides), _SD_OF_DECAY * _decay(plate))
+    sd = max(sd, _VANISHED * max(sides) / (math.pi * _MOST_WAVES))
+    Ni, Nj = (math.ceil(_VANISHED * side / (math.pi * sd)) for side in sides)
+    return SineBasis(plate.patch, Ni, Nj), sd
+
+
+def _mixed(patch: Patch, edge: str) -> tuple[ProductBasis, float]:
+    """The same of other functions: as fine along both sides, as many as a matrix may have."""
+    shorter = min(patch.a, patch.b)
+    most = min(_MIXED, math.sqrt(_MOST_MIXED * shorter / max(patch.a, patch.b)))
+    Ni, Nj = (math.ceil(most * side / shorter) for side in (patch.a, patch.b))
     mixed = cast("ProductBasis", basis_for(patch, edge, Ni, Nj))
-    sd = _MIXED_SD * shorter / (math.pi * most)
+    return mixed, _MIXED_SD * shorter / (math.pi * most)
+
+
+def _means(basis: ProductBasis, x: Array, y: Array, sd: float) -> tuple[Array, Array]:
+    """Means (nx, Ni), (ny, Nj) of the functions under Gaussians at the nodes."""
+    if isinstance(basis, SineBasis):
+        ki, kj = basis.wavenumbers
+        share_i, share_j = (np.exp(-((sd * k) ** 2) / 2) for k in (ki, kj))
+        return np.sin(np.multiply.outer(x, ki)) * share_i, np.sin(
+            np.multiply.outer(y, kj)
+        ) * share_j
     z, weights = np.polynomial.hermite_e.hermegauss(9)
     near_x, near_y = (
         np.clip(np.add.outer(at, sd * z), 0.0, side).ravel()
-        for at, side in zip((x, y), sides, strict=True)
+        for at, side in ((x, basis.patch.a), (y, basis.patch.b))
     )
-    grid, shares = mixed.on_grid(near_x, near_y), weights / weights.sum()
+    grid, shares = basis.on_grid(near_x, near_y), weights / weights.sum()
     along_x = np.einsum("q,pqn->pn", shares, grid.X.reshape(len(x), len(z), -1))
     along_y = np.einsum("q,pqn->pn", shares, grid.Y.reshape(len(y), len(z), -1))
-    return mixed, along_x, along_y, sd
+    return along_x, along_y
 
 
 def _second(values: Array, nodes: Array, axis: int) -> Array:

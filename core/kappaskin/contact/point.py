@@ -52,6 +52,7 @@ def _waves(count: int) -> Array:
 _SIGNIFICANT = 30.0  # drop of chi-squared below which a contact may be noise found by searching
 _SEARCHED = 33  # points searched along each side
 _NODES = 64  # of them whose normal equations are kept
+_TRIED = 2  # loads on a cap that a step is taken from, before one is refined
 _FUNCTIONS = 15  # along each side, of the shape searched for
 _STEPS = 20  # of Gauss-Newton at most; 1 or 2 do but for the last millimetres at the rim
 _WORTH = 2.0  # variances of the noise: after a step that gains less, another one is not worth it
@@ -143,6 +144,7 @@ class PointContact:
         self._rows = np.zeros((5 + len(self._free), len(self._M)))
         self._influence = influence_of(plate, layout, edge, _FUNCTIONS, self._rows[:4])
         self._unknowns = 4 if self._influence.sized else 3
+        self._theory_error = plate.theory_error
         self._stretched = StretchedSkin(plate, layout, edge) if plate.stretches else None
         self._live, self._element = layout.live.ravel(), layout.element
         self._readings = self._none = np.zeros(len(self._M))
@@ -208,6 +210,9 @@ class PointContact:
             return NO_CONTACT
         self._rows[4] = self._readings = K
         if tables.weights is None and self._stretched is None and not len(self._free):
+            if self._nodes is not None:  # what explains most may lead to less
+                best = explained.argpartition(-_TRIED)[-_TRIED:].tolist()
+                node = min(best, key=lambda each: self._first(each).left)
             (x, y, s), here = self._places[node].tolist(), self._first(node)
         else:
             x, y, s = self._peak(explained, node)
@@ -360,7 +365,7 @@ class PointContact:
             np.array([x, y]),
             sd[1:3] / strength,
             force,
-            float(sd[0]) * unit,
+            math.hypot(float(sd[0]) * unit, self._theory_error * force),
             *self._displacement(fit, x, y, under),
             tables.spare,
             spread < _AS_WELL * float(fit.noise),

@@ -33,6 +33,12 @@ _MORE = 12  # functions of u and v along the meridian, more than f has
 _AT_POLE = 1e-6  # of the arc to the rim: nearer, nothing depends on u and v
 
 
+def _products(S: Array) -> Array:
+    """S' S (M, n, n) of parts S (k, Q, M, n)."""
+    rows = np.ascontiguousarray(np.moveaxis(S, 2, 0)).reshape(S.shape[2], -1, S.shape[3])
+    return np.matmul(np.swapaxes(rows, 1, 2), rows)
+
+
 class CapShell:
     """A cap of D in N m, C and T in N/m, nu and k_f in N/m^3, on the functions of a `basis`.
 
@@ -54,39 +60,35 @@ class CapShell:
         self._count = basis.Ni + _MORE
         rho, weights = gauss(1.0, 2 * self._count + len(self._m) + 24)
         a = basis.cap.rim_radius
-        along = basis.cap.meridian(a * rho)
-        S, area = self._strains(rho, along), a * weights * along.radius
-        self.volume: Array = 2 * np.pi * area @ S[8, :, 0, : basis.Ni]
+        along, m = basis.cap.meridian(a * rho), self._m[:, None]
+        F = basis.along(rho) / np.array([1.0, a, a**2])[:, None, None, None]
+        r = along.radius[:, None, None]
+        area: Array = np.pi * a * weights[:, None, None] * r * np.where(m > 0, 1.0, 2.0)
+        self.volume: Array = np.einsum("qi,q->i", F[0, :, 0], area[:, 0, 0])
         """The integral (Ni,) in m^2 of the functions that are alike all around."""
-        law = np.zeros((len(rho), 9, 9))
-        law[:] = np.diag([C, C, C * (1 - nu) / 2, D, D, 2 * D * (1 - nu), T, T, k_f])
-        law[:, 0, 1] = law[:, 1, 0] = nu * C
-        law[:, 3, 4] = law[:, 4, 3] = nu * D
-        bare = self._integral(S, law, area)
-        law[:, 8, 8] -= T * np.sum(along.curvatures**2, axis=0)
-        K = self._integral(S, law, area) if T else bare
+        S = self._strains(F, rho, along)
+        for one, other in ((0, 1), (3, 4)):  # x^2 + y^2 + 2 nu x y = (x + nu y)^2 + (1 - nu^2) y^2
+            S[one] += nu * S[other]
+            S[other] *= np.sqrt(1 - nu**2)
+        law = np.array([C, C, C * (1 - nu) / 2, D, D, 2 * D * (1 - nu)])
+        K = _products(np.sqrt(law[:, None, None, None] * area) * S)
         f, t = slice(0, basis.Ni), slice(basis.Ni, None)
-        alone = np.einsum("mtt->mt", K[:, t, t])
-        alone[alone == 0] = 1.0  # of no v at m = 0
-        scale = 1 / np.sqrt(alone)
-        Ktt = K[:, t, t] * scale[:, :, None] * scale[:, None, :]
+        f_s, f_t, flat = (np.sqrt(area) * of for of in (F[1], m * F[0] / r, F[0]))
+        own = K[:, f, f] + T * _products(np.stack([f_s, f_t])) + k_f * _products(flat[None])
+        alone: Array = np.einsum("mtt->mt", K[:, t, t])
+        scale: Array = 1 / np.sqrt(np.where(alone > 0, alone, 1.0))  # there is no v at m = 0
+        Ktt: Array = K[:, t, t] * scale[:, :, None] * scale[:, None, :]
         np.einsum("mtt->mt", Ktt)[:] = 1.0
         coupled: Array = K[:, t, f] * scale[:, :, None]
-        least: Array = np.linalg.solve(Ktt, coupled)
+        least = np.asarray(np.linalg.solve(Ktt, coupled), float)
         self._least = -scale[:, :, None] * least
-        self.stiffness: Array = K[:, f, f] + K[:, f, t] @ self._least
+        squares = T * np.sum(along.curvatures**2, axis=0)
+        curved = np.sqrt(squares)[:, None, None] * flat
+        relief: Array = np.matmul(K[:, f, t], self._least)
+        self.stiffness: Array = own - _products(curved[None]) + relief
         """Stiffness (M, Ni, Ni) in N/m of the functions of each wave m around."""
-        self.bare: Array = bare[:, f, f]
+        self.bare = own
         """The same without u, v and the negative terms, for scaling."""
-
-    def _integral(self, S: Array, law: Array, weights: Array) -> Array:
-        """S' law S (M, n, n) over the skin."""
-        around = np.pi * np.where(self._m > 0, 1.0, 2.0)
-        stress = np.einsum("qij,jqmn->iqmn", law * weights[:, None, None], S, optimize=True)
-        left, right = (
-            np.moveaxis(of, 2, 0).reshape(len(self._m), -1, S.shape[-1]) for of in (S, stress)
-        )
-        return around[:, None, None] * (np.swapaxes(left, 1, 2) @ right)
 
     def _tangential(self, rho: Array) -> tuple[Array, Array]:
         """U and V of each function of them with their derivatives by s, (2, Q, M, n)."""
@@ -103,14 +105,13 @@ class CapShell:
         V[:, :, 0] = 0.0
         return U, V
 
-    def _strains(self, rho: Array, along: Meridian) -> Array:
-        """Strains (9, Q, M, n): e_s, e_t, g, of curvature ss, tt, st, and f_s, f_t, f."""
+    def _strains(self, F: Array, rho: Array, along: Meridian) -> Array:
+        """Strains (6, Q, M, n): e_s, e_t, g, and of curvature ss, tt and st."""
         (k1, k2), (c1, c2) = along.curvatures[..., None, None], along.changes[..., None, None]
         r, slope = along.radius[:, None, None], along.slope[:, None, None]
-        m, a, Ni = self._m[:, None], self._basis.cap.rim_radius, self._basis.Ni
-        F = self._basis.along(rho) / np.array([1.0, a, a**2])[:, None, None, None]
+        m, Ni = self._m[:, None], self._basis.Ni
         (U, U1), (V, V1) = self._tangential(rho)
-        S = np.zeros((9, *F.shape[1:3], Ni + U.shape[-1]))
+        S = np.zeros((6, *F.shape[1:3], Ni + U.shape[-1]))
         f, t = S[..., :Ni], S[..., Ni:]
         f[0], f[1] = -k1 * F[0], -k2 * F[0]
         t[0], t[1], t[2] = U1, (m * V + slope * U) / r, V1 - (m * U + slope * V) / r
@@ -120,7 +121,6 @@ class CapShell:
         S[3] += k1 * S[0]
         S[4] += k2 * S[1]
         S[5] += (k1 + k2) / 4 * S[2]
-        f[6], f[7], f[8] = F[1], m * F[0] / r, F[0]
         return S
 
     def _waves(self, positions: Array) -> tuple[Array, Array, Array, Array]:
@@ -188,18 +188,14 @@ class CapWaves:
         radius = basis.cap.meridian(a * rho).radius[:, None, None]
         self._basis, self._m = basis, m
         f, f_s, _ = np.sqrt(a * weights[:, None, None] * radius) * basis.along(rho)
-
-        def products(g: Array) -> Array:
-            return np.moveaxis(g, 0, 2) @ np.moveaxis(g, 0, 1)
-
-        gram = products(f)
-        slopes = products(f_s / a) + products(m[:, None] * f / radius)
-        inverse = np.linalg.inv(np.linalg.cholesky(gram))
+        gram = _products(f[None])
+        slopes = _products(np.stack([f_s / a, m[:, None] * f / radius]))
+        inverse = np.asarray(np.linalg.inv(np.linalg.cholesky(gram)), float)
         squares, turned = np.linalg.eigh(inverse @ slopes @ np.swapaxes(inverse, 1, 2))
         self.k: Array = np.sqrt(squares)
         """Wave numbers (M, Ni) in 1/m, for each number m of waves around."""
-        self._shapes: Array = np.swapaxes(inverse, 1, 2) @ turned
-        self._shares: Array = gram @ self._shapes
+        shapes: Array = np.swapaxes(inverse, 1, 2) @ turned
+        self._shapes, self._shares = shapes, gram @ shapes
 
     def along(self, distance: Array) -> Array:
         """Each wave along a meridian (Q, M, Ni), at each `distance` (Q,) in m from the pole.

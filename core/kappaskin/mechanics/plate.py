@@ -71,11 +71,14 @@ INPLANE = ("held", "diaphragm", "free", "hoop")
 `free`: no membrane force across the edge, no shear. `hoop`, of a bent skin: the hoop displacement
 is held, the axial one free. Of a cylinder skin they are those of the straight edges; the curved
 ones hold the radial and the hoop displacement and leave the axial one free. Of a shallow skin, as
-of a flat one, they are those of all four edges, and there is no `hoop`. Of a cap they are those of
-its rim: `held` and, of less than a hemisphere, `diaphragm`, which lets it slide along the meridian.
+of a flat one, they are those of all four edges, and there is no `hoop`; where they are free, it
+does not slide along itself as a whole. Of a cap they are those of its rim: `held` and, of less than
+a hemisphere, `diaphragm`, which lets it slide along the meridian.
 """
 
 
+_HARDLY = 1e-8  # of the bending stiffness of the longest wave: what stretching adds is left out
+_LARGEST_ERROR = 0.03  # of a force, by the theory of shallow skins
 _STIFFEST = 1e50  # in SI units; and its inverse: squares of what they make of loads are numbers
 
 
@@ -154,6 +157,12 @@ class Plate:
                 f"{self.patch.name if any(self.patch.curvatures) else 'flat skin'}, got "
                 f"{self.inplane!r:.40}"
             )
+        if self.theory_error > _LARGEST_ERROR:
+            raise Refusal(
+                f"shallow shell theory may err by {self.theory_error:.1%} in a force on a "
+                f"{self.patch.name} with edges that are free in plane: expected at most "
+                f"{_LARGEST_ERROR:.0%}; hold the edges in plane, or use larger radii"
+            )
 
     def _check_cap(self, cap: Cap) -> None:
         if not self.rigidity:
@@ -197,6 +206,23 @@ class Plate:
         """Whether it is a flat rectangle or strip of known thickness, as `Stretching` needs."""
         flat = type(self.patch) is Patch and not any(self.patch.curvatures)
         return flat and self.thickness is not None
+
+    @property
+    def theory_error(self) -> float:
+        """Standard deviation of a force by the theory of shallow skins, as a share of it.
+
+        1 / (R k)^2 of the longest wave times its share of bending, twice where the edges are
+        diaphragms, four times where they are free, not where they are held: a saddle's, mostly,
+        which bends without stretching (`tests/truths/koiter.py`).
+        """
+        times = {"diaphragm": 2.0, "free": 4.0}.get(self.inplane_edge, 0.0)
+        if not self.patch.is_shallow or not times:
+            return 0.0
+        k2, (Hx, Hy) = (np.pi / np.array([self.patch.a, self.patch.b])) ** 2, self.patch.curvatures
+        stretch = (1 - self.poisson**2) * self.membrane_stiffness * (k2 @ (Hy, Hx)) ** 2
+        bend, rest = self.rigidity * k2.sum() ** 4, self.tension * k2.sum() ** 3 + stretch
+        rest += self.foundation * k2.sum() ** 2
+        return float(times * self.patch.steepness * bend / (bend + rest))
 
     def modulus(self, h: float) -> float:
         """Young's modulus E = 12 (1 - nu^2) D / h^3 in Pa of a sheet of thickness `h` in m."""
@@ -266,9 +292,14 @@ class Plate:
 
     @property
     def mixes_sines(self) -> bool:
-        """Whether a load that is a sine each way moves it in others too."""
-        shallow = self.patch.is_shallow and self.inplane_edge != "diaphragm"
-        return bool(self.patch.arc_curvature) or (shallow and self.membrane_stiffness > 0)
+        """Whether a load that is a sine each way moves it in others too.
+
+        A shallow skin that hardly stretches over the longest wave moves as a flat one.
+        """
+        if not self.patch.is_shallow or self.inplane_edge == "diaphragm":
+            return bool(self.patch.arc_curvature)
+        stretch = self.membrane_stiffness * self.patch.steepness**2  # times k^4, over H^2
+        return stretch > _HARDLY * self.rigidity * max(map(abs, self.patch.curvatures)) ** 2
 
     @property
     def _is_shell(self) -> bool:

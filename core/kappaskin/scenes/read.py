@@ -89,7 +89,7 @@ _MOST_READINGS = 2**16
 _MOST_ELEMENTS = _MOST_READINGS // 3  # with three readings, as many as the wire format can number
 _MOST_VALUES = 2**25  # of functions at channels, a quarter of a gigabyte
 _MOST_TOUCHES = 10_000  # some seconds to read
-_MOST_FUNCTIONS, _MOST_THAT_MIX = 64**2, 20**2  # some seconds to make the skin of
+_MOST_FUNCTIONS, _MOST_THAT_MIX, _MOST_ON_CAP = 64**2, 20**2, 32**2  # seconds to make the skin of
 
 
 def scene_file(name: str = "") -> Path:
@@ -503,6 +503,8 @@ def _check_functions(plate: Plate, edge: str, counts: tuple[int, int], elements:
     whole = isinstance(plate.patch, Disk | Polygon)
     mix = whole or plate.mixes_sines or edge != "hinged"
     most = _MOST_THAT_MIX if mix else _MOST_FUNCTIONS
+    if isinstance(plate.patch, Cap):
+        most = _MOST_ON_CAP
     most = min(most, _MOST_VALUES // (3 * elements))
     if min(counts) > 0 and counts[0] * counts[1] > most:
         raise Refusal(
@@ -513,4 +515,6 @@ def _check_functions(plate: Plate, edge: str, counts: tuple[int, int], elements:
 
 def usual_reference(patch: Patch) -> tuple[int, int]:
     """The default number of functions of the true shape."""
+    if isinstance(patch, Cap):  # a shell bends close around a load
+        return 16, 33
     return (15, 1 if patch.strip else 15)

@@ -185,6 +185,9 @@ class Base(NamedTuple):
         return found
 
 
+_FLAT = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class LocalGeometry:
     """The skin at rest around each of P places.
@@ -340,13 +343,15 @@ class Patch:
     def at_rest(self, positions: Array) -> tuple[Array, Array]:
         """Points (..., 3) in m and outward unit normals (..., 3) of the skin at rest."""
         base = self.base(positions[..., 0], positions[..., 1])
-        point, normal = (np.broadcast_arrays(*each) for each in (base.point, base.normal))
-        return np.stack(point, axis=-1), np.stack(normal, axis=-1)
+        each = np.broadcast_arrays(*base.point, *base.normal)
+        return np.stack(each[:3], axis=-1), np.stack(each[3:], axis=-1)
 
     def base(self, x: Number, y: Number) -> Base:
         """The skin at rest at x, y in m: numbers, or arrays of one shape."""
-        sin, cos = (math.sin, math.cos) if isinstance(x, float) else (np.sin, np.cos)
         Hx, Hy = self.curvatures
+        if not (Hx or Hy):
+            return Base((x, y, 0.0), *_FLAT)
+        sin, cos = (math.sin, math.cos) if isinstance(x, float) else (np.sin, np.cos)
         u, v = x - self.a / 2, y - self.b / 2
         sx, cx, sy, cy = sin(Hx * u), cos(Hx * u), sin(Hy * v), cos(Hy * v)
         px, py, pz = x, y, 0.0
@@ -432,6 +437,7 @@ class Meridian:
 
 
 _STRETCHES = (0.2, 5.0)
+_LEVEL = 0.2  # of what the pole moves by across itself, along the axis, the rim does
 _NEAR_POLE = 1e-7  # of the arc to the rim: so far from the pole azimuths have a value
 
 
@@ -505,6 +511,11 @@ class Cap(Disk):
             arc = cast("Number", scipy.special.ellipeinc(t, m))
             t = t - (arc - distance / self.equator) / (1 - m * np.sin(t) ** 2) ** 0.5
         return t
+
+    @property
+    def moves_as_a_whole(self) -> bool:
+        """Whether its rim moves along itself where it moves along its axis, or nearly so."""
+        return self.stretch == 1 and math.cos(self.angle) < _LEVEL
 
     def meridian(self, distance: Array) -> Meridian:
         """The meridian at each `distance` (...) in m from the pole along the skin."""

@@ -140,7 +140,8 @@ def test_every_colour_is_drawn_smooth_and_per_element(window: MainWindow, until)
     for name in ALL:
         for how in ("smooth", "elements"):
             window.history.change("Colour", -1, colour_by=name, colour_from=how)
-            told = f"<b>{SHADES[name].symbol}</b>"
+            label, symbol = SHADES[name].label, SHADES[name].symbol
+            told = label if label == symbol else f"{label}<br><b>{symbol}</b>"
             until(lambda told=told: window.scale.what.text() == told)
             drawn = len(window.membrane.ages)
             until(lambda drawn=drawn: len(window.membrane.ages) > drawn + 1)

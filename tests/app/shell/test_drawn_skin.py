@@ -5,12 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kappaskin import Patch
+from kappaskin import Cap, Patch
 from kappaskin_app.shell.drawn_skin import DrawnSkin
 
 FLAT = Patch(0.1, 0.06)
 ARC = Patch(0.04, 0.03, 0.0129)
 DOME, SADDLE = Patch(0.05, 0.04, (0.15, 0.12)), Patch(0.05, 0.04, (0.15, -0.12))
+CAP, LONG = Cap(0.008), Cap(0.008, 1.3, 1.4)
 PATCHES = pytest.mark.parametrize(
     "patch", [FLAT, ARC, DOME, SADDLE], ids=["flat", "arc", "dome", "saddle"]
 )
@@ -67,6 +68,37 @@ def test_the_whole_of_a_rectangle_is_covered_by_squares(patch: Patch) -> None:
     assert [len(line) for line in skin.lines(2)] == [5] * 2 + [4] * 3
     values = np.arange(20.0).reshape(4, 5)
     np.testing.assert_array_equal(skin.values(values), values.ravel())
+
+
+@pytest.mark.parametrize("cap", [CAP, LONG], ids=["sphere", "spheroid"])
+def test_a_cap_is_drawn_to_its_rim_and_shaded_along_its_normals(cap: Cap) -> None:
+    at_rest = DrawnSkin(cap, 101, 101)
+    lowest = at_rest.points()[np.unique(at_rest.faces()[:, 1:]), 2].min()
+    assert lowest == pytest.approx(-1e3 * cap.rise, rel=1e-5)
+    assert at_rest.bounds[0][2] == pytest.approx(lowest - at_rest.deepest)
+    skin = drawn(cap, 101, 101)
+    skin.height *= skin.on
+    points = skin.points().reshape(101, 101, 3)
+    normal = np.cross(np.gradient(points, axis=1), np.gradient(points, axis=0))
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    inside = cap.depth(np.stack(np.meshgrid(*cap.grid(101, 101)), -1).reshape(-1, 2)) > 0.02 * cap.a
+    shading = skin.shading()[inside]
+    np.testing.assert_allclose(shading, normal.reshape(-1, 3)[inside], atol=0.02)
+    assert np.abs(shading - cap.at_rest(skin.shares * cap.a)[1][inside]).max() > 0.1
+
+
+@pytest.mark.parametrize("cap", [CAP, LONG], ids=["sphere", "spheroid"])
+@given(st.floats(0, 0.98), st.floats(-np.pi, np.pi), st.floats(-0.5, 1))
+def test_the_line_of_sight_on_to_a_cap_meets_it_where_it_is_nearest(
+    cap: Cap, far: float, azimuth: float, height: float
+) -> None:
+    skin = DrawnSkin(cap, 33, 33)
+    position = cap.rim_radius * (1 + far * np.array([np.cos(azimuth), np.sin(azimuth)]))
+    (point,), (out,) = skin.at_rest(position[None])
+    near, away = point + (height + 50) * out, point - 50 * out
+    seen = skin.seen_at(near, away, height, beside=position)
+    np.testing.assert_allclose(seen, position, atol=1e-8)
+    np.testing.assert_allclose(skin.hit(near, away), position, atol=2e-4)
 
 
 def area_of(skin: DrawnSkin) -> float:

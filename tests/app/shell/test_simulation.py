@@ -224,7 +224,7 @@ def test_a_free_load_presses_every_shape_so_that_it_shows() -> None:
 def test_a_dragged_load_stays_on_the_skin(
     case: str, shape: str, to: tuple[float, float], ends: tuple[float, ...], end: bool
 ) -> None:
-    x, y, x_end, y_end = ends
+    x, y, x_end, y_end = (end * (0.5 if shape == "cap" else 1.0) for end in ends)
     settings = on(shape, load_case=case, x=x, y=y, x_end=x_end, y_end=y_end)
     scene = scene_of(settings)
     scene = scene_of(replace(settings, **dragged(settings, scene, *to, end)))

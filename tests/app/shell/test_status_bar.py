@@ -67,6 +67,8 @@ def test_slopes_that_a_method_neglects_are_told_after_the_rest() -> None:
     words = "slopes reach 0.4: up to 8 % too flat; select Finite slope"
     assert warnings(ESTIMATE, 0, METHOD, 0.4) == words[0].upper() + words[1:]
     assert warnings(ESTIMATE, 1, METHOD, 0.4) == f"1 element over 1 % strain; {words}"
+    assert "up to 1 % too flat" in warnings(ESTIMATE, 0, METHOD, 0.141)
+    assert warnings(ESTIMATE, 0, METHOD, 0.02) == ""  # 0.02 %
 
 
 def test_a_warning_takes_the_hints_place_in_the_colour_of_alarms_and_gives_it_back(qapp) -> None:

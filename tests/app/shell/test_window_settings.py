@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
 
 from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.settings import Look, Settings
+from kappaskin_app.shell.settings.scene import SHAPES
 from kappaskin_app.shell.window import MainWindow
 
 
@@ -153,7 +154,7 @@ def test_every_button_and_editor_explains_itself(window: MainWindow) -> None:
 
 
 @pytest.mark.cases("flat")
-@pytest.mark.parametrize("shape", ["flat", "cylinder"])
+@pytest.mark.parametrize("shape", ["flat", "cylinder", "dome", "cap"])
 def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
     window: MainWindow, qtbot, shape: str
 ) -> None:
@@ -193,7 +194,9 @@ def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
                 assert window.history.settings == now
                 window.history.stack.undo()
     asked = {f.name for f in fields(Settings) if "form" in f.metadata}
-    hidden = {"rim_radius", "size", "size_y", "design_base_radius", "design_rim_radius"}
+    lengths = {length for shape in SHAPES.values() for length in shape.lengths}
+    hidden = {*lengths, *(f"design_{length}" for length in lengths), "size", "size_y"}
+    hidden -= {"design_side_x", "design_side_y"}
     hidden |= {"design_height_noise", "design_slope_noise"} | {"added_noise"}  # of a device
-    hidden |= {"base_radius"} if shape == "flat" else set()
+    hidden -= set(SHAPES[shape].lengths)
     assert asked - obeyed == hidden

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from kappaskin import Disk, Patch, Polygon, Refusal, SineBasis, basis_for
+from kappaskin import Cap, Disk, Patch, Polygon, Refusal, SineBasis, basis_for
 from kappaskin.bases import (
     EDGES,
     ORDERS,
@@ -263,8 +263,12 @@ def test_at_a_free_tip_there_is_neither_moment_nor_shear_force(held_skin):
 
 
 def has_no_moment(held_skin):
-    """Of the others, the hexagon's and the L's curvature has no bound next to corners."""
-    return held_skin.edge in ("hinged", "sliding") and held_skin.name not in ("hexagon", "L")
+    """Of the others, the hexagon's and the L's curvature has no bound next to corners.
+
+    A cap's polynomials meet what they are held by only.
+    """
+    known = held_skin.name not in ("hexagon", "L") and not isinstance(held_skin.patch, Cap)
+    return held_skin.edge in ("hinged", "sliding") and known
 
 
 @pytest.mark.where(which=has_no_moment)
@@ -330,6 +334,12 @@ def test_what_no_reading_sees_is_how_a_rim_that_gives_moves_as_a_whole(held_skin
 # Integrals, scale, independence
 
 
+def is_no_cap(held_skin):
+    """Their box is no map of equal areas: `test_cap.py` has what holds there."""
+    return not isinstance(held_skin.patch, Cap)
+
+
+@pytest.mark.where(which=is_no_cap)
 def test_the_quadrature_is_exact_for_what_two_quintics_make(held_skin):
     """Against Green's theorem: the integral of x^i y^j from one along the rim."""
     patch = held_skin.patch
@@ -346,7 +356,7 @@ def test_the_quadrature_is_exact_for_what_two_quintics_make(held_skin):
         assert found == pytest.approx(outward @ lengths, rel=1e-12)
 
 
-@pytest.mark.where(which=lambda held_skin: held_skin.edge != "elastic")
+@pytest.mark.where(which=lambda held: held.edge != "elastic" and is_no_cap(held))
 def test_functions_are_orthogonal_with_the_mean_square_of_sines(held_skin):
     basis = held_skin.basis()
     points, weights = basis.quadrature()
@@ -368,6 +378,8 @@ def test_functions_of_a_rim_that_gives_are_independent(held_skin):
 
 
 def larger(patch, factor):
+    if isinstance(patch, Cap):
+        return Cap(factor * patch.radius, patch.angle, patch.stretch)
     if isinstance(patch, Disk):
         return Disk(factor * patch.rim_radius)
     if isinstance(patch, Polygon):
@@ -469,7 +481,8 @@ def test_the_error_falls_at_the_rate_that_the_edge_conditions_set(held_skin, p):
     found = rate(held_skin, p)
 
     assert found > 0.8 * (order + 0.5)
-    assert order == 4 or found < 1.25 * (order + 0.5)
+    smoother = isinstance(held_skin.patch, Cap)  # whose polynomials meet no moment
+    assert order == 4 or smoother or found < 1.25 * (order + 0.5)
 
 
 def test_a_pinned_arc_has_no_shape_with_a_mean():

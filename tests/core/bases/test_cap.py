@@ -91,3 +91,20 @@ def test_a_cap_may_be_hinged_or_clamped():
     with pytest.raises(Refusal, match="among hinged, clamped"):
         basis_for(CAP, "sliding", 4, 5)
     assert edges_of(Disk(0.05)) == edges_of(CAP)
+
+
+def test_on_a_hemisphere_the_fit_is_free_of_what_moves_it_as_a_whole():
+    cap = Cap(8e-3)
+    basis = basis_for(cap, "hinged", 6, 7)
+    points, weights = basis.quadrature()
+    moved = cap.at_rest(points)[1][:, 2]  # along the axis
+    c, *_ = np.linalg.lstsq(basis.at(points), moved)
+
+    assert np.abs(curvature_at(basis, points) @ c).max() < 1e-5 / 8e-3**2
+    assert basis.free.shape == (42, 41)
+    np.testing.assert_allclose((weights * moved) @ basis.at(points) @ basis.free, 0, atol=1e-18)
+    bent = np.linalg.svd(curvature_at(basis, points).reshape(-1, 42) @ basis.free)[1]
+    assert bent[0] / bent[-1] < 1000
+    assert basis_for(cap, "clamped", 6, 7).free.shape == (42, 41)
+    assert basis_for(CAP, "hinged", 6, 7).free is None
+    assert basis_for(Cap(8e-3, 1.2), "hinged", 6, 7).free is None

@@ -8,7 +8,7 @@ from kappaskin.contact import Contacts, ImprintObjects, as_one, contacts_of
 from kappaskin.contact.imprint import CHANCE, Imprints, imprinted_object
 from kappaskin.estimation import METHODS, Fit
 from kappaskin.frames import LocalGeometry
-from kappaskin.skin import Disk
+from kappaskin.skin import Cap, Disk
 from navier import HingedPlate, Load
 
 SQUARE, OBLONG = Patch(0.1, 0.1), Patch(0.06, 0.04)
@@ -138,6 +138,36 @@ def test_a_skin_turned_by_a_quarter_has_the_same_contact():
     np.testing.assert_allclose(here[0].size, there[0].size, rtol=1e-9)
     # The frame in which curvatures are averaged lies along x, on slopes of 0.2 too.
     np.testing.assert_allclose(here[1].principal, there[1].principal, rtol=3e-3)
+
+
+DOMED = {
+    "dome": (Patch(0.04, 0.03, (0.1, 0.08)), (14, 12)),
+    "saddle": (Patch(0.04, 0.03, (0.1, -0.08)), (14, 12)),
+    "cap": (Cap(0.02, 1.3), (9, 17)),
+    "spheroid": (Cap(0.02, 1.3, 1.4), (9, 17)),
+}
+
+
+@pytest.mark.parametrize("share", [0.5, 0.6])
+@pytest.mark.parametrize(("patch", "functions"), DOMED.values(), ids=DOMED)
+def test_a_dent_lies_as_far_along_a_domed_skin_and_is_as_wide_as_on_a_flat_one(
+    patch, functions, share
+):
+    layout, x, y = heights(patch, 28, 28), share * patch.a, patch.b / 2
+    points = patch.at_rest(np.vstack([[x, y], layout.positions]))[0]
+    squares = np.sum((points[1:] - points[0]) ** 2, axis=1)
+    noise = np.random.default_rng(0).normal(0, 2e-6, len(layout))
+
+    contact, there, _ = told(
+        layout, 5e-4 * np.exp(-squares / 2 / 0.0035**2) + noise, functions=functions
+    )
+
+    np.testing.assert_allclose(contact.position, [x, y], atol=2e-4)
+    assert contact.single
+    # sqrt(2) / 2 of where a flat skin turns over, 3.5 mm; a dome is convex again sooner.
+    assert np.sqrt(contact.size) == pytest.approx(2.4e-3, rel=0.15)
+    at, normal = patch.at_rest(contact.position)
+    np.testing.assert_allclose(there.position, at - contact.displacement * normal, atol=1e-9)
 
 
 def test_two_dents_are_no_single_contact():

@@ -42,7 +42,7 @@ class AnyBasis:
     """Sines that a load does not know to be sines."""
 
     def __init__(self, basis):
-        self.shape, self.at = basis.shape, basis.at
+        self.patch, self.shape, self.at = basis.patch, basis.shape, basis.at
 
 
 def density(load, x, y):

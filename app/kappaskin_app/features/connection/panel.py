@@ -30,6 +30,7 @@ from kappaskin._text import printable
 from kappaskin.calibration import Calibration
 from kappaskin.live import Status
 from kappaskin.sensing import Sensor
+from kappaskin.skin import Cap
 from kappaskin.sources import Port, feeds_found, parts_of
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import BackgroundTask, Tasks
@@ -447,6 +448,9 @@ def _sensor_text(sensor: Sensor, calibration: Calibration | None) -> str:
             f", radii {along_x:g} and {along_y:g} mm\nrises {1e3 * patch.rise:.2g} mm; shallow "
             f"shell theory is accurate to {100 * patch.steepness:.2g} %"
         )
+    if isinstance(patch, Cap):
+        angle = f"{math.degrees(patch.angle):.3g}\N{DEGREE SIGN}"
+        bent = f" along the skin\ncap of radius {1e3 * patch.equator:g} mm, {angle} to the rim"
     health = f"\n{dead} of {sensing.size} channels dead" if dead else ""
     name = printable(f"{sensor.name} ({sensor.serial_number})")
     calibrated = f"\n{calibration_text(calibration)}" if calibration else ""

@@ -27,6 +27,7 @@ from kappaskin_app.widgets.text import Coverage
 
 _UNFIT = "; press it straight at one place: it may touch at several or with its rim"
 _AT_EDGE = "shape unknown (contact at the edge)"
+_SNAPS = "shape unknown (the skin snaps through)"
 _AS_ONE = "as one object: "  # of two contacts
 _DRIFTING = "no object is named while readings drift: tare at rest"
 _PREPARING = "Computing the model readings of objects on this skin\N{HORIZONTAL ELLIPSIS}"
@@ -153,8 +154,8 @@ def _recognise(
 ) -> tuple[str, ContactObject, Estimate]:
     if isinstance(finder, str):
         found, what = NO_OBJECT, finder
-    elif estimate.contact.near_rim:
-        found, what = NO_OBJECT, _AT_EDGE
+    elif estimate.contact.no_force:
+        found, what = NO_OBJECT, _AT_EDGE if estimate.contact.near_rim else _SNAPS
     elif estimate.drift:  # which is in the readings still
         found, what = NO_OBJECT, _DRIFTING
     else:

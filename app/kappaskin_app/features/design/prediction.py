@@ -44,7 +44,8 @@ def noise_settings(settings: Settings) -> dict[str, str]:
 def scene_of(settings: Settings) -> Scene:
     """The design with its elements on a regular grid, and a point load in the middle."""
     s, patch = settings, patch_of(settings)
-    layout, edge = SensorLayout.regular(patch, s.design_x, s.design_y), edges_of(patch)[0]
+    layout = SensorLayout.regular(patch, s.design_x, s.design_y)
+    edge = SHAPES[s.design_shape].defaults.get("edge", edges_of(patch)[0])
     layout, plate, electronics = layout.reading_each(s.design_reads), Plate(patch), Transduction()
     converter = replace(electronics.converter, conversion_time=s.design_conversion)
     electronics, effects = (
@@ -157,7 +158,7 @@ class DesignPrediction(QObject):
         self._stop()
         self._requested, self.check, self.refusal = settings, None, ""
         # Optimised positions and computed modes take seconds.
-        plain = "rim_radius" not in SHAPES[settings.design_shape].lengths
+        plain = "side_x" in SHAPES[settings.design_shape].lengths
         self._quick = plain and settings.design_place in ("scene", "clustered")
         if self._quick:
             self.predicts.run(_prospect, settings)

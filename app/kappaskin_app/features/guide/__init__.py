@@ -23,8 +23,8 @@ class GuideFeature:
 
     def read(self, page: Page, heading: str = "") -> None:
         """Show a page of the guide, from a heading in it on."""
-        self._shell.docks.reveal("guide")
         self.guide.read(page, heading)
+        self._shell.docks.reveal("guide")
 
     def _entries(self) -> Iterator[FinderEntry]:
         for page in pages():

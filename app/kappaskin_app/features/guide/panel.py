@@ -71,6 +71,7 @@ class GuidePanel(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
+        self._due: tuple[Page, str] | None = (pages()[0], "")
         self.contents, self.text = QComboBox(), _Text()
         self.contents.setPlaceholderText("Another page")
         self.contents.setSizeAdjustPolicy(
@@ -109,7 +110,10 @@ class GuidePanel(QWidget):
         column.addWidget(self.text, 1)
 
     def read(self, page: Page, heading: str = "") -> None:
-        """Show a page, from a heading in it on."""
+        """Show a page, from a heading in it on; once the panel is shown, where it is hidden."""
+        self._due = None if self.isVisible() else (page, heading)
+        if self._due:
+            return
         url = QUrl.fromLocalFile(str(page.file))
         url.setFragment(heading)
         self.text.setSource(url)
@@ -127,8 +131,8 @@ class GuidePanel(QWidget):
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
-        if self.text.source().isEmpty():
-            self.read(pages()[0])
+        if self._due:
+            self.read(*self._due)
 
 
 class _Text(QTextBrowser):
@@ -274,6 +278,7 @@ def _ground(block: QTextBlock, theme: Theme) -> None:
     cursor, ground, letters = QTextCursor(block), QTextBlockFormat(), QTextCharFormat()
     ground.setBackground(QColor(theme.window))
     ground.setLeftMargin(_CODE)
+    ground.setNonBreakableLines(False)  # a long line goes on below
     if _kind(block) != _kind(block.previous()):
         ground.setTopMargin(_ABOVE / 2)
     if not _is_code(block.next()):

@@ -88,6 +88,7 @@ class Caption:
 
 _SIDE_LETTERS = 15  # px
 _AROUND = 129  # points of the line around a cap
+_OUT = 0.004  # of the skin's size: how far out lines are drawn, which the surface would hide
 _LABEL_WIDTH = 5.2  # width of a label with its margin, of the letters' height
 _MOST_WIDTH = 0.2  # of the view's width, of one label
 
@@ -114,14 +115,15 @@ class Sides:
         x, y = f"x {round(a * MM, 1):g} mm", f"y {round(b * MM, 1):g} mm"
         if isinstance(skin.patch, Cap):
             ends, texts = np.array([(0, b / 2), (a, b / 2), (a / 2, 0)]), ("x 0", x, "y 0")
-            shares = np.array([(-0.1, 0, 0), (0.1, 0, 0), (-0.02, -0.06, 0)])
+            shares = np.array([(-0.1, 0, 0), (0.06, 0, 0), (-0.02, -0.12, 0)])
             turn = np.linspace(0, 2 * np.pi, _AROUND)
             line = skin.patch.rim_radius * (1 + np.stack([np.cos(turn), np.sin(turn)], axis=-1))
         else:
             ends, texts = np.array([(0.0, 0.0), (a, 0.0), (0.0, b)]), ("0", x, y)
             shares = np.array([(-0.04, -0.04, 0), (0, -0.06, 0), (0, 0.05, 0)])
             line = ends[[1, 0, 2]]
-        self._lines.points = skin.at_rest(line)[0]
+        points, out = skin.at_rest(line)
+        self._lines.points = points + _OUT * skin.size * out
         self._lines.lines = np.r_[len(line), : len(line)]
         self.actor.visibility = not skin.on.all()
         places = skin.at_rest(ends)[0] + shares * (MM * np.array([a, b, 0]))

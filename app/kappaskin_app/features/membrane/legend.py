@@ -36,6 +36,16 @@ _ENTRIES = {
 }
 
 
+_SPARE, _GAP = 10, 2  # px that Qt leaves right of the words of a button; between two buttons
+
+
+class _Switch(QToolButton):
+    """A button without spare room: all of them fit in one line of a small window."""
+
+    def sizeHint(self) -> QSize:
+        return super().sizeHint() - QSize(_SPARE, 0)
+
+
 class Legend(QWidget):
     """A button for each thing that is drawn; `toggled` emits the name of its setting."""
 
@@ -47,11 +57,11 @@ class Legend(QWidget):
         self._colours: Colours | None = None
         self._ink = ""
         self.buttons: dict[str, QToolButton] = {}
-        flow = Flow()
-        flow.setContentsMargins(6, 2, 6, 2)
+        flow = Flow(_GAP)
+        flow.setContentsMargins(2, 2, 2, 2)
         self.setLayout(flow)
         for name, entry in _ENTRIES.items():
-            button = self.buttons[name] = QToolButton(checkable=True, autoRaise=True)  # pyright: ignore[reportCallIssue]
+            button = self.buttons[name] = _Switch(checkable=True, autoRaise=True)  # pyright: ignore[reportCallIssue]
             button.setText(entry.words)
             button.setToolTip(f"{form_field(name).label}: click to show or hide it.")
             button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)

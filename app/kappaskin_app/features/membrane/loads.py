@@ -55,7 +55,8 @@ class DrawnLoads:
         return centres
 
     def _show_footprints(self, loads: Sequence[Load], skin: DrawnSkin, lift: float) -> None:
-        lines = [line for line in map(footprint, loads) if line is not None]
+        found = (footprint(load, skin.patch) for load in loads)
+        lines = [line for line in found if line is not None]
         self._line_actor.visibility = bool(lines)
         if lines:
             points, _ = skin.place(np.concatenate(lines), lift)

@@ -189,6 +189,7 @@ class ContactFrame:
         position.
         """
         (origin,), _ = skin.place(position[None])
+        x0, y0 = position.tolist()
         x, y = skin.tangents(position)
         normal = np.cross(x, y)
         normal /= np.linalg.norm(normal)
@@ -197,9 +198,9 @@ class ContactFrame:
         for turn in (angle, angle + np.pi / 2):
             # Along the skin: straight lines would be hidden where it is concave.
             along = length / MM * np.linspace(-0.5, 0.5, _POINTS)[:, None]
-            there = skin.patch.around(*position, along * (np.cos(turn), np.sin(turn)))
+            there = skin.patch.around(x0, y0, along * (np.cos(turn), np.sin(turn)))
             lines.append(skin.place(there, lift)[0])
-        ellipse = skin.patch.around(*position, np.nan_to_num(reach) * _SIDES)
+        ellipse = skin.patch.around(x0, y0, np.nan_to_num(reach) * _SIDES)
         lines.append(skin.place(ellipse, lift)[0])
         self._lines.points[:] = np.concatenate(lines)
         self.actor.visibility = True
@@ -256,10 +257,13 @@ def underside(stands: PlacedObject, skin: DrawnSkin, times: float) -> Array | No
 
     None where the object is nowhere above the skin.
     """
-    reach = min(float(np.hypot(*stands.object_.extent)), skin.side / MM)
+    reach, (x, y) = (
+        min(float(np.hypot(*stands.object_.extent)), skin.side / MM),
+        stands.place.tolist(),
+    )
     shares = np.linspace(0.0, 1.0, _FINE)
     offsets = (reach * shares[:, None, None] * _SIDES).reshape(-1, 2)
-    places = skin.patch.around(*stands.place, offsets)
+    places = skin.patch.around(x, y, offsets)
     height = stands.over(skin.patch, places)[0].reshape(_FINE, _AROUND)
     depth = _depth(skin, places, height.ravel(), times)
     if not np.isfinite(depth):
@@ -270,7 +274,7 @@ def underside(stands: PlacedObject, skin: DrawnSkin, times: float) -> Array | No
         return None
     far = reach * shares[np.maximum(outermost, 0)]
     offsets = np.linspace(0, 1, _OUT)[:, None, None] * far[:, None] * _SIDES
-    places = skin.patch.around(*stands.place, offsets.reshape(-1, 2))
+    places = skin.patch.around(x, y, offsets.reshape(-1, 2))
     rise = np.nan_to_num(stands.over(skin.patch, places)[0] - depth, posinf=0.0)
     rest, out = skin.at_rest(places)
     return rest + out * (times * MM * rise)[:, None]

@@ -178,7 +178,8 @@ class SkinView(QObject):
         self.membrane.limited = times < self._settings.exaggeration
         self.membrane.show_estimate(estimate, values, tint.limits, times)
         self.scale.bar.show_tint(tint, beside)
-        self.scale.show_what("" if tint.unit == "shape" else shade.symbol, shade.tip)
+        what = ("", "") if tint.unit == "shape" else (shade.label, shade.symbol)
+        self.scale.show_what(*what, shade.tip)
 
     def _show_reason(self, name: str, values: NDArray[np.generic]) -> None:
         """Show in the view why there are no colours."""

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
-from PySide6.QtCore import QByteArray, QEvent, QObject, QRect, Qt, QTimer
+from PySide6.QtCore import QEvent, QObject, QRect, Qt, QTimer
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QScrollBar, QToolBar, QWidget
 
 from kappaskin.contact import ContactObject
@@ -58,7 +58,7 @@ class PresenterController(QObject):
         self._display, self._load = display, load
         self._before: _WindowState | None = None
         self._left: _WindowState | None = None
-        self._left_at, self._arranged = -math.inf, QByteArray()
+        self._left_at, self._resized = -math.inf, False
         self._restoring = QTimer(self, singleShot=True)  # pyright: ignore[reportCallIssue]
         self._restoring.timeout.connect(guarded(self._restore))
         window.installEventFilter(self)
@@ -116,20 +116,22 @@ class PresenterController(QObject):
             for part in before.shown:
                 part.show()
             before.arrange()
-        self._left, self._left_at, self._arranged = before, time.monotonic(), window.saveState()
+        self._left, self._left_at, self._resized = before, time.monotonic(), False
         self._restoring.start(0)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         # A window manager may resize the window a while after it was asked to.
         if event.type() == QEvent.Type.Resize and time.monotonic() - self._left_at < _SETTLES:
+            self._resized = True
             self._restoring.start(0)
         return False
 
     def _restore(self) -> None:
         """Restore the sizes of docks and the scrolled positions in a window of its old size."""
         if self._left is not None and not self.on:
-            if self._window.saveState() != self._arranged:
+            if self._resized:
                 self._left.arrange()
+                self._resized = False
             for bar in self._window.findChildren(QScrollBar):  # without those deleted since
                 bar.setValue(self._left.scrolled.get(bar, bar.value()))
 

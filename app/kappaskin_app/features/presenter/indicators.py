@@ -333,7 +333,7 @@ _EDGE_HEIGHT = 0.6  # of the view's height
 
 
 class RadiusView(Indicator):
-    """Circle of the radius at the contact, in the band between both ends of its interval."""
+    """Circle of the radius at the contact, in the band between both ends of its error bar."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -392,7 +392,7 @@ class RadiusView(Indicator):
             painter.drawLine(QPointF(x, bar.bottom() - 8 * self.unit), QPointF(x, bar.bottom()))
 
     def _draw_round(self, painter: QPainter, estimate: RadiusEstimate) -> None:
-        theme, (low, high) = current(), estimate.interval
+        theme, (low, high) = current(), estimate.bar
         band = QPainterPath()  # filled between both: the inner one lies in the outer one
         band.addEllipse(self.circle(high))
         band.addEllipse(self.circle(low))

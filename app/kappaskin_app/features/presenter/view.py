@@ -313,13 +313,16 @@ def radius_in_words(feedback: Feedback, recorded: bool = False) -> tuple[str, st
 
 def _radius(estimate: RadiusEstimate, recorded: bool) -> tuple[str, str]:
     """Value and note: the value only where both ends of its interval are known."""
-    low, high = (1e3 * radius for radius in estimate.interval)
+    low, high = (1e3 * radius for radius in estimate.bar)
     if low == math.inf:
         return "flat", ""
     if low > 0 and high < math.inf:
         half = (high - low) / 2
         value, low, high = (rounded(r, half)[0] for r in (1e3 * estimate.value, low, high))
-        return f"{value} mm", "exact" if low == high else f"95 %: {low} to {high} mm"
+        return (
+            f"{value} mm",
+            "exact" if low == high else f"{Coverage.now.label}: {low} to {high} mm",
+        )
     if low > 0:
         return NONE, f"unknown, over {low:.3g} mm"
     hint = "pressed too lightly" if recorded else "press harder"
@@ -328,7 +331,8 @@ def _radius(estimate: RadiusEstimate, recorded: bool) -> tuple[str, str]:
 
 def _figure(unit: str, half: float, *values: float) -> tuple[str, str]:
     """The values with their unit, and their error bar `half`, with which one that is."""
-    found = [rounded(value, half, 3 if unit == "N" else 1) for value in values]
+    digits = 3 if unit == "N" else 1 + (max(map(abs, values)) < 1)
+    found = [rounded(value, half, digits) for value in values]
     bar = found[0][1]
     text = f"{', '.join(text for text, _ in found)} {unit}"
     off = f"\N{PLUS-MINUS SIGN} {bar} {unit} ({Coverage.now.label})"

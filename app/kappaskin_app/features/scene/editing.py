@@ -1,8 +1,9 @@
 """Edits of scenes and loads, as commands of the history."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,11 +32,17 @@ class SceneEditing:
         self._grabbed_load: Load | None = None
         self._place = (0.0, 0.0)
         self._grabbed_in: Written | None = None
-        load.grabbed.connect(guarded(self.grab))
-        load.dragged.connect(guarded(self.drag))
-        load.pressed.connect(guarded(self.press))
-        load.released.connect(guarded(self.release))
-        load.cancelled.connect(guarded(self.cancel))
+        self._late: list[Callable[[], None]] = []
+        self._late_in: Written | None = None
+        for signal, act in (
+            (load.grabbed, self.grab),
+            (load.dragged, self.drag),
+            (load.pressed, self.press),
+            (load.released, self.release),
+            (load.cancelled, self.cancel),
+        ):
+            signal.connect(guarded(partial(self._in_turn, act)))
+        session.playing.connect(guarded(lambda _: self._catch_up()))
         load.replaced.connect(guarded(self.replace_object))
 
     # Scene texts
@@ -103,6 +110,20 @@ class SceneEditing:
 
     # Dragged loads
 
+    def _in_turn(self, act: Callable[..., None], *values: float) -> None:
+        """Act now, or once the scene that is being computed is simulated."""
+        if not self._session.making:
+            act(*values)
+            return
+        if not self._late:
+            self._late_in = self._history.settings.written
+        self._late.append(partial(act, *values))
+
+    def _catch_up(self) -> None:
+        late, self._late = self._late, []
+        for act in late if self._late_in == self._history.settings.written else ():
+            act()
+
     def grab(self, x: float, y: float) -> None:
         """Grab the load at (x, y) in m; the changes until its release are one undo step."""
         settings, session = self._history.settings, self._session
@@ -110,7 +131,7 @@ class SceneEditing:
         self._grabbed_end = second < math.dist((x, y), (settings.x, settings.y))
         self._gesture, self._grabbed_in = self._history.new_gesture(), settings.written
         # Only where the displayed scene is that of the text.
-        writes = settings.written is not None and not (session.refusal or session.making)
+        writes = settings.written is not None and not session.refusal
         self._held = GrabbedStimulus.at_place(session.scene, session.time, x, y) if writes else None
         self._grabbed_load = session.scene.loads[0] if session.scene.loads else None
         self._place = x, y

@@ -9,7 +9,7 @@ from kappaskin.estimation import ScanTradeoff
 from kappaskin.live import Status
 from kappaskin.mechanics import INPLANE
 from kappaskin.sensing import DigitalReadings, Sensor
-from kappaskin.skin import Patch
+from kappaskin.skin import Cap, Patch
 from kappaskin_app.shell.badge import in_use
 from kappaskin_app.shell.form import Form, SimulationForm
 from kappaskin_app.shell.settings import Settings
@@ -19,7 +19,7 @@ from kappaskin_app.widgets.parts import Label
 from kappaskin_app.widgets.text import Coverage
 
 _PREPARING = "Computing this skin; the previous one is shown until then."
-_NUMBERS = ("side_x", "side_y", "base_radius", "radius_x", "radius_y", "rim_radius")
+_NUMBERS = tuple(dict.fromkeys(length for shape in SHAPES.values() for length in shape.lengths))
 _FACTS = (
     ("Opening angle", "The angle of the arc: its length over its radius."),
     ("Rise", "Height of the unloaded skin, from its lowest to its highest point."),
@@ -33,6 +33,12 @@ _FACTS = (
 
 def _facts_of(patch: Patch) -> tuple[str, str, str]:
     """Opening, rise and relative error of shallow shell theory, as far as `patch` has them."""
+    if isinstance(patch, Cap):
+        return (
+            f"{2 * math.degrees(patch.angle):.1f}\N{DEGREE SIGN}",
+            f"{1e3 * patch.rise:.2f} mm",
+            "",
+        )
     bent = [(L, H) for L, H in zip((patch.a, patch.b), patch.curvatures, strict=True) if H]
     if not bent:
         return "", "", ""

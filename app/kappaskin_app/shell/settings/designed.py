@@ -1,6 +1,7 @@
 """Settings of the sensor design: skin, elements, noise and placement."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from kappaskin_app.shell.settings.form_fields import (
     MILLIMETRES,
@@ -10,7 +11,7 @@ from kappaskin_app.shell.settings.form_fields import (
     Several,
     setting,
 )
-from kappaskin_app.shell.settings.scene import SHAPES, radius_along
+from kappaskin_app.shell.settings.scene import SHAPES, Skin
 
 PLACINGS = (
     ("scene", "Regular grid"),
@@ -22,6 +23,12 @@ PLACINGS = (
 
 def _length(label: str, tip: str) -> Range:
     return Range(label, tip, 5e-3, 0.5, 1e-3, *MILLIMETRES, 1)
+
+
+def _as_skin(name: str) -> Any:
+    """A setting with the default and the form field of the simulated skin's setting `name`."""
+    its = Skin.__dataclass_fields__[name]
+    return setting(its.default, its.metadata["form"])
 
 
 def _noise(of: str, least: float, most: float, step: float, scale: float, unit: str) -> Range:
@@ -37,7 +44,7 @@ class DesignSettings:
         "flat",
         Choice(
             "Outline",
-            "Outline of the designed skin, which is hinged along its edges.",
+            "Outline of the designed skin, which is hinged along its edges; a cap is clamped.",
             tuple((name, shape.label) for name, shape in SHAPES.items()),
         ),
     )
@@ -46,8 +53,11 @@ class DesignSettings:
     design_base_radius: float = setting(
         12.9e-3, _length("Radius", "Radius of the arc of the unloaded skin.")
     )
-    design_radius_x: float = setting(0.15, radius_along("x"))
-    design_radius_y: float = setting(0.15, radius_along("y"))
+    design_radius_x: float = _as_skin("radius_x")
+    design_radius_y: float = _as_skin("radius_y")
+    design_cap_radius: float = _as_skin("cap_radius")
+    design_cap_angle: float = _as_skin("cap_angle")
+    design_cap_stretch: float = _as_skin("cap_stretch")
     design_rim_radius: float = setting(
         0.05,
         _length(

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from kappaskin.scenes import PARTS
-from kappaskin.skin import Disk, Patch, Polygon
+from kappaskin.skin import Cap, Disk, Patch, Polygon
 from kappaskin_app.shell.settings.form_fields import (
     MILLIMETRES,
     PER_METRE,
@@ -18,6 +18,7 @@ from kappaskin_app.shell.settings.form_fields import (
 )
 
 _FINGERTIP = 0.0129  # m, the paper's
+_CAP_ANGLE = math.radians(80)
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Shape:
     label: str
     make: Callable[..., Patch]
     lengths: Mapping[str, float]
-    defaults: Mapping[str, float] = field(default_factory=dict[str, float])
+    defaults: Mapping[str, Any] = field(default_factory=dict[str, Any])
     rate: float = 500.0
 
 
@@ -72,6 +73,14 @@ SHAPES = {
         {"side_x": 0.05, "side_y": 0.05, "radius_x": 0.15, "radius_y": 0.15},
         {"force": 0.5, "exaggeration": 10.0},
     ),
+    "cap": Shape(
+        "Cap (fingertip)",
+        Cap,
+        {"cap_radius": 8e-3, "cap_angle": _CAP_ANGLE, "cap_stretch": 1.0},
+        # Hinged, a hemisphere may move as a whole, and a cap nearly so: hardly a reading shows it.
+        {"force": 1.0, "exaggeration": 40.0, "edge": "clamped"},
+        rate=200.0,
+    ),
     "disk": Shape("Disk", Disk, {"rim_radius": 0.05}, _AS_TABLE_1, rate=200.0),
     "hexagon": Shape("Hexagon", _hexagon, {"rim_radius": 0.05}, _AS_TABLE_1, rate=100.0),
 }
@@ -86,8 +95,7 @@ def _side(axis: str, more: str = "") -> Range:
     return Range(f"Length along {axis}", tip, 0.005, 1.0, 0.001, *MILLIMETRES, decimals=1)
 
 
-def radius_along(axis: str) -> Range:
-    """The form field of a radius of a dome or saddle."""
+def _radius(axis: str) -> Range:
     tip = f"Radius of the unloaded skin along {axis}; negative: hollow from outside; 0: straight."
     return Range(f"Radius along {axis}", tip, -1.0, 1.0, 0.001, *MILLIMETRES, decimals=1)
 
@@ -106,8 +114,8 @@ class Skin:
         Choice(
             "Shape",
             "The flat patch of the paper's Table 1; its fingertip, a half circle, curved along x "
-            "and straight along y; a shallow dome or saddle, curved along both; or a flat disk or "
-            "hexagon. Selecting a shape sets its default "
+            "and straight along y; a shallow dome or saddle, curved along both; a cap of a "
+            "sphere or spheroid; or a flat disk or hexagon. Selecting a shape sets its default "
             "size, force and vertical exaggeration.",
             tuple((name, shape.label) for name, shape in SHAPES.items()),
         ),
@@ -126,8 +134,29 @@ class Skin:
             decimals=1,
         ),
     )
-    radius_x: float = setting(0.15, radius_along("x"))
-    radius_y: float = setting(0.15, radius_along("y"))
+    radius_x: float = setting(0.15, _radius("x"))
+    radius_y: float = setting(0.15, _radius("y"))
+    cap_radius: float = setting(
+        8e-3,
+        Range(
+            "Radius",
+            "Radius of the sphere, or of the equator of the spheroid, that the cap is part of.",
+            1e-3,
+            0.5,
+            5e-4,
+            *MILLIMETRES,
+            decimals=1,
+        ),
+    )
+    cap_angle: float = setting_of_key(
+        _SKIN.key("angle"),
+        _CAP_ANGLE,
+        label="Rim angle",
+        step=math.radians(1),
+        decimals=1,
+        least=math.radians(5),
+    )
+    cap_stretch: float = setting_of_key(_SKIN.key("stretch"), 1.0, step=0.05, decimals=2)
     rim_radius: float = setting(
         0.05,
         Range(

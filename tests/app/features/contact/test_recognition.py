@@ -1,5 +1,6 @@
 """Object recognition: its text in the status bar."""
 
+import math
 import re
 import threading
 import time
@@ -105,6 +106,16 @@ def test_no_object_and_no_curvature_is_named_near_the_rim():
 
     assert words == "shape unknown (contact at the edge)"
     assert (curvature_text(rim), found.probability) == ("", {})
+
+
+def test_no_object_is_named_where_the_skin_snaps_through():
+    estimate = _estimate(PointLoad(0.05, 0.05, 0.15))
+    contact = replace(estimate.contact, snaps_through=True, force=math.nan, force_sd=math.nan)
+
+    words, found, _ = recognition._recognise(None, replace(estimate, contact=contact))  # noqa: SLF001
+
+    assert words == "shape unknown (the skin snaps through)"
+    assert found.probability == {}
 
 
 def _ball(radius=0.04, **changes):

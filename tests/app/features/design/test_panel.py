@@ -11,6 +11,7 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QApplication, QFileDialog
 
 from kappaskin import load_scene, write_scene
+from kappaskin.errors import Refusal
 from kappaskin.scenes import read_scene
 from kappaskin.studies import prospect
 from kappaskin_app.features.design.panel import DesignForm, _place, _value_at
@@ -47,7 +48,7 @@ def test_every_outline_is_a_scene_that_opens_however_slow_its_converter_is(name:
     assert read_scene(write_scene(scene), Path("a.toml")).rate == scene.rate
 
 
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("name", [name for name in SHAPES if name != "cap"])
 def test_a_design_that_reads_heights_and_slopes_is_a_scene_that_opens(name: str):
     settings = replace(shaped(name), design_reads=("height", "slope@0"))
 
@@ -56,6 +57,13 @@ def test_a_design_that_reads_heights_and_slopes_is_a_scene_that_opens(name: str)
     assert scene.layout.each_reads == ["height", "slope@0"]
     assert dict(scene.transduction.noise) == {"height": 5e-6, "slope": 5e-4}
     assert scene.rate == SHAPES[name].rate
+
+
+def test_a_cap_that_reads_slopes_is_refused() -> None:
+    with pytest.raises(
+        Refusal, match="heights, curvature and twist at a point of each element of a cap"
+    ):
+        scene_of(replace(shaped("cap"), design_reads=("height", "slope@0")))
 
 
 def test_the_error_bar_of_heights_is_that_of_their_noise():

@@ -1,11 +1,12 @@
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint
-from PySide6.QtGui import QImage
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtGui import QImage, QMouseEvent
 from PySide6.QtWidgets import QApplication
 
-from kappaskin import Patch, SensorLayout
-from kappaskin_app.features.heatmaps.heatmap import Heatmap
+from kappaskin import Cap, Patch, SensorLayout
+from kappaskin.skin import Outline
+from kappaskin_app.features.heatmaps.heatmap import CellGrid, Heatmap, cells_of
 from kappaskin_app.shell.colouring import SHADES
 from kappaskin_app.theme import DARK, DIVERGING, apply_look
 
@@ -99,3 +100,54 @@ def test_no_minus_stands_before_a_zero(name: str) -> None:
     shade = SHADES[name]
     assert shade.written(-1e-4) == shade.written(0.0)
     assert "\N{MINUS SIGN}" in shade.written(-1.0)
+
+
+def _cap_layout(count: int) -> SensorLayout:
+    """Elements on a spiral of a hemisphere, the last ones near its rim."""
+    cap, at = Cap(0.008), np.arange(count) + 0.5
+    far, turn = 0.95 * cap.rim_radius * np.sqrt(at / count), 2.4 * at
+    places = cap.rim_radius + far[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+    return SensorLayout(cap, places, np.ones((3, count), bool))
+
+
+@pytest.mark.parametrize("count", [1, 2, 60])
+def test_every_place_of_a_cap_lies_in_the_cell_of_the_nearest_element(count: int) -> None:
+    layout = _cap_layout(count)
+    cells = [Outline(_in_order(cell)) for cell in cells_of(layout)]
+    rng = np.random.default_rng(1)
+    rim = layout.patch.rim_radius
+    places = rim * (1 + rng.uniform(-1, 1, (400, 2)))
+    places = places[layout.patch.contains(places)]
+    nearest = np.argmin(np.linalg.norm(layout.positions[:, None] - places, axis=-1), axis=0)
+    inside = np.stack([cell.inside(places) for cell in cells])
+    assert (inside.sum(axis=0) == 1).all()
+    np.testing.assert_array_equal(inside.argmax(axis=0), nearest)
+
+
+def _in_order(cell: np.ndarray) -> np.ndarray:
+    """The corners of a cell, counter-clockwise."""
+    x, y = (cell - cell.mean(axis=0)).T
+    return cell[np.argsort(np.arctan2(y, x))]
+
+
+def test_a_cap_is_a_disc_of_cells_that_are_pointed_at_up_to_its_rim(qapp: QApplication) -> None:
+    layout = _cap_layout(60)
+    heatmap = _heatmap(layout)
+    heatmap.show_values(np.linspace(-1, 1, 60), TINT)
+    picture, cells = _picture(heatmap), heatmap.cells
+    area, pointed = cells.area_of_patch(), []
+    cells.pointed.connect(pointed.append)
+    for element, (x, y) in enumerate(layout.positions):
+        at = cells.pixel_of(area, x, y).toPoint()
+        wanted = TINT.rgb(np.linspace(-1, 1, 60), "#000000")[element].tolist()
+        assert picture.pixelColor(at).getRgb()[:3] == tuple(wanted)
+        _point(cells, at)
+        assert pointed[-1] == element
+    _point(cells, area.topLeft().toPoint() + QPoint(3, 3))
+    assert pointed[-1] == -1
+
+
+def _point(cells: CellGrid, at: QPoint) -> None:
+    none, button = Qt.KeyboardModifier.NoModifier, Qt.MouseButton.NoButton
+    kind, place = QEvent.Type.MouseMove, QPointF(at)
+    QApplication.sendEvent(cells, QMouseEvent(kind, place, place, button, button, none))

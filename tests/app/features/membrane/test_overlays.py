@@ -83,3 +83,19 @@ def test_the_normals_of_a_drawn_object_point_to_one_side_of_it() -> None:
     centre = points[0] + (0.0, 0.0, 20.0)
     towards = (centre - points) / 20.0
     np.testing.assert_allclose(np.vecdot(_normals(points), towards), 1.0, atol=0.05)
+
+
+def test_the_legend_takes_one_line_in_a_small_window(window, until) -> None:
+    window.resize(1024, 700)
+    entries = window.legend.buttons
+    until(lambda: entries["show_truth"].isVisible() and entries["show_load"].isVisible())
+    until(lambda: window.size().width() == 1024 and window.legend.height() < 2 * _line(entries))
+    shown = [button for button in entries.values() if button.isVisible()]
+    assert len({button.y() for button in shown}) == 1
+    for button in shown:  # icon, gap, words and a frame
+        words = button.fontMetrics().horizontalAdvance(button.text())
+        assert button.width() >= button.iconSize().width() + 4 + words + 4
+
+
+def _line(entries) -> int:
+    return entries["show_fit"].height()

@@ -8,6 +8,7 @@ from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QMouseEvent, QWheelEvent
 from PySide6.QtWidgets import QApplication
 
+from kappaskin_app.shell.simulation import patch_of
 from kappaskin_app.shell.window import MainWindow
 
 LEFT, RIGHT = Qt.MouseButton.LeftButton, Qt.MouseButton.RightButton
@@ -76,27 +77,43 @@ def test_the_left_button_on_the_skin_presses_there_and_drags(
     assert pressed.history.settings == settings
 
 
-@pytest.mark.parametrize("radius", [0.15, -0.15], ids=["dome", "saddle"])
+@pytest.mark.parametrize(
+    ("shape", "radius"),
+    [("dome", 0.15), ("dome", -0.15), ("cap", 0.15)],
+    ids=["dome", "saddle", "cap"],
+)
 def test_the_flank_of_a_curved_skin_is_pressed_and_pointed_at_under_the_mouse(
-    window: MainWindow, qtbot, until, pixel_of, radius: float
+    window: MainWindow, qtbot, until, pixel_of, shape: str, radius: float
 ) -> None:
-    window.requests.set("shape", "dome")
-    window.history.change("Saddle", -1, load_case="point", force=0.02, radius_y=radius)
-    until(lambda: window.membrane.skin.patch.radius == (0.15, radius))
-    until(lambda: window.membrane.drag.handles.tolist() == [[0.025, 0.025]])
-    plotter, flank = window.membrane.plotter, np.array([0.0075, 0.0425])  # an element is there
+    window.requests.set("shape", shape)
+    window.history.change("Press", -1, load_case="point", force=0.02, radius_y=radius)
+    patch = patch_of(window.history.settings)
+    until(lambda: window.membrane.skin.patch == patch)
+    until(lambda: held_at(window, patch.a / 2, patch.b / 2))
+    plotter = window.membrane.plotter
+    shares = (0.15, 0.85) if shape == "dome" else (0.25, 0.35)
+    flank = np.array(shares) * (patch.a, patch.b)  # an element is there
     at = pixel_of(window, flank)
     move(window, at, held=Qt.MouseButton.NoButton)
-    until(lambda: window.selection.element == 81)
+    positions = window.session.scene.layout.positions
+    nearest = int(np.argmin(np.linalg.norm(positions - flank, axis=1)))
+    np.testing.assert_allclose(positions[nearest], flank)
+    until(lambda: window.selection.element == nearest)
     qtbot.mousePress(plotter, LEFT, pos=at)
     pressed = window.history.settings
     assert (pressed.x, pressed.y) == pytest.approx(flank, abs=3e-4)
     move(window, at + QPoint(60, -10))
-    until(lambda: np.allclose(window.membrane.drag.handles[0], dragged(window)))
+    until(lambda: held_at(window, *dragged(window)))
     qtbot.mouseRelease(plotter, LEFT, pos=at + QPoint(60, -10))
     (moved,) = window.membrane.drag.handles
     assert (pixel_of(window, moved) - at - QPoint(60, -10)).manhattanLength() <= 6
     until(lambda: np.allclose(window.session.estimate.true_contact, dragged(window)))
+
+
+def held_at(window: MainWindow, x: float, y: float) -> bool:
+    """Whether the one load is drawn at (x, y) in m."""
+    handles = window.membrane.drag.handles
+    return handles.shape == (1, 2) and np.allclose(handles, [[x, y]])
 
 
 def dragged(window: MainWindow) -> tuple[float, float]:

@@ -12,6 +12,7 @@ from kappaskin import ObjectFinder, Pipeline, PointLoad, Setup, Simulator, load_
 from kappaskin.mechanics import Sphere
 from kappaskin_app.features.presenter.feedback import RadiusEstimate, Recognised, feedback_of
 from kappaskin_app.features.presenter.view import radius_in_words
+from kappaskin_app.widgets.text import ERROR_BARS, Coverage
 
 _LARGE = Sphere(0.12)  # lies against the skin over more than any disc that a contact may be
 
@@ -124,10 +125,23 @@ def test_a_small_contact_is_told_with_all_its_error_bars() -> None:
         ((1.1, 1.4), 1.234, ("1230 mm", "95 %: 1100 to 1400 mm")),
     ],
 )
-def test_a_radius_is_written_as_far_as_it_is_known(interval, radius, words) -> None:
+def test_a_radius_is_written_as_far_as_it_is_known(interval, radius, words, monkeypatch) -> None:
+    monkeypatch.setattr(Coverage, "now", ERROR_BARS["95"])
     feedback = replace(feedback_of(_estimate(0.3)), kind="sphere")
     told = radius_in_words(replace(feedback, radius=RadiusEstimate("sphere", radius, interval)))
     assert told == (*words, "Radius of the ball")
+
+
+def test_a_radius_has_the_error_bar_of_all_views() -> None:
+    low, high = RadiusEstimate("sphere", 0.04, (0.038, 0.042)).bar
+    assert (1 / low - 25, 25 - 1 / high) == pytest.approx((1.3158 / 1.96, 1.1905 / 1.96), rel=1e-3)
+    feedback = replace(feedback_of(_estimate(0.3)), kind="sphere")
+    known = replace(feedback, radius=RadiusEstimate("sphere", 0.04, (0.038, 0.042)))
+    assert (
+        radius_in_words(known)[1]
+        == "\N{PLUS-MINUS SIGN}1 \N{GREEK SMALL LETTER SIGMA}: 39.0 to 41.0 mm"
+    )
+    assert RadiusEstimate("sphere", 0.2, (0.12, math.inf)).bar == (0.12, math.inf)
 
 
 def test_a_recording_has_no_hint_to_press_harder() -> None:

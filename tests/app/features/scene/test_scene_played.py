@@ -5,7 +5,7 @@ import signal
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QImage
 
 from kappaskin.scenes import scene_file
@@ -90,6 +90,27 @@ def test_a_touch_of_a_written_scene_is_dragged_in_the_picture_and_in_the_text(
     drag.released.emit()
     assert window.session.scene.name == "hum"
     assert window.history.settings.written == written
+
+
+def test_a_drag_begun_while_the_scene_is_computed_moves_the_load_in_it(
+    window, panel, until, qtbot, pixel_of
+) -> None:
+    panel.gallery.chosen.emit("centre")
+    until(lambda: plays(window, "centre") and len(window.membrane.drag.handles) == 1)
+    written, (x, y) = window.history.settings.written, window.membrane.drag.handles[0]
+    text = written.text.replace("4.70e-3", "4.60e-3")
+    start, view = pixel_of(window, (x, y)), window.membrane.plotter
+    window.editing.write(text)
+    assert window.session.making
+    qtbot.mousePress(view, Qt.MouseButton.LeftButton, pos=start)
+    qtbot.mouseMove(view, start + QPoint(30, 0))
+    qtbot.mouseRelease(view, Qt.MouseButton.LeftButton, pos=start + QPoint(30, 0))
+    assert window.session.making
+    until(lambda: window.session.scene.stimuli[0].what.x > x + 1e-3)
+    assert "4.60e-3" in window.history.settings.written.text
+    window.history.stack.undo()
+    until(lambda: window.session.scene.stimuli[0].what.x == x)
+    assert window.history.settings.written.text == text
 
 
 @pytest.mark.full
