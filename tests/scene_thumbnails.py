@@ -89,7 +89,8 @@ def relief(scene: Scene) -> Relief:
     loads = pressed.loads if pressed else ()
     rigid = scene.indenter is not None
     centres = [pressed.contact] if pressed and rigid else [load.centre() for load in loads]
-    outlines = [line for line in map(footprint, loads) if line is not None]
+    each = (footprint(load, patch) for load in loads)
+    outlines = [line for line in each if line is not None]
     pieces = [piece for stimulus in scene.stimuli for piece in _path(stimulus, scene.duration)]
     bearing = _marks(skin, np.reshape([load.centre() for load in loads if rigid], (-1, 2)))
     return Relief(

@@ -17,6 +17,7 @@ from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.scenes import EffectSelection, Plan, Scene, Simulator, plan
 from kappaskin.scenes.effects import EFFECTS, ReadingEffect
+from kappaskin.skin import Cap
 
 _MOST = 10_000_000  # readings: 80 MB for each array of them
 
@@ -67,6 +68,11 @@ def simulated_readings(
         "size": np.array(size),
         "positions": places[:, :1] if skin.strip else places,
         "radius": np.array(skin.radius),
+        **(
+            {"angle": np.array(skin.angle), "stretch": np.array(skin.stretch)}
+            if isinstance(skin, Cap)
+            else {}
+        ),
     }
 
 

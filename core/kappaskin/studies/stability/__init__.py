@@ -65,9 +65,10 @@ class MethodAnswer:
 
     @classmethod
     def of(cls, case: HardCase, fit: Fit, frames: NDArray[np.intp]) -> "MethodAnswer":
-        """The answer of a `fit` to these `frames` of a case, at the middles of 9 x 9 cells."""
+        """The answer of a `fit` to these `frames`, at the middles of 9 x 9 cells on the skin."""
         x, y = case.layout.patch.cell_centres(_PLACES, 1 if case.layout.patch.strip else _PLACES)
         places = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
+        places = places[case.layout.patch.contains(places)]
         c = fit.coefficients.reshape(len(frames), -1).astype(float)
         truth = case.truth.reshape(-1, case.true_basis.size)
         truth = truth if len(truth) == 1 else truth[frames]

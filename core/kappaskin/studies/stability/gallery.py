@@ -11,13 +11,13 @@ from enum import Enum
 
 import numpy as np
 
-from kappaskin.bases import Basis, CurvatureMap, SineBasis
+from kappaskin.bases import Basis, CurvatureMap, SineBasis, basis_for
 from kappaskin.estimation import FiniteSlopeLeastSquares
 from kappaskin.frames import COMPONENTS, Array
 from kappaskin.mechanics import DiscLoad, Plate, PointLoad, Stretching
 from kappaskin.scenes import TABLE_1_NOISE, scaled_to
 from kappaskin.sensing import SensorLayout, Transduction
-from kappaskin.skin import Patch
+from kappaskin.skin import Cap, Patch
 from kappaskin.studies.accuracy import root_mean_square
 from kappaskin.studies.paper import RADIUS
 
@@ -208,6 +208,46 @@ def _arcs() -> Iterator[HardCase]:
         basis=SineBasis(patch, 8, 1, sliding=True),
         announced="no reading depends on the position of the skin as a whole",
     )
+
+
+def _domes() -> Iterator[HardCase]:
+    dome, saddle = (Patch(0.02, 0.02, radii) for radii in ((0.05, 0.05), (0.05, -0.05)))
+    read = SensorLayout.regular(dome, 8, 8)
+    yield case_of("dome, dead row", "a row of eight elements of a dome reads nothing",
+                  read.without(range(24, 32)), (6, 6))  # fmt: skip
+    yield _pressed("dome, load at the rim", "1.5 mm from the rim of a dome, which gives near the "
+                   "load only", read, SineBasis(dome, 24, 24), DiscLoad(1.5e-3, 0.01, 1e-3),
+                   SineBasis(dome, 7, 7))  # fmt: skip
+    yield _pressed("saddle", "a load on a saddle, whose widest waves do not stretch it",
+                   replace(read, patch=saddle), SineBasis(saddle, 24, 24),
+                   DiscLoad(8e-3, 0.011, 1e-3), SineBasis(saddle, 7, 7))  # fmt: skip
+    uneven = Patch(0.02, 0.02, (0.046, 5.0))
+    yield case_of("radii of 46 mm and 5 m", "bent a hundred times as much along x as along y",
+                  replace(read, patch=uneven), (7, 7))  # fmt: skip
+    cap = Cap(0.008, math.radians(75))
+    rings, few = SensorLayout.on_rings(cap, (1, 6, 12, 18, 23)), basis_for(cap, "clamped", 4, 7)
+    load = scaled_to(Plate(cap), DiscLoad(6e-3, 8e-3, 2e-3), 1e-4, few)
+    moved = Plate(cap).deflection([load], few)
+    yield case_of("cap, dead ring", "a ring of 18 elements of a cap of 60 reads nothing",
+                  rings.without(range(19, 37)), few.shape, basis=few, truth=moved)  # fmt: skip
+    x, y = (rings.positions - cap.rim_radius).T
+    seam = rings.without(np.flatnonzero((np.abs(np.arctan2(y, x)) < 0.35) & (np.hypot(x, y) > 0)))
+    yield case_of("cap, seam", "no element reads within 20 degrees of a line from pole to rim",
+                  seam, few.shape, basis=few, truth=moved)  # fmt: skip
+    near_rim = DiscLoad(2e-3, cap.rim_radius, 1e-3)
+    yield _pressed("cap, load at the rim", "2 mm from the rim of a cap, outside all elements but "
+                   "those of the last ring", rings, basis_for(cap, "clamped", 12, 25), near_rim,
+                   basis_for(cap, "clamped", 6, 9))  # fmt: skip
+
+
+def _pressed(
+    name: str, hard: str, layout: SensorLayout, finest: Basis, load: DiscLoad, fitted: Basis
+) -> HardCase:
+    """A load that moves a skin by 0.1 mm, of the functions `finest`, of which some are fitted."""
+    plate = Plate(finest.patch)
+    truth = plate.deflection([scaled_to(plate, load, 1e-4, finest)], finest)
+    return case_of(name, f"{hard}; coarse functions follow fine ones", layout, fitted.shape,
+                   basis=fitted, true_basis=finest, truth=truth, kind=CaseKind.LINEAR)  # fmt: skip
 
 
 def _loads() -> Iterator[HardCase]:
@@ -486,7 +526,8 @@ def _large(count: int) -> HardCase:
 
 def gallery(long: bool = False) -> Iterator[HardCase]:
     """Every case, made on demand; the largest only when `long`."""
-    for room in (_sizes, _arcs, _loads, _elements, _scales, _readings, _other_readings, _slopes):
+    rooms = _sizes, _arcs, _domes, _loads, _elements, _scales, _readings, _other_readings, _slopes
+    for room in rooms:
         yield from room()
     yield _sequence(1000, 6, 4)
     yield _large(64)
