@@ -115,14 +115,14 @@ def covariant_at(basis: Basis, positions: Array) -> Array:
     At `positions` (P, 2) in m; in the order of `ORDERS`.
     """
     jet = np.stack([basis.at(positions, *order) for order in ORDERS])
-    found: Array = np.einsum("pij,jpn->ipn", basis.patch.local(positions).covariant, jet)
+    found: Array = np.einsum("pij,jpn->ipn", basis.patch.base(*positions.T).covariant, jet)
     return found
 
 
 def _on_cap(basis: Basis, cap: Cap, positions: Array) -> Array:
     """As `curvature_at`, on a cap."""
     f, _, _, xx, xy, yy = covariant_at(basis, positions)
-    Kxx, Kyy, Kxy = cap.local(positions).curvature
+    Kxx, Kyy, Kxy = cap.base(*positions.T).form
     squares = np.stack([Kxx**2 + Kxy**2, Kyy**2 + Kxy**2, Kxy * (Kxx + Kyy)])
     found: Array = np.stack([xx, yy, xy]) + squares[..., None] * f
     return found

@@ -399,7 +399,7 @@ class _OfCap:
         self.unit = 8 * math.pi * plate.rigidity
         self._table, self._steps, self._gives = _on_cap(plate, edge, layout.positions.tobytes())
         self._positions, self._out = layout.positions, out
-        inverse = np.linalg.inv(cap.local(layout.positions).covariant[:, 1:3, 1:3])
+        inverse = np.linalg.inv(cap.base(*layout.positions.T).covariant[:, 1:3, 1:3])
         self._tangents = np.swapaxes(inverse, 1, 2)  # from steps along x and y
         self._last = [n - 4 for n in self._table.shape[:3]]
         self._block, self._weights = lru_cache(16)(self._block_at), np.empty((4, 4, 16))

@@ -845,7 +845,7 @@ class NormalCurvature:
         self._columns = np.concatenate([self._first, *self._at]).T
         self.frame_shape, self._base = layout.frame_shape, np.empty((0, 1), dtype)
         if any(patch.curvatures):
-            self._base = patch.local(places).curvature[:, layout.element].astype(dtype)
+            self._base = patch.base(*places.T).form[:, layout.element].astype(dtype)
 
     @property
     def maps(self) -> Array:

@@ -3,7 +3,6 @@
 from kappaskin.skin.patch import Base as Base
 from kappaskin.skin.patch import Cap as Cap
 from kappaskin.skin.patch import Disk as Disk
-from kappaskin.skin.patch import LocalGeometry as LocalGeometry
 from kappaskin.skin.patch import Meridian as Meridian
 from kappaskin.skin.patch import Outline as Outline
 from kappaskin.skin.patch import Patch as Patch

@@ -175,8 +175,22 @@ class Base(NamedTuple):
     turning: Numbers = ()
 
     @property
+    def frame(self) -> Array:
+        """The tangents e_x and e_y in space, (..., 2, 3)."""
+        e_x, e_y = (np.broadcast_arrays(*each, self.point[0])[:3] for each in self[1:3])
+        return np.stack([np.stack(e_x, axis=-1), np.stack(e_y, axis=-1)], axis=-2)
+
+    @property
+    def form(self) -> Array:
+        """The curvature (3, ...) in 1/m."""
+        return np.stack(np.broadcast_arrays(*self.curvature, self.point[0])[:3])
+
+    @property
     def covariant(self) -> Array:
-        """As that of `LocalGeometry`, (..., 6, 6)."""
+        """The map (..., 6, 6) from a function's derivatives along x and y, as `ORDERS` has them.
+
+        To its covariant ones along e_x and e_y.
+        """
         found = np.zeros((*np.shape(self.point[0]), 6, 6))
         found[...] = np.eye(6)
         for i, row in enumerate(self.slopes + self.second, 1):
@@ -186,21 +200,6 @@ class Base(NamedTuple):
 
 
 _FLAT = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LocalGeometry:
-    """The skin at rest around each of P places.
-
-    `frame` (P, 2, 3): orthonormal tangents e_x and e_y in space. `curvature` (3, P) in 1/m: the
-    curvature form xx, yy, xy along them, positive where the skin is convex seen from outside.
-    `covariant` (P, 6, 6): from a function's derivatives f, f_x, f_y, f_xx, f_xy, f_yy in the skin's
-    coordinates to its covariant ones along e_x and e_y, in that order.
-    """
-
-    frame: Array
-    curvature: Array
-    covariant: Array
 
 
 @dataclass(frozen=True)
@@ -365,15 +364,6 @@ class Patch:
         ny, nz = cx * sy * up, cx * cy * up
         across, normal = (-sx * ny, cy * up, -cx * ny), (sx * cy * up, ny, nz)
         return Base((px, py, pz), (cx, 0.0, -sx), across, normal, (Hx, Hy, 0.0))
-
-    def local(self, positions: Array) -> LocalGeometry:
-        """The frames, curvature and covariant derivatives at `positions` (P, 2) in m."""
-        base, P = self.base(*positions.T), len(positions)
-        frame = np.zeros((P, 2, 3))
-        for k in range(3):
-            frame[:, 0, k], frame[:, 1, k] = base.along[k], base.across[k]
-        form = np.stack([np.broadcast_to(each, P) for each in base.curvature])
-        return LocalGeometry(frame, form, base.covariant)
 
     def around(self, x: float, y: float, offsets: Array) -> Array:
         """Positions (Q, 2) in m that lie from (x, y) as far along the skin as `offsets` (Q, 2)."""
@@ -582,15 +572,15 @@ class Cap(Disk):
 
         Along circles of the skin's curvature there: of a spheroid nearly.
         """
-        at = np.array([[x, y]])
-        ((point,), (normal,)), local = self.at_rest(at), self.local(at)
-        xx, yy, xy = local.curvature[:, 0]
+        base = self.base(x, y)
+        xx, yy, xy = base.curvature
         squares: Array = np.sum(offsets**2, axis=1)
         forms: Array = offsets**2 @ np.array([xx, yy]) + 2 * xy * offsets[:, 0] * offsets[:, 1]
         H = np.where(squares > 0, forms, xx) / np.where(squares > 0, squares, 1.0)
         turn = H * np.sqrt(squares)
-        along: Array = (np.sinc(turn / np.pi)[:, None] * offsets) @ local.frame[0]
-        return self.places(point + along - (2 * np.sin(turn / 2) ** 2 / H)[:, None] * normal)
+        along: Array = (np.sinc(turn / np.pi)[:, None] * offsets) @ base.frame
+        fall = np.multiply.outer(2 * np.sin(turn / 2) ** 2 / H, base.normal)
+        return self.places(base.point + along - fall)
 
 
 @dataclass(frozen=True, init=False)

@@ -234,7 +234,7 @@ def by_differences(surface, x, y, h=2e-5):
         if isinstance(surface.patch, Cap):  # along the axis that elements read by
             rest = [surface.patch.at_rest(np.array([x, y]) + h * e)[0] for e in SIDES]
             steps = np.stack([rest[0] - rest[1], rest[2] - rest[3]], axis=1) / (2 * h)
-            axis = surface.patch.local(np.array([[x, y]])).frame[0, 0]
+            axis = surface.patch.base(x, y).frame[0]
             first = np.column_stack([rx, ry]) @ np.linalg.lstsq(steps, axis)[0]
         first = first / np.linalg.norm(first)
         return np.array([first, np.cross(n, first), n]), np.column_stack([rx, ry])

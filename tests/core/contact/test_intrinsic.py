@@ -33,7 +33,7 @@ def frame_at(patch, place):
     x, y = place
     if patch.is_shallow or isinstance(patch, Cap):
         at, n = patch.at_rest(np.array(place))
-        return at, n, patch.local(np.array([place])).frame[0, 0]
+        return at, n, patch.base(*place).frame[0]
     turn = 0.0 if math.isinf(patch.radius) else (x - patch.a / 2) / patch.radius
     n, t = (
         np.array([math.sin(turn), 0, math.cos(turn)]),

@@ -99,7 +99,7 @@ def test_readings_of_a_spheroid_are_half_of_what_strains_back_to_back_differ_by(
     def moved(p, share):
         rest, normals = cap.at_rest(p)
         u = shell.tangential_at(p) @ c
-        along = np.einsum("kp,pki->pi", u, cap.local(p).frame)
+        along = np.einsum("kp,pki->pi", u, cap.base(*p.T).frame)
         return rest + share * (along - normals * (basis.at(p) @ c)[:, None])
 
     def first(g, e):
@@ -119,7 +119,7 @@ def test_readings_of_a_spheroid_are_half_of_what_strains_back_to_back_differ_by(
         )
 
     rest, (more, less) = forms(0), (forms(0.5), forms(-0.5))
-    to_frame = np.linalg.inv(rest[2] @ np.swapaxes(cap.local(at).frame, 1, 2))
+    to_frame = np.linalg.inv(rest[2] @ np.swapaxes(cap.base(*at.T).frame, 1, 2))
 
     def in_frame(form):
         return to_frame @ form @ np.swapaxes(to_frame, 1, 2)

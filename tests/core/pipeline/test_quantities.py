@@ -121,7 +121,7 @@ def test_a_spheroid_at_rest_keeps_its_bends_and_its_slopes_lie_along_its_axes(ce
     layout, basis = SensorLayout.regular(cap, 8, 8), basis_for(cap, "hinged", 4, 5)
     quantities = Quantities(layout, basis, 9, 9)
     still = replace(centre[1], coefficients=np.zeros((4, 5)), curvature=np.zeros((3, len(layout))))
-    form = cap.local(layout.positions).curvature
+    form = cap.base(*layout.positions.T).form
     for name in ("first", "second", "gaussian"):
         found = quantities.of_elements(name, still)
         np.testing.assert_allclose(found, curvature_invariant(name, form), rtol=1e-6)
@@ -133,12 +133,12 @@ def test_a_spheroid_at_rest_keeps_its_bends_and_its_slopes_lie_along_its_axes(ce
     c = np.random.default_rng(0).normal(0, 1e-4, (4, 5))
     places = np.stack(np.meshgrid(*cap.grid(81, 81)), -1).reshape(-1, 2)
     places = places[cap.contains(places)]
-    slopes = np.einsum("pij,jp->ip", cap.local(places).covariant, [
+    slopes = np.einsum("pij,jp->ip", cap.base(*places.T).covariant, [
         basis.at(places, *order) @ c.ravel() for order in ORDERS])[1:3]  # fmt: skip
     assert fit.slope(c) == pytest.approx(np.hypot(*slopes).max(), rel=0.02)
     bars = ErrorBars(fit, np.zeros((3, len(layout))), x, y)
     place = places[200]
-    rows = cap.local(place[None]).covariant[0] @ basis.jet(*place.tolist())
+    rows = cap.base(*place).covariant @ basis.jet(*place.tolist())
     covariance = fit(np.zeros((3, len(layout)))).uncertainty.covariance_of(rows[1:3])
     expected = 0.3 * np.sqrt(np.diag(covariance))
     np.testing.assert_allclose(bars.of_slopes(place, 0.3), expected, rtol=1e-9)

@@ -67,7 +67,7 @@ def test_the_frame_and_the_curvature_are_those_of_the_surface_in_space(cap):
         for k in (0, 1)
         for e in (ex, ey)
     )
-    local, (_, normals) = cap.local(at), cap.at_rest(at)
+    local, (_, normals) = cap.base(*at.T), cap.at_rest(at)
 
     e_x, e_y = np.moveaxis(local.frame, 1, 0)
 
@@ -76,7 +76,7 @@ def test_the_frame_and_the_curvature_are_those_of_the_surface_in_space(cap):
         local.frame @ np.swapaxes(local.frame, 1, 2) - np.eye(2), 0, atol=1e-12
     )
     # The normal's change along a tangent is the form times it: n_t = K t with t in the frame.
-    K = np.moveaxis(local.curvature[[0, 2, 2, 1]].reshape(2, 2, -1), -1, 0)
+    K = np.moveaxis(local.form[[0, 2, 2, 1]].reshape(2, 2, -1), -1, 0)
     for r_t, n_t in ((r_x, n_x), (r_y, n_y)):
         along, change = (np.einsum("pki,pi->pk", local.frame, t) for t in (r_t, n_t))
         np.testing.assert_allclose(change, np.einsum("pij,pj->pi", K, along), atol=1e-6 / R)
@@ -86,7 +86,7 @@ def test_the_frame_and_the_curvature_are_those_of_the_surface_in_space(cap):
 def test_covariant_derivatives_are_those_of_a_function_in_space(cap):
     at = places(cap)
     jet = differences(lambda p: f(cap.at_rest(p)[0]), at, STEP)
-    local, (points, normals) = cap.local(at), cap.at_rest(at)
+    local, (points, normals) = cap.base(*at.T), cap.at_rest(at)
 
     value, f_x, f_y, xx, xy, yy = np.einsum("pij,jp->ip", local.covariant, jet)
 
@@ -112,7 +112,7 @@ def test_covariant_derivatives_are_those_of_a_function_in_space(cap):
     slopes = np.einsum("pki,pi->pk", local.frame, grad)
     second = local.frame @ hess @ np.swapaxes(local.frame, 1, 2)
     outward = np.einsum("pi,pi->p", normals, grad)
-    k_xx, k_yy, k_xy = local.curvature
+    k_xx, k_yy, k_xy = local.form
     np.testing.assert_allclose(value, f(points), rtol=1e-12)
     np.testing.assert_allclose([f_x, f_y], slopes.T, atol=1e-5 / R)
     np.testing.assert_allclose(xx, second[:, 0, 0] - k_xx * outward, atol=1e-4 / R**2)
@@ -149,7 +149,7 @@ def test_offsets_lie_as_far_away_along_the_skin(cap):
     there = cap.around(x, y, offsets)
 
     (points, _), (point, _) = cap.at_rest(there), cap.at_rest(np.array([[x, y]]))
-    frame = cap.local(np.array([[x, y]])).frame[0]
+    frame = cap.base(x, y).frame
     np.testing.assert_allclose(there[0], [x, y], atol=1e-15)
     sphere = cap.stretch == 1
     chord = 2 * R * math.sin(0.1) if sphere else 0.2 * R
@@ -165,16 +165,16 @@ def test_a_wide_cap_is_a_disk():
     cap, disk = Cap(1e6, 5e-8), Disk(0.05)
     np.testing.assert_allclose([cap.a, cap.b], [disk.a, disk.b], rtol=1e-12)
     at = places(cap)
-    local = cap.local(at)
-    np.testing.assert_allclose(local.covariant, disk.local(at).covariant, atol=1e-8)
-    np.testing.assert_allclose(local.frame, disk.local(at).frame, atol=1e-6)
+    local = cap.base(*at.T)
+    np.testing.assert_allclose(local.covariant, disk.base(*at.T).covariant, atol=1e-8)
+    np.testing.assert_allclose(local.frame, disk.base(*at.T).frame, atol=1e-6)
 
 
 def test_other_skins_have_constant_forms_and_plain_derivatives():
     patch = Patch(0.1, 0.08, (0.5, -0.4))
     at = np.array([[0.02, 0.03], [0.07, 0.07]])
-    local = patch.local(at)
-    np.testing.assert_array_equal(local.curvature[:, 0], [2.0, -2.5, 0.0])
+    local = patch.base(*at.T)
+    np.testing.assert_array_equal(local.form[:, 0], [2.0, -2.5, 0.0])
     np.testing.assert_array_equal(local.covariant[1], np.eye(6))
     np.testing.assert_allclose(
         np.cross(local.frame[:, 0], local.frame[:, 1]), patch.at_rest(at)[1], atol=1e-12

@@ -122,7 +122,7 @@ class Directions:
         self._nodes = np.flatnonzero(chosen & skin.on)
         self._positions = np.tile(skin.shares[self._nodes] * (skin.patch.a, skin.patch.b), (2, 1))
         # From steps along the skin's frames to steps of its coordinates.
-        self._ways = skin.patch.local(self._positions).covariant[:, 1:3, 1:3]
+        self._ways = skin.patch.base(*self._positions.T).covariant[:, 1:3, 1:3]
         self._apart = stride * MM * float(skin.cell.min())
         if self.actor is not None:
             self._plotter.remove_actor(self.actor, render=False)
