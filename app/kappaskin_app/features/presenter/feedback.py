@@ -38,7 +38,7 @@ class RadiusEstimate:
     def bar(self) -> tuple[float, float]:
         """Both ends in m of the error bar as all views show it; of a bound the interval."""
         low, high = self.interval
-        if not 0 < low <= high < math.inf:
+        if not (0 < low <= high < math.inf and math.isfinite(self.value)):
             return self.interval
         k, off = 1 / self.value, Coverage.now.of_half_width  # normal in the curvature
         return 1 / (k + off(1 / low - k)), 1 / (k - off(k - 1 / high))

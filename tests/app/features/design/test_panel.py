@@ -192,6 +192,7 @@ def test_what_lies_beside_a_round_skin_has_the_colour_of_the_window(qtbot) -> No
     view = SurfaceMap("Predicted", "mm", "tip")
     qtbot.addWidget(view)
     view.resize(200, 200)
+    view.show()  # a hidden one follows a theme later
     values = np.ones((20, 20))
     values[-1, 0] = np.nan
     view.show_surface(values, (0.0, 2.0), "sequential", np.full(2, np.nan), (1.0, 1.0))
