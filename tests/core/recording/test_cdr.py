@@ -128,7 +128,7 @@ def test_a_definition_that_is_none_is_a_mistake_of_ours() -> None:
 
 def test_a_contact_is_packed_as_any_other_message() -> None:
     rng = np.random.default_rng(1)
-    times, flags = rng.normal(size=4).tolist(), [True, False, True, True, False]
+    times, flags = rng.normal(size=4).tolist(), [True, False, True, True, False, False, True]
     numbers = rng.normal(size=40)
     message = m.pack_contact(17 * 10**9 + 5, 2**40, times, flags, -3, numbers.tolist())
     read = theirs(m.CONTACT, message)

@@ -353,11 +353,12 @@ def test_the_surface_goes_through_the_skin_moved_along_its_normals(held_skin) ->
 
 
 def test_the_surface_is_as_large_as_the_skin_and_faces_outwards(held_skin) -> None:
-    surface, _ = shape_on(held_skin)
+    surface, _ = shape_on(held_skin, 1e-6)
     mesh = trimesh.Trimesh(surface.points, surface.triangles, process=False)
     _, weights = held_skin.basis().quadrature()
     assert mesh.area == pytest.approx(weights.sum(), rel=0.01)
-    there = mesh.area_faces > 1e-9 * mesh.area
+    # Three points of the rim of a cap lie in one plane across it: slivers that look up.
+    there = mesh.area_faces > mesh.area_faces.mean() / 30
     outwards = surface.normals[surface.triangles].mean(axis=1)
     assert (np.einsum("pi,pi->p", mesh.face_normals, outwards)[there] > 0.99).all()
     assert len(np.unique(surface.triangles)) == len(surface.points)

@@ -19,9 +19,7 @@ def test_every_channel_is_on_the_page_and_no_other() -> None:
 def test_its_example_prints_every_contact(tmp_path, monkeypatch, capsys) -> None:
     file = RecordingFile(tmp_path / "press.mcap")
     for n in range(3):
-        contact = m.pack_contact(
-            0, n, [0.0] * 4, [n > 0, True, False, True, False], 5, [n / 2] * 40
-        )
+        contact = m.pack_contact(0, n, [0.0] * 4, [n > 0, True, *[False] * 5], 5, [n / 2] * 40)
         file.put(m.CONTACTS, float(n), contact)
     file.close()
     monkeypatch.chdir(tmp_path)
