@@ -1,6 +1,6 @@
 """Docks beside and below the skin.
 
-The columns beside it reach to the bottom of the window where what is below it fits between them.
+The left and right columns reach to the bottom of the window where the bottom docks fit between.
 """
 
 from collections.abc import Iterator, Mapping

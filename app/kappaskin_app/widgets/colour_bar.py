@@ -31,8 +31,8 @@ _TILTED = 40.0  # degrees, of a pin that holds nothing
 class ColourBar(QWidget):
     """A vertical scale of colours with its limits and unit, above a legend of other colours.
 
-    A mark beside it shows one standard deviation of the noise. Categories, as the health of the
-    elements, have no scale, only the legend.
+    A mark at its edge shows one standard deviation of the noise. Categories, such as the health of
+    elements, have only the legend.
     """
 
     def __init__(self) -> None:
