@@ -112,10 +112,10 @@ class CapShell:
         """U and V of each function of them with their derivatives by s, (2, Q, M, n)."""
         per_arc = np.array([1.0, 1 / self._basis.cap.rim_radius])[:, None, None, None]
         powers = self._m + 1, np.abs(self._m - 1)
-        A, B = (per_arc * radial(rho, m, self._count, 1)[:2] for m in powers)
+        A, B = (per_arc * radial(rho, m, self._count, 1, 2) for m in powers)
         of_u, of_v = [A, B], [A, -B]
         if self._u_free:  # one more of each, alike at the rim
-            ends = [radial(np.append(rho, 1.0), m, 1, 0)[:2] for m in powers]
+            ends = [radial(np.append(rho, 1.0), m, 1, 0, 2) for m in powers]
             one, other = (per_arc * of[:, :-1] / of[0, -1] for of in ends)
             of_u, of_v = [*of_u, one + other], [*of_v, one - other]
         U, V = np.concatenate(of_u, axis=-1), np.concatenate(of_v, axis=-1)
