@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kappaskin.bases import Basis, CapBasis, ProductBasis, SineBasis, basis_for
 from kappaskin.frames import Array
-from kappaskin.mechanics import CapWaves, Compliance, Plate, Shell
+from kappaskin.mechanics import CapWaves, Compliance, Plate, Shell, cap_shell
 from kappaskin.sensing import Readings, SensorLayout
 from kappaskin.skin import Cap, Patch
 
@@ -486,16 +486,14 @@ def _on_cap(
     step, (_, M, _, C) = cap.a / _ON_CAP, rows.shape
     radii = np.abs(np.arange(math.ceil(_SIZES * _ON_CAP) + 4) - 1.5) * step
     turns = math.ceil(np.pi * _rim_share(cap) * _ON_CAP)
-    felt = np.multiply.outer(radii, k)
-    by_m = np.empty((2, M, len(radii), len(along), C), np.float32)
-    for m in range(M):
-        share: Array = 2 * scipy.special.j1(felt[:, None, m]) / felt[:, None, m]
-        shapes = share * along[:, m]
-        by_m[:, m] = (shapes.astype(np.float32) @ rows[:, m, None]).reshape(by_m[:, m].shape)
+    felt = np.moveaxis(np.multiply.outer(radii, k), 1, 0)[:, :, None]
+    share: Array = 2 * scipy.special.j1(felt) / felt
+    shapes: Single = (share * np.moveaxis(along, 1, 0)[:, None]).astype(np.float32)
+    by_m: Single = shapes.reshape(M, -1, shapes.shape[-1]) @ rows
     azimuths = 2 * np.pi / turns * np.arange(-1.0, turns + 2)
     turn = np.multiply.outer(azimuths, np.arange(float(M)))
-    around = np.hstack([np.cos(turn), np.sin(turn)]).astype(np.float32)
-    table = (around @ by_m.reshape(2 * M, -1)).reshape(len(around), *by_m.shape[2:])
+    around: Single = np.hstack([np.cos(turn), np.sin(turn)]).astype(np.float32)
+    table: Single = (around @ by_m.reshape(2 * M, -1)).reshape(len(around), *shapes.shape[1:3], C)
     return table, (2 * np.pi / turns, step, step), gives
 
 
@@ -517,13 +515,18 @@ def _waves_on_cap(
     Nj = 2 * math.ceil(_WAVES * np.pi * _rim_share(cap)) + 1  # as fine around as along
     basis = cast("CapBasis", basis_for(cap, edge, _WAVES, Nj))
     compliance, waves = plate.compliance_by_wave(basis), CapWaves(basis)
-    M = layout.operator(basis, plate).reshape(-1, *basis.shape)
-    for j in range(Nj):
-        M[..., j] = M[..., j] @ compliance[(j + 1) // 2]
+    shell, shape = cap_shell(plate, basis), (layout.channels, 2, *waves.k.shape)
+
+    def curvature(positions: Array) -> Array:
+        read = np.moveaxis(shell.curvature_by_wave(positions), 0, 2)
+        return read.reshape(3, len(positions), -1)
+
+    read = layout.mean_curvature(basis, curvature).reshape(shape)
+    by_m = read.transpose(1, 2, 0, 3)
     unit = 8 * math.pi * plate.rigidity
-    rows = np.moveaxis(np.stack(waves.rows(unit * M.reshape(len(M), -1))), 1, 3)
-    f = basis.along(np.linspace(0, 1, _ON_CAP + 1))[0]
-    gives: Array = np.einsum("qmi,mij,qmj->q", f, compliance, f, optimize=True)
+    rows: Array = np.swapaxes(by_m @ (unit * compliance @ waves.shares), 2, 3)
+    f = np.swapaxes(basis.along(np.linspace(0, 1, _ON_CAP + 1), 1)[0], 0, 1)
+    gives: Array = np.vecdot(f @ compliance, f).sum(axis=0)
     along = waves.along(cap.a / _ON_CAP * np.arange(-1.0, _ON_CAP // 2 + 1))
     return waves.k, along, rows.astype(np.float32), gives
 

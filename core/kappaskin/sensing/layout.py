@@ -652,8 +652,12 @@ class SensorLayout:
         if self.reads:
             M = self._read_by(self.reads, basis, plate, curvature)
             return M if self.scale is None else self.scale[:, None] * M
+        return self.mean_curvature(basis, curvature)
+
+    def mean_curvature(self, basis: Basis, curvature: ValuesAt) -> Array:
+        """Means over the gages (3 P, N) of the `curvature` (3, P, N) at positions (P, 2)."""
         if not self.gage_length:
-            return curvature(self.positions).reshape(self.channels, basis.size)
+            return np.concatenate(curvature(self.positions))
         along = partial(_along, basis, self.positions, self.gage_length, curvature)
         return np.concatenate([along(_X), along(_Y), _twist(along)])
 
