@@ -1,5 +1,7 @@
 """Caps: how a domed skin that stretches gives, and what it reads."""
 
+import math
+
 import numpy as np
 
 from kappaskin.bases import CapBasis, curvature_at, gauss, radial
@@ -33,6 +35,16 @@ _MORE = 12  # functions of u and v along the meridian, more than f has
 _AT_POLE = 1e-6  # of the arc to the rim: nearer, nothing depends on u and v
 
 
+def _radii(fineness: int) -> tuple[Array, Array]:
+    """Radii (Q,) of the unit disk and weights (Q,) of an integral over them.
+
+    Every product of two functions times the radius is one of r^2 times r: half as many points do.
+    """
+    squares, weights = gauss(1.0, math.ceil(fineness / 2))
+    rho: Array = np.sqrt(squares)
+    return rho, weights / (2 * rho)
+
+
 def _products(S: Array) -> Array:
     """S' S (M, n, n) of parts S (k, Q, M, n)."""
     rows = np.ascontiguousarray(np.moveaxis(S, 2, 0)).reshape(S.shape[2], -1, S.shape[3])
@@ -58,7 +70,7 @@ class CapShell:
         self._basis, self._u_free = basis, u_free
         self._m = np.arange(basis.Nj // 2 + 1)
         self._count = basis.Ni + _MORE
-        rho, weights = gauss(1.0, 2 * self._count + len(self._m) + 24)
+        rho, weights = _radii(2 * self._count + len(self._m) + 24)
         a = basis.cap.rim_radius
         along, m = basis.cap.meridian(a * rho), self._m[:, None]
         F = basis.along(rho) / np.array([1.0, a, a**2])[:, None, None, None]
@@ -184,7 +196,7 @@ class CapWaves:
 
     def __init__(self, basis: CapBasis) -> None:
         a, m = basis.cap.rim_radius, np.arange(basis.Nj // 2 + 1)
-        rho, weights = gauss(1.0, 2 * basis.Ni + len(m) + 24)
+        rho, weights = _radii(2 * basis.Ni + len(m) + 24)
         radius = basis.cap.meridian(a * rho).radius[:, None, None]
         self._basis, self._m = basis, m
         f, f_s, _ = np.sqrt(a * weights[:, None, None] * radius) * basis.along(rho)
