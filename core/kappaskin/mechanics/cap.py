@@ -50,6 +50,16 @@ def _parts(k: int, Q: int, M: int, n: int) -> Array:
     return np.moveaxis(np.zeros((M, k, Q, n)), 0, 2)
 
 
+def _radii(fineness: int) -> tuple[Array, Array]:
+    """Radii (Q,) of the unit disk and weights (Q,) of an integral over them.
+
+    Every product of two functions times the radius is one of r^2 times r: half as many points do.
+    """
+    squares, weights = gauss(1.0, math.ceil(fineness / 2))
+    rho: Array = np.sqrt(squares)
+    return rho, weights / (2 * rho)
+
+
 def _products(S: Array) -> Array:
     """S' S (M, n, n) of parts S (k, Q, M, n)."""
     rows = np.ascontiguousarray(np.moveaxis(S, 2, 0)).reshape(S.shape[2], -1, S.shape[3])
