@@ -23,21 +23,18 @@ from kappaskin.frames import Array, Indices, Mask
 from kappaskin.sensing import SensorLayout
 
 
-def singular_values(
-    basis: Basis, layout: SensorLayout, sigma: ArrayLike = 1.0
-) -> tuple[Array, Array]:
+def singular_values(basis: Basis, layout: SensorLayout) -> tuple[Array, Array]:
     """Singular values (F,) of the live readings, the best observed first, and shapes (F, Ni, Nj).
 
     They are those of M W with columns scaled to unit length: the first over the last is
     `LeastSquares.condition`. Where the readings do not determine all coefficients the last values
     are zero, or rounding, and no mixture of the last shapes changes the readings; the rigid motions
     of an elastic rim are among them where curvature alone is read. The squared coefficients of each
-    shape, in m, sum to 1 m^2. Readings that differ in unit are taken over their `sigma` (R,).
+    shape, in m, sum to 1 m^2.
     """
     some, still = combinations(basis, layout)
     W = np.eye(basis.size) if some is None else some
-    M = layout.operator(basis) / np.reshape(sigma, (-1, 1))
-    M_W = M[layout.live.ravel()] @ W
+    M_W = layout.operator(basis)[layout.live.ravel()] @ W
     length = column_lengths(M_W)
     A, back = M_W / length, W / np.where(np.isfinite(length), length, 1.0)
     R = cast("tuple[Array]", linalg.qr(A, mode="r"))[0][: A.shape[1]] if len(A) else A

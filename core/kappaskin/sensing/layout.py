@@ -239,7 +239,8 @@ class SensorLayout:
     (m, n) for a regular grid, with element p + m q in column p (along x) and row q (along y), and
     None otherwise. Curvature is the mean over gages of `gage_length` in m, along x, y or the
     direction, the twist that along both diagonals. So are slopes; without gages they, and heights,
-    are the mean over a rectangle with the sides `cell` in m.
+    are the mean over a rectangle with the sides `cell` in m. The operator has the readings times
+    `scale` (R,), as 1 over their noise.
     """
 
     patch: Patch
@@ -249,6 +250,7 @@ class SensorLayout:
     gage_length: float = 0.0
     reads: Readings | None = None
     cell: tuple[float, float] = (0.0, 0.0)
+    scale: Array | None = None
 
     def __post_init__(self) -> None:
         P = self.positions
@@ -639,7 +641,8 @@ class SensorLayout:
             raise Refusal(f"the layout is on {self.patch}, the basis on {basis.patch}; use one")
         curvature = plate.curvature(basis) if plate else partial(curvature_at, basis)
         if self.reads:
-            return self._read_by(self.reads, basis, plate, curvature)
+            M = self._read_by(self.reads, basis, plate, curvature)
+            return M if self.scale is None else self.scale[:, None] * M
         if not self.gage_length:
             return curvature(self.positions).reshape(self.channels, basis.size)
         along = partial(_along, basis, self.positions, self.gage_length, curvature)

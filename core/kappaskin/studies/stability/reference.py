@@ -210,15 +210,13 @@ def reference_of(case: HardCase) -> Reference:
     if case.kind is CaseKind.LARGE:
         return _by_transforms(case)
     used = case.layout.live & np.isfinite(case.curvature[0])
-    sigma = np.ones(used.shape)
-    if case.sigma is not None and case.layout.reads:
-        sigma = np.broadcast_to(case.sigma, used.shape)
-    layout = replace(case.layout, live=used)
-    M = (layout.operator(case.basis) / sigma.reshape(-1, 1))[used.ravel()]
-    b, W = (case.curvature[0] / sigma)[used], case.basis.free
+    scale = None if case.sigma is None or not case.layout.reads else 1 / case.sigma
+    layout = replace(case.layout, live=used, scale=scale)
+    M = layout.operator(case.basis)[used.ravel()]
+    b, W = (case.curvature[0] * (1.0 if scale is None else scale))[used], case.basis.free
     A = M if W is None else M @ W
     length = column_lengths(A)
-    values = singular_values(case.basis, layout, sigma.ravel())[0][: len(length)]
+    values = singular_values(case.basis, layout)[0][: len(length)]
     k = _condition(values, A.shape)
     bare = _condition(np.linalg.svd(M, compute_uv=False).astype(float), M.shape)
     R, size = len(b), cast("float", linalg.norm(b))
