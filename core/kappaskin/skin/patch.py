@@ -476,7 +476,8 @@ class Cap(Disk):
     @property
     def name(self) -> str:
         of = f" stretched {self.stretch:g} times" if self.stretch != 1 else ""
-        return f"cap of radius {self.equator:g} m{of} with {math.degrees(self.angle):g} degrees"
+        rim = f"its rim at {math.degrees(self.angle):g} degrees"
+        return f"cap of radius {self.equator:g} m{of} with {rim}"
 
     @property
     def equator(self) -> float:
