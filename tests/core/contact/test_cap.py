@@ -78,6 +78,7 @@ def test_a_disc_feels_of_a_wave_what_bessel_has(name):
         np.testing.assert_allclose(of_disc[low], (share * of_point)[low], atol=0.02 * scale)
 
 
+@pytest.mark.cases("0.001-0.05-hemisphere", "0.002-0.07-egg")
 @pytest.mark.parametrize("name", CAPS)
 @pytest.mark.parametrize(("radius", "share"), [(1e-3, 0.05), (2e-3, 0.07)])
 def test_the_table_has_what_many_functions_read_of_a_disc(name, radius, share):
@@ -113,6 +114,7 @@ def test_the_slopes_of_the_table_are_those_of_its_readings(name):
         np.testing.assert_allclose(slopes[k], expected, atol=2e-3 * np.abs(expected).max())
 
 
+@pytest.mark.cases("hemisphere")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CAPS)
 def test_discs_of_any_size_are_found_and_weighed(name):
