@@ -57,7 +57,7 @@ def influence_of(
     that of heights and slopes, which are bounded under a load, is one of more.
     """
     if isinstance(plate.patch, Cap):
-        if layout.senses_curvature_only:
+        if layout.senses_curvature_only and not (layout.reads and layout.gage_length):
             return (_OfDirections if layout.reads else _OfCap)(plate, layout, edge, out)
         return _OfFunctions(plate, layout, edge, _FINE, out)
     if type(plate.patch) is not Patch or plate.patch.strip or not _is_stiff(plate):
@@ -397,7 +397,8 @@ class _OfCap:
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str, out: Array) -> None:
         self._cap = cap = cast("Cap", plate.patch)
         self.unit = 8 * math.pi * plate.rigidity
-        self._table, self._steps, self._gives = _on_cap(plate, edge, layout.positions.tobytes())
+        places, length = layout.positions.tobytes(), layout.gage_length
+        self._table, self._steps, self._gives = _on_cap(plate, edge, places, length)
         self._positions, self._out = layout.positions, out
         inverse = np.linalg.inv(cap.base(*layout.positions.T).covariant[:, 1:3, 1:3])
         self._tangents = np.swapaxes(inverse, 1, 2)  # from steps along x and y
@@ -471,7 +472,9 @@ _SIZES = 0.2  # of the box: the largest radius of a load
 
 
 @lru_cache(2)
-def _on_cap(plate: Plate, edge: str, places: bytes) -> tuple[Single, tuple[float, ...], Array]:
+def _on_cap(
+    plate: Plate, edge: str, places: bytes, gage_length: float
+) -> tuple[Single, tuple[float, ...], Array]:
     """Readings (T, Q, S, C) in 1/m per N under discs, the steps, and displacements in m per N.
 
     By azimuth from -1 step, radius of the disc from -3/2 steps, and distance from the pole from -1
@@ -479,7 +482,7 @@ def _on_cap(plate: Plate, edge: str, places: bytes) -> tuple[Single, tuple[float
     from the pole to the rim.
     """
     cap = cast("Cap", plate.patch)
-    k, along, rows, gives = _waves_on_cap(plate, edge, places)
+    k, along, rows, gives = _waves_on_cap(plate, edge, places, gage_length)
     step, (_, M, _, C) = cap.a / _ON_CAP, rows.shape
     radii = np.abs(np.arange(math.ceil(_SIZES * _ON_CAP) + 4) - 1.5) * step
     turns = math.ceil(np.pi * _rim_share(cap) * _ON_CAP)
@@ -501,13 +504,16 @@ def _rim_share(cap: Cap) -> float:
     return float(cap.meridian(np.array(cap.rim_radius)).radius) / cap.rim_radius
 
 
-def _waves_on_cap(plate: Plate, edge: str, places: bytes) -> tuple[Array, Array, Single, Array]:
+def _waves_on_cap(
+    plate: Plate, edge: str, places: bytes, gage_length: float
+) -> tuple[Array, Array, Single, Array]:
     """Wave numbers (M, n), waves along the meridian (S, M, n), their readings, and displacements.
 
     The readings (2, M, n, C) are of waves that go as a cosine around and as a sine.
     """
     cap = cast("Cap", plate.patch)
     layout = SensorLayout.scattered(cap, np.frombuffer(places).reshape(-1, 2))
+    layout = replace(layout, gage_length=gage_length)
     Nj = 2 * math.ceil(_WAVES * np.pi * _rim_share(cap)) + 1  # as fine around as along
     basis = cast("CapBasis", basis_for(cap, edge, _WAVES, Nj))
     compliance, waves = plate.compliance_by_wave(basis), CapWaves(basis)
