@@ -650,12 +650,13 @@ class SensorLayout:
             raise Refusal(f"the layout is on {self.patch}, the basis on {basis.patch}; use one")
         curvature = plate.curvature(basis) if plate else partial(curvature_at, basis)
         if self.reads:
-            M = self._read_by(self.reads, basis, plate, curvature)
-            return M if self.scale is None else self.scale[:, None] * M
-        if not self.gage_length:
-            return curvature(self.positions).reshape(self.channels, basis.size)
-        along = partial(_along, basis, self.positions, self.gage_length, curvature)
-        return np.concatenate([along(_X), along(_Y), _twist(along)])
+            rows = self._read_by(self.reads, basis, plate, curvature)
+        elif not self.gage_length:
+            rows = curvature(self.positions).reshape(self.channels, basis.size)
+        else:
+            along = partial(_along, basis, self.positions, self.gage_length, curvature)
+            rows = np.concatenate([along(_X), along(_Y), _twist(along)])
+        return rows if self.scale is None else self.scale[:, None] * rows
 
     def _read_by(
         self, reads: Readings, basis: Basis, plate: Plate | None, curvature: ValuesAt
