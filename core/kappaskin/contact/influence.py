@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from kappaskin.bases import Basis, CapBasis, ProductBasis, SineBasis, basis_for
 from kappaskin.frames import Array
 from kappaskin.mechanics import CapWaves, Compliance, Plate, Shell, cap_shell
-from kappaskin.sensing import Readings, SensorLayout
+from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Cap, Patch
 
 Single = NDArray[np.float32]
@@ -56,17 +56,15 @@ def influence_of(
     On strips, disks, polygons and drum heads it is that of a basis of so many `functions` each way;
     that of heights and slopes, which are bounded under a load, is one of more.
     """
-    if isinstance(plate.patch, Cap):
-        if layout.senses_curvature_only and not (layout.reads and layout.gage_length):
-            return (_OfDirections if layout.reads else _OfCap)(plate, layout, edge, out)
-        return _OfFunctions(plate, layout, edge, _FINE, out)
-    if type(plate.patch) is not Patch or plate.patch.strip or not _is_stiff(plate):
+    is_cap = isinstance(plate.patch, Cap)
+    is_rectangle = type(plate.patch) is Patch and not plate.patch.strip
+    if not is_cap and not (is_rectangle and _is_stiff(plate)):
         return _OfFunctions(plate, layout, edge, functions, out)
-    if layout.reads and layout.senses_curvature_only and not layout.gage_length:
-        return _OfDirections(plate, layout, edge, out)
-    if layout.reads:
+    if not layout.senses_curvature_only or (layout.reads and layout.gage_length):
         return _OfFunctions(plate, layout, edge, _FINE, out)
-    return _OfPlate(plate, layout, edge, out)
+    if layout.reads or layout.scale is not None:
+        return _OfDirections(plate, layout, edge, out)
+    return (_OfCap if is_cap else _OfPlate)(plate, layout, edge, out)
 
 
 @lru_cache(1)  # the same array for all, which is read in half the time
@@ -356,7 +354,10 @@ class _OfPlate:
 
 
 class _OfDirections:
-    """That of curvatures along any direction, from xx, yy and xy: c^2 xx + 2 c s xy + s^2 yy."""
+    """That of curvatures along any direction, from xx, yy and xy: c^2 xx + 2 c s xy + s^2 yy.
+
+    Times the `scale` of the readings.
+    """
 
     sized = True
 
@@ -366,11 +367,15 @@ class _OfDirections:
         self._of = of_skin(plate, layout.of_curvature, edge, self._rows)
         self.unit = self._of.unit
         self.nodes: tuple[Array, Single] | None = None
-        reads, P = cast("Readings", layout.reads), len(layout)
-        c, s = reads.along.T
-        twist = reads.quantity == "twist"
-        self._parts = np.where(twist, 0.0, [c * c, s * s, 2 * c * s])
-        self._parts[2, twist] = 1.0
+        reads, P = layout.reads, len(layout)
+        self._parts = np.repeat(np.eye(3), P, axis=1)
+        if reads is not None:
+            c, s = reads.along.T
+            twist = reads.quantity == "twist"
+            self._parts = np.where(twist, 0.0, [c * c, s * s, 2 * c * s])
+            self._parts[2, twist] = 1.0
+        if layout.scale is not None:
+            self._parts *= layout.scale
         self._channels = layout.element + P * np.arange(3)[:, None]
         if self._of.nodes is not None:
             places, read = self._of.nodes

@@ -650,9 +650,10 @@ class SensorLayout:
             raise Refusal(f"the layout is on {self.patch}, the basis on {basis.patch}; use one")
         curvature = plate.curvature(basis) if plate else partial(curvature_at, basis)
         if self.reads:
-            M = self._read_by(self.reads, basis, plate, curvature)
-            return M if self.scale is None else self.scale[:, None] * M
-        return self.mean_curvature(basis, curvature)
+            rows = self._read_by(self.reads, basis, plate, curvature)
+        else:
+            rows = self.mean_curvature(basis, curvature)
+        return rows if self.scale is None else self.scale[:, None] * rows
 
     def mean_curvature(self, basis: Basis, curvature: ValuesAt) -> Array:
         """Means over the gages (3 P, N) of the `curvature` (3, P, N) at positions (P, 2)."""
