@@ -145,13 +145,6 @@ class CapShell:
 
         return by_function(even * cos, even * sin), by_function(odd * sin, -odd * cos)
 
-    def tangential_at(self, positions: Array) -> Array:
-        """Tangential displacement (2, P, N) along the frame, per m of each function."""
-        _, angle, U, V = self._waves(positions)
-        u, v = self._summed(U[0], V[0], angle)
-        c, z = np.cos(angle)[:, None], np.sin(angle)[:, None]
-        return np.stack([c * u - z * v, z * u + c * v])
-
     def curvature_at(self, positions: Array) -> Array:
         """Curvature xx, yy, xy (3, P, N) in 1/m per m of each function at `positions` (P, 2)."""
         found, cap, m = curvature_at(self._basis, positions), self._basis.cap, self._m[:, None]

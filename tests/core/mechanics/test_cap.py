@@ -98,7 +98,10 @@ def test_readings_of_a_spheroid_are_half_of_what_strains_back_to_back_differ_by(
 
     def moved(p, share):
         rest, normals = cap.at_rest(p)
-        u = shell.tangential_at(p) @ c
+        _, angle, U, V = shell._waves(p)  # noqa: SLF001
+        u, v = (of @ c for of in shell._summed(U[0], V[0], angle))  # noqa: SLF001
+        turned = (u + 1j * v) * np.exp(1j * angle)  # from along the meridian to the frame
+        u = np.stack([turned.real, turned.imag])
         along = np.einsum("kp,pki->pi", u, cap.base(*p.T).frame)
         return rest + share * (along - normals * (basis.at(p) @ c)[:, None])
 
