@@ -164,16 +164,6 @@ class CapShell:
         turn = np.multiply.outer(angle, self._m)[..., None]
         return np.cos(turn), np.sin(turn)
 
-    def tangential_at(self, positions: Array) -> Array:
-        """Tangential displacement (2, P, N) along the frame, per m of each function."""
-        s, angle = self._polar(positions)
-        (U, _), (V, _) = self._tangential_waves(s)
-        cos, sin = self._turned(angle)
-        u = self._by_function(U * cos, U * sin)
-        v = self._by_function(V * sin, -V * cos)
-        c, z = np.cos(angle)[:, None], np.sin(angle)[:, None]
-        return np.stack([c * u - z * v, z * u + c * v])
-
     def curvature_by_wave(self, positions: Array) -> Array:
         """Curvature xx, yy, xy (2, 3, P, M, Ni) in 1/m per m of each wave, at `positions` (P, 2).
 
