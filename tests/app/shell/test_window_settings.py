@@ -200,6 +200,7 @@ def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
     lengths = {length for shape in SHAPES.values() for length in shape.lengths}
     hidden = {*lengths, *(f"design_{length}" for length in lengths), "size", "size_y"}
     hidden -= {"design_side_x", "design_side_y"}
+    hidden |= {"design_pattern", "design_count", "design_rings"}  # of round skins
     hidden |= {"design_height_noise", "design_slope_noise"} | {"added_noise"}  # of a device
     hidden -= set(SHAPES[shape].lengths)
     assert asked - obeyed == hidden

@@ -24,7 +24,7 @@ from kappaskin.estimation import (
 )
 from kappaskin.frames import Array, Contact, Mask, Truth
 from kappaskin.mechanics import DiscLoad, Plate, PointLoad
-from kappaskin.scenes import Indenter, Scene, Simulator, kept_effects
+from kappaskin.scenes import Indenter, Scene, Simulator, kept_effects, planned
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Cap, Patch
 from kappaskin.studies.accuracy import covered, points_on, rms_distance, root_mean_square, seconds
@@ -314,7 +314,7 @@ All but `time` are the same wherever they are computed.
 
 _SPACING = 0.4  # of the mean distance between elements: places that are tried
 _SIDE, _PRESSED_SIDE = 41, 25  # points along each side of the maps, and of those of presses
-_BLOCK, _MOST = 250, 5_000  # frames at a time, and in all
+_BLOCK, _MOST, _MOST_PRESSES = 250, 5_000, 2_000  # frames at a time, and in all
 _NEAR_RIM = 1 / 15  # of the shorter side: nearer to the rim, no force is reported
 _AREA_STEPS = 513
 _NEAR_POLE = 1e-6  # of the box
@@ -413,7 +413,7 @@ class Prospect:
     the force as a share, the root of the mean square error under the scene's load at each place.
     `x` (nx,) and `y` (ny,) are in m, `shares` (ny, nx) how much of the skin each point stands for,
     `positions` (P, 2) where the elements are, `rate` in 1/s what the conversions allow; infinite
-    where readings come all at once.
+    where readings come all at once. `of` is one of `PREDICTIONS`, of a contact's under its `load`.
     """
 
     x: Array
@@ -422,6 +422,8 @@ class Prospect:
     shares: Array
     positions: Array
     rate: float
+    of: str = PREDICTIONS[0]
+    load: PressedLoad | None = None
 
     @property
     def rms(self) -> float:
@@ -462,6 +464,11 @@ class Check:
         """The square root of the mean variance over the skin, as its prospect's `rms`."""
         return _over_skin(self.sd, self.shares)
 
+    def over(self, predicted: Prospect) -> float:
+        """`rms_sd` over that which is predicted of the same points."""
+        known = np.where(np.isfinite(self.sd), predicted.sd, np.nan)
+        return self.rms_sd / _over_skin(known, self.shares)
+
 
 def _over_skin(sd: Array, shares: Array) -> float:
     """The root of the mean square over the skin of errors (ny, nx), where they are known."""
@@ -488,13 +495,13 @@ def prospect(design: Design, of: str = "displacement") -> Prospect:
     if of == "displacement":
         sd = predicted_sd(estimator, noise_of(scene), seen.points)
     else:
-        load = pressed_load(scene)
-        loads = [replace(load, x=x, y=y) for x, y in seen.points.tolist()]
+        loads = [replace(pressed_load(scene), x=x, y=y) for x, y in seen.points.tolist()]
         each = np.array([_contact_covariance(scene, layout, load).diagonal() for load in loads])
         sd = np.sqrt(each[:, 1:].sum(axis=1) if of == "contact" else each[:, 0])
     scan_time = scene.transduction.scan_time(layout.channels)
     rate = 1 / scan_time if scan_time else math.inf
-    return Prospect(seen.x, seen.y, seen.filled(sd), seen.shares, layout.positions, rate)
+    load = None if of == "displacement" else pressed_load(scene)
+    return Prospect(seen.x, seen.y, seen.filled(sd), seen.shares, layout.positions, rate, of, load)
 
 
 def check(design: Design, frames: int = _MOST, of: str = "displacement") -> Generator[Check]:
@@ -502,18 +509,19 @@ def check(design: Design, frames: int = _MOST, of: str = "displacement") -> Gene
 
     The readings are made as all simulations make them, with every effect of the scene. Of
     displacements these are frames under the scene's load; of contacts and forces it presses at one
-    point of the map after the other, and what presses is found as in every frame of a sensor.
+    point of the map after the other, and what presses is found as in every frame of a sensor. Those
+    that are reported as perhaps on the rim, whose force is not determined, are left out.
     """
     seen = _map_of(design.scene, of)
     if of == "displacement":
         yield from _check_displacement(design, seen, frames)
     else:
-        yield from _check_contacts(design, of, seen, frames)
+        yield from _check_contacts(design, of, seen, min(frames, _MOST_PRESSES))
 
 
 def _check_contacts(design: Design, of: str, seen: _Map, frames: int) -> Generator[Check]:
     estimator, load = design.estimator(), pressed_load(design.scene)
-    scene = replace(design.scene, layout=estimator.layout, seed=0)
+    scene = planned(replace(design.scene, layout=estimator.layout, seed=0))  # not at every press
     simulator, scan, places = Simulator(scene), scene.sensor().scan(), seen.points
     find = _contact_finder(estimator, scene.plate, scene.edge)
     squares, counts, count = np.zeros(len(places)), np.zeros(len(places)), 0
@@ -529,7 +537,7 @@ def _check_contacts(design: Design, of: str, seen: _Map, frames: int) -> Generat
             if of == "contact":
                 error = _distance(scene.plate.patch, contact.position[None], places[[n]])[0]
             count += 1
-            if contact.present:
+            if contact.present and not contact.near_rim:
                 counts[n] += 1
                 squares[n] += error**2
         known = np.where(counts, squares / np.maximum(counts, 1), np.nan)
