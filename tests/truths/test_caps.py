@@ -48,7 +48,12 @@ def known(name):
     return ours, lambda load: np.vstack([moved(load)[None], along_x(read(load), azimuth)])
 
 
-@pytest.mark.cases("fingertip, clamped", "long")
+@pytest.mark.cases(
+    "0.001-pole-fingertip, clamped",
+    "0.001-middle-long",
+    "0.002-middle-fingertip, clamped",
+    "0.002-near the rim-long",
+)
 @each_cap
 @each_place
 @pytest.mark.parametrize("radius", [1e-3, 2e-3])

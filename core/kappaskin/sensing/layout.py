@@ -652,12 +652,16 @@ class SensorLayout:
         curvature = plate.curvature(basis) if plate else partial(curvature_at, basis)
         if self.reads:
             rows = self._read_by(self.reads, basis, plate, curvature)
-        elif not self.gage_length:
-            rows = curvature(self.positions).reshape(self.channels, basis.size)
         else:
-            along = partial(_along, basis, self.positions, self.gage_length, curvature)
-            rows = np.concatenate([along(_X), along(_Y), _twist(along)])
+            rows = self.mean_curvature(basis, curvature)
         return rows if self.scale is None else self.scale[:, None] * rows
+
+    def mean_curvature(self, basis: Basis, curvature: ValuesAt) -> Array:
+        """Means over the gages (3 P, N) of the `curvature` (3, P, N) at positions (P, 2)."""
+        if not self.gage_length:
+            return np.concatenate(curvature(self.positions))
+        along = partial(_along, basis, self.positions, self.gage_length, curvature)
+        return np.concatenate([along(_X), along(_Y), _twist(along)])
 
     def _read_by(
         self, reads: Readings, basis: Basis, plate: Plate | None, curvature: ValuesAt
