@@ -278,10 +278,11 @@ class SensorLayout:
             raise Refusal(f"expected {self.shape[0]} x {self.shape[1]} elements, got {len(P)}")
         outside = np.flatnonzero(~self.patch.contains(P))  # NaN counts as outside
         if outside.size:
-            p, (x, y) = int(outside[0]), P[outside[0]]
+            p, (x, y), patch = int(outside[0]), P[outside[0]], self.patch
             raise Refusal(
-                f"{outside.size} of {len(P)} elements lie outside the {self.patch.name}: element "
-                f"{p} is at ({x:g}, {y:g}) m; positions are in metres from the corner x = y = 0"
+                f"{outside.size} of {len(P)} elements lie outside the {patch.name}: element {p} is "
+                f"at ({x:g}, {y:g}) m; positions are in metres from the corner x = y = 0, the "
+                f"middle of the skin is at ({patch.a / 2:g}, {patch.b / 2:g})"
             )
         if isinstance(self.patch, Cap):
             self._check_on_cap()

@@ -238,10 +238,11 @@ class Patch:
             )
 
     def _check_shallow(self, radii: tuple[float, float]) -> None:
-        if self.strip or any(math.isnan(R) or not R for R in radii):
+        least = SIDES[0]
+        if self.strip or not all(abs(R) >= least for R in radii):  # NaN too
             raise Refusal(
-                "expected two radii other than zero in m, or infinity, of a skin that is no strip; "
-                f"got {list(radii)}, strip {self.strip}"
+                f"expected two radii of at least {least:g} m, either sign, or infinity, of a skin "
+                f"that is no strip; got {list(radii)}, strip {self.strip}"
             )
         if self.steepness > _STEEPEST:
             least = min(map(abs, radii)) * math.sqrt(self.steepness / _STEEPEST)
@@ -436,6 +437,7 @@ class Meridian:
 
 _STRETCHES = (0.2, 5.0)
 _LEVEL = 0.2  # of what the pole moves by across itself, along the axis, the rim does
+_HALF = 1e-4  # of pi/2: an angle so near makes a hemisphere, as 1.5708 rad does
 _NEAR_POLE = 1e-7  # of the arc to the rim: so far from the pole azimuths have a value
 
 
@@ -462,10 +464,10 @@ class Cap(Disk):
                 f"expected a cap with a radius above zero in metres and a stretch from {least:g} "
                 f"to {most:g}, got {radius} and {stretch}"
             )
-        if not 0 < angle <= math.pi / 2 * (1 + _ROUNDING):
+        if not 0 < angle <= math.pi / 2 * (1 + _HALF):
             raise Refusal(
                 "expected a cap whose rim is turned by an angle above zero, at most pi/2 (a "
-                f"hemisphere), got {angle} rad"
+                f"hemisphere), got {angle} rad; multiply degrees by pi/180"
             )
         for name, value in (("angle", min(angle, math.pi / 2)), ("stretch", stretch)):
             object.__setattr__(self, name, value)
@@ -501,7 +503,7 @@ class Cap(Disk):
 
     @property
     def is_hemisphere(self) -> bool:
-        return math.isclose(self.angle, math.pi / 2)
+        return math.isclose(self.angle, math.pi / 2, rel_tol=_HALF)
 
     def _angle(self, distance: Number) -> Number:
         """The `angle` of the `meridian` at a `distance` in m from the pole."""
