@@ -9,6 +9,7 @@ import pytest
 
 from studies import (
     BENT,
+    CAP_SHAPES,
     CAPS,
     FLAT,
     GRIDS,
@@ -25,6 +26,7 @@ from studies import (
     read_as_flat,
     robustness,
     shape_coverage,
+    shapes_on_cap,
     told,
 )
 
@@ -172,6 +174,22 @@ def test_bands_of_the_surface_cover_nine_tenths_of_it(case, method, functions, f
 
     assert 0.90 <= covered <= 0.98
     assert rms < 30e-6
+
+
+# A cap stretches, by a thickness that the prior does not know
+
+
+@pytest.mark.cases("fingertip of 1 mm")
+@each([case for case in CAP_SHAPES if "disc" in case.name])
+@pytest.mark.parametrize("frames", [60, pytest.param(FEW, marks=pytest.mark.full)])
+def test_bands_of_the_surface_of_a_cap_cover_it_and_are_no_worse_than_of_least_squares(
+    case, frames
+):
+    (_, least), *others = shapes_on_cap(case, frames).values()
+
+    for covered, rms in others:
+        assert 0.92 - slack(frames) <= covered <= 0.98 + slack(frames)
+        assert rms <= least
 
 
 # Bad elements, up to a quarter of them, off by 20 to 40 noises

@@ -242,7 +242,8 @@ def _device(text: str) -> str:
     from kappaskin.sources import sensor_from_json
 
     sensor = sensor_from_json(text)
-    return f"{sensor.name} {sensor.serial_number}, {sensor.layout}, firmware {sensor.firmware}"
+    skin = f"{sensor.layout} on a {sensor.edge} {sensor.layout.patch.name}"
+    return f"{sensor.name} {sensor.serial_number}, {skin}, firmware {sensor.firmware}"
 
 
 def verify(file: Path, *, limit: Limit = "") -> int:

@@ -202,3 +202,23 @@ def test_the_interval_of_the_radius_holds_the_true_one(radius):
         held += low <= radius <= high
 
     assert 0.90 <= held / frames <= 0.99
+
+
+@pytest.mark.parametrize("names", [("xx", "yy", "xy"), ("twist", "yy", "curvature@30")])
+@pytest.mark.parametrize("gage_length", [0.0, 4e-3])
+def test_readings_of_unlike_noise_give_the_force_of_the_load(names, gage_length):
+    layout = replace(SensorLayout.regular(SQUARE, 8, 8), gage_length=gage_length)
+    layout = layout.reading_each(names)
+    load, truth = Load(0.045, 0.055, 0.05, 2e-3), HingedPlate(modes=240)
+    xx, yy, xy = truth.readings(load, layout.positions, gage_length)
+    c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
+    by_name = {"xx": xx, "yy": yy, "xy": xy, "twist": xy}
+    by_name["curvature@30"] = c**2 * xx + 2 * c * s * xy + s**2 * yy
+    K = np.concatenate([by_name[name] for name in names]).reshape(layout.frame_shape)
+    sigma = np.repeat([0.1, 0.1, 0.5], len(layout)).reshape(K.shape)
+
+    fit = LeastSquares(SineBasis(SQUARE, 8, 8), layout, sigma)(K)
+    contact = PointContact(Plate(SQUARE), layout, sigma=sigma)(K, fit)
+
+    assert contact.force == pytest.approx(load.force, rel=0.01)
+    assert contact.position == pytest.approx([load.x, load.y], abs=5e-5)

@@ -305,3 +305,9 @@ def test_a_round_load_over_the_rim_of_a_cap_is_refused():
 
     with pytest.raises(Refusal, match="expected a load completely on the skin"):
         DiscLoad(0.001, 0.0126, 2e-3).modal(basis)
+
+
+@pytest.mark.parametrize("x", [0.03, 0.219])  # at 0.219 m the angle from the pole is a full turn
+def test_a_disc_beyond_the_rim_of_a_cap_is_refused(x):
+    with pytest.raises(Refusal, match="expected a load on the cap"):
+        DiscLoad(x, 0.0121, 2.5e-3).check(Cap(8e-3, 1.309))

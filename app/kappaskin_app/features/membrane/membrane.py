@@ -293,8 +293,9 @@ class MembraneView(QWidget):
         """Whether the picture target for last has been drawn."""
         return self._drawn
 
-    def show_loads(self, loads: Sequence[Load]) -> None:
-        """Draw the simulated loads; none while the connection is lost."""
+    def show_loads(self, loads: Sequence[Load], lifted: bool = False) -> None:
+        """Draw the simulated loads, which may all be `lifted`; none without a connection."""
+        self.drag.lifted = lifted and not self.surface.lost
         loads = [load for load in loads if load.force and not self.surface.lost]
         self.drag.handles = self._loads.show(loads, self.skin, self.lift, self._shown["load"])
 

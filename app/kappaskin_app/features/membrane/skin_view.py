@@ -196,4 +196,5 @@ class SkinView(QObject):
         session = self._session
         at = session.status.playing.time(estimate.device_time)
         touches = loads_at(session.scene, at) if session.inside else ()
-        self.membrane.show_loads([touch.load for touch in touches])
+        lifted = session.inside and not touches and bool(session.scene.stimuli)
+        self.membrane.show_loads([touch.load for touch in touches], lifted)

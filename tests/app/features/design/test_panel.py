@@ -61,9 +61,7 @@ def test_a_design_that_reads_heights_and_slopes_is_a_scene_that_opens(name: str)
 
 
 def test_a_cap_that_reads_slopes_is_refused() -> None:
-    with pytest.raises(
-        Refusal, match="heights, curvature and twist at a point of each element of a cap"
-    ):
+    with pytest.raises(Refusal, match="heights, curvature or twist of each element of a cap"):
         scene_of(replace(shaped("cap"), design_reads=("height", "slope@0")))
 
 
