@@ -97,7 +97,6 @@ class Truth:
 
 
 @pytest.mark.cases("heights")
-@pytest.mark.full
 @pytest.mark.slow
 @every_kind
 def test_intervals_of_a_contact_hold_the_truth_as_often_as_they_say(kind):

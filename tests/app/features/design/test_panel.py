@@ -33,6 +33,7 @@ def shaped(name: str) -> Settings:
     return replace(settings, **with_consequences(settings, None, "design_shape", name))
 
 
+@pytest.mark.cases("cap", "cylinder", "disk", "dome", "flat", "strip")
 @pytest.mark.parametrize("name", SHAPES)
 def test_every_outline_is_designed_with_its_usual_lengths(name: str):
     told = prospect(design_of(shaped(name)))
