@@ -281,7 +281,7 @@ def _is_stiff(plate: Plate) -> bool:
     return max(plate.tension * near**2, plate.foundation * near**4) < D
 
 
-_CUBICS = np.linalg.inv(np.vander(np.arange(4.0), increasing=True).T).T
+CUBICS = np.linalg.inv(np.vander(np.arange(4.0), increasing=True).T).T
 """Lagrange's cubics through four even nodes, by the powers of the place."""
 _BESIDE = 2.5  # of a load's squared radius: an element as far off does not lie under it
 
@@ -336,7 +336,7 @@ class _OfPlate:
             (1.0, v, vv, v * vv),
             (0.0, 1 / hy, 2 * v / hy, 3 * vv / hy),
         )
-        cubics = np.dot(powers, _CUBICS, self._cubics)
+        cubics = np.dot(powers, CUBICS, self._cubics)
         # Value and slopes along x and y; the fourth, which is mixed, gives way to that by size.
         pairs = (cubics[2:, None, :, None] * cubics[None, :2, None]).reshape(4, 16)
         weights[:, 0] = pairs
@@ -351,7 +351,7 @@ class _OfPlate:
 
     def gives(self, x: float, y: float) -> float:
         i, j, u, v = self._among_nodes(x, y)
-        of_x, of_y = np.dot(((1.0, u, u * u, u * u * u), (1.0, v, v * v, v * v * v)), _CUBICS)
+        of_x, of_y = np.dot(((1.0, u, u * u, u * u * u), (1.0, v, v * v, v * v * v)), CUBICS)
         return float(of_y.dot(self._gives[j : j + 4, i : i + 4]).dot(of_x))
 
 
@@ -398,7 +398,7 @@ class _OfCap:
         self._cap = cap = cast("Cap", plate.patch)
         self.unit = 8 * math.pi * plate.rigidity
         places, length = layout.positions.tobytes(), layout.gage_length
-        self._table, self._steps, self._gives = _on_cap(plate, edge, places, length)
+        self._table, self._steps, self._gives = cap_table(plate, edge, places, length)
         self._positions, self._out = layout.positions, out
         inverse = np.linalg.inv(cap.base(*layout.positions.T).covariant[:, 1:3, 1:3])
         self._tangents = np.swapaxes(inverse, 1, 2)  # from steps along x and y
@@ -442,7 +442,7 @@ class _OfCap:
         )
         first = [min(int(at) - 1, most) for at, most in zip(places, self._last, strict=True)]
         (turn, turn_t), (size, size_r), (along, along_s) = (
-            np.dot(((1.0, u, u * u, u * u * u), (0.0, 1 / h, 2 * u / h, 3 * u * u / h)), _CUBICS)
+            np.dot(((1.0, u, u * u, u * u * u), (0.0, 1 / h, 2 * u / h, 3 * u * u / h)), CUBICS)
             for u, h in ((at - i, h) for at, i, h in zip(places, first, step, strict=True))
         )
         W, cos, sin = self._weights, dx / d, dy / d
@@ -472,7 +472,7 @@ _SIZES = 0.2  # of the box: the largest radius of a load
 
 
 @lru_cache(2)
-def _on_cap(
+def cap_table(
     plate: Plate, edge: str, places: bytes, gage_length: float
 ) -> tuple[Single, tuple[float, ...], Array]:
     """Readings (T, Q, S, C) in 1/m per N under discs, the steps, and displacements in m per N.
@@ -482,7 +482,7 @@ def _on_cap(
     from the pole to the rim.
     """
     cap = cast("Cap", plate.patch)
-    k, along, rows, gives = _waves_on_cap(plate, edge, places, gage_length)
+    k, along, rows, gives = _wavescap_table(plate, edge, places, gage_length)
     step, (_, M, _, C) = cap.a / _ON_CAP, rows.shape
     radii = np.abs(np.arange(math.ceil(_SIZES * _ON_CAP) + 4) - 1.5) * step
     turns = math.ceil(np.pi * _rim_share(cap) * _ON_CAP)
@@ -499,12 +499,17 @@ def _on_cap(
     return table, (2 * np.pi / turns, step, step), gives
 
 
+def cap_half_wave(cap: Cap) -> float:
+    """Half of the shortest wave in m that the table follows."""
+    return cap.rim_radius / _WAVES
+
+
 def _rim_share(cap: Cap) -> float:
     """Radius of the rim in space over the arc to it."""
     return float(cap.meridian(np.array(cap.rim_radius)).radius) / cap.rim_radius
 
 
-def _waves_on_cap(
+def _wavescap_table(
     plate: Plate, edge: str, places: bytes, gage_length: float
 ) -> tuple[Array, Array, Single, Array]:
     """Wave numbers (M, n), waves along the meridian (S, M, n), their readings, and displacements.
