@@ -279,7 +279,7 @@ def _is_stiff(plate: Plate) -> bool:
     return max(plate.tension * near**2, plate.foundation * near**4) < D
 
 
-_CUBICS = np.linalg.inv(np.vander(np.arange(4.0), increasing=True).T).T
+CUBICS = np.linalg.inv(np.vander(np.arange(4.0), increasing=True).T).T
 """Lagrange's cubics through four even nodes, by the powers of the place."""
 _BESIDE = 2.5  # of a load's squared radius: an element as far off does not lie under it
 
@@ -334,7 +334,7 @@ class _OfPlate:
             (1.0, v, vv, v * vv),
             (0.0, 1 / hy, 2 * v / hy, 3 * vv / hy),
         )
-        cubics = np.dot(powers, _CUBICS, self._cubics)
+        cubics = np.dot(powers, CUBICS, self._cubics)
         # Value and slopes along x and y; the fourth, which is mixed, gives way to that by size.
         pairs = (cubics[2:, None, :, None] * cubics[None, :2, None]).reshape(4, 16)
         weights[:, 0] = pairs
@@ -349,7 +349,7 @@ class _OfPlate:
 
     def gives(self, x: float, y: float) -> float:
         i, j, u, v = self._among_nodes(x, y)
-        of_x, of_y = np.dot(((1.0, u, u * u, u * u * u), (1.0, v, v * v, v * v * v)), _CUBICS)
+        of_x, of_y = np.dot(((1.0, u, u * u, u * u * u), (1.0, v, v * v, v * v * v)), CUBICS)
         return float(of_y.dot(self._gives[j : j + 4, i : i + 4]).dot(of_x))
 
 
@@ -403,7 +403,7 @@ class _OfCap:
         self._cap = cap = cast("Cap", plate.patch)
         self.unit = 8 * math.pi * plate.rigidity
         places, length = layout.positions.tobytes(), layout.gage_length
-        self._table, self._steps, self._gives = _on_cap(plate, edge, places, length)
+        self._table, self._steps, self._gives = cap_table(plate, edge, places, length)
         self._positions, self._out = layout.positions, out
         inverse = np.linalg.inv(cap.base(*layout.positions.T).covariant[:, 1:3, 1:3])
         self._tangents = np.swapaxes(inverse, 1, 2)  # from steps along x and y
@@ -447,7 +447,7 @@ class _OfCap:
         )
         first = [min(int(at) - 1, most) for at, most in zip(places, self._last, strict=True)]
         (along, along_s), (turn, turn_t), (size, size_r) = (
-            np.dot(((1.0, u, u * u, u * u * u), (0.0, 1 / h, 2 * u / h, 3 * u * u / h)), _CUBICS)
+            np.dot(((1.0, u, u * u, u * u * u), (0.0, 1 / h, 2 * u / h, 3 * u * u / h)), CUBICS)
             for u, h in ((at - i, h) for at, i, h in zip(places, first, step, strict=True))
         )
         W, cos, sin = self._weights, dx / d, dy / d
@@ -478,7 +478,7 @@ _TINY = 1e-15  # of the largest of a sum's terms
 
 
 @lru_cache(2)
-def _on_cap(
+def cap_table(
     plate: Plate, edge: str, places: bytes, gage_length: float
 ) -> tuple[Single, tuple[float, ...], Array]:
     """Readings (S, T, Q, C) in 1/m per N under discs, the steps, and displacements in m per N.
@@ -503,6 +503,11 @@ def _on_cap(
         by_m: Single = (share * shape[:, None]).astype(np.float32) @ rows
         np.matmul(around, by_m.reshape(2 * M, -1), out=ring)
     return table, (step, 2 * np.pi / turns, step), gives
+
+
+def cap_half_wave(cap: Cap) -> float:
+    """Half of the shortest wave in m that the table follows."""
+    return cap.rim_radius / _WAVES
 
 
 def _rim_share(cap: Cap) -> float:
