@@ -280,6 +280,7 @@ def test_a_rectangle_with_a_side_of_no_length_is_refused(sides):
         RectangleLoad(0.05, 0.02, *sides)
 
 
+@pytest.mark.cases("6-disc", "7-Gaussian")
 @pytest.mark.parametrize("kind", [(DiscLoad, 2e-3), (GaussianLoad, 5e-4)], ids=["disc", "Gaussian"])
 @pytest.mark.parametrize("Nj", [6, 7])
 @given(st.floats(0, 1), st.floats(0, 7))

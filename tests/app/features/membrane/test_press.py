@@ -78,6 +78,7 @@ def test_the_left_button_on_the_skin_presses_there_and_drags(
     assert pressed.history.settings == settings
 
 
+@pytest.mark.cases("dome")
 @pytest.mark.parametrize(
     ("shape", "radius"),
     [("dome", 0.15), ("dome", -0.15), ("cap", 0.15)],
@@ -175,6 +176,7 @@ def test_a_load_of_a_timetable_rests_while_it_is_held_and_goes_on_after_escape(
     until(lambda: not np.allclose(drag.handles, [handle], atol=1e-4))
 
 
+@pytest.mark.cases("window")
 def test_escape_returns_the_load_that_is_held(pressed, qtbot, pixel_of) -> None:
     plotter, settings = pressed.membrane.plotter, pressed.history.settings
     qtbot.mousePress(plotter, LEFT, pos=pixel_of(pressed, (0.03, 0.06)))
@@ -188,6 +190,7 @@ def test_escape_returns_the_load_that_is_held(pressed, qtbot, pixel_of) -> None:
     assert pressed.presenter.on == presenting
 
 
+@pytest.mark.cases("window")
 def test_keys_move_and_press_the_load(pressed, qtbot, until) -> None:
     if not pressed.presenter.on:  # which gives the view the keys itself
         pressed.membrane.setFocus()
@@ -202,6 +205,7 @@ def test_keys_move_and_press_the_load(pressed, qtbot, until) -> None:
     assert pressed.history.stack.count() == count + 1
 
 
+@pytest.mark.cases("window")
 def test_off_the_skin_and_with_the_right_button_the_mouse_turns_the_view(
     pressed, qtbot, pixel_of
 ) -> None:
@@ -220,6 +224,7 @@ def test_off_the_skin_and_with_the_right_button_the_mouse_turns_the_view(
         assert (now.x, now.y, now.force) == (settings.x, settings.y, settings.force)
 
 
+@pytest.mark.cases("window")
 def test_the_cursor_shows_what_the_left_button_does(pressed, until, pixel_of) -> None:
     plotter, none = pressed.membrane.plotter, Qt.MouseButton.NoButton
     tip = pixel_of(pressed, (0.05, 0.05))

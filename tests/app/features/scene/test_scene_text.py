@@ -31,6 +31,9 @@ def read(text: str, name: str):
     return read_scene(text, scene_file(name))
 
 
+@pytest.mark.cases(
+    "camera", "demo", "failing-elements", "fingertip", "long-gages", "saddle", "slipping", "sphere"
+)
 @pytest.mark.parametrize("name", SCENES)
 def test_an_effect_forced_on_or_off_is_and_the_rest_of_the_scene_stays(name) -> None:
     scene, text = load_scene(name), text_of(name)
