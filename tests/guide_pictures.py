@@ -49,7 +49,7 @@ def keep(made: Path, picture: Path) -> None:
     if picture.suffix == ".svg":
         shutil.copy(made, picture)
     else:
-        for colours in (192, 96, 64, 48):
+        for colours in (192, 128, 96, 76, 64):
             how = {"method": Image.Quantize.MAXCOVERAGE, "kmeans": 4, "dither": Image.Dither.NONE}
             small(made).quantize(colours, **how).save(picture, optimize=True)
             if picture.stat().st_size <= _LARGEST:
