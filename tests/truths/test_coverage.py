@@ -65,12 +65,14 @@ def test_intervals_on_a_flat_or_shallow_skin_cover_the_truth(case, frames):
     assert low <= found.force <= high
 
 
+@pytest.mark.cases("flat, point", "gages of 6 mm", "Gaussian of 2 mm")
 @each(FLAT)
 @frames
 def test_the_force_on_a_flat_skin_is_unbiased(case, frames):
     assert abs(figures(case, frames).bias) < 0.01
 
 
+@pytest.mark.cases("flat, point", "gages of 6 mm", "Gaussian of 2 mm")
 @each(FLAT)
 @frames
 def test_the_place_on_a_flat_skin_is_near_the_cramer_rao_bound(case, frames):
@@ -89,6 +91,7 @@ def test_the_force_on_a_bent_skin_is_right(case, frames):
     assert abs(figures(case, frames).bias) < 0.03
 
 
+@pytest.mark.cases("half round")
 @each(UNBOUND)
 @frames
 def test_intervals_on_a_bent_skin_cover_the_truth(case, frames):
@@ -144,6 +147,7 @@ def test_the_force_on_a_stretched_skin_is_right(case, frames):
     assert abs(figures(case, frames).bias) < 0.05
 
 
+@pytest.mark.cases("1.7 thicknesses")
 @each(EACH_STRETCHED)
 @frames
 def test_intervals_on_a_stretched_skin_cover_the_truth(case, frames):
@@ -158,6 +162,7 @@ def test_intervals_on_a_stretched_skin_cover_the_truth(case, frames):
 SLOW = ("robust", "tracking")
 
 
+@pytest.mark.cases("least-squares-8-flat, point", "bayes-15-flat, disc of 5 mm")
 @pytest.mark.parametrize("case", FLAT[:3], ids=lambda case: case.name)
 @pytest.mark.parametrize(
     ("method", "functions"),
@@ -194,7 +199,12 @@ by_grid = pytest.mark.parametrize("grid", GRIDS, ids=lambda grid: "{} elements, 
 draws = pytest.mark.parametrize("draws", [SOME, pytest.param(MORE, marks=pytest.mark.full)])
 
 
-@pytest.mark.cases("-0.1-", "-0.25-")  # the fewest bad elements, and the most
+@pytest.mark.cases(
+    "True-0.1-6 elements, 4",
+    "True-0.25-8 elements, 6",
+    "False-0.1-10 elements, 8",
+    "False-0.25-12 elements, 8",
+)
 @by_grid
 @pytest.mark.parametrize("share", SHARES)
 @pytest.mark.parametrize("equal", [True, False])
@@ -232,6 +242,7 @@ CLEAR = [
 ]
 
 
+@pytest.mark.cases("one point", "one disc")
 @each(SINGLE)
 @many
 def test_no_second_contact_is_invented_beside_a_single_one(case, frames):

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from kappaskin.bases import Basis, CapBasis, ProductBasis, SineBasis, basis_for
 from kappaskin.frames import Array
-from kappaskin.mechanics import CapWaves, Compliance, Plate, Shell
-from kappaskin.sensing import Readings, SensorLayout
+from kappaskin.mechanics import CapWaves, Compliance, Plate, Shell, cap_shell
+from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Cap, Patch
 
 Single = NDArray[np.float32]
@@ -56,17 +56,15 @@ def influence_of(
     On strips, disks, polygons and drum heads it is that of a basis of so many `functions` each way;
     that of heights and slopes, which are bounded under a load, is one of more.
     """
-    if isinstance(plate.patch, Cap):
-        if layout.senses_curvature_only:
-            return (_OfDirections if layout.reads else _OfCap)(plate, layout, edge, out)
-        return _OfFunctions(plate, layout, edge, _FINE, out)
-    if type(plate.patch) is not Patch or plate.patch.strip or not _is_stiff(plate):
+    is_cap = isinstance(plate.patch, Cap)
+    is_rectangle = type(plate.patch) is Patch and not plate.patch.strip
+    if not is_cap and not (is_rectangle and _is_stiff(plate)):
         return _OfFunctions(plate, layout, edge, functions, out)
-    if layout.reads and layout.senses_curvature_only and not layout.gage_length:
-        return _OfDirections(plate, layout, edge, out)
-    if layout.reads:
+    if not layout.senses_curvature_only or (layout.reads and layout.gage_length):
         return _OfFunctions(plate, layout, edge, _FINE, out)
-    return _OfPlate(plate, layout, edge, out)
+    if layout.reads or layout.scale is not None:
+        return _OfDirections(plate, layout, edge, out)
+    return (_OfCap if is_cap else _OfPlate)(plate, layout, edge, out)
 
 
 @lru_cache(1)  # the same array for all, which is read in half the time
@@ -356,7 +354,10 @@ class _OfPlate:
 
 
 class _OfDirections:
-    """That of curvatures along any direction, from xx, yy and xy: c^2 xx + 2 c s xy + s^2 yy."""
+    """That of curvatures along any direction, from xx, yy and xy: c^2 xx + 2 c s xy + s^2 yy.
+
+    Times the `scale` of the readings.
+    """
 
     sized = True
 
@@ -366,11 +367,15 @@ class _OfDirections:
         self._of = of_skin(plate, layout.of_curvature, edge, self._rows)
         self.unit = self._of.unit
         self.nodes: tuple[Array, Single] | None = None
-        reads, P = cast("Readings", layout.reads), len(layout)
-        c, s = reads.along.T
-        twist = reads.quantity == "twist"
-        self._parts = np.where(twist, 0.0, [c * c, s * s, 2 * c * s])
-        self._parts[2, twist] = 1.0
+        reads, P = layout.reads, len(layout)
+        self._parts = np.repeat(np.eye(3), P, axis=1)
+        if reads is not None:
+            c, s = reads.along.T
+            twist = reads.quantity == "twist"
+            self._parts = np.where(twist, 0.0, [c * c, s * s, 2 * c * s])
+            self._parts[2, twist] = 1.0
+        if layout.scale is not None:
+            self._parts *= layout.scale
         self._channels = layout.element + P * np.arange(3)[:, None]
         if self._of.nodes is not None:
             places, read = self._of.nodes
@@ -397,7 +402,8 @@ class _OfCap:
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str, out: Array) -> None:
         self._cap = cap = cast("Cap", plate.patch)
         self.unit = 8 * math.pi * plate.rigidity
-        self._table, self._steps, self._gives = _on_cap(plate, edge, layout.positions.tobytes())
+        places, length = layout.positions.tobytes(), layout.gage_length
+        self._table, self._steps, self._gives = _on_cap(plate, edge, places, length)
         self._positions, self._out = layout.positions, out
         inverse = np.linalg.inv(cap.base(*layout.positions.T).covariant[:, 1:3, 1:3])
         self._tangents = np.swapaxes(inverse, 1, 2)  # from steps along x and y
@@ -408,20 +414,20 @@ class _OfCap:
 
     def _searched(self) -> tuple[Array, Single]:
         """`nodes`: rings of the table, as far apart as the places on them."""
-        table, (step_t, step_r, step) = self._table, self._steps
+        table, (step, step_t, step_r) = self._table, self._steps
         found = list[tuple[int, int, int]]()
-        for i in range(1, table.shape[2], _RINGS):
+        for i in range(1, table.shape[0], _RINGS):
             radius = float(self._cap.meridian(np.array((i - 1) * step)).radius)
             around = max(round(2 * math.pi * radius / (_RINGS * step)), 1)
             for n in range(around):
-                turn = 1 + n * (table.shape[0] - 3) // around
-                found += [(turn, size, i) for size in _SEARCHED_SIZES]
-        turn, size, ring = np.array(found).T
+                turn = 1 + n * (table.shape[1] - 3) // around
+                found += [(i, turn, size) for size in _SEARCHED_SIZES]
+        ring, turn, size = np.array(found).T
         angle, away = (turn - 1) * step_t, (ring - 1) * step
         offset = away * np.stack([np.cos(angle), np.sin(angle)])
         s = ((size - 1.5) * step_r) ** 2
         places: Array = np.column_stack([*(self._cap.rim_radius + offset), s])
-        return places, table[turn, size, ring]
+        return places, table[ring, turn, size]
 
     def _block_at(self, i: int, j: int, k: int) -> Single:
         return self._table[i : i + 4, j : j + 4, k : k + 4].reshape(64, -1)
@@ -431,26 +437,26 @@ class _OfCap:
         away = np.einsum("pij,pj->pi", self._tangents, self._positions - (x, y))
         self.t = np.vecdot(away, away)
         step, d = self._steps, math.hypot(dx, dy)
-        if d < (near := _AT_POLE * step[2]):
+        if d < (near := _AT_POLE * step[0]):
             dx, dy, d = (dx, dy, d) if d else (near, 0.0, near)
             dx, dy, d = dx * near / d, dy * near / d, near
         places = (
-            math.atan2(dy, dx) % (2 * math.pi) / step[0] + 1,
-            r / step[1] + 1.5,
-            d / step[2] + 1,
+            d / step[0] + 1,
+            math.atan2(dy, dx) % (2 * math.pi) / step[1] + 1,
+            r / step[2] + 1.5,
         )
         first = [min(int(at) - 1, most) for at, most in zip(places, self._last, strict=True)]
-        (turn, turn_t), (size, size_r), (along, along_s) = (
+        (along, along_s), (turn, turn_t), (size, size_r) = (
             np.dot(((1.0, u, u * u, u * u * u), (0.0, 1 / h, 2 * u / h, 3 * u * u / h)), _CUBICS)
             for u, h in ((at - i, h) for at, i, h in zip(places, first, step, strict=True))
         )
         W, cos, sin = self._weights, dx / d, dy / d
-        here = np.outer(size, along).ravel()
-        outward, around = np.outer(turn, np.outer(size, along_s)), np.outer(turn_t / d, here)
-        np.outer(turn, here, W[0])
+        here = np.outer(turn, size).ravel()
+        outward, around = np.outer(along_s, here), np.outer(along, np.outer(turn_t / d, size))
+        np.outer(along, here, W[0])
         W[1] = cos * outward - sin * around
         W[2] = sin * outward + cos * around
-        np.outer(turn, np.outer(size_r / (2 * r), along), W[3])
+        np.outer(along, np.outer(turn, size_r / (2 * r)), W[3])
         self._out[:] = W.reshape(4, 64).astype(np.float32).dot(self._block(*first))
 
     def trust(self, s: float, share: float) -> Array | None:
@@ -468,32 +474,35 @@ _AT_POLE = 1e-3  # of a step: nearer, it is taken for a place so far away
 _RINGS = 2  # steps between the places searched
 _SEARCHED_SIZES = 3, 6, 10  # of the table: radii of 1.5, 4.5 and 8.5 steps
 _SIZES = 0.2  # of the box: the largest radius of a load
+_TINY = 1e-15  # of the largest of a sum's terms
 
 
 @lru_cache(2)
-def _on_cap(plate: Plate, edge: str, places: bytes) -> tuple[Single, tuple[float, ...], Array]:
-    """Readings (T, Q, S, C) in 1/m per N under discs, the steps, and displacements in m per N.
+def _on_cap(
+    plate: Plate, edge: str, places: bytes, gage_length: float
+) -> tuple[Single, tuple[float, ...], Array]:
+    """Readings (S, T, Q, C) in 1/m per N under discs, the steps, and displacements in m per N.
 
-    By azimuth from -1 step, radius of the disc from -3/2 steps, and distance from the pole from -1
-    step; the steps are in rad, m and m. The displacements under a point load are at even distances
+    By distance from the pole from -1 step, azimuth from -1 step, and radius of the disc from -3/2
+    steps; the steps are in m, rad and m. The displacements under a point load are at even distances
     from the pole to the rim.
     """
     cap = cast("Cap", plate.patch)
-    k, along, rows, gives = _waves_on_cap(plate, edge, places)
+    k, along, rows, gives = _waves_on_cap(plate, edge, places, gage_length)
     step, (_, M, _, C) = cap.a / _ON_CAP, rows.shape
     radii = np.abs(np.arange(math.ceil(_SIZES * _ON_CAP) + 4) - 1.5) * step
     turns = math.ceil(np.pi * _rim_share(cap) * _ON_CAP)
     felt = np.multiply.outer(radii, k)
-    by_m = np.empty((2, M, len(radii), len(along), C), np.float32)
-    for m in range(M):
-        share: Array = 2 * scipy.special.j1(felt[:, None, m]) / felt[:, None, m]
-        shapes = share * along[:, m]
-        by_m[:, m] = (shapes.astype(np.float32) @ rows[:, m, None]).reshape(by_m[:, m].shape)
+    share: Array = np.swapaxes(2 * scipy.special.j1(felt) / felt, 0, 1)
     azimuths = 2 * np.pi / turns * np.arange(-1.0, turns + 2)
     turn = np.multiply.outer(azimuths, np.arange(float(M)))
-    around = np.hstack([np.cos(turn), np.sin(turn)]).astype(np.float32)
-    table = (around @ by_m.reshape(2 * M, -1)).reshape(len(around), *by_m.shape[2:])
-    return table, (2 * np.pi / turns, step, step), gives
+    around: Single = np.hstack([np.cos(turn), np.sin(turn)]).astype(np.float32)
+    table = np.empty((len(along), len(around), len(radii), C), np.float32)
+    # Ring by ring: what a ring is made of stays in the cache.
+    for ring, shape in zip(table.reshape(*table.shape[:2], -1), along, strict=True):
+        by_m: Single = (share * shape[:, None]).astype(np.float32) @ rows
+        np.matmul(around, by_m.reshape(2 * M, -1), out=ring)
+    return table, (step, 2 * np.pi / turns, step), gives
 
 
 def _rim_share(cap: Cap) -> float:
@@ -501,25 +510,38 @@ def _rim_share(cap: Cap) -> float:
     return float(cap.meridian(np.array(cap.rim_radius)).radius) / cap.rim_radius
 
 
-def _waves_on_cap(plate: Plate, edge: str, places: bytes) -> tuple[Array, Array, Single, Array]:
+def _waves_on_cap(
+    plate: Plate, edge: str, places: bytes, gage_length: float
+) -> tuple[Array, Array, Single, Array]:
     """Wave numbers (M, n), waves along the meridian (S, M, n), their readings, and displacements.
 
     The readings (2, M, n, C) are of waves that go as a cosine around and as a sine.
     """
     cap = cast("Cap", plate.patch)
     layout = SensorLayout.scattered(cap, np.frombuffer(places).reshape(-1, 2))
+    layout = replace(layout, gage_length=gage_length)
     Nj = 2 * math.ceil(_WAVES * np.pi * _rim_share(cap)) + 1  # as fine around as along
     basis = cast("CapBasis", basis_for(cap, edge, _WAVES, Nj))
     compliance, waves = plate.compliance_by_wave(basis), CapWaves(basis)
-    M = layout.operator(basis, plate).reshape(-1, *basis.shape)
-    for j in range(Nj):
-        M[..., j] = M[..., j] @ compliance[(j + 1) // 2]
+    shell, shape = cap_shell(plate, basis), (layout.channels, 2, *waves.k.shape)
+
+    def curvature(positions: Array) -> Array:
+        read = np.moveaxis(shell.curvature_by_wave(positions), 0, 2)
+        return read.reshape(3, len(positions), -1)
+
+    read = layout.mean_curvature(basis, curvature).reshape(shape)
+    by_m = read.transpose(1, 2, 0, 3)
     unit = 8 * math.pi * plate.rigidity
-    rows = np.moveaxis(np.stack(waves.rows(unit * M.reshape(len(M), -1))), 1, 3)
-    f = basis.along(np.linspace(0, 1, _ON_CAP + 1))[0]
-    gives: Array = np.einsum("qmi,mij,qmj->q", f, compliance, f, optimize=True)
+    rows: Array = np.swapaxes(by_m @ (unit * compliance @ waves.shares), 2, 3)
+    f = np.swapaxes(basis.along(np.linspace(0, 1, _ON_CAP + 1), 1)[0], 0, 1)
+    gives: Array = np.vecdot(f @ compliance, f).sum(axis=0)
     along = waves.along(cap.a / _ON_CAP * np.arange(-1.0, _ON_CAP // 2 + 1))
-    return waves.k, along, rows.astype(np.float32), gives
+    return waves.k, _rounded(along), _rounded(rows).astype(np.float32), gives
+
+
+def _rounded(values: Array) -> Array:
+    """`values` with zeros for what is too small to count: products of subnormals take long."""
+    return np.where(np.abs(values) > _TINY * np.abs(values).max(), values, 0.0)
 
 
 @lru_cache(4)

@@ -163,6 +163,7 @@ BLADES = [
 ]
 
 
+@pytest.mark.cases("rigid1", "rigid4")
 @pytest.mark.parametrize("rigid", BALLS + RODS)
 def test_pressed_hard_enough_the_right_kind_wins(rigid):
     found = PAPER.finds(curvature(rigid), 10)
@@ -455,7 +456,7 @@ def test_a_rod_and_a_ball_dent_a_fingertip_further(finger, kind):
         assert one.radius_95[0] < 0.06 < one.radius_95[1]
 
 
-@pytest.mark.cases("-3.0", "-8.0")
+@pytest.mark.cases("cylinder-8.0", "sphere-3.0")
 @pytest.mark.parametrize(
     ("kind", "force"), [("plane", 4.0), *product(("cylinder", "sphere"), (3.0, 4.0, 6.0, 8.0))]
 )
@@ -480,7 +481,7 @@ def test_a_shape_that_no_object_explains_is_not_named(sheet):
         assert one.describe() == "shape unknown: no object fits"
 
 
-@pytest.mark.cases("0.06")
+@pytest.mark.full
 @pytest.mark.parametrize("radius", [0.03, 0.06, 0.12])
 def test_the_intervals_of_a_radius_on_a_bent_skin_cover_it(finger, sheet, radius):
     kinds = ("cylinder", ALONG), ("sphere", {})

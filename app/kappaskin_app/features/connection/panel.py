@@ -456,5 +456,5 @@ def _sensor_text(sensor: Sensor, calibration: Calibration | None) -> str:
     calibrated = f"\n{calibration_text(calibration)}" if calibration else ""
     rate = f", up to {sensor.rate:g} frames/s" if math.isfinite(sensor.rate) else ""
     return (
-        f"{name}\n{sensor.layout}, {sensor.edge}{health}\n{a:g} x {b:g} mm{bent}{rate}{calibrated}"
+        f"{name}\n{sensor.layout}, {sensor.edge}{rate}{health}\n{a:g} x {b:g} mm{bent}{calibrated}"
     )
