@@ -839,7 +839,10 @@ class NormalCurvature:
         plate: Plate | None = None,
     ) -> None:
         places, patch = layout.positions, basis.patch
-        at = list(covariant_at(basis, places)[1:3])
+        if isinstance(patch, Cap):
+            at = list(covariant_at(basis, places)[1:3])
+        else:  # by shallow shell theory x and y meet at a right angle
+            at = [basis.at(places, 1, 0), basis.at(places, 0, 1)]
         if H := patch.arc_curvature:
             v, *turns = plate.hoop(basis, places) if plate else hoop_at(basis, places)
             curvature = plate.curvature(basis)(places) if plate else curvature_at(basis, places)
@@ -860,7 +863,7 @@ class NormalCurvature:
         self._columns = np.concatenate([self._first, *self._at]).T
         self.frame_shape, self._base = layout.frame_shape, np.empty((0, 1), dtype)
         if any(patch.curvatures):
-            self._base = patch.base(*places.T).form[:, layout.element].astype(dtype)
+            self._base = patch.read_at_rest(places)[:, layout.element].astype(dtype)
 
     @property
     def maps(self) -> Array:

@@ -159,10 +159,11 @@ class Base(NamedTuple):
     """A skin at rest at one place, each number, or at many, each an array.
 
     Its point in m and outward normal in space, orthonormal tangents e_x and e_y, and its curvature
-    xx, yy and xy in 1/m along these. On a cap also, on other skins empty: the rows of the matrix
-    `slopes` (2, 2) from derivatives along x and y to those along e_x and e_y, those of the matrix
-    (3, 5) from f_x, f_y, f_xx, f_xy, f_yy to the second ones, and by how much e_x turns to e_y
-    along each of them, in 1/m.
+    xx, yy and xy in 1/m along these. On caps, domes and saddles, where x and y are no lengths
+    at a right angle, also, on other skins empty: the rows of the matrix `slopes` (2, 2) from
+    derivatives along x and y to those along e_x and e_y, those of the matrix (3, 5) from f_x, f_y,
+    f_xx, f_xy, f_yy to the second ones, and by how much e_x turns to e_y along each of them, in
+    1/m.
     """
 
     point: Vector
@@ -191,6 +192,10 @@ class Base(NamedTuple):
 
         To its covariant ones along e_x and e_y.
         """
+        if isinstance(self.point[0], float) and self.slopes:  # a third of the time
+            first = ((0.0, *row, 0.0, 0.0, 0.0) for row in self.slopes)
+            value = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            return np.array([value, *first, *((0.0, *row) for row in self.second)])
         found = np.zeros((*np.shape(self.point[0]), 6, 6))
         found[...] = np.eye(6)
         for i, row in enumerate(self.slopes + self.second, 1):
@@ -359,16 +364,41 @@ class Patch:
             px, pz = self.a / 2 + sx / Hx, -2 * sin(Hx * u / 2) ** 2 / Hx
         if Hy:
             py, pz = self.b / 2 + sy / Hy, pz - 2 * sin(Hy * v / 2) ** 2 / Hy
-        # The arcs' tangents (cx, 0, -sx) and (0, cy, -sy) meet at a right angle only along the
-        # middles.
-        up = 1 / (1 - (sx * sy) ** 2) ** 0.5
-        ny, nz = cx * sy * up, cx * cy * up
+        # The arcs' tangents r_x = (cx, 0, -sx) and r_y = (0, cy, -sy) meet at a right angle only
+        # along the middles: r_x . r_y = m. The frame is e_x = r_x and e_y = t r_x + up r_y.
+        m = sx * sy
+        up = 1 / (1 - m * m) ** 0.5
+        ny, nz, t = cx * sy * up, cx * cy * up, -m * up
         across, normal = (-sx * ny, cy * up, -cx * ny), (sx * cy * up, ny, nz)
-        return Base((px, py, pz), (cx, 0.0, -sx), across, normal, (Hx, Hy, 0.0))
+        base = Base((px, py, pz), (cx, 0.0, -sx), across, normal, (Hx, Hy, 0.0))
+        if not (Hx and Hy):
+            return base
+        # r_xx . e_y = p, r_yy . r_x = q and r_xy = 0.
+        p, q, b = up * Hx * cx * sy, Hy * cy * sx, Hx * cy * up
+        along = -t * p, -up * p, 1.0, 0.0, 0.0
+        across = -(up**4) * q, m * up**4 * q, 0.0, 2 * t * up, up * up
+        return base._replace(
+            curvature=(b, t * t * b + up**3 * Hy * cx, t * b),
+            slopes=((1.0, 0.0), (t, up)),
+            second=(
+                along,
+                (*(t * each for each in along[:3]), up, 0.0),
+                tuple(t * t * one + other for one, other in zip(along, across, strict=True)),
+            ),
+            turning=(p, t * p),
+        )
+
+    def read_at_rest(self, positions: Array) -> Array:
+        """Curvature xx, yy, xy (3, P) in 1/m of the skin at rest that elements are taken to have.
+
+        At `positions` (P, 2) in m; by shallow shell theory it is alike all over.
+        """
+        return np.multiply.outer([*self.curvatures, 0.0], np.ones(len(positions)))
 
     def around(self, x: float, y: float, offsets: Array) -> Array:
         """Positions (Q, 2) in m that lie from (x, y) as far along the skin as `offsets` (Q, 2)."""
-        return np.array([x, y]) + offsets
+        slopes = self.base(x, y).slopes
+        return np.array([x, y]) + (offsets @ np.array(slopes) if slopes else offsets)
 
     def along(self, positions: Array, ways: Array, far: Number) -> tuple[Array, Array]:
         """Positions (P, 2) in m that lie `far` in m from `positions` (P, 2) along the skin.
@@ -567,6 +597,9 @@ class Cap(Disk):
             second,
             (-flat / r * n, flat / r * c),
         )
+
+    def read_at_rest(self, positions: Array) -> Array:
+        return self.base(*positions.T).form
 
     def places(self, points: Array) -> Array:
         """Positions (..., 2) in m of `points` (..., 3) of the skin in space, or just off it."""
