@@ -18,7 +18,7 @@ from kappaskin.contact.element_grid import element_grid
 from kappaskin.contact.influence import CUBICS, Single, cap_half_wave, cap_table
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Indices, Mask
-from kappaskin.mechanics import Plate
+from kappaskin.mechanics import Plate, layer_compliance
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Cap, Patch
 
@@ -181,6 +181,8 @@ class ElasticSkin:
         """Curvature (3,) in 1/m at rest: xx, yy and xy."""
         self.bend = 1 / (4 * math.pi * plate.rigidity)
         """Curvature in 1/m lost inside a ring or an arc per N and e-fold of its size."""
+        self.layer = layer_compliance(plate)
+        """By how much the skin's thickness gives under a pressure, in m^3/N."""
         self._take(plate, layout, edge, functions)
 
     def _take(self, plate: Plate, layout: SensorLayout, edge: str, functions: int) -> None:

@@ -69,22 +69,53 @@ class Width:
 
 @dataclass(frozen=True, slots=True)
 class WidthOnDome(Width):
-    """The same of a cylinder that bears along the length 2 `half` in m of a dome.
+    """The same on a dome of the curvature `rest`, whose sheet is compressed as well.
+
+    A layer that gives by t per pressure widens the contact of a force F, `soft` = t F in m^3: its
+    pressure is even with a paraboloid of the relative curvature k, with the mean square distance
+    2/3 sqrt(t F / (pi k)) from its middle.
+    """
+
+    rest: float
+    soft: float
+
+    def curvature(self, q: float) -> float:
+        tried = self.rest * (_RELATIVE - 1)
+        return float(np.interp(-q, -self.of_curvature(tried), tried, right=math.inf))
+
+    def of_curvature(self, curvature: Array) -> Array:
+        thin = Width.of_curvature(self, curvature)
+        if not self.soft:
+            return thin
+        layer = 2 / 3 * np.sqrt(self.soft / (np.pi * (curvature + self.rest)))
+        # It widens less what the bending spreads already: so the contact solver has it, to 5 %.
+        return thin + layer / (1 + (thin / (2 * layer)) ** 3)
+
+    def uncertain(self, off: float) -> "WidthOnDome":
+        """The same where curvatures of objects are known to `off` of themselves and the skin's."""
+        k = min(max(self.curvature(self.q), 0.0), _RELATIVE[-1] * self.rest)
+        low, high = self.of_curvature(k + off * (self.rest + k) * np.array([-1.0, 1.0]))
+        return replace(self, sd=math.hypot(self.sd, float(low - high) / 2))
+
+
+_RELATIVE = np.geomspace(0.05, 1e3, 400)  # curvatures of objects over a dome's own, plus one
+
+
+@dataclass(frozen=True, slots=True)
+class WidthOfCylinder(WidthOnDome):
+    """The same of a cylinder that bears along the length 2 `half` in m.
 
     Forces even in angle around an ellipse with the half axes A and B leave the skin inside less
     bent by (F / 4 pi D) (ln((A + B) / 2) -+ (B - A) / (2 (A + B))) along and across it. Along a
-    cylinder it is as straight as that.
+    cylinder it is as straight as that. The layer has a pressure as a parabola across.
     """
 
     half: float
 
-    def curvature(self, q: float) -> float:
-        narrow = math.sqrt(max(q, 0.0))
-        return self.bend * (self.half - narrow) / (self.half + narrow)
-
     def of_curvature(self, curvature: Array) -> Array:
-        narrow = np.maximum(self.bend - curvature, 0.0) / (self.bend + curvature)
-        return (self.half * narrow) ** 2
+        narrow = np.maximum(self.bend - curvature, 0.0) / np.maximum(self.bend + curvature, 1e-300)
+        across = 1.5 * self.soft / (2 * self.half * (curvature + self.rest))
+        return (self.half * np.minimum(narrow, 1.0)) ** 2 + 2 / 5 * across ** (2 / 3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -224,11 +255,11 @@ def _measured_width(skin: ElasticSkin, optimum: Optimum) -> tuple[float, float, 
 
 def _width(skin: ElasticSkin, optimum: Optimum, curvature: float, force: float) -> Width:
     q, q0, sd = _measured_width(skin, optimum)
-    bend = skin.bend * abs(force)
-    if skin.is_dome:
-        bent = INEXACT_BENT * (float(skin.form[:2].max()) + max(curvature, 0.0))
-        sd = math.hypot(sd, 2 * max(q, 0.0) * bent / bend)
-    return Width(q, sd, curvature, q0, bend)
+    if not skin.is_dome:
+        return Width(q, sd, curvature, q0, skin.bend * abs(force))
+    of_skin = float(skin.form[:2].sum()) / 2, skin.layer * abs(force)
+    width = WidthOnDome(q, sd, curvature, q0, skin.bend * abs(force), *of_skin)
+    return width.uncertain(1.25 * INEXACT_BENT)
 
 
 def fitted_sphere(skin: ElasticSkin, sphere: Optimum) -> Hypothesis:
@@ -377,23 +408,22 @@ def _straight(skin: ElasticSkin, best: Optimum, length: float) -> Hypothesis:
     bend, half = skin.bend * force, length / 2
     along = np.array([math.cos(angle), math.sin(angle)])
     inexact = INEXACT_BENT * 2 * float(skin.sag(along)) / bend
-    width = None
+    width, rest, soft = None, 2 * float(skin.sag(along)), skin.layer * force
     if len(best.parameters) > 6:
-        narrow = math.sqrt(best.parameters[6])
-        for _ in range(20):  # as straight as along the edge
-            half = length / 2 * math.exp(narrow / (half + narrow)) - narrow
-            half = max(half, narrow)
+        q, _, sd = _measured_width(skin, best)
+        bears = math.sqrt(best.parameters[4]) / 2
         # Squared, as about as much force acts inside the ellipse instead: to 5 % of what `pressed`
         # finds, up to half lengths of 1.3 times that over which a dent fades.
-        bend *= _unevenness(skin, best) ** 2
-        q, _, sd = _measured_width(skin, best)
-        width = WidthOnDome(q, sd, 0.0, q, bend, math.sqrt(best.parameters[4]) / 2)
+        bent = bend * _unevenness(skin, best) ** 2
+        width = WidthOfCylinder(q, sd, 0.0, q, bent, rest, soft, bears).uncertain(2 * INEXACT_BENT)
         k = width.curvature(q)
-        off = INEXACT_BENT * 2 * (float(skin.sag(along)) + k)
-        low, high = width.of_curvature(np.array([k - off, k + off]))
-        width = replace(width, sd=math.hypot(sd, float(low - high) / 2))
-    square = (2 * half) ** 2
-    sd = math.hypot(2 * square * inexact, (_BLUNT * skin.half_wave) ** 2)
+        narrow = bears * max(bent - k, 0.0) / (bent + k)
+        for _ in range(20):  # as straight as along the edge
+            half = length / 2 * math.exp(narrow / max(half + narrow, 1e-12)) - narrow
+            half = max(half, narrow)
+    longer = 8 / 3 * math.sqrt(soft * math.sqrt(1 + bend / rest) / (np.pi * rest))  # by the layer
+    square = (2 * half) ** 2 + longer / 2
+    sd = math.hypot(2 * square * inexact + longer / 2, (_BLUNT * skin.half_wave) ** 2)
     return Hypothesis(best, width, along, length2=square, length2_sd=sd)
 
 
@@ -491,7 +521,10 @@ class WeightedReadings:
 
     def shaped(self, sphere: Optimum) -> Optimum:
         """The sphere, its ring of forces as the bending of the skin shapes it."""
-        sphere = self.again(sphere, ring(ring_pattern(self.skin, sphere)), 4)
+        pattern = ring_pattern(self.skin, sphere)
+        even, sphere = sphere, self.again(sphere, ring(pattern), 4)
+        if self.skin.is_dome and pattern is not ROUND:  # which may have tipped over to another
+            sphere = min(sphere, self.again(even, ring(ROUND), 4), key=_cost)
         for _ in range(
             2 if self.skin.form.any() and not self.skin.is_even else 1
         ):  # further from a circle

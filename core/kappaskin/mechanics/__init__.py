@@ -1,6 +1,7 @@
 """Mechanics: the shape of a skin under loads and under rigid objects."""
 
 from kappaskin.mechanics.cap import CapWaves as CapWaves
+from kappaskin.mechanics.contact_solver import layer_compliance as layer_compliance
 from kappaskin.mechanics.height_maps import HeightMap as HeightMap
 from kappaskin.mechanics.height_maps import Mesh as Mesh
 from kappaskin.mechanics.indentation import Indentation as Indentation

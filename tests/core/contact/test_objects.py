@@ -29,7 +29,7 @@ from kappaskin import (
     load_scene,
     local_geometry,
 )
-from kappaskin.mechanics import Block, IndentationSolver, Sphere
+from kappaskin.mechanics import Block, Cylinder, IndentationSolver, Sphere, Wedge
 
 pytestmark = pytest.mark.slow
 
@@ -531,6 +531,23 @@ def test_a_plate_on_a_dome_is_a_plane_and_a_ball_has_its_own_radius(dome):
         assert one.radius == pytest.approx(0.04, rel=0.1)
         assert one.radius_95[0] < 0.04 < one.radius_95[1]
         np.testing.assert_allclose(one.position, [0.018, 0.016], atol=1e-4)
+
+
+def test_a_rod_and_a_wedge_on_a_dome_bear_in_their_middle(dome):
+    for one in dome.finds(Cylinder(0.04, 0.04), 3.0):
+        assert {"cylinder", "edge"} >= {one.kind}
+        assert one.sure
+        assert math.isnan(one.length)
+        assert one.radius_95[0] < 0.04 < one.radius_95[1]
+        assert one.axis == pytest.approx(0.3, abs=0.05)
+    for rigid in (Cylinder(0.01, 0.04), Wedge(1.2, 0.04, 0.04)):
+        for one in dome.finds(rigid, 3.0):
+            assert one.describe().startswith("edge, axis 17 deg, or a cylinder of radius below ")
+            assert one.radius_95[1] > 0.01
+
+
+def test_a_large_ball_on_a_dome_is_no_sure_plane(dome):
+    assert not any(one.sure and one.kind == "plane" for one in dome.finds(Sphere(0.5), 2.0))
 
 
 @pytest.mark.parametrize("radius", [0.002, 0.01])
