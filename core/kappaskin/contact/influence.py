@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 from functools import lru_cache
+from itertools import product
 from typing import Protocol, cast
 
 import numpy as np
@@ -40,6 +41,14 @@ class Influence(Protocol):
 
         The readings of one that lies under the load depend on how it is spread over it: its
         variance is 1 + `share`.
+        """
+        ...
+
+    def profile(self, s: float) -> Array | None:
+        """What the readings of a Gaussian load at the last place differ by from those of `at`.
+
+        Of one as wide, with the standard deviation sqrt(s) / 2 each way, and its derivatives,
+        (4, C), on a cap, where they differ all around; else None, and `trust` is to be used.
         """
         ...
 
@@ -115,6 +124,9 @@ class _OfFunctions:
         return np.stack([f, share @ f_x, share @ f_y, outward[0] @ f_x + outward[1] @ f_y])
 
     def trust(self, s: float, share: float) -> Array | None:
+        return None
+
+    def profile(self, s: float) -> Array | None:
         return None
 
     def gives(self, x: float, y: float) -> float:
@@ -349,6 +361,9 @@ class _OfPlate:
     def trust(self, s: float, share: float) -> Array | None:
         return _trust(self._disc.t, s, share)
 
+    def profile(self, s: float) -> Array | None:
+        return None
+
     def gives(self, x: float, y: float) -> float:
         i, j, u, v = self._among_nodes(x, y)
         of_x, of_y = np.dot(((1.0, u, u * u, u * u * u), (1.0, v, v * v, v * v * v)), _CUBICS)
@@ -385,32 +400,42 @@ class _OfDirections:
     def trust(self, s: float, share: float) -> Array | None:
         return self._of.trust(s, share)
 
+    def profile(self, s: float) -> Array | None:
+        rows = self._of.profile(s)
+        if rows is None:
+            return None
+        turned: Array = np.einsum("cr,ncr->nr", self._parts, rows[:, self._channels])
+        return turned
+
     def gives(self, x: float, y: float) -> float:
         return self._of.gives(x, y)
 
 
 class _OfCap:
-    """A cap's: a table of what a load over discs of several radii makes, summed until it stands."""
+    """A cap's: a table of what discs and Gaussian loads of several sizes make, summed until it stands.
+
+    Between the nodes it is a cubic spline.
+    """
 
     sized = True
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str, out: Array) -> None:
-        self._cap = cap = cast("Cap", plate.patch)
+        self._cap = cast("Cap", plate.patch)
         self.unit = 8 * math.pi * plate.rigidity
         self._table, self._steps, self._gives = _on_cap(plate, edge, layout.positions.tobytes())
-        self._positions, self._out = layout.positions, out
-        inverse = np.linalg.inv(cap.base(*layout.positions.T).covariant[:, 1:3, 1:3])
-        self._tangents = np.swapaxes(inverse, 1, 2)  # from steps along x and y
-        self._last = [n - 4 for n in self._table.shape[:3]]
-        self._block, self._weights = lru_cache(16)(self._block_at), np.empty((4, 4, 16))
-        self.t = np.empty(len(layout))
+        self._out = out
+        self._last, self._discs = [n - 4 for n in self._table.shape[:3]], len(_radii(1))
+        self._block, self._first = lru_cache(32)(self._block_at), (0, 0)
+        self._of_place: Array = np.empty((3, 4, 4))
+        self._difference: Array = np.empty(out.shape)
+        self._weights = np.empty((4, 4, 4, 4), np.float32)
         self.nodes: tuple[Array, Single] | None = self._searched()
 
     def _searched(self) -> tuple[Array, Single]:
         """`nodes`: rings of the table, as far apart as the places on them."""
         table, (step_t, step_r, step) = self._table, self._steps
         found = list[tuple[int, int, int]]()
-        for i in range(1, table.shape[2], _RINGS):
+        for i in range(1, table.shape[2] - 1, _RINGS):
             radius = float(self._cap.meridian(np.array((i - 1) * step)).radius)
             around = max(round(2 * math.pi * radius / (_RINGS * step)), 1)
             for n in range(around):
@@ -421,45 +446,79 @@ class _OfCap:
         offset = away * np.stack([np.cos(angle), np.sin(angle)])
         s = ((size - 1.5) * step_r) ** 2
         places: Array = np.column_stack([*(self._cap.rim_radius + offset), s])
-        return places, table[turn, size, ring]
+        read: Single = np.zeros((len(places), table.shape[3]), np.float32)
+        for i, j, k in product((-1, 0, 1), repeat=3):
+            share = 4.0 ** (3 - abs(i) - abs(j) - abs(k)) / 216
+            read += np.float32(share) * table[turn + i, size + j, ring + k]
+        return places, read
 
     def _block_at(self, i: int, j: int, k: int) -> Single:
         return self._table[i : i + 4, j : j + 4, k : k + 4].reshape(64, -1)
 
     def at(self, x: float, y: float, s: float) -> None:
-        r, dx, dy = math.sqrt(s), x - self._cap.rim_radius, y - self._cap.rim_radius
-        away = np.einsum("pij,pj->pi", self._tangents, self._positions - (x, y))
-        self.t = np.vecdot(away, away)
-        step, d = self._steps, math.hypot(dx, dy)
-        if d < (near := _AT_POLE * step[2]):
+        dx, dy = x - self._cap.rim_radius, y - self._cap.rim_radius
+        (step_t, _, step), d = self._steps, math.hypot(dx, dy)
+        if d < (near := _AT_POLE * step):
             dx, dy, d = (dx, dy, d) if d else (near, 0.0, near)
             dx, dy, d = dx * near / d, dy * near / d, near
-        places = (
-            math.atan2(dy, dx) % (2 * math.pi) / step[0] + 1,
-            r / step[1] + 1.5,
-            d / step[2] + 1,
-        )
-        first = [min(int(at) - 1, most) for at, most in zip(places, self._last, strict=True)]
-        (turn, turn_t), (size, size_r), (along, along_s) = (
-            np.dot(((1.0, u, u * u, u * u * u), (0.0, 1 / h, 2 * u / h, 3 * u * u / h)), _CUBICS)
-            for u, h in ((at - i, h) for at, i, h in zip(places, first, step, strict=True))
-        )
-        W, cos, sin = self._weights, dx / d, dy / d
-        here = np.outer(size, along).ravel()
-        outward, around = np.outer(turn, np.outer(size, along_s)), np.outer(turn_t / d, here)
-        np.outer(turn, here, W[0])
+        azimuth, (last_t, _, last) = math.atan2(dy, dx) % (2 * math.pi), self._last
+        i, turn, turn_t = _spline(azimuth / step_t + 1, step_t, last_t)
+        k, along, along_s = _spline(d / step + 1, step, last)
+        cos, sin = dx / d, dy / d
+        outward, around = np.outer(turn, along_s), np.outer(turn_t / d, along)
+        W = self._of_place
+        np.outer(turn, along, W[0])
         W[1] = cos * outward - sin * around
         W[2] = sin * outward + cos * around
-        np.outer(turn, np.outer(size_r / (2 * r), along), W[3])
-        self._out[:] = W.reshape(4, 64).astype(np.float32).dot(self._block(*first))
+        self._first = i, k
+        self._out[:] = self._under(s, 0, 1)
+
+    def _under(self, s: float, begin: int, coarser: int) -> Single:
+        """Readings and derivatives (4, C) of a load of size s, by sizes of the table."""
+        r, step, (i, k) = math.sqrt(s), coarser * self._steps[1], self._first
+        j, size, size_r = _spline(r / step + 1.5, step, self._last[1])
+        W, here = self._weights, self._of_place[:, :, None]
+        np.multiply(here, size[:, None], W[:3])
+        np.multiply(here[0], size_r[:, None] / (2 * r), W[3])
+        return W.reshape(4, 64).dot(self._block(i, begin + j, k))
 
     def trust(self, s: float, share: float) -> Array | None:
-        return _trust(self.t, s, share)
+        return None
+
+    def profile(self, s: float) -> Array | None:
+        np.subtract(self._under(s, self._discs, _COARSER), self._out, self._difference)
+        return self._difference
 
     def gives(self, x: float, y: float) -> float:
         d = math.hypot(x - self._cap.rim_radius, y - self._cap.rim_radius)
         at = np.linspace(0, self._cap.rim_radius, len(self._gives))
         return float(np.interp(d, at, self._gives))
+
+
+_SPLINES = np.array([[1, 4, 1, 0], [-3, 0, 3, 0], [3, -6, 3, 0], [-1, 3, -3, 1]]) / 6
+"""Cubic splines around a place between the second and third of four nodes, by its powers."""
+
+
+def _coefficients(nodes: int) -> Array:
+    """The map (n + 1, n) from values at even nodes to the coefficients of a cubic spline.
+
+    The last coefficient is that of a node beyond.
+    """
+    A = (np.eye(nodes, k=-1) + 4 * np.eye(nodes) + np.eye(nodes, k=1)) / 6
+    B = np.eye(nodes)
+    for end, inward in ((0, slice(4)), (-1, slice(-1, -5, -1))):
+        A[end], B[end, inward] = np.eye(nodes)[end], np.array([4, 5, -4, 1]) / 6
+    inside = np.asarray(np.linalg.solve(A, B), float)
+    return np.vstack([inside, 6 * np.eye(nodes)[-1] - 4 * inside[-1] - inside[-2]])
+
+
+def _spline(at: float, step: float, last: int) -> tuple[int, Array, Array]:
+    """The first of four nodes around `at`, in steps, their weights, and those of the slope."""
+    i = min(int(at) - 1, last)
+    u = at - i - 1
+    powers = (1.0, u, u * u, u * u * u), (0.0, 1 / step, 2 * u / step, 3 * u * u / step)
+    weights, slopes = np.dot(powers, _SPLINES)
+    return i, weights, slopes
 
 
 _WAVES = 28  # functions along the meridian of a cap that a load is followed by
@@ -468,30 +527,40 @@ _AT_POLE = 1e-3  # of a step: nearer, it is taken for a place so far away
 _RINGS = 2  # steps between the places searched
 _SEARCHED_SIZES = 3, 6, 10  # of the table: radii of 1.5, 4.5 and 8.5 steps
 _SIZES = 0.2  # of the box: the largest radius of a load
+_COARSER = 2  # times the step between sizes, of Gaussian loads, whose readings are smoother
+
+
+def _radii(steps: int) -> Array:
+    """Radii of loads in steps of the table, every so many."""
+    return steps * np.abs(np.arange(math.ceil(_SIZES * _ON_CAP / steps) + 4) - 1.5)
 
 
 @lru_cache(2)
 def _on_cap(plate: Plate, edge: str, places: bytes) -> tuple[Single, tuple[float, ...], Array]:
-    """Readings (T, Q, S, C) in 1/m per N under discs, the steps, and displacements in m per N.
+    """Splines of the readings (T, Q, S, C) in 1/m per N, the steps, and displacements in m per N.
 
-    By azimuth from -1 step, radius of the disc from -3/2 steps, and distance from the pole from -1
-    step; the steps are in rad, m and m. The displacements under a point load are at even distances
-    from the pole to the rim.
+    By azimuth from -1 step, size of the load, and distance from the pole from -1 step; the steps
+    are in rad, m and m. Sizes are radii of discs from -3/2 steps, then those of Gaussian loads as
+    wide, every `_COARSER` steps. The displacements under a point load are at even distances from
+    the pole to the rim.
     """
     cap = cast("Cap", plate.patch)
     k, along, rows, gives = _waves_on_cap(plate, edge, places)
     step, (_, M, _, C) = cap.a / _ON_CAP, rows.shape
-    radii = np.abs(np.arange(math.ceil(_SIZES * _ON_CAP) + 4) - 1.5) * step
     turns = math.ceil(np.pi * _rim_share(cap) * _ON_CAP)
-    felt = np.multiply.outer(radii, k)
-    by_m = np.empty((2, M, len(radii), len(along), C), np.float32)
+    discs, gaussians = step * _radii(1), step * _radii(_COARSER)
+    of_discs, of_gaussians = (_coefficients(len(of))[:-1] for of in (discs, gaussians))
+    along = np.tensordot(_coefficients(len(along)), along, 1)
+    by_m = np.empty((2, M, len(discs) + len(gaussians), len(along), C), np.float32)
     for m in range(M):
-        share: Array = 2 * scipy.special.j1(felt[:, None, m]) / felt[:, None, m]
-        shapes = share * along[:, m]
+        t, u = np.multiply.outer(discs, k[m]), np.multiply.outer(gaussians, k[m])
+        means = of_discs @ (2 * scipy.special.j1(t) / t), of_gaussians @ np.exp(-u * u / 8)
+        shapes = np.vstack(means)[:, None] * along[:, m]
         by_m[:, m] = (shapes.astype(np.float32) @ rows[:, m, None]).reshape(by_m[:, m].shape)
     azimuths = 2 * np.pi / turns * np.arange(-1.0, turns + 2)
     turn = np.multiply.outer(azimuths, np.arange(float(M)))
-    around = np.hstack([np.cos(turn), np.sin(turn)]).astype(np.float32)
+    sharper = 3 / (2 + np.cos(turn[2]))  # the coefficients of a wave's spline over it
+    around = np.hstack([sharper * np.cos(turn), sharper * np.sin(turn)]).astype(np.float32)
     table = (around @ by_m.reshape(2 * M, -1)).reshape(len(around), *by_m.shape[2:])
     return table, (2 * np.pi / turns, step, step), gives
 
