@@ -412,9 +412,9 @@ class _OfDirections:
 
 
 class _OfCap:
-    """A cap's: a table of what discs and Gaussian loads of several sizes make, summed until it stands.
+    """A cap's: a table of what discs and Gaussian loads of several sizes make.
 
-    Between the nodes it is a cubic spline.
+    It is summed until it stands, and a cubic spline between its nodes.
     """
 
     sized = True

@@ -265,7 +265,10 @@ class PointContact:
         return self._step(s, first, inverse, rows.dot(K), float(K.dot(K)), None)
 
     def _node(self, node: int) -> tuple[Array, float, Array]:
-        self._influence.at(*self._places[node].tolist())
+        x, y, s = self._places[node].tolist()
+        self._influence.at(x, y, s)
+        if (profile := self._influence.profile(s)) is not None:
+            self._rows[:4] += _TO_GAUSSIAN * profile
         rows = self._rows[: self._unknowns].copy()
         H = rows.dot(rows.T)
         return rows, H.item(0, 0), _inverse(H)
