@@ -18,6 +18,7 @@ from kappaskin.cli import main
 
 GUIDE = Path(__file__).parents[1] / "resources" / "kappaskin_resources" / "guide"
 _WINDOW, _FIGURE = 1280, 780  # px wide, of a window and of a figure that is printed finer
+_LARGEST = 60_000  # bytes of a picture
 _SHOWN = re.compile(r"!\[[^\]]+\]\(([^)]+)\)\n\n\*[^*`]*`((?:kappaskin|python3) [^`]+)`\*")
 
 
@@ -48,13 +49,11 @@ def keep(made: Path, picture: Path) -> None:
     if picture.suffix == ".svg":
         shutil.copy(made, picture)
     else:
-        how = {
-            "colors": 192,
-            "method": Image.Quantize.MAXCOVERAGE,
-            "kmeans": 4,
-            "dither": Image.Dither.NONE,
-        }
-        small(made).quantize(**how).save(picture, optimize=True)
+        for colours in (192, 128, 96, 76, 64):
+            how = {"method": Image.Quantize.MAXCOVERAGE, "kmeans": 4, "dither": Image.Dither.NONE}
+            small(made).quantize(colours, **how).save(picture, optimize=True)
+            if picture.stat().st_size <= _LARGEST:
+                break
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ with other colours use `follow_look`.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from itertools import cycle
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -84,7 +85,8 @@ DARK = Theme(
     alert="#ff9a90",
     disabled="#8a939e",
 )
-_LATER = 20  # ms, after which hidden widgets follow
+_LATER, _APART, _TURNS = 20, 6, 10  # ms after which hidden widgets follow, in so many turns
+_turns = cycle(range(_TURNS))
 THEMES = {"light": LIGHT, "dark": DARK}
 FAINT, ALERT = QPalette.ColorRole.PlaceholderText, QPalette.ColorRole.BrightText
 """The roles of a theme's colours `faint` and `alert` in its palette."""
@@ -149,10 +151,14 @@ def apply_look(theme: Theme, percent: float = 100.0, colours: str = "standard") 
 
 
 class _LookFollower(QTimer):
-    """Calls `show` when the palette or font of a widget changes; of a hidden one a while later."""
+    """Calls `show` when the palette or font of a widget changes; of a hidden one a while later.
+
+    All hidden ones at once would hold the window.
+    """
 
     def __init__(self, widget: QWidget, show: Callable[[], object]) -> None:
-        super().__init__(widget, singleShot=True, interval=_LATER)  # pyright: ignore[reportCallIssue]
+        later = _LATER + _APART * next(_turns)
+        super().__init__(widget, singleShot=True, interval=later)  # pyright: ignore[reportCallIssue]
         self._show = show
         self.timeout.connect(show)
         widget.installEventFilter(self)

@@ -187,6 +187,36 @@ def window(opened: Callable[..., MainWindow], until: Wait) -> MainWindow:
     return window
 
 
+@pytest.fixture(scope="module")
+def _one_window(qapp: QApplication, until: Wait) -> Iterator[TestedWindow]:
+    qapp.setStyle("Fusion")
+    window = TestedWindow("sim:")
+    window.show()
+    until(lambda: window.display.badge.state == "SIM" and len(window.membrane.ages) > 1)
+    yield window
+    window.close()
+    window.deleteLater()
+
+
+@pytest.fixture
+def shared_window(
+    _one_window: TestedWindow, qapp: QApplication, until: Wait
+) -> Iterator[TestedWindow]:
+    """One window for the tests of a file that leave it as it was; undo takes back settings."""
+    _one_window.show()
+
+    def ready() -> bool:
+        _one_window.activateWindow()  # which is lost on a window that is not on the screen yet
+        return _one_window.isActiveWindow() and _one_window.display.badge.state == "SIM"
+
+    until(ready)
+    _one_window.history.stack.clear()
+    yield _one_window
+    _one_window.history.stack.setIndex(0)
+    qapp.processEvents()
+    _one_window.hide()
+
+
 @pytest.fixture(scope="session")
 def points_at() -> Callable[[QWidget, QPoint], None]:
     """Moves the mouse, no button down, to a place of a widget.

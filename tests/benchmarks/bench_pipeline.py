@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kappaskin import Pipeline, Setup, Simulator, load_scene
+from kappaskin import Pipeline, Scene, Setup, Simulator, load_scene
 
 
 class Bench:
@@ -94,3 +94,23 @@ def test_a_whole_estimate_called_each_millisecond_is_a_part_of_one_lstsq(
         f"{shares[-1]:.2f}"
     )
     ratio("whole estimate, of one lstsq, both 1 ms apart", shares[2], at_most=0.15)
+
+
+def test_a_cap_is_set_up_in_a_few_times_what_a_flat_skin_takes(figure, ratio) -> None:
+    scenes = load_scene("demo"), load_scene("fingertip-cap")
+
+    def set_up(scene: Scene, turn: int) -> float:
+        plate = scene.plate  # another rigidity each time, or what is cached would be found
+        other = replace(plate, rigidity=plate.rigidity * (1 + 1e-9 * turn))
+        sensor = replace(scene, plate=other).sensor()
+        began = time.process_time()
+        Pipeline(sensor, Setup())
+        return time.process_time() - began
+
+    taken = np.array([[set_up(scene, turn) for scene in scenes] for turn in range(9)])
+    flat, cap = np.median(taken, axis=0)
+    figure(
+        f"set-up of a pipeline, processor time: {cap:.2f} s of the scene fingertip-cap, "
+        f"{cap / flat:.1f} times that of a flat skin ({flat:.2f} s)"
+    )
+    ratio("set-up of a cap, against that of a flat skin", cap / flat, at_most=8)

@@ -298,30 +298,41 @@ def along_x(read, azimuth):
     )
 
 
-@cache
-def _revolved(cap, edge):
+def _from_pole(cap, positions):
+    """Distances (P,) in m from the pole and azimuths (P,) of `positions` (P, 2)."""
+    x, y = (positions - cap.rim_radius).T
+    return np.hypot(x, y), np.arctan2(y, x)
+
+
+def _beside_pole(cap, load):
+    return replace(load, x=load.x - cap.rim_radius, y=load.y - cap.rim_radius)
+
+
+def _revolved(plate, edge):
+    cap, thickness = plate.patch, plate.sheet_thickness
     surface = Spheroid(cap.radius, cap.stretch * cap.radius)
-    shell = RevolvedShell(surface, cap.rim_radius, edge=edge)
+    return RevolvedShell(surface, cap.rim_radius, edge=edge, thickness=thickness)
+
+
+@cache
+def _reader(plate, edge):
+    shell = _revolved(plate, edge)
     return cache(lambda elements: shell.reader(np.frombuffer(elements).reshape(-1, 2)))
 
 
-def _cap_case(name, cap, edge, force, **width):
+def _cap_case(name, cap, edge, force, thickness=None, **width):
+    plate = Plate(cap, thickness=thickness)
+
     def truth(layout):
-        x, y = (layout.positions - cap.rim_radius).T
-        azimuth = np.arctan2(y, x)
-        read = _revolved(cap, edge)(np.stack([np.hypot(x, y), azimuth], -1).tobytes())
-
-        def turned(load):
-            out = replace(load, x=load.x - cap.rim_radius, y=load.y - cap.rim_radius)
-            return along_x(read(out), azimuth)
-
-        return turned
+        polar = _from_pole(cap, layout.positions)
+        read = _reader(plate, edge)(np.stack(polar, -1).tobytes())
+        return lambda load: along_x(read(_beside_pole(cap, load)), polar[1])
 
     def load(share):
         far = cap.rim_radius * _even(share[0], 0.75 * cap.angle) / cap.angle
         return Load(*_on_cap(cap, far, 2 * pi * share[1]), force, **width)
 
-    return CapCase(name, Plate(cap), truth, load, edge=edge, low=0, high=1, bound=False)
+    return CapCase(name, plate, truth, load, edge=edge, low=0, high=1, bound=False)
 
 
 FINGERTIP, PAD, LONG_FINGER = Cap(8e-3), Cap(20e-3, 0.6), Cap(8e-3, stretch=1.4)
@@ -357,6 +368,39 @@ def shape_coverage(case, method, functions, frames, seed=0) -> tuple[float, floa
     return np.mean(covered), sqrt(np.mean(squares))
 
 
+def shapes_on_cap(case, frames, seed=0) -> dict[str, tuple[float, float]]:
+    """The same of 150 places on the cap of `case`, by method, in the order of `ON_CAPS`."""
+    rng, layout, cap = np.random.default_rng(seed), case.layout, case.skin.patch
+    share, azimuth = rng.uniform((0, 0), (0.95, 2 * pi), (150, 2)).T
+    polar = np.stack([cap.rim_radius * np.sqrt(share), azimuth], -1)
+    read, moved = case.truth(layout), _revolved(case.skin, case.edge).mover(polar)
+    loads = [case.load(place) for place in rng.uniform(0, 1, (frames, 2))]
+    moves = np.array([moved(_beside_pole(cap, load)) for load in loads])
+    noise = rng.uniform(-case.noise, case.noise, (frames, *layout.frame_shape))
+    frames_read = np.array([read(load) for load in loads]) + noise
+    found = {}
+    for method, functions in ON_CAPS.items():
+        fit = estimator_for(method, basis_for(cap, case.edge, *functions), layout)
+        at, covered, squares = fit.basis.at(_on_cap(cap, *polar.T)), [], []
+        for frame, true in zip(frames_read, moves, strict=True):
+            fit.restart()
+            one = fit(frame)
+            off = at @ one.coefficients.ravel() - true
+            covered.append(np.mean(np.abs(off) < REACH * one.surface_sd(_on_cap(cap, *polar.T))))
+            squares.append(np.mean(off**2))
+        found[method] = np.mean(covered), sqrt(np.mean(squares))
+    return found
+
+
+ON_CAPS = {"least-squares": (6, 9), "bayes": (8, 15), "tracking": (8, 15)}
+# Of the fingertip in the scene, too.
+THICK = [
+    _cap_case(
+        "fingertip of 1 mm, disc of 2.5 mm", Cap(8e-3, 1.309), "clamped", 4.0, 1e-3, radius=2.5e-3
+    ),
+    _cap_case("shallow cap of 1 mm, disc of 1 mm", PAD, "hinged", 1.0, 1e-3, radius=1e-3),
+]
+CAP_SHAPES = [*CAPS, *THICK]
 SHAPES = [("least-squares", 8), ("robust", 8), ("tracking", 8), ("bayes", 15)]
 
 # So weak that not every press is found, and those that are found are told too hard.

@@ -109,12 +109,14 @@ def test_a_sigma_that_is_off_by_two_is_said(method, functions, given, frames):
     assert recordings == 1
 
 
+@pytest.mark.cases("bayes-15", "least-squares-6")
 @pytest.mark.parametrize(("method", "functions"), SIGMA_FITS[:3])
 @pytest.mark.parametrize("frames", [500, pytest.param(10_000, marks=pytest.mark.full)])
 def test_a_sigma_that_is_right_is_never_said_to_be_off(method, functions, frames):
     assert sigma_said(method, functions, 1.0, frames) == (0, 0)
 
 
+@pytest.mark.cases("0.23094", "0.02]")
 @pytest.mark.parametrize("noise", [NOISE / sqrt(3), 0.05, 0.02])
 def test_a_contact_that_is_held_is_not_taken_for_a_wrong_sigma(noise):
     rng, layout = np.random.default_rng(0), SensorLayout.regular(PATCH, 10, 10)

@@ -72,6 +72,7 @@ def test_a_ball_in_a_gel_has_its_shape(method, functions):
     assert abs(off[HEIGHT.argmax()]) < 0.01 * HEIGHT.max()
 
 
+@pytest.mark.cases("functions0", "functions4", "functions5", "functions6")
 @pytest.mark.parametrize(("method", "functions"), [*METHODS, PLAIN])
 def test_a_ball_in_a_gel_has_its_place_and_curvature(method, functions):
     contact, there, _ = ball_told(method, functions)
@@ -83,6 +84,7 @@ def test_a_ball_in_a_gel_has_its_place_and_curvature(method, functions):
     assert there.mean == pytest.approx(-1 / RADIUS, rel=0.2)
 
 
+@pytest.mark.cases("functions0", "functions3")
 @pytest.mark.parametrize(("method", "functions"), METHODS[:4])
 def test_a_ball_in_a_gel_is_named_with_its_radius(method, functions):
     contact, _, found = ball_told(method, functions)
@@ -95,6 +97,7 @@ def test_a_ball_in_a_gel_is_named_with_its_radius(method, functions):
     assert contact.load_radius_95[0] < 3.2e-3 < contact.load_radius_95[1]  # where it lifts off
 
 
+@pytest.mark.cases("functions0", "functions4", "functions5", "functions6", "functions9")
 @pytest.mark.parametrize(("method", "functions"), [*METHODS, PLAIN, *COARSE])
 def test_a_ball_is_told_within_its_errors_or_not_named(method, functions):
     contact, there, found = ball_told(method, functions)
@@ -161,6 +164,7 @@ def pressed(kind, reads, functions, frames):
 SKINS = [("height", 16), ("height", 24), ("height", 36), ("slope", 18)]
 
 
+@pytest.mark.cases("height-24", "slope-18")
 @pytest.mark.parametrize(("reads", "functions"), SKINS)
 @frames
 def test_errors_cover_a_ball_in_an_elastomer(reads, functions, frames):
@@ -202,6 +206,7 @@ def test_a_ball_that_is_resolved_is_mostly_named(frames):
     assert pressed("sphere", "height", 36, frames)[6] > 0.7
 
 
+@pytest.mark.cases("height-16-punch", "height-36-cone", "slope-18-punch")
 @pytest.mark.parametrize("kind", ["punch", "cone"])
 @pytest.mark.parametrize(("reads", "functions"), SKINS)
 @frames
@@ -243,6 +248,7 @@ def on_plate(reads, radius, frames):
     return np.array(found, float).mean(axis=0)
 
 
+@pytest.mark.cases("0.0001-height", "0.003-curvature", "0.01-height")
 @pytest.mark.parametrize("reads", ["height", "curvature"])
 @pytest.mark.parametrize("radius", [1e-4, 3e-3, 1e-2])
 @frames
@@ -253,6 +259,7 @@ def test_errors_cover_a_load_on_a_plate_of_unknown_rigidity(reads, radius, frame
     assert forces == 0
 
 
+@pytest.mark.cases("height-0.2", "curvature-0.3")
 @pytest.mark.parametrize("radius", [0.2, 0.3])
 @pytest.mark.parametrize("reads", ["height", "curvature"])
 def test_errors_cover_the_curvature_of_a_ball_on_a_plate(reads, radius):

@@ -78,6 +78,7 @@ def test_a_rim_that_bears_in_part_is_mostly_not_named(name, frames):
     assert told.named < 0.6 * frames
 
 
+@pytest.mark.cases("sphere", "rounded edge")
 @pytest.mark.parametrize("frames", [FEW, pytest.param(ALL, marks=pytest.mark.full)])
 @pytest.mark.parametrize("name", ["sphere", "cylinder", "edge", "rounded edge"])
 def test_what_is_of_a_kind_mostly_fits_one(name, frames):

@@ -324,9 +324,10 @@ def loads_at(scene: Scene, time: float) -> list[DrawnStimulus]:
 
 @dataclass
 class GrabbedStimulus:
-    """A stimulus of a `scene` that was grabbed `at` (x, y) in m and has moved `by` (dx, dy) in m.
+    """A stimulus of a `scene`, there `at` (x, y) in m, that is held and moved `by` (dx, dy) in m.
 
-    Its force is `times` that at the start, within limits that keep the skin in the view.
+    It leaves its motion and rests with its whole force or depth, which is `times` the one in the
+    scene, within limits that keep the skin in the view.
     """
 
     scene: Scene
@@ -334,51 +335,93 @@ class GrabbedStimulus:
     at: tuple[float, float]
     by: tuple[float, float] = (0.0, 0.0)
     times: float = 1.0
+    moved: bool = False
 
     @classmethod
     def at_place(cls, scene: Scene, time: float, x: float, y: float) -> "GrabbedStimulus | None":
-        """The stimulus nearest to (x, y) in m at `time` in s, if there is one."""
-        there = loads_at(scene, time)
+        """The stimulus that presses nearest to (x, y) in m at `time` in s.
+
+        Where none presses it is the nearest one in the scene, put there; None without any.
+        """
+        pressing = loads_at(scene, time)
+        there = pressing or [
+            DrawnStimulus(number, PointLoad(*_place(stimulus.what), 1.0))
+            for number, stimulus in enumerate(scene.stimuli)
+        ]
         if not there:
             return None
         near = min(there, key=lambda touch: math.dist(touch.load.centre(), (x, y)))
-        return cls(scene, near.number, (x, y))
+        grabbed = cls(scene, near.number, _place(scene.stimuli[near.number].what))
+        if grabbed.moves:
+            grabbed.moved_to(*(near.load.centre().tolist() if pressing else (x, y)))
+            grabbed.moved = not pressing
+        return grabbed
 
     @property
-    def moved(self) -> bool:
-        return self.by != (0.0, 0.0) or self.times != 1.0
+    def moves(self) -> bool:
+        """Whether it has a motion in the scene."""
+        return self.scene.stimuli[self.number].motion is not None
 
     def moved_to(self, x: float, y: float) -> Scene:
-        """The scene with the stimulus moved to (x, y) in m, or to its last valid position."""
-        by = x - self.at[0], y - self.at[1]
-        try:
-            scene = self._moved(by)
-        except Refusal:  # over the rim
-            return self._moved(self.by)
-        self.by = by
-        return scene
+        """The scene with the stimulus at (x, y) in m, or as near to it on a line to the middle.
+
+        It is there completely on the skin.
+        """
+        patch, before = self.scene.plate.patch, self.by
+        middle, to = np.array([patch.a, patch.b]) / 2, np.array([x, y])
+        least, most = 0.0, 2.0  # of the line: the whole of it first
+        for _ in range(_HALVINGS):
+            share = (least + most) / 2
+            dx, dy = (middle + share * (to - middle) - self.at).tolist()
+            if self._fits(dx, dy):
+                self.by, least = (dx, dy), share
+            else:
+                most = share
+            if least == 1.0:
+                break
+        self.moved |= self.by != before
+        return self.resting
 
     def pressed(self, times: float) -> Scene:
-        """The scene with `times` the force that the stimulus had when it was grabbed."""
+        """The scene with `times` the force that the stimulus has in the scene."""
         what = self.scene.stimuli[self.number].what
         most = largest_factor(self.scene, what)
         self.times = min(max(times, min(_LEAST_FORCE * most, 1.0)), max(most, 1.0))
-        return self._moved(self.by)
+        self.moved |= self.times != 1.0
+        return self.resting
 
-    def _moved(self, by: tuple[float, float]) -> Scene:
+    @property
+    def resting(self) -> Scene:
+        """The scene with the stimulus at rest where it is held."""
         stimuli = list(self.scene.stimuli)
-        stimuli[self.number] = scaled(_shifted(stimuli[self.number], *by), self.times)
-        moved = replace(self.scene, stimuli=tuple(stimuli))
-        if moved.indenter is not None:
-            _check_inside(moved, moved.indenter)
-        return moved
+        stimuli[self.number] = scaled(self._held(*self.by), self.times)
+        return replace(self.scene, stimuli=tuple(stimuli))
+
+    def _held(self, dx: float, dy: float) -> Stimulus:
+        return Stimulus(_shifted(self.scene.stimuli[self.number].what, dx, dy))
+
+    def _fits(self, dx: float, dy: float) -> bool:
+        """Whether the stimulus is on the skin where it is moved by (dx, dy) in m."""
+        held, plate = self._held(dx, dy), self.scene.plate
+        try:
+            held.check(plate)
+            if isinstance(held.what, Indenter):  # its middle is on the skin too
+                PointLoad(held.what.x, held.what.y, 1.0).check(plate.patch)
+        except Refusal:
+            return False
+        return True
 
 
-def _shifted(stimulus: Stimulus, dx: float, dy: float) -> Stimulus:
-    what = stimulus.what
+def _place(what: Load | Indenter) -> tuple[float, float]:
+    """The place (x, y) in m of `what`, without its motion."""
+    x, y = (what.x, what.y) if isinstance(what, Indenter) else what.centre().tolist()
+    return x, y
+
+
+def _shifted(what: Load | Indenter, dx: float, dy: float) -> Load | Indenter:
     if isinstance(what, Indenter):
-        return replace(stimulus, what=replace(what, x=what.x + dx, y=what.y + dy))
-    return replace(stimulus, what=what.shifted(dx, dy))
+        return replace(what, x=what.x + dx, y=what.y + dy)
+    return what.shifted(dx, dy)
 
 
 def scaled(stimulus: Stimulus, times: float) -> Stimulus:
@@ -402,15 +445,6 @@ def largest_factor(scene: Scene, what: Load | Indenter) -> float:
         return deepest / (what.depth or deepest)
     gives = middle_compliance(scene.plate, scene.edge)
     return deepest / (abs(what.force or 1.0) * gives) if gives > 0 else 1.0
-
-
-def _check_inside(scene: Scene, stimulus: Stimulus) -> None:
-    """Refuse a rigid object whose middle leaves the skin during its motion."""
-    moments = stimulus.motion.moments if stimulus.motion else [0.0]
-    for time in moments:
-        pose, what = stimulus.pose_at(time), stimulus.what
-        if isinstance(what, Indenter):
-            PointLoad(what.x + pose.dx, what.y + pose.dy, 1.0).check(scene.plate.patch)
 
 
 def object_replaceable(scene: Scene) -> bool:

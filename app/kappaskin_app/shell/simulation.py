@@ -295,6 +295,7 @@ def with_consequences(settings: Settings, scene: Scene, name: str, value: Any) -
         changed |= {**SHAPES[value].lengths, **SHAPES[value].defaults}
     if name == "design_shape":
         changed |= {f"design_{name}": length for name, length in SHAPES[value].lengths.items()}
+        changed |= {"design_pattern": "spiral" if value == "cap" else "grid"}
         changed |= {"design_place": "scene"} if value == "strip" else {}
     if name in _BOXED and "side_x" not in changed:
         patch = patch_of(replace(settings, **changed))

@@ -2,8 +2,8 @@
 
 import numpy as np
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen, QPolygonF
-from PySide6.QtWidgets import QToolButton, QVBoxLayout, QWidget
+from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen, QPolygonF, QStaticText
+from PySide6.QtWidgets import QGridLayout, QToolButton, QWidget
 
 from kappaskin_app.widgets.lettering import read_from_afar
 from kappaskin_app.widgets.parts import Label
@@ -174,6 +174,28 @@ class LockButton(QToolButton):
         painter.drawPolygon(_PIN)
 
 
+class UprightLabel(Label):
+    """A line of rich text that reads upwards."""
+
+    def __init__(self) -> None:
+        super().__init__(rich=True)
+
+    def sizeHint(self) -> QSize:
+        return super().sizeHint().transposed()
+
+    def minimumSizeHint(self) -> QSize:
+        return QSize(self.sizeHint().width(), 0)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        text = QStaticText(self.text())
+        text.prepare(font=self.font())
+        wide, high = text.size().toTuple()
+        with QPainter(self) as painter:
+            painter.translate((self.width() - high) / 2, (self.height() + wide) / 2)
+            painter.rotate(-90)
+            painter.drawStaticText(0, 0, text)
+
+
 class SkinScale(QWidget):
     """The scale of the skin: quantity, colour bar and pin."""
 
@@ -181,17 +203,16 @@ class SkinScale(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.what = Label(rich=True, alignment=Qt.AlignmentFlag.AlignHCenter)  # pyright: ignore[reportCallIssue]
-        self.bar, self.lock = ColourBar(), LockButton()
+        self.what, self.bar, self.lock = UprightLabel(), ColourBar(), LockButton()
         self.bar.show_tint(Tint("sequential", (0.0, 1.0), "mm"))
         self.lock.wanted.connect(self.lock_wanted)
         self._shown = "", ""
-        self.what.setWordWrap(True)
-        around = QVBoxLayout(self)
+        around = QGridLayout(self)
         around.setContentsMargins(0, 4, 0, 4)
-        around.addWidget(self.what)
-        around.addWidget(self.bar, 1)
-        around.addWidget(self.lock, 0, Qt.AlignmentFlag.AlignHCenter)
+        around.setHorizontalSpacing(2)
+        around.addWidget(self.what, 0, 0)
+        around.addWidget(self.bar, 0, 1)
+        around.addWidget(self.lock, 1, 1)
 
     def show_unit(self, unit: float) -> None:
         """Use large letters without controls where a unit is so many px; 0: the usual ones."""
@@ -202,5 +223,5 @@ class SkinScale(QWidget):
         """Show what colours the skin: name, `symbol` in HTML and tooltip."""
         if (name, symbol) != self._shown:
             self._shown = name, symbol
-            self.what.setText(name if name == symbol else f"{name}<br><b>{symbol}</b>")
+            self.what.setText(name if name == symbol else f"{name} <b>{symbol}</b>")
             self.what.setToolTip(tip)

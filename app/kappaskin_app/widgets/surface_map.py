@@ -104,7 +104,7 @@ class SurfaceMap(QWidget):
         bold = self.title.font()
         bold.setBold(True)
         self.title.setFont(bold)
-        self.map, self.bar, self._unit = _Map(), ColourBar(), unit
+        self.map, self.bar, self.unit = _Map(), ColourBar(), unit
         self._tint = Tint("sequential", (0.0, 1.0), unit)
         self.bar.show_tint(self._tint)
         self._values: Array | None = None
@@ -137,7 +137,7 @@ class SurfaceMap(QWidget):
         `part` of the colour map is used; `noise` is the standard deviation of a value.
         """
         self._values, self._contact, self._sides = values, contact, sides
-        self._tint = Tint(part, limits, self._unit, noise=noise)
+        self._tint = Tint(part, limits, self.unit, noise=noise)
         self.bar.show_tint(self._tint)
         self._show()
 

@@ -183,7 +183,7 @@ class PointMap:
 
 def covariant_maps(basis: Basis, x: Array, y: Array) -> list[ValueMap]:
     """The maps from coefficients to what `covariant_at` gives, on the grid of `x` and `y`."""
-    if not isinstance(basis.patch, Cap):
+    if not basis.patch.base(float(x[0]), float(y[0])).slopes:
         return [basis.on_grid(x, y, *order) for order in ORDERS]
     jets = covariant_at(basis, np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))]))
     return [PointMap.of(lambda _, jet=jet: jet, x, y) for jet in jets]

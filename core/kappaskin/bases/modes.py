@@ -171,35 +171,62 @@ class CapBasis(RoundBasis):
     def _parallel(self, distance: Array) -> Array:
         return self.cap.meridian(distance).radius
 
-    def along(self, r: Array) -> Array:
-        """Each function along a meridian, and its first two derivatives, (3, Q, M, Ni).
+    def along(self, r: Array, orders: int = 3) -> Array:
+        """Each function along a meridian, and its derivatives, (`orders`, Q, M, Ni).
 
         At the shares `r` (Q,) of the arc to the rim, and by them; for m = 0 to M - 1.
         """
-        return radial(r, np.arange(self.Nj // 2 + 1), self.Ni, 1 + self.clamped)
+        return radial(r, np.arange(self.Nj // 2 + 1), self.Ni, 1 + self.clamped, orders)
+
+    def around_pole(self, r: Array) -> Array:
+        """f, f', m f / r, f'', m (f' / r - f / r^2) and f' / r - m^2 f / r^2, (6, Q, M, Ni).
+
+        As `along`, of functions f that go as cos m t or sin m t around. No division by r: they are
+        regular at the pole.
+        """
+        f, down, up, *second = _jacobi(r, np.arange(self.Nj // 2 + 1), self.Ni, 1 + self.clamped)
+        both, twist = (second[0] + second[2]) / 4, (second[0] - second[2]) / 4
+        mixed = second[1] / 2
+        return np.stack([f, (down + up) / 2, (down - up) / 2, both + mixed, twist, mixed - both])
 
 
-def radial(r: Array, m: NDArray[np.intp], count: int, k: int) -> Array:
-    """r^m (1 - r^2)^k P_i(2 r^2 - 1) and two derivatives, (3, Q, M, count), at `r` (Q,).
+def radial(r: Array, m: NDArray[np.intp], count: int, k: int, orders: int = 3) -> Array:
+    """r^m (1 - r^2)^k P_i(2 r^2 - 1) and derivatives, (`orders`, Q, M, count), at `r` (Q,).
 
     For each of `m` (M,). P_i = P_i^(2k, m), i < count. Their mean square over the disk, times that
-    of cos m t, is 1/4.
+    of cos m t, is 1/4. At most two derivatives.
     """
-    f, down, up, *second = _jacobi(r, m, count, k)
-    return np.stack([f, (down + up) / 2, (second[0] + 2 * second[1] + second[2]) / 4])
+    G, (m, r) = _scaled(r, m, count, k, orders), (m[:, None], r[:, None, None])
+    found = np.empty((orders, *G[0].shape))
+    np.multiply(r**m, G[0], found[0])
+    if orders > 1:
+        found[1] = m * r ** np.maximum(m - 1, 0) * G[0] + 2 * r ** (m + 1) * G[1]
+    if orders > 2:
+        found[2] = m * (m - 1) * r ** np.maximum(m - 2, 0) * G[0]
+        found[2] += (4 * m + 2) * r**m * G[1] + 4 * r ** (m + 2) * G[2]
+    return found
+
+
+def _scaled(r: Array, m: NDArray[np.intp], count: int, k: int, orders: int) -> list[Array]:
+    """The functions of `radial` over r^m, (Q, M, count), and derivatives by r^2."""
+    i, m, t = np.arange(count), m[:, None], r[:, None, None] ** 2
+    share = np.prod([(i + d) / (i + m + d) for d in range(1, 2 * k + 1)], axis=0)
+    mean_square = share / (2 * i + 2 * k + m + 1) * np.where(m > 0, 0.5, 1.0)
+    scale = 1 / (2 * np.sqrt(mean_square))
+    P, rest = list[Array](), list[Array]()  # P(2 t - 1), (1 - t)^k, and derivatives by t
+    for d in range(orders):
+        rising = np.prod([i + 2 * k + m + 1 + e for e in range(d)], axis=0) * scale
+        P.append(rising * _polynomials(2 * k + d, m[:, 0] + d, count, 2 * t[..., 0] - 1, d))
+        rest.append((-1.0) ** d * math.perm(k, d) * (1 - t) ** max(k - d, 0))
+    return [
+        sum((math.comb(d, e) * rest[d - e] * P[e] for e in range(1, d + 1)), rest[d] * P[0])
+        for d in range(orders)
+    ]
 
 
 def _jacobi(r: Array, m: NDArray[np.intp], count: int, k: int) -> Array:
     """Radial parts (6, Q, M, count) of the functions of `radial` by `_STEPS`."""
-    i, m, r = np.arange(count), m[:, None], r[:, None, None]
-    x = 2 * r**2 - 1
-    P, rest = list[Array](), list[Array]()  # P(2 t - 1), (1 - t)^k, and derivatives by t = r^2
-    for d in range(3):
-        rising = np.prod([i + 2 * k + m + 1 + e for e in range(d)], axis=0)
-        P.append(rising * _polynomials(2 * k + d, m[:, 0] + d, count, x[..., 0], d))
-        rest.append((-1.0) ** d * math.perm(k, d) * ((1 - x) / 2) ** max(k - d, 0))
-    G, G1 = rest[0] * P[0], rest[1] * P[0] + rest[0] * P[1]
-    G2 = rest[2] * P[0] + 2 * rest[1] * P[1] + rest[0] * P[2]
+    (G, G1, G2), (m, r) = _scaled(r, m, count, k, 3), (m[:, None], r[:, None, None])
     # With r^m G(r^2) D- adds 2 m r^(m-1) G + 2 r^(m+1) G', D+ 2 r^(m+1) G', and so on.
     below, two_below = r ** np.maximum(m - 1, 0), r ** np.maximum(m - 2, 0)
     up, twice = 2 * r ** (m + 1) * G1, 4 * r ** (m + 2) * G2
@@ -211,9 +238,7 @@ def _jacobi(r: Array, m: NDArray[np.intp], count: int, k: int) -> Array:
         4 * (m + 1) * r**m * G1 + twice,
         twice,
     ]
-    share = np.prod([(i + d) / (i + m + d) for d in range(1, 2 * k + 1)], axis=0)
-    mean_square = share / (2 * i + 2 * k + m + 1) * np.where(m > 0, 0.5, 1.0)
-    return np.stack(steps) / (2 * np.sqrt(mean_square))
+    return np.stack(steps)
 
 
 # With z = x + i y the derivatives of J_m(k r) e^(i m theta) along D- = d/dx - i d/dy and
@@ -240,15 +265,15 @@ def _polynomials(a: int, b: NDArray[np.intp], count: int, x: Array, skipped: int
 
     After as many zeros as are `skipped`. By their three-term recurrence.
     """
-    found = np.zeros((len(x), len(b), count + 3))
-    own = found[..., skipped:]
-    own[..., 0], own[..., 1] = 1.0, a + 1 + (a + b + 2) * (x - 1) / 2
+    found = np.zeros((count + 3, len(x), len(b)))
+    own = found[skipped:]
+    own[0], own[1] = 1.0, a + 1 + (a + b + 2) * (x - 1) / 2
     for i in range(2, count - skipped):
         c = 2 * i + a + b
-        ahead = (c - 1) * (c * (c - 2) * x + (a - b) * (a + b)) * own[..., i - 1]
-        behind = 2 * (i + a - 1) * (i + b - 1) * c * own[..., i - 2]
-        own[..., i] = (ahead - behind) / (2 * i * (i + a + b) * (c - 2))
-    return found[..., :count]
+        below = 2 * i * (i + a + b) * (c - 2)
+        ahead = (c - 1) / below * (c * (c - 2) * x + (a - b) * (a + b)) * own[i - 1]
+        own[i] = ahead - 2 * (i + a - 1) * (i + b - 1) * c / below * own[i - 2]
+    return np.moveaxis(found[:count], 0, 2)
 
 
 class _PolarFunctions:

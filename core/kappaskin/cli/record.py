@@ -241,8 +241,12 @@ def _contents(recording: "Recording") -> dict[str, Any]:
 def _device(text: str) -> str:
     from kappaskin.sources import sensor_from_json
 
-    sensor = sensor_from_json(text)
-    return f"{sensor.name} {sensor.serial_number}, {sensor.layout}, firmware {sensor.firmware}"
+    try:
+        sensor = sensor_from_json(text)
+    except Refusal as reason:
+        return str(reason)
+    skin = f"{sensor.layout} on a {sensor.edge} {sensor.layout.patch.name}"
+    return f"{sensor.name} {sensor.serial_number}, {skin}, firmware {sensor.firmware}"
 
 
 def verify(file: Path, *, limit: Limit = "") -> int:

@@ -1,17 +1,23 @@
 """Point-force models of rigid objects on an elastic skin, and their best fit."""
 
+import cmath
 import math
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import cast
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy import linalg
 
 from kappaskin.bases import basis_for
 from kappaskin.contact.element_grid import element_grid
+from kappaskin.contact.influence import CUBICS, SPLINES, Single, cap_half_wave, cap_table
 from kappaskin.errors import Refusal
-from kappaskin.frames import Array, Mask
+from kappaskin.frames import Array, Indices, Mask
 from kappaskin.mechanics import Plate
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Cap, Patch
@@ -118,20 +124,35 @@ def _turned(parameters: Array, places: Array, moves: Array, growth: Array) -> Po
     return PointForces(parameters[:2] + places @ axes, parameters[2] * growth[2], moves, growth)
 
 
-def oval(parameters: Array) -> PointForces:
-    """Parameters of `ends` and q: forces around an ellipse, as long and 2 sqrt(q) wide.
+def lengthwise(along: Array, across: Array, share: Array) -> ForceModel:
+    """Parameters of `ends`, and q where forces lie beside the axis.
 
-    They are as 1 + 2 share to 1 - 2 share at its two ends, and change evenly from one to the other.
+    Each has a `share` (k,) of the force, `along` (k,) half lengths from the middle and `across`
+    (k,) times sqrt(q) beside the axis. They are as 1 + 2 share to 1 - 2 share at the two ends, and
+    change evenly from one to the other.
     """
-    length, share, b = math.sqrt(parameters[4]), parameters[5], math.sqrt(parameters[6])
-    n, along, across = len(_AROUND), np.cos(_AROUND), np.sin(_AROUND)
-    place, moves, growth = (along - share) / 2, np.zeros((7, n, 2)), np.zeros((7, n))
-    moves[4, :, 0], moves[5, :, 0] = place / (2 * length), -length / 2
-    moves[6, :, 1] = across / (2 * b)
-    growth[2], growth[5] = (1 + 2 * share * along) / n, 2 * along * parameters[2] / n
-    return _turned(parameters, np.column_stack([length * place, b * across]), moves, growth)
+    square = float(share @ along**2)
+
+    def forces(parameters: Array) -> PointForces:
+        n, length, tilt = len(parameters), math.sqrt(parameters[4]), parameters[5]
+        place, places = along / 2 - tilt * square, np.zeros((len(along), 2))
+        moves, growth = np.zeros((n, *places.shape)), np.zeros((n, len(along)))
+        places[:, 0], moves[4, :, 0] = length * place, place / (2 * length)
+        moves[5, :, 0] = -square * length
+        if n > 6:
+            b = math.sqrt(parameters[6])
+            places[:, 1], moves[6, :, 1] = across * b, across / (2 * b)
+        growth[2], growth[5] = share * (1 + 2 * tilt * along), 2 * share * along * parameters[2]
+        return _turned(parameters, places, moves, growth)
+
+    return forces
 
 
+oval = lengthwise(np.cos(_AROUND), np.sin(_AROUND), np.full(12, 1 / 12))
+"""Forces around an ellipse, as long and 2 sqrt(q) wide."""
+
+
+_EVEN = 0.1  # of the sum of two curvatures: they differ less
 _GRID = 13  # places along each side
 _MOST = 2000  # elements: 100 MB
 _SEARCHED = np.array([0.025, 0.045, 0.07, 0.1, 0.14, 0.19, 0.26, 0.35])  # of the shorter side
@@ -149,17 +170,22 @@ class ElasticSkin:
         patch = plate.patch
         if patch.strip:
             raise Refusal("object recognition needs a 2-D skin; this one is a strip")
-        if isinstance(patch, Cap):
-            raise Refusal(
-                "object recognition needs a flat skin, a cylinder or a shallow one; this one is a "
-                "cap, whose contact still has its curvatures"
-            )
         if not plate.rigidity:
             raise Refusal("object recognition needs a rigidity above zero; this skin has none")
         layout.check_curvature_sensor("objects")
         if len(layout) > _MOST:
             raise Refusal(f"object recognition takes at most {_MOST} elements, got {len(layout)}")
-        self.patch, self.side, self._layout = patch, min(patch.a, patch.b), layout
+        self.patch, self.side, self._elements = patch, min(patch.a, patch.b), layout.positions
+        Hx, Hy = patch.curvatures
+        self.form = np.array([Hx, Hy, 0.0])
+        """Curvature (3,) in 1/m at rest: xx, yy and xy."""
+        self.bend = 1 / (4 * math.pi * plate.rigidity)
+        """Curvature in 1/m lost inside a ring or an arc per N and e-fold of its size."""
+        self._take(plate, layout, edge, functions)
+
+    def _take(self, plate: Plate, layout: SensorLayout, edge: str, functions: int) -> None:
+        """Compute what the skin reads and how it gives."""
+        patch = plate.patch
         self._corners = None
         if type(patch) is Patch:
             self._corners = patch.inward(-math.inf, -math.inf), patch.inward(math.inf, math.inf)
@@ -170,18 +196,48 @@ class ElasticSkin:
             M = self._compliance.after(layout.operator(self._basis, plate))
             self._M: NDArray[np.float32] = M.astype(np.float32)
         self.half_wave = max(patch.a, patch.b) / functions
-        self.bend = 1 / (4 * math.pi * plate.rigidity)
-        """Curvature in 1/m lost inside a ring or an arc per N and e-fold of its size."""
         steps = (np.arange(_GRID) + 0.5) / _GRID
         x, y = np.meshgrid(patch.a * steps, patch.b * steps)
         self.grid = np.stack([x.ravel(), y.ravel()], axis=-1)
         """Places (k, 2) in m all over the skin."""
-        self.under = self._read(self._felt(self.grid))
+        self.under = self._per_newton(self.grid)
         """Curvature (k, R) in 1/m of all channels for 1 N at each of them."""
+
+    @property
+    def is_dome(self) -> bool:
+        """Whether it bulges outward along x and y."""
+        return bool(self.form[:2].min() > 0)
+
+    @property
+    def is_even(self) -> bool:
+        """Whether it curves alike along all directions, or nearly so."""
+        xx, yy, xy = self.form.tolist()
+        return math.hypot(xx - yy, 2 * xy) <= _EVEN * (xx + yy)
+
+    def near(self, place: Array) -> "ElasticSkin":
+        """The skin around a `place` (2,) in m, with the coordinates of `local`."""
+        return self
+
+    def local(self, place: Array) -> Array:
+        """A place (2,) in m on the skin in the coordinates of forces."""
+        return place
+
+    def on_patch(self, place: Array) -> Array:
+        """The reverse of `local`."""
+        return place
 
     def sag(self, offsets: Array) -> Array:
         """By how much in m the skin at rest falls at `offsets` (..., 2) in m from a place."""
-        return offsets**2 @ np.array(self.patch.curvatures) / 2
+        return offsets**2 @ self.form[:2] / 2 + self.form[2] * offsets[..., 0] * offsets[..., 1]
+
+    def _per_newton(self, points: Array) -> Array:
+        """Readings (k, R) in 1/m for 1 N at each of `points` (k, 2)."""
+        return self._read(self._felt(points))
+
+    def _given(self, points: Array) -> Array:
+        """Displacement (k, k) in m at each of `points` (k, 2) per N at each."""
+        felt = self._felt(points)
+        return self._compliance.after(felt) @ felt.T
 
     def _on_skin(self, points: Array) -> Array:
         if self._corners is not None:
@@ -225,8 +281,7 @@ class ElasticSkin:
         """
         from scipy.optimize import nnls  # slow to import, and seldom needed
 
-        felt = self._felt(points)
-        G = self._compliance.after(felt) @ felt.T
+        G = self._given(points)
         G[np.diag_indices_from(G)] *= 1 + _SOFT
         L = linalg.cholesky(G, lower=True)
         # The least p'Gp / 2 + p'gap with a given sum: the sum as one more, heavy row.
@@ -240,7 +295,7 @@ class ElasticSkin:
 
         It matters only for elements within a half wave or two of a force.
         """
-        away = self._layout.positions[:, None] - forces.points
+        away = self._elements[:, None] - forces.points
         waves = np.hypot(away[..., 0], away[..., 1]) / self.half_wave
         blur = (_BLUR * self.bend * forces.weights) ** 2 * np.maximum(waves, 0.2) ** (-2 * _FALL)
         return np.tile(blur.sum(axis=1), 3)
@@ -254,7 +309,7 @@ class ElasticSkin:
         angles = 2 * np.pi * np.arange(_ANGLES) / _ANGLES
         out = np.stack([np.multiply.outer(_SEARCHED, f(angles)).ravel() for f in (np.cos, np.sin)])
         points = self._on_skin(around + self.side * np.vstack([np.zeros(2), out.T]))
-        T = self._read(self._felt(points)) * used
+        T = self._per_newton(points) * used
         G, h = T @ T.T, T @ readings
         own = np.diag(G)
         squares = np.multiply.outer(own, own)
@@ -266,6 +321,134 @@ class ElasticSkin:
         explained = np.where(one * two > 0, one * h[:, None] + two * h, -np.inf)
         i, j = np.unravel_index(int(np.argmax(explained)), explained.shape)
         return points[[i, j]], np.array([one[i, j], two[i, j]])
+
+
+_AROUND_CONTACT = 10  # steps of the table of a cap: as far around a contact forces are looked for
+_ROUGH = 1.75  # times a half wave of a cap's table: what that lacks of a point is as much
+_BLOCK = (np.arange(4)[:, None] * (2 * _AROUND_CONTACT + 1) + np.arange(4)).ravel()
+_GIVES = 256  # distances at which the displacement beside a force is known
+
+
+class SkinOnCap(ElasticSkin):
+    """A cap with elements on it, in coordinates from a contact: lengths along the skin."""
+
+    def _take(self, plate: Plate, layout: SensorLayout, edge: str, functions: int) -> None:
+        places, length = layout.positions.tobytes(), layout.gage_length
+        table, self._steps, _ = cap_table(plate, edge, places, length)
+        # As under a point: even in the radius, 9/8 of the spline at 0.5 steps less 1/8 at 1.5.
+        shares = np.array([9, 36, 8, -4, -1]) / (48 * 8 * math.pi * plate.rigidity)
+        self._table = np.tensordot(shares.astype(np.float32), table[:, :, :5], (0, 2))
+        self._plate, self._positions = plate, layout.positions
+        self._reach = _AROUND_CONTACT * self._steps[0]
+        self.side = 2 * self._reach
+        self.half_wave = _ROUGH * cap_half_wave(cast("Cap", plate.patch))
+        self.move_to(np.array([plate.patch.a, plate.patch.b]) / 2)
+
+    def near(self, place: Array) -> "SkinOnCap":
+        made = copy(self)
+        made.move_to(place)
+        return made
+
+    def move_to(self, place: Array) -> None:
+        """Count lengths from a `place` (2,) in m, and compute what loads around it make."""
+        cap, (step, turns, _), (x, y) = cast("Cap", self.patch), self._steps, place.tolist()
+        base = cap.base(x, y)
+        self._place, self.form = place, base.form
+        self._elements = (self._positions - place) @ np.linalg.inv(np.array(base.slopes))
+        nodes = step * np.arange(-_AROUND_CONTACT, _AROUND_CONTACT + 1.0)
+        at = cap.around(x, y, np.stack(np.meshgrid(nodes, nodes), -1).reshape(-1, 2))
+        dx, dy = (at - cap.rim_radius).T
+        away = np.minimum(np.hypot(dx, dy), cap.rim_radius)
+        i, turn, _ = _cubic(
+            np.arctan2(dy, dx) % (2 * np.pi) / turns + 1, self._table.shape[1], SPLINES
+        )
+        j, along, _ = _cubic(away / step + 1, len(self._table), SPLINES)
+        self._local = np.zeros((len(at), self._table.shape[2]), np.float32)
+        for k, m in np.ndindex(4, 4):
+            share = (turn[:, k] * along[:, m]).astype(np.float32)
+            self._local += share[:, None] * self._table[j + m, i + k]
+        xx, yy, xy = base.form.tolist()
+        square = (3 * xx**2 + 3 * yy**2 + 2 * xx * yy + 4 * xy**2) / 8
+        self._green = _green(self._plate, square, 3 * self.side)
+
+    def local(self, place: Array) -> Array:
+        return np.zeros(2)
+
+    def on_patch(self, place: Array) -> Array:
+        x, y = self._place.tolist()
+        return cast("Cap", self.patch).around(x, y, place[None])[0]
+
+    def _on_skin(self, points: Array) -> Array:
+        return np.minimum(np.maximum(points, -self._reach), self._reach)
+
+    def _weights(self, points: Array) -> tuple[Array, Single]:
+        """Weights (3, k, 16) of nodes around `points` (k, 2), and of slopes; what is read there."""
+        n, step = 2 * _AROUND_CONTACT + 1, self._steps[0]
+        (i, j), (X, Y), (X1, Y1) = _cubic((self._on_skin(points).T + self._reach) / step, n)
+        both = np.empty((3, len(points), 4, 4))
+        np.multiply(Y[:, :, None], X[:, None], out=both[0])
+        np.multiply(Y[:, :, None], (X1 / step)[:, None], out=both[1])
+        np.multiply((Y1 / step)[:, :, None], X[:, None], out=both[2])
+        return both.reshape(3, -1, 16), self._local[(j * n + i)[:, None] + _BLOCK]
+
+    def _per_newton(self, points: Array) -> Array:
+        weights, read = self._weights(points)
+        return np.einsum("kn,knc->kc", weights[0].astype(np.float32), read).astype(float)
+
+    def readings(self, forces: PointForces) -> tuple[Array, Array]:
+        (f, fx, fy), read = self._weights(forces.points)
+        moved = forces.weights * forces.moves.transpose(2, 0, 1)
+        rows = forces.growth[..., None] * f + moved[0][..., None] * fx + moved[1][..., None] * fy
+        rows = np.concatenate([(forces.weights[:, None] * f)[None], rows])
+        answer = rows.reshape(len(rows), -1).astype(np.float32) @ read.reshape(-1, read.shape[2])
+        return answer[0].astype(float), answer[1:].T.astype(float)
+
+    def _between(self, places: Array, others: Array) -> Array:
+        """Displacement (k, m) in m at `places` (k, 2) per N at `others` (m, 2)."""
+        away = np.linalg.norm(places[:, None] - others, axis=-1)
+        i, weights, _ = _cubic(away.ravel() / (3 * self.side) * (_GIVES - 1), _GIVES)
+        rest = np.vecdot(weights, self._green[i[:, None] + np.arange(4)]).reshape(away.shape)
+        return rest + self.bend / 2 * away**2 * np.log(np.maximum(away, 1e-300) / self.side)
+
+    def gives(self, forces: PointForces, points: Array) -> Array:
+        return self._between(points, forces.points) @ forces.weights
+
+    def _given(self, points: Array) -> Array:
+        return self._between(points, points)
+
+
+@lru_cache(4)
+def _green(plate: Plate, square: float, far: float) -> Array:
+    """Displacement in m per N at `_GIVES` even distances up to `far` in m from a force.
+
+    Less r^2 ln r / (8 pi D), on a shallow shell without edges whose curvature has the mean square
+    `square` in 1/m^2 over its directions: a plate over a foam.
+    """
+    D, T = plate.rigidity, plate.tension
+    below = plate.foundation + (1 - plate.poisson**2) * plate.membrane_stiffness * square
+    # D k^4 + T k^2 + below = D (k^2 + p) (k^2 + q)
+    root = cmath.sqrt(T**2 - 4 * D * below) or 1e-6j * T
+    p, q = (T - root) / (2 * D), (T + root) / (2 * D)
+    r: Array = np.linspace(0, far, _GIVES)
+    r[0] = 1e-6 * r[1]
+    one, other = (cast("Array", scipy.special.kv(0, cmath.sqrt(k2) * r)) for k2 in (p, q))
+    whole: Array = np.real((one - other) / (2 * np.pi * D * (q - p)))
+    return whole - r**2 * np.log(r / far * 3) / (8 * np.pi * D)
+
+
+def _cubic(at: Array, nodes: int, of: Array = CUBICS) -> tuple[Indices, Array, Array]:
+    """The first (...) of four even nodes around `at` (...), their weights (..., 4), and slopes."""
+    i = np.minimum(np.maximum(at.astype(int) - 1, 0), nodes - 4)
+    u, powers = at - i, np.zeros((2, *at.shape, 4))
+    value, slope = powers
+    value[..., 0] = slope[..., 1] = 1.0
+    value[..., 1] = u
+    np.multiply(u, 2, out=slope[..., 2])
+    np.multiply(u, u, out=value[..., 2])
+    np.multiply(value[..., 2], u, out=value[..., 3])
+    np.multiply(value[..., 2], 3, out=slope[..., 3])
+    values, slopes = powers @ of
+    return i, values, slopes
 
 
 _GAIN = 0.05  # of chi-squared: less is not worth a step

@@ -244,8 +244,8 @@ def _frame(base: Base, jet: Jet, of: _Surface) -> tuple[Array, Array, Array]:
     place = [p - f * n for p, n in zip(base.point, base.normal, strict=True)]
     metric = L, m * L, 0 * f, 1 / k
     if base.slopes:  # of steps along e_1 and e_2: the inverse of these has x and y
-        (axx, axy), (_, ayy) = base.slopes
-        det = axx * ayy - axy * axy
-        xx, xy, yy = ayy / det, -axy / det, axx / det
-        metric = L * (xx + m * xy), L * (xy + m * yy), xy / k, yy / k
+        (axx, axy), (ayx, ayy) = base.slopes
+        det = axx * ayy - axy * ayx
+        xx, xy, yx, yy = ayy / det, -ayx / det, -axy / det, axx / det
+        metric = L * (xx + m * yx), L * (xy + m * yy), yx / k, yy / k
     return np.array(place).T, _matrix(*rows), _matrix(*metric)

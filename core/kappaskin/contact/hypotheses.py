@@ -1,7 +1,7 @@
 """Object hypotheses: the best sphere, edge and cylinder for a contact, and their likelihoods."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import cast
 
 import numpy as np
@@ -18,12 +18,16 @@ from kappaskin.contact.elastic_skin import (
     Prior,
     arcs,
     ends,
+    lengthwise,
     optimise,
     oval,
     ring,
 )
 from kappaskin.frames import Array, Contact, Mask
 
+# On a bent skin, of its curvature and the object's: 0.02 to 0.07 of shells from 0.25 to 2 mm thick,
+# but 0.23 where the arcs are narrower than a half wave.
+INEXACT_BENT = 0.08
 _LEAST = 3e-3  # of a side: as narrow as a ring or an arc is made
 _BLUNT = 0.4  # of a half wave: a narrower contact is a point to the functions
 _WIDE = 2.0  # half waves: a smaller ring is taken for a circle
@@ -31,6 +35,8 @@ _MOST = 0.5  # of the force: between the ends, at most
 _NOTHING = 0.01  # of the force: less is not worth the points it takes
 _RING_RADII = (0.25, 0.5, 0.7, 0.85, 1.0, 1.15, 1.3, 1.6, 2.0)  # of a ring: circles it may press on
 _PLACES = np.vstack([np.zeros((1, 2)), *(r * ROUND[:, :2] for r in _RING_RADII)])
+_EVENLY = ROUND[:, 0], np.zeros(len(ROUND)), ROUND[:, 2]  # as a line bears on a plate
+_LINE = lengthwise(*_EVENLY)
 _TRIAL = 0.2  # of the force: between the ends, to see what it does
 
 
@@ -61,17 +67,41 @@ class Width:
         return np.exp(-0.5 * ((q - self.q) / self.sd) ** 2)
 
 
+@dataclass(frozen=True, slots=True)
+class WidthOnDome(Width):
+    """The same of a cylinder that bears along the length 2 `half` in m of a dome.
+
+    Forces even in angle around an ellipse with the half axes A and B leave the skin inside less
+    bent by (F / 4 pi D) (ln((A + B) / 2) -+ (B - A) / (2 (A + B))) along and across it. Along a
+    cylinder it is as straight as that.
+    """
+
+    half: float
+
+    def curvature(self, q: float) -> float:
+        narrow = math.sqrt(max(q, 0.0))
+        return self.bend * (self.half - narrow) / (self.half + narrow)
+
+    def of_curvature(self, curvature: Array) -> Array:
+        narrow = np.maximum(self.bend - curvature, 0.0) / (self.bend + curvature)
+        return (self.half * narrow) ** 2
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Hypothesis:
     """The best object of a kind, with its `width` if it has one.
 
     `between` (2,) in m is the vector from one end to the other, `slopes` (2,) the change of slope.
+    On a dome a straight object bears on the square `length2` in m^2 of a length, with the standard
+    deviation `length2_sd`, whatever its own length is.
     """
 
     best: Optimum
     width: Width | None = None
     between: Array = field(default_factory=lambda: np.zeros(2))
     slopes: Array = field(default_factory=lambda: np.zeros(2))
+    length2: float = math.nan
+    length2_sd: float = math.nan
 
     def axis(self, radius: float) -> float:
         """Angle in rad of the axis for that `radius` in m.
@@ -119,7 +149,8 @@ def ring_pattern(skin: ElasticSkin, sphere: Optimum) -> Array:
     that no point is pressed in less deep than the sphere is.
     """
     q = sphere.parameters[-1]
-    if q < (_WIDE * skin.half_wave) ** 2 and not any(skin.patch.curvatures):
+    narrow = skin.half_wave if skin.is_dome and skin.is_even else 0.0
+    if q < (narrow if skin.form.any() else _WIDE * skin.half_wave) ** 2:
         return ROUND
     p = _resolved(skin, sphere)
     curvature, tilt = _inside_ring(skin, sphere.contact(p))
@@ -181,14 +212,23 @@ def arc_widths(skin: ElasticSkin, cylinder: Optimum, middle: float) -> tuple[flo
     return (1.0, width) if strong == 0 else (width, 1.0)
 
 
-def _width(skin: ElasticSkin, optimum: Optimum, curvature: float, force: float) -> Width:
+def _measured_width(skin: ElasticSkin, optimum: Optimum) -> tuple[float, float, float]:
+    """q in m^2, what of it the functions resolve, and its standard deviation."""
     # On its bound, q is where the readings would have it.
     low = least_width(skin)
     q = float(optimum.parameters[-1])
     q += float(optimum.prevented[-1]) if q <= low * 1.001 else 0.0
     sd = math.hypot(math.sqrt(optimum.covariance[-1, -1]), (_BLUNT * skin.half_wave) ** 2)
-    q0 = float(_resolved(skin, optimum)[-1])
-    return Width(q, sd, curvature, q0, skin.bend * abs(force))
+    return q, float(_resolved(skin, optimum)[-1]), sd
+
+
+def _width(skin: ElasticSkin, optimum: Optimum, curvature: float, force: float) -> Width:
+    q, q0, sd = _measured_width(skin, optimum)
+    bend = skin.bend * abs(force)
+    if skin.is_dome:
+        bent = INEXACT_BENT * (float(skin.form[:2].max()) + max(curvature, 0.0))
+        sd = math.hypot(sd, 2 * max(q, 0.0) * bent / bend)
+    return Width(q, sd, curvature, q0, bend)
 
 
 def fitted_sphere(skin: ElasticSkin, sphere: Optimum) -> Hypothesis:
@@ -240,8 +280,7 @@ class Hypotheses:
     @property
     def plane(self) -> Hypothesis:
         """What a plane presses as: on a dome as a sphere, on others as a cylinder."""
-        is_dome = min(self.weighted.skin.patch.curvatures) > 0
-        return self.sphere if is_dome else self.cylinder
+        return self.sphere if self.weighted.skin.is_dome else self.cylinder
 
 
 def fit_hypotheses(
@@ -258,15 +297,18 @@ def fit_hypotheses(
     functions a force would stay on the side of an element where it started.
     """
     frame = WeightedReadings(coarse, readings, used)
-    pair, forces = coarse.best_pair(contact.position, readings, used)
-    frame.trust(noise, _at(contact.position[None], np.array([contact.force])), _at(pair, forces))
-    sphere, edge = frame.sphere(contact), frame.edge(pair, forces)
+    place = skin.local(contact.position)
+    pair, forces = coarse.best_pair(place, readings, used)
+    frame.trust(noise, _at(place[None], np.array([contact.force])), _at(pair, forces))
+    sphere, edge = frame.sphere(place, contact.force), frame.edge(pair, forces)
     cylinder = frame.cylinder(edge)
     tried = (sphere, edge, cylinder)
     noise *= frame.spread(tried)
     frame = WeightedReadings(skin, readings, used)
     frame.trust(noise, *(o.contact(o.parameters) for o in tried))
     sphere = frame.shaped(sphere)
+    if skin.is_dome:
+        return _fitted_on_dome(frame, sphere, edge, cylinder, noise)
     edge = min((frame.edged(edge), frame.edged(cylinder)), key=_cost)
     between = middle(skin, edge)
     cylinder = frame.rounded(cylinder, between)
@@ -281,6 +323,93 @@ def fit_hypotheses(
         int(used.sum()),
         frame,
     )
+
+
+def _fitted_on_dome(
+    frame: "WeightedReadings", sphere: Optimum, edge: Optimum, cylinder: Optimum, noise: float
+) -> Hypotheses:
+    """The best objects on a dome, where one that is straight bears in its middle."""
+    skin = frame.skin
+    near = min((edge, cylinder), key=_cost)
+    along, share, length = bearing_length(skin, near.parameters)
+    edge = frame.again(near, lengthwise(along, np.zeros_like(along), share), 6)
+    beside = np.sqrt(np.maximum(1 - along**2, 0.0))
+    of_arcs = lengthwise(np.tile(along, 2), np.append(beside, -beside), np.tile(share / 2, 2))
+    cylinder = frame.again(near if near is cylinder else frame.widened(edge), of_arcs, 7)
+    noise *= frame.spread((sphere, edge, cylinder))
+    return Hypotheses(
+        fitted_sphere(skin, sphere),
+        _straight(skin, edge, length),
+        _straight(skin, cylinder, length),
+        noise,
+        frame.count,
+        frame,
+    )
+
+
+_STATIONS = np.linspace(-1.0, 1.0, 33)
+
+
+def bearing_length(skin: ElasticSkin, parameters: Array) -> tuple[Array, Array, float]:
+    """How a long straight edge bears on a dome: places (k,), shares (k,), and its length in m.
+
+    Its force and direction are those of `parameters`; places are in half lengths from its middle.
+    """
+    force, angle = abs(float(parameters[2])), float(parameters[3])
+    way, reach = np.array([math.cos(angle), math.sin(angle)]), skin.side / 2
+    share, square, length = _EVENLY[2], 0.0, 0.0
+    for _ in range(3):
+        out = np.multiply.outer(reach * _STATIONS, way)
+        share = skin.pressed(np.add(parameters[:2], out), skin.sag(out), force)
+        share = (share + share[::-1]) / (2 * share.sum())  # the middle of the skin is not seen
+        square = float(share @ _STATIONS**2)
+        length = reach * math.sqrt(8 * square)  # as of shares 1 / sqrt(1 - u^2)
+        reach = max(0.75 * length, least_width(skin) ** 0.5)
+    if not square:
+        return np.array([-1.0, 0.0, 1.0]), np.array([0.25, 0.5, 0.25]), length
+    on = share > _NOTHING / 10
+    return _STATIONS[on] / math.sqrt(2 * square), share[on] / share[on].sum(), length
+
+
+def _straight(skin: ElasticSkin, best: Optimum, length: float) -> Hypothesis:
+    """An edge or a cylinder on a dome, that alone bears on an edge's `length` in m."""
+    force, angle = abs(best.parameters[2]), best.parameters[3]
+    bend, half = skin.bend * force, length / 2
+    along = np.array([math.cos(angle), math.sin(angle)])
+    inexact = INEXACT_BENT * 2 * float(skin.sag(along)) / bend
+    width = None
+    if len(best.parameters) > 6:
+        narrow = math.sqrt(best.parameters[6])
+        for _ in range(20):  # as straight as along the edge
+            half = length / 2 * math.exp(narrow / (half + narrow)) - narrow
+            half = max(half, narrow)
+        # Squared, as about as much force acts inside the ellipse instead: to 5 % of what `pressed`
+        # finds, up to half lengths of 1.3 times that over which a dent fades.
+        bend *= _unevenness(skin, best) ** 2
+        q, _, sd = _measured_width(skin, best)
+        width = WidthOnDome(q, sd, 0.0, q, bend, math.sqrt(best.parameters[4]) / 2)
+        k = width.curvature(q)
+        off = INEXACT_BENT * 2 * (float(skin.sag(along)) + k)
+        low, high = width.of_curvature(np.array([k - off, k + off]))
+        width = replace(width, sd=math.hypot(sd, float(low - high) / 2))
+    square = (2 * half) ** 2
+    sd = math.hypot(2 * square * inexact, (_BLUNT * skin.half_wave) ** 2)
+    return Hypothesis(best, width, along, length2=square, length2_sd=sd)
+
+
+def _unevenness(skin: ElasticSkin, best: Optimum) -> float:
+    """By how much forces along a line bend a dome more along it than across, of a plate's share."""
+    x, y, force, angle = best.parameters[:4]
+    forces = _LINE(np.append(best.parameters[:5], 0.0))
+    out, near = forces.points - (x, y), skin.half_wave / 2
+    far = np.hypot(*out.T) > near
+    if not far.any():
+        return 1.0
+    step = near / 2 * np.array([math.cos(angle), math.sin(angle)])
+    around = np.array([step, -step, step[::-1] * (1, -1), step[::-1] * (-1, 1)])
+    part = replace(forces, points=forces.points[far], weights=forces.weights[far])
+    bent = float(np.dot((1, 1, -1, -1), skin.gives(part, np.add(around, (x, y)))))
+    return bent / (near / 2) ** 2 / (skin.bend * force) + float(np.count_nonzero(~far)) / len(far)
 
 
 def _cost(optimum: Optimum) -> float:
@@ -326,20 +455,31 @@ class WeightedReadings:
         """The optimum of `contact` near another's, as many of its `parameters` as it has."""
         return self._climb(contact, optimum.parameters[:parameters], 4)
 
-    def sphere(self, contact: Contact) -> Optimum:
-        return self._climb(
-            ring(ROUND), np.array([*contact.position, contact.force, self._start]), 4
-        )
+    @property
+    def count(self) -> int:
+        """The number of readings used."""
+        return int(self._used.sum())
+
+    def sphere(self, place: Array, force: float) -> Optimum:
+        return self._climb(ring(ROUND), np.array([*place, force, self._start]), 4)
+
+    def widened(self, edge: Optimum) -> Optimum:
+        """An edge as a cylinder that is narrow."""
+        return replace(edge, parameters=np.append(edge.parameters, self._start / 10))
 
     def edge(self, pair: Array, forces: Array) -> Optimum:
         force, between = float(forces.sum()), pair[0] - pair[1]
         share = float(np.clip(forces[0] / force - 0.5, -0.4, 0.4))
         angle = math.atan2(between[1], between[0])
         start = [*(forces @ pair / force), force, angle, max(between @ between, self._least), share]
+        if self.skin.is_dome:
+            return self._climb(_LINE, np.array(start), 6)
         return self._climb(ends(0.0), np.array(start), 6)
 
     def cylinder(self, edge: Optimum) -> Optimum:
         """From the edge, or across it: a short cylinder's arcs may be longer than itself."""
+        if self.skin.is_dome:
+            return self._climb(oval, np.append(edge.parameters, self._start / 10), 5)
         along = self._climb(arcs(EVEN, 0.0), np.append(edge.parameters, self._start), 5)
         length2 = edge.parameters[4]
         if length2 > (_SHORT * self.skin.side) ** 2:
@@ -352,7 +492,9 @@ class WeightedReadings:
     def shaped(self, sphere: Optimum) -> Optimum:
         """The sphere, its ring of forces as the bending of the skin shapes it."""
         sphere = self.again(sphere, ring(ring_pattern(self.skin, sphere)), 4)
-        for _ in range(2 if any(self.skin.patch.curvatures) else 1):  # further from a circle
+        for _ in range(
+            2 if self.skin.form.any() and not self.skin.is_even else 1
+        ):  # further from a circle
             again = self.again(sphere, ring(ring_pattern(self.skin, sphere)), 4)
             if again.cost > _WORSE * sphere.cost:  # the pattern has tipped over to another
                 break
@@ -425,12 +567,12 @@ def log_likelihoods(skin: ElasticSkin, all_of: Hypotheses) -> dict[str, float]:
     of_sphere = laplace_integral(all_of.sphere.best, all_of)
     of_sphere += _beyond_bound(all_of.sphere.best, sphere)
     of_cylinder = laplace_integral(all_of.cylinder.best, all_of) + length_prior(
-        skin, all_of.cylinder.best
+        skin, all_of.cylinder
     )
     of_cylinder += _beyond_bound(all_of.cylinder.best, cylinder) - _unexplained(all_of, cylinder)
     return {
         "sphere": of_sphere + radius_prior(skin, sphere),
-        "edge": laplace_integral(all_of.edge.best, all_of) + length_prior(skin, all_of.edge.best),
+        "edge": laplace_integral(all_of.edge.best, all_of) + length_prior(skin, all_of.edge),
         "cylinder": of_cylinder + radius_prior(skin, cylinder),
         "plane": of_sphere + _flat_share(sphere)
         if all_of.plane is all_of.sphere
@@ -451,7 +593,7 @@ def oval_likelihood(skin: ElasticSkin, all_of: Hypotheses, best: Optimum) -> flo
     q, sd = best.parameters[-1], math.sqrt(best.covariance[-1, -1])
     widths = np.linspace(0, skin.side / 4, 400)
     likely = np.exp(-0.5 * ((widths**2 - q) / sd) ** 2)
-    return laplace_integral(best, all_of) + length_prior(skin, best) + _line(sd, likely)
+    return laplace_integral(best, all_of) + length_prior(skin, Hypothesis(best)) + _line(sd, likely)
 
 
 def _line(sd: float, likely: Array) -> float:
@@ -459,11 +601,15 @@ def _line(sd: float, likely: Array) -> float:
     return math.log(max(float(np.mean(likely)), 1e-300)) - math.log(sd * math.sqrt(2 * math.pi))
 
 
-def length_prior(skin: ElasticSkin, best: Optimum) -> float:
+def length_prior(skin: ElasticSkin, found: Hypothesis) -> float:
     """Log correction for the priors of angle, length and share."""
+    best = found.best
     square, sd = best.parameters[4], math.sqrt(best.covariance[4, 4])
     lengths = np.linspace(0, skin.side, 400)
     likely = np.exp(-0.5 * ((lengths**2 - square) / sd) ** 2)
+    if skin.is_dome and math.isfinite(found.length2):
+        wide = math.hypot(sd, found.length2_sd)
+        likely = sd / wide * np.exp(-0.5 * ((found.length2 - square) / np.array([wide])) ** 2)
     share = -0.5 * (best.parameters[5] / SHARE) ** 2 - math.log(SHARE * math.sqrt(2 * math.pi))
     return share - math.log(math.pi) + _line(sd, likely)
 

@@ -187,8 +187,8 @@ class Imprints:
         det: Array = np.linalg.det(squares)
         size = 4 * det.item() ** (1 / len(squares))
         if slopes := self._basis.patch.base(*place.tolist()).slopes:
-            (xx, xy), (_, yy) = slopes
-            size /= xx * yy - xy * xy  # of areas: a cap's coordinates are wider around than it is
+            (xx, xy), (yx, yy) = slopes
+            size /= xx * yy - xy * yx  # of areas: a cap's coordinates are wider around than it is
         return place, size, away
 
     def _form_over(self, form: Array, away: Array) -> tuple[Array, float]:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from kappaskin.bases import Basis, CapBasis, ProductBasis, SineBasis, basis_for
 from kappaskin.frames import Array
-from kappaskin.mechanics import CapWaves, Compliance, Plate, Shell
-from kappaskin.sensing import Readings, SensorLayout
+from kappaskin.mechanics import CapWaves, Compliance, Plate, Shell, cap_shell
+from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Cap, Patch
 
 Single = NDArray[np.float32]
@@ -65,17 +65,15 @@ def influence_of(
     On strips, disks, polygons and drum heads it is that of a basis of so many `functions` each way;
     that of heights and slopes, which are bounded under a load, is one of more.
     """
-    if isinstance(plate.patch, Cap):
-        if layout.senses_curvature_only:
-            return (_OfDirections if layout.reads else _OfCap)(plate, layout, edge, out)
-        return _OfFunctions(plate, layout, edge, _FINE, out)
-    if type(plate.patch) is not Patch or plate.patch.strip or not _is_stiff(plate):
+    is_cap = isinstance(plate.patch, Cap)
+    is_rectangle = type(plate.patch) is Patch and not plate.patch.strip
+    if not is_cap and not (is_rectangle and _is_stiff(plate)):
         return _OfFunctions(plate, layout, edge, functions, out)
-    if layout.reads and layout.senses_curvature_only and not layout.gage_length:
-        return _OfDirections(plate, layout, edge, out)
-    if layout.reads:
+    if not layout.senses_curvature_only or (layout.reads and layout.gage_length):
         return _OfFunctions(plate, layout, edge, _FINE, out)
-    return _OfPlate(plate, layout, edge, out)
+    if layout.reads or layout.scale is not None:
+        return _OfDirections(plate, layout, edge, out)
+    return (_OfCap if is_cap else _OfPlate)(plate, layout, edge, out)
 
 
 @lru_cache(1)  # the same array for all, which is read in half the time
@@ -293,8 +291,10 @@ def _is_stiff(plate: Plate) -> bool:
     return max(plate.tension * near**2, plate.foundation * near**4) < D
 
 
-_CUBICS = np.linalg.inv(np.vander(np.arange(4.0), increasing=True).T).T
+CUBICS = np.asarray(np.linalg.inv(np.vander(np.arange(4.0), increasing=True).T).T, float)
 """Lagrange's cubics through four even nodes, by the powers of the place."""
+SPLINES: Array = np.array([[8, -5, 4, -1], [-12, 21, -12, 3], [6, -15, 12, -3], [-1, 3, -3, 1]]) / 6
+"""The same of a cubic spline, between the second and third of four nodes."""
 _BESIDE = 2.5  # of a load's squared radius: an element as far off does not lie under it
 
 
@@ -348,7 +348,7 @@ class _OfPlate:
             (1.0, v, vv, v * vv),
             (0.0, 1 / hy, 2 * v / hy, 3 * vv / hy),
         )
-        cubics = np.dot(powers, _CUBICS, self._cubics)
+        cubics = np.dot(powers, CUBICS, self._cubics)
         # Value and slopes along x and y; the fourth, which is mixed, gives way to that by size.
         pairs = (cubics[2:, None, :, None] * cubics[None, :2, None]).reshape(4, 16)
         weights[:, 0] = pairs
@@ -366,12 +366,15 @@ class _OfPlate:
 
     def gives(self, x: float, y: float) -> float:
         i, j, u, v = self._among_nodes(x, y)
-        of_x, of_y = np.dot(((1.0, u, u * u, u * u * u), (1.0, v, v * v, v * v * v)), _CUBICS)
+        of_x, of_y = np.dot(((1.0, u, u * u, u * u * u), (1.0, v, v * v, v * v * v)), CUBICS)
         return float(of_y.dot(self._gives[j : j + 4, i : i + 4]).dot(of_x))
 
 
 class _OfDirections:
-    """That of curvatures along any direction, from xx, yy and xy: c^2 xx + 2 c s xy + s^2 yy."""
+    """That of curvatures along any direction, from xx, yy and xy: c^2 xx + 2 c s xy + s^2 yy.
+
+    Times the `scale` of the readings.
+    """
 
     sized = True
 
@@ -381,11 +384,15 @@ class _OfDirections:
         self._of = of_skin(plate, layout.of_curvature, edge, self._rows)
         self.unit = self._of.unit
         self.nodes: tuple[Array, Single] | None = None
-        reads, P = cast("Readings", layout.reads), len(layout)
-        c, s = reads.along.T
-        twist = reads.quantity == "twist"
-        self._parts = np.where(twist, 0.0, [c * c, s * s, 2 * c * s])
-        self._parts[2, twist] = 1.0
+        reads, P = layout.reads, len(layout)
+        self._parts = np.repeat(np.eye(3), P, axis=1)
+        if reads is not None:
+            c, s = reads.along.T
+            twist = reads.quantity == "twist"
+            self._parts = np.where(twist, 0.0, [c * c, s * s, 2 * c * s])
+            self._parts[2, twist] = 1.0
+        if layout.scale is not None:
+            self._parts *= layout.scale
         self._channels = layout.element + P * np.arange(3)[:, None]
         if self._of.nodes is not None:
             places, read = self._of.nodes
@@ -422,7 +429,8 @@ class _OfCap:
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str, out: Array) -> None:
         self._cap = cast("Cap", plate.patch)
         self.unit = 8 * math.pi * plate.rigidity
-        self._table, self._steps, self._gives = _on_cap(plate, edge, layout.positions.tobytes())
+        places, length = layout.positions.tobytes(), layout.gage_length
+        self._table, self._steps, self._gives = cap_table(plate, edge, places, length)
         self._out = out
         self._last, self._discs = [n - 4 for n in self._table.shape[:3]], len(_radii(1))
         self._block, self._first = lru_cache(32)(self._block_at), (0, 0)
@@ -433,13 +441,13 @@ class _OfCap:
 
     def _searched(self) -> tuple[Array, Single]:
         """`nodes`: rings of the table, as far apart as the places on them."""
-        table, (step_t, step_r, step) = self._table, self._steps
+        table, (step, step_t, step_r) = self._table, self._steps
         found = list[tuple[int, int, int]]()
-        for i in range(1, table.shape[2] - 1, _RINGS):
+        for i in range(1, table.shape[0] - 1, _RINGS):
             radius = float(self._cap.meridian(np.array((i - 1) * step)).radius)
             around = max(round(2 * math.pi * radius / (_RINGS * step)), 1)
             for n in range(around):
-                turn = 1 + n * (table.shape[0] - 3) // around
+                turn = 1 + n * (table.shape[1] - 3) // around
                 found += [(turn, size, i) for size in _SEARCHED_SIZES]
         turn, size, ring = np.array(found).T
         angle, away = (turn - 1) * step_t, (ring - 1) * step
@@ -449,7 +457,7 @@ class _OfCap:
         read: Single = np.zeros((len(places), table.shape[3]), np.float32)
         for i, j, k in product((-1, 0, 1), repeat=3):
             share = 4.0 ** (3 - abs(i) - abs(j) - abs(k)) / 216
-            read += np.float32(share) * table[turn + i, size + j, ring + k]
+            read += np.float32(share) * table[ring + i, turn + j, size + k]
         return places, read
 
     def _block_at(self, i: int, j: int, k: int) -> Single:
@@ -457,30 +465,30 @@ class _OfCap:
 
     def at(self, x: float, y: float, s: float) -> None:
         dx, dy = x - self._cap.rim_radius, y - self._cap.rim_radius
-        (step_t, _, step), d = self._steps, math.hypot(dx, dy)
+        (step, step_t, _), d = self._steps, math.hypot(dx, dy)
         if d < (near := _AT_POLE * step):
             dx, dy, d = (dx, dy, d) if d else (near, 0.0, near)
             dx, dy, d = dx * near / d, dy * near / d, near
-        azimuth, (last_t, _, last) = math.atan2(dy, dx) % (2 * math.pi), self._last
-        i, turn, turn_t = _spline(azimuth / step_t + 1, step_t, last_t)
-        k, along, along_s = _spline(d / step + 1, step, last)
+        azimuth, (last, last_t, _) = math.atan2(dy, dx) % (2 * math.pi), self._last
+        i, along, along_s = _spline(d / step + 1, step, last)
+        j, turn, turn_t = _spline(azimuth / step_t + 1, step_t, last_t)
         cos, sin = dx / d, dy / d
-        outward, around = np.outer(turn, along_s), np.outer(turn_t / d, along)
+        outward, around = np.outer(along_s, turn), np.outer(along, turn_t / d)
         W = self._of_place
-        np.outer(turn, along, W[0])
+        np.outer(along, turn, W[0])
         W[1] = cos * outward - sin * around
         W[2] = sin * outward + cos * around
-        self._first = i, k
+        self._first = i, j
         self._out[:] = self._under(s, 0, 1)
 
     def _under(self, s: float, begin: int, coarser: int) -> Single:
         """Readings and derivatives (4, C) of a load of size s, by sizes of the table."""
-        r, step, (i, k) = math.sqrt(s), coarser * self._steps[1], self._first
-        j, size, size_r = _spline(r / step + 1.5, step, self._last[1])
-        W, here = self._weights, self._of_place[:, :, None]
-        np.multiply(here, size[:, None], W[:3])
-        np.multiply(here[0], size_r[:, None] / (2 * r), W[3])
-        return W.reshape(4, 64).dot(self._block(i, begin + j, k))
+        r, step, (i, j) = math.sqrt(s), coarser * self._steps[2], self._first
+        k, size, size_r = _spline(r / step + 1.5, step, self._last[2])
+        W, here = self._weights, self._of_place[..., None]
+        np.multiply(here, size, W[:3])
+        np.multiply(here[0], size_r / (2 * r), W[3])
+        return W.reshape(4, 64).dot(self._block(i, j, begin + k))
 
     def trust(self, s: float, share: float) -> Array | None:
         return None
@@ -493,10 +501,6 @@ class _OfCap:
         d = math.hypot(x - self._cap.rim_radius, y - self._cap.rim_radius)
         at = np.linspace(0, self._cap.rim_radius, len(self._gives))
         return float(np.interp(d, at, self._gives))
-
-
-_SPLINES = np.array([[1, 4, 1, 0], [-3, 0, 3, 0], [3, -6, 3, 0], [-1, 3, -3, 1]]) / 6
-"""Cubic splines around a place between the second and third of four nodes, by its powers."""
 
 
 def _coefficients(nodes: int) -> Array:
@@ -515,9 +519,9 @@ def _coefficients(nodes: int) -> Array:
 def _spline(at: float, step: float, last: int) -> tuple[int, Array, Array]:
     """The first of four nodes around `at`, in steps, their weights, and those of the slope."""
     i = min(int(at) - 1, last)
-    u = at - i - 1
+    u = at - i
     powers = (1.0, u, u * u, u * u * u), (0.0, 1 / step, 2 * u / step, 3 * u * u / step)
-    weights, slopes = np.dot(powers, _SPLINES)
+    weights, slopes = np.dot(powers, SPLINES)
     return i, weights, slopes
 
 
@@ -528,6 +532,7 @@ _RINGS = 2  # steps between the places searched
 _SEARCHED_SIZES = 3, 6, 10  # of the table: radii of 1.5, 4.5 and 8.5 steps
 _SIZES = 0.2  # of the box: the largest radius of a load
 _COARSER = 2  # times the step between sizes, of Gaussian loads, whose readings are smoother
+_TINY = 1e-15  # of the largest of a sum's terms
 
 
 def _radii(steps: int) -> Array:
@@ -536,33 +541,44 @@ def _radii(steps: int) -> Array:
 
 
 @lru_cache(2)
-def _on_cap(plate: Plate, edge: str, places: bytes) -> tuple[Single, tuple[float, ...], Array]:
-    """Splines of the readings (T, Q, S, C) in 1/m per N, the steps, and displacements in m per N.
+def cap_table(
+    plate: Plate, edge: str, places: bytes, gage_length: float
+) -> tuple[Single, tuple[float, ...], Array]:
+    """Splines of the readings (S, T, Q, C) in 1/m per N, the steps, and displacements in m per N.
 
-    By azimuth from -1 step, size of the load, and distance from the pole from -1 step; the steps
-    are in rad, m and m. Sizes are radii of discs from -3/2 steps, then those of Gaussian loads as
+    By distance from the pole from -1 step, azimuth from -1 step, and size of the load; the steps
+    are in m, rad and m. Sizes are radii of discs from -3/2 steps, then those of Gaussian loads as
     wide, every `_COARSER` steps. The displacements under a point load are at even distances from
     the pole to the rim.
     """
     cap = cast("Cap", plate.patch)
-    k, along, rows, gives = _waves_on_cap(plate, edge, places)
+    k, along, rows, gives = _waves_on_cap(plate, edge, places, gage_length)
     step, (_, M, _, C) = cap.a / _ON_CAP, rows.shape
     turns = math.ceil(np.pi * _rim_share(cap) * _ON_CAP)
     discs, gaussians = step * _radii(1), step * _radii(_COARSER)
     of_discs, of_gaussians = (_coefficients(len(of))[:-1] for of in (discs, gaussians))
+    r, u = np.multiply.outer(discs, k), np.multiply.outer(gaussians, k)
+    means = (
+        np.tensordot(of_discs, 2 * scipy.special.j1(r) / r, 1),
+        np.tensordot(of_gaussians, np.exp(-u * u / 8), 1),
+    )
+    share = np.swapaxes(np.concatenate(means), 0, 1)
     along = np.tensordot(_coefficients(len(along)), along, 1)
-    by_m = np.empty((2, M, len(discs) + len(gaussians), len(along), C), np.float32)
-    for m in range(M):
-        t, u = np.multiply.outer(discs, k[m]), np.multiply.outer(gaussians, k[m])
-        means = of_discs @ (2 * scipy.special.j1(t) / t), of_gaussians @ np.exp(-u * u / 8)
-        shapes = np.vstack(means)[:, None] * along[:, m]
-        by_m[:, m] = (shapes.astype(np.float32) @ rows[:, m, None]).reshape(by_m[:, m].shape)
     azimuths = 2 * np.pi / turns * np.arange(-1.0, turns + 2)
     turn = np.multiply.outer(azimuths, np.arange(float(M)))
     sharper = 3 / (2 + np.cos(turn[2]))  # the coefficients of a wave's spline over it
-    around = np.hstack([sharper * np.cos(turn), sharper * np.sin(turn)]).astype(np.float32)
-    table = (around @ by_m.reshape(2 * M, -1)).reshape(len(around), *by_m.shape[2:])
-    return table, (2 * np.pi / turns, step, step), gives
+    around: Single = np.hstack([sharper * np.cos(turn), sharper * np.sin(turn)]).astype(np.float32)
+    table = np.empty((len(along), len(around), share.shape[1], C), np.float32)
+    # Ring by ring: what a ring is made of stays in the cache.
+    for ring, shape in zip(table.reshape(*table.shape[:2], -1), along, strict=True):
+        by_m: Single = (share * shape[:, None]).astype(np.float32) @ rows
+        np.matmul(around, by_m.reshape(2 * M, -1), out=ring)
+    return table, (step, 2 * np.pi / turns, step), gives
+
+
+def cap_half_wave(cap: Cap) -> float:
+    """Half of the shortest wave in m that the table follows."""
+    return cap.rim_radius / _WAVES
 
 
 def _rim_share(cap: Cap) -> float:
@@ -570,25 +586,38 @@ def _rim_share(cap: Cap) -> float:
     return float(cap.meridian(np.array(cap.rim_radius)).radius) / cap.rim_radius
 
 
-def _waves_on_cap(plate: Plate, edge: str, places: bytes) -> tuple[Array, Array, Single, Array]:
+def _waves_on_cap(
+    plate: Plate, edge: str, places: bytes, gage_length: float
+) -> tuple[Array, Array, Single, Array]:
     """Wave numbers (M, n), waves along the meridian (S, M, n), their readings, and displacements.
 
     The readings (2, M, n, C) are of waves that go as a cosine around and as a sine.
     """
     cap = cast("Cap", plate.patch)
     layout = SensorLayout.scattered(cap, np.frombuffer(places).reshape(-1, 2))
+    layout = replace(layout, gage_length=gage_length)
     Nj = 2 * math.ceil(_WAVES * np.pi * _rim_share(cap)) + 1  # as fine around as along
     basis = cast("CapBasis", basis_for(cap, edge, _WAVES, Nj))
     compliance, waves = plate.compliance_by_wave(basis), CapWaves(basis)
-    M = layout.operator(basis, plate).reshape(-1, *basis.shape)
-    for j in range(Nj):
-        M[..., j] = M[..., j] @ compliance[(j + 1) // 2]
+    shell, shape = cap_shell(plate, basis), (layout.channels, 2, *waves.k.shape)
+
+    def curvature(positions: Array) -> Array:
+        read = np.moveaxis(shell.curvature_by_wave(positions), 0, 2)
+        return read.reshape(3, len(positions), -1)
+
+    read = layout.mean_curvature(basis, curvature).reshape(shape)
+    by_m = read.transpose(1, 2, 0, 3)
     unit = 8 * math.pi * plate.rigidity
-    rows = np.moveaxis(np.stack(waves.rows(unit * M.reshape(len(M), -1))), 1, 3)
-    f = basis.along(np.linspace(0, 1, _ON_CAP + 1))[0]
-    gives: Array = np.einsum("qmi,mij,qmj->q", f, compliance, f, optimize=True)
+    rows: Array = np.swapaxes(by_m @ (unit * compliance @ waves.shares), 2, 3)
+    f = np.swapaxes(basis.along(np.linspace(0, 1, _ON_CAP + 1), 1)[0], 0, 1)
+    gives: Array = np.vecdot(f @ compliance, f).sum(axis=0)
     along = waves.along(cap.a / _ON_CAP * np.arange(-1.0, _ON_CAP // 2 + 1))
-    return waves.k, along, rows.astype(np.float32), gives
+    return waves.k, _rounded(along), _rounded(rows).astype(np.float32), gives
+
+
+def _rounded(values: Array) -> Array:
+    """`values` with zeros for what is too small to count: products of subnormals take long."""
+    return np.where(np.abs(values) > _TINY * np.abs(values).max(), values, 0.0)
 
 
 @lru_cache(4)

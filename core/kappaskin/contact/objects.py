@@ -7,8 +7,9 @@ from typing import cast
 import numpy as np
 import scipy
 
-from kappaskin.contact.elastic_skin import ElasticSkin
+from kappaskin.contact.elastic_skin import ElasticSkin, SkinOnCap
 from kappaskin.contact.hypotheses import (
+    INEXACT_BENT,
     Hypotheses,
     Hypothesis,
     Width,
@@ -19,7 +20,7 @@ from kappaskin.contact.hypotheses import (
 from kappaskin.frames import Array, Contact
 from kappaskin.mechanics import Block, Cylinder, PlacedObject, Plate, RigidObject, Sphere, Wedge
 from kappaskin.sensing import SensorLayout
-from kappaskin.skin import Patch
+from kappaskin.skin import Cap, Patch
 
 KINDS = ("plane", "cylinder", "sphere", "edge")
 """Kinds of object, equally likely a priori."""
@@ -29,14 +30,12 @@ _FINE, _FINE_MIXED = 40, 30  # and then: of waves that do not mix, and of those 
 _WELL = 1.2  # times the residual of the fitted shape, or of an oval, that an object may leave
 _ENOUGH = 20  # readings at least
 _INEXACT = 0.02  # of a curvature: what a ring or arcs leave out of a real contact
-# On a bent skin, of its curvature and the object's: 0.02 to 0.07 of shells from 0.25 to 2 mm thick,
-# but 0.23 where the arcs are narrower than a half wave.
-_INEXACT_BENT = 0.08
 _LONG = 2.0  # half waves: on a bent skin, two ends that are nearer may be one
 _QUIET = 1e-4  # of the largest reading: no skin is quieter
 _SEEN = 2.6  # standard deviations: a width below is only an upper bound, or noise passes for one
 _LEAST, _DEEPEST = 1e-12, 10.0  # of a side: displacements beyond show no shape of an object
 _SURE = 0.4  # probability below which a kind is not the result
+_PLANE = 3.0  # radii of a dome: a ball below would not pass for a plane
 _CERTAIN = 0.9  # probability below which a result is not named in words
 _VAST = 1.0  # m: a radius beyond is flat to a skin, and as a bound says nothing
 _LEVEL = 0.01  # probability that noise leaves as much of the readings unexplained
@@ -59,7 +58,8 @@ class ContactObject:
     Other objects read the same: a flat face `face` in m wide with the 95 % interval `face_95`,
     round for a sphere and a bar for a cylinder, that bears at its rim; where the interval begins at
     0, any tip for a sphere, and any two ends for an edge or a cylinder, that are as narrow. A
-    cylinder whose radius is in `radius_95` of an edge reads as that edge.
+    cylinder whose radius is in `radius_95` of an edge reads as that edge. On a dome straight
+    objects bear in their middle, whatever their `length`.
     """
 
     kind: str
@@ -99,7 +99,9 @@ class ContactObject:
         alike = {self.kind, "cylinder"} if self.kind == "edge" else {self.kind}
         likely = sum(self.probability[kind] for kind in alike) >= _CERTAIN
         bounded = self.radius_95[0] > 0 and self.radius_95[1] < math.inf
-        sized = {"plane": True, "edge": self.length > self.length_95}
+        on_dome = math.isnan(self.length)
+        long = self.radius_95[1] < math.inf if on_dome else self.length > self.length_95
+        sized = {"plane": True, "edge": long}
         return likely and sized.get(self.kind, bounded)
 
     def describe(self) -> str:
@@ -122,13 +124,14 @@ class ContactObject:
     def _alike(self) -> list[str]:
         """What else would read the same."""
         low, high = self.face_95
+        thin = [f"or a cylinder of radius below {_millimetres(self.radius_95[1])} mm"]
+        thin *= self.kind == "edge"
         if self.kind == "plane" or not high < math.inf:
-            return []
+            return thin
         if low:
             return [f"or a flat face {_millimetres(self.face)} mm wide"]
-        thin = [f"or a cylinder of radius below {_millimetres(self.radius_95[1])} mm"]
         other = "any tip" if self.kind == "sphere" else "any two ends"
-        return thin * (self.kind == "edge") + [f"or {other} less than {_millimetres(high)} mm wide"]
+        return [*thin, f"or {other} less than {_millimetres(high)} mm wide"]
 
     def _bounds(self) -> str:
         """What is known in spite of an unknown shape."""
@@ -137,7 +140,9 @@ class ContactObject:
             return ": no object fits"
         if low >= _VAST:
             return " (flat, or nearly so)"
-        if self.likeliest == "plane" or not (low > 0 or high < _VAST):
+        if not low and not high < _VAST:  # the contact is a point
+            return " (press harder)"
+        if self.likeliest == "plane":
             return ""
         far = f"over {_millimetres(low)}" if low else f"under {_millimetres(high)}"
         if low and high < _VAST:
@@ -176,11 +181,17 @@ class ObjectFinder:
     likelihoods, with unknown noise. The object's curvature is that of the skin between the forces.
     It takes a few tens of milliseconds: for display, not for every frame. On a skin bent to a
     radius of a few elements its probabilities are too confident: a dent there is not much wider
-    than what the functions resolve. Raises a `Refusal` for a strip and a drum head.
+    than what the functions resolve. On a dome or a cap the curvature is that of the object over
+    the skin's, and an edge or a cylinder is longer than its contact. Raises a `Refusal` for a strip
+    and a drum head.
     """
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str = "hinged") -> None:
         patch = plate.patch
+        if isinstance(patch, Cap):
+            self._coarse = self._skin = SkinOnCap(plate, layout, edge, 0)
+            self._live = layout.live.ravel()
+            return
         if type(patch) is not Patch:
             fine = _COARSE
         else:
@@ -203,9 +214,9 @@ class ObjectFinder:
             return replace(NO_OBJECT, probability=dict.fromkeys(KINDS, 1 / len(KINDS)))
         K = np.where(used, curvature.ravel(), 0.0)
         noise = max(noise, _QUIET * float(np.abs(K).max()))
-        return _judged(
-            self._skin, fit_hypotheses(self._coarse, self._skin, K, used, noise, contact), noise
-        )
+        skin = self._skin.near(contact.position)
+        coarse = skin if self._coarse is self._skin else self._coarse
+        return _judged(skin, fit_hypotheses(coarse, skin, K, used, noise, contact), noise)
 
 
 def _judged(skin: ElasticSkin, all_of: Hypotheses, noise: float) -> ContactObject:
@@ -219,11 +230,18 @@ def _judged(skin: ElasticSkin, all_of: Hypotheses, noise: float) -> ContactObjec
     width = found.width or cast("Width", all_of.cylinder.width)
     radius, radius_95 = _radius(skin, width, reach)
     fits = all_of.noise <= _WELL * noise
-    known = probability[kind] >= _SURE
-    flat = not any(skin.patch.curvatures)
+    known = probability[kind] >= _SURE or (kind == "edge" and skin.is_dome)
+    flat = not skin.form.any()
     if flat:
         fits = fits and all_of.weighted.chance(found.best) >= _LEVEL
-    if found is not all_of.sphere:
+    if skin.is_dome:
+        squares = (one.best.squares for one in (all_of.sphere, all_of.edge, all_of.cylinder))
+        fits = fits and found.best.squares <= _WELL**2 * min(squares) and _bears(found, kind, width)
+        if kind == "cylinder" and not radius_95[0]:  # which reads as an edge
+            kind = "edge"
+        elif kind == "plane":
+            known = known and radius_95[0] > _PLANE / float(skin.form[:2].max())
+    elif found is not all_of.sphere:
         oval = all_of.weighted.oval(all_of.cylinder.best, all_of.edge.best)
         if flat:
             known = known and weights[kind] - oval_likelihood(skin, all_of, oval) >= _ODDS
@@ -234,7 +252,7 @@ def _judged(skin: ElasticSkin, all_of: Hypotheses, noise: float) -> ContactObjec
     return ContactObject(
         kind if known and fits else "",
         probability,
-        found.best.parameters[:2],
+        skin.on_patch(found.best.parameters[:2]),
         reach * np.sqrt(np.diag(found.best.covariance)[:2]),
         float(found.best.parameters[2]),
         reach * math.sqrt(found.best.covariance[2, 2]),
@@ -245,6 +263,14 @@ def _judged(skin: ElasticSkin, all_of: Hypotheses, noise: float) -> ContactObjec
         *_face(skin, "sphere" if found is all_of.sphere else kind, width, reach),
         fits,
     )
+
+
+def _bears(found: Hypothesis, kind: str, width: Width) -> bool:
+    """Whether it bears on a dome as long and no wider than an object of its kind may."""
+    if kind in ("edge", "cylinder"):
+        sd = math.hypot(math.sqrt(found.best.covariance[4, 4]), found.length2_sd)
+        return abs(found.best.parameters[4] - found.length2) <= _SEEN * sd
+    return width.q <= float(width.of_curvature(np.zeros(1))[0]) + _SEEN * width.sd
 
 
 def _axis(found: Hypothesis, radius_95: tuple[float, float], reach: float) -> tuple[float, float]:
@@ -261,7 +287,7 @@ def _axis(found: Hypothesis, radius_95: tuple[float, float], reach: float) -> tu
 
 def _length(found: Hypothesis, reach: float) -> tuple[float, float]:
     """Length in m and its half width."""
-    if len(found.best.parameters) < 6:
+    if len(found.best.parameters) < 6 or math.isfinite(found.length2):
         return math.nan, math.nan
     length = math.sqrt(found.best.parameters[4])
     return length, reach * math.sqrt(found.best.covariance[4, 4]) / (2 * length)
@@ -269,14 +295,14 @@ def _length(found: Hypothesis, reach: float) -> tuple[float, float]:
 
 def _radius(skin: ElasticSkin, width: Width, reach: float) -> tuple[float, tuple[float, float]]:
     """The radius in m and its interval of `reach` standard deviations."""
-    bent = max(map(abs, skin.patch.curvatures))
+    bent = 0.0 if skin.is_dome else max(map(abs, skin.patch.curvatures))  # in its deviation there
     low, high = width.q - reach * width.sd, max(width.q, 0.0) + reach * width.sd
     flattest, best = width.curvature(high), width.curvature(width.q)
     resolved = not bent or width.q > skin.half_wave**2
     if width.q < _SEEN * width.sd or low <= 0 or not resolved:
-        off = _INEXACT_BENT * (flattest + bent) if bent else _INEXACT * flattest
+        off = INEXACT_BENT * (flattest + bent) if bent else _INEXACT * flattest
         return math.nan, (0.0, _inverse(flattest - off))
-    off = _INEXACT_BENT * (best + bent) if bent else _INEXACT * best
+    off = INEXACT_BENT * (best + bent) if bent else _INEXACT * best
     up, down = math.hypot(width.curvature(low) - best, off), math.hypot(best - flattest, off)
     return _inverse(best), (_inverse(best + up), _inverse(best - down))
 
@@ -291,6 +317,8 @@ def _face(
     per = 2.0 if kind == "sphere" else math.sqrt(2)
     q = np.array([width.q, width.q - reach * width.sd, max(width.q, 0.0) + reach * width.sd])
     face, low, high = per * np.sqrt(np.maximum(q, 0.0))
+    if kind == "edge" and skin.is_dome:  # which its ends do not touch
+        return math.nan, (math.nan, math.nan)
     if kind == "edge" or width.q < _SEEN * width.sd or low == 0:
         return math.nan, (0.0, float(high))
     return float(face), (float(low), float(high))

@@ -185,6 +185,29 @@ class PointContact:
         self.linear = self._rows[:0]
         """Readings of the last contact for a unit force, and their derivatives, (n, R)."""
 
+    def covariance(self, x: float, y: float, s: float, force: float, noise: float) -> Array:
+        """Covariance (3, 3) of force in N, x and y in m, due to a `noise` of the readings.
+
+        Of a load of this `force` in N at (x, y) in m, over a disc of radius sqrt(s) in m, whose
+        size is unknown too. The noise is in the readings' unit, or in units of `sigma`. That a skin
+        stretches is left out.
+        """
+        tables, s, n = self._used(self._none)[1], max(s, self._least), self._unknowns
+        strength = force / self._influence.unit
+        self._influence.at(x, y, s)
+        weights = self._weights(s, strength, tables, noise**2)
+        weights = np.ones(len(self._M)) if weights is None else weights
+        rows = self._rows * weights
+        free = rows[5:]
+        if len(free):
+            rows -= rows @ free.T @ np.linalg.pinv(free @ free.T) @ free
+        # Of readings with weights w other than over their noise, (T w)' K / (T w)' (T w).
+        T = rows[:n]
+        inverse = _inverse(T @ T.T)
+        of_noise = inverse @ (T * weights)
+        unit = np.array([self._influence.unit, 1 / strength, 1 / strength])
+        return noise**2 * np.multiply.outer(unit, unit) * (of_noise @ of_noise.T)[:3, :3]
+
     def _tables(self, used: Mask) -> _Tables:
         """The tables for the readings `used` (3 P,)."""
         M, free = self._M[used], orthonormal(np.where(used, self._free, 0.0))

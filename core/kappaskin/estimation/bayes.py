@@ -1,18 +1,22 @@
 """Bayesian estimator, with the prior of a plate under random loads."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
 from scipy import linalg
 
-from kappaskin.bases import Basis, SineBasis
+from kappaskin.bases import Basis, SineBasis, covariant_at
 from kappaskin.errors import Refusal
 from kappaskin.estimation.estimator import Estimator, PatternCache
 from kappaskin.estimation.fit import Fit, Uncertainty, power_of_two
 from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import Plate
+from kappaskin.skin import Cap
+
+_THICKNESSES = 0.25e-3, 1e-3, 4e-3  # m
+_WIDTH = 0.15  # of the shorter side, over which wide loads are smoothed twice
 
 
 def prior_root(basis: Basis) -> Array:
@@ -20,10 +24,13 @@ def prior_root(basis: Basis) -> Array:
 
     White means that loads at two points are independent: with G the Gram matrix of the functions,
     the modal forces have the covariance G, and the coefficients of a plate of compliance C have
-    C G C. L spans the F combinations that are `basis.free`; unobservable shapes are left out.
-    Scaled so that the displacement's RMS over the skin is 1 m.
+    C G C. L spans the F combinations that are `basis.free`, on a cap all; unobservable shapes are
+    left out. Scaled so that the displacement's RMS over the skin is 1 m.
 
-    For sines on a flat skin it is the diagonal of 1 / (k_i^2 + k_j^2)^2, so scaled.
+    For sines on a flat skin it is the diagonal of 1 / (k_i^2 + k_j^2)^2, so scaled. A skin that
+    curves both ways stretches: how fine its shapes are depends on its thickness and on how wide
+    loads are, of which nothing is known. It is the mean covariance of skins of `_THICKNESSES` under
+    loads that are white, and smoothed over `_WIDTH`.
     """
     if isinstance(basis, SineBasis) and not any(basis.patch.curvatures):
         # The squares of sines average 1/2, along x and along y.
@@ -34,12 +41,25 @@ def prior_root(basis: Basis) -> Array:
     f = np.sqrt(weights / weights.sum())[:, None] * basis.at(points)
     # With f = Q R, G = R'R and C R' is a root of C G C; R C R' is one of the displacement's.
     R = _triangle(f)
-    root = _on_free(basis, Plate(basis.patch).compliance(basis).after(R).T)
+    plates, loads = [Plate(basis.patch)], [R]
+    if isinstance(basis.patch, Cap) or basis.patch.is_shallow:
+        plates = [
+            replace(plates[0], axial_stiffness=plates[0].modulus(h) * h) for h in _THICKNESSES
+        ]
+        slopes = covariant_at(basis, points)[1:3] * np.sqrt(weights / weights.sum())[:, None]
+        along = slopes.reshape(-1, basis.size) @ np.asarray(np.linalg.inv(R), float)
+        square = (_WIDTH * min(basis.patch.a, basis.patch.b)) ** 2
+        smooth = np.asarray(np.linalg.inv(np.eye(basis.size) + square * (along.T @ along)), float)
+        loads.append(smooth @ smooth @ R)
+    roots = [plate.compliance(basis).after(load).T for plate in plates for load in loads]
+    joined = np.hstack([root / np.linalg.norm(R @ root) for root in roots])
+    # How far a cap moves along its axis is a matter of its stiffness, not of its edge.
+    root = _triangle(joined.T).T if isinstance(basis.patch, Cap) else _on_free(basis, joined)
     return root / np.linalg.norm(R @ root)
 
 
 def _on_free(basis: Basis, root: Array) -> Array:
-    """The part of a covariance's `root` (N, N) in the free combinations, as a root (N, F)."""
+    """The part of a covariance's `root` (N, n) in the free combinations, as a root (N, F)."""
     W = np.eye(basis.size) if basis.free is None else basis.free
     V = W if basis.unobservable is None else np.hstack([W, basis.unobservable])
     share = cast("Array", np.linalg.lstsq(V, root)[0])[: W.shape[1]]
@@ -192,7 +212,8 @@ class Bayes(Estimator):
     """The posterior mean of the shape of a plate under a white load, given the readings.
 
     The coefficients are Gaussian with the standard deviation of a plate's under a load that is
-    white in space, for sines proportional to 1/(i^2/a^2 + j^2/b^2)^2. Its scale, and the noise
+    white in space, for sines proportional to 1/(i^2/a^2 + j^2/b^2)^2; of domes, saddles and caps it
+    is that of shells of several thicknesses (`prior_root`). Its scale, and the noise
     unless `sigma` is given, are those that make the readings most likely (type II maximum
     likelihood, doi:10.1162/neco.1992.4.3.415), of each frame by itself. The prior decides what the
     readings do not, with error bars that show it: no basis is too large. Where the zero of readings

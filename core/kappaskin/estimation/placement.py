@@ -21,6 +21,7 @@ from kappaskin.errors import Refusal
 from kappaskin.estimation.estimator import Estimator, column_lengths, combinations
 from kappaskin.frames import Array, Indices, Mask
 from kappaskin.sensing import SensorLayout
+from kappaskin.skin import Cap
 
 
 def singular_values(basis: Basis, layout: SensorLayout) -> tuple[Array, Array]:
@@ -140,18 +141,30 @@ def _sigma_of_each(layout: SensorLayout, sigma: ArrayLike | None) -> Array:
 
 def _candidates(layout: SensorLayout, spacing: float) -> Array:
     """Candidate places (C, 2) in m on the skin, at least `spacing` in m from each other."""
-    patch = layout.patch
+    patch, places = layout.patch, np.empty((0, 2))
+    count = patch.a * patch.b / spacing**2
     m, n = (math.floor(side / spacing + 1e-9) for side in (patch.a, patch.b))
-    places = np.empty((0, 2))
-    if 0 < m * n <= _MOST_CANDIDATES:
-        places = SensorLayout.regular(patch, m, n).positions
+    if m * n and count <= _MOST_CANDIDATES * (1 + 1e-9):
+        if isinstance(patch, Cap):
+            places = SensorLayout.on_rings(patch, _rings(patch, spacing)).positions
+        else:
+            places = SensorLayout.regular(patch, m, n).positions
         places = places[layout.has_room(places)]
     if len(places) <= len(layout):
         raise Refusal(
-            f"expected a spacing that leaves more than {len(layout)} places on a tiling of "
-            f"at most {_MOST_CANDIDATES}, got {m} x {n} at {spacing:g} m"
+            f"expected a spacing that leaves more than {len(layout)} places, at most "
+            f"{_MOST_CANDIDATES}, got about {count:.3g} at {spacing:g} m"
         )
     return places
+
+
+def _rings(cap: Cap, spacing: float) -> list[int]:
+    """The places on each ring of a cap, at least `spacing` in m from each other through the air."""
+    count = max(math.floor(cap.rim_radius / spacing + 0.5), 1)
+    away: Array = cap.rim_radius / (count - 0.5) * np.arange(1.0, count)
+    chord = spacing / (2 * cap.meridian(away).radius)
+    around = np.floor(np.pi / np.arcsin(np.minimum(chord, 1.0))).astype(int)
+    return [1, *around.tolist()]
 
 
 def _exchanged(

@@ -16,6 +16,7 @@ from kappaskin.mechanics.plate import INPLANE as INPLANE
 from kappaskin.mechanics.plate import USUAL_THICKNESS as USUAL_THICKNESS
 from kappaskin.mechanics.plate import Compliance as Compliance
 from kappaskin.mechanics.plate import Plate as Plate
+from kappaskin.mechanics.plate import cap_shell as cap_shell
 from kappaskin.mechanics.rigid_objects import Block as Block
 from kappaskin.mechanics.rigid_objects import Cylinder as Cylinder
 from kappaskin.mechanics.rigid_objects import Punch as Punch

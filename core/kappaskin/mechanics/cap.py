@@ -1,8 +1,10 @@
 """Caps: how a domed skin that stretches gives, and what it reads."""
 
+import math
+
 import numpy as np
 
-from kappaskin.bases import CapBasis, curvature_at, gauss, radial
+from kappaskin.bases import CapBasis, gauss, radial
 from kappaskin.frames import Array
 from kappaskin.skin import Meridian
 
@@ -30,7 +32,22 @@ from kappaskin.skin import Meridian
 # -(f_;ss + f_;tt) = k^2 f, 2 J1(k r) / (k r) times its value in the middle: exactly on a plane.
 
 _MORE = 12  # functions of u and v along the meridian, more than f has
-_AT_POLE = 1e-6  # of the arc to the rim: nearer, nothing depends on u and v
+_AT_POLE = 1e-8  # of the arc to the rim: nearer, nothing depends on u and v
+
+
+def _radii(fineness: int) -> tuple[Array, Array]:
+    """Radii (Q,) of the unit disk and weights (Q,) of an integral over them.
+
+    Every product of two functions times the radius is one of r^2 times r: half as many points do.
+    """
+    squares, weights = gauss(1.0, math.ceil(fineness / 2))
+    rho: Array = np.sqrt(squares)
+    return rho, weights / (2 * rho)
+
+
+def _parts(k: int, Q: int, M: int, n: int) -> Array:
+    """Zeros (k, Q, M, n) in the order that `_products` has them in."""
+    return np.moveaxis(np.zeros((M, k, Q, n)), 0, 2)
 
 
 def _products(S: Array) -> Array:
@@ -58,7 +75,7 @@ class CapShell:
         self._basis, self._u_free = basis, u_free
         self._m = np.arange(basis.Nj // 2 + 1)
         self._count = basis.Ni + _MORE
-        rho, weights = gauss(1.0, 2 * self._count + len(self._m) + 24)
+        rho, weights = _radii(2 * self._count + len(self._m) + 24)
         a = basis.cap.rim_radius
         along, m = basis.cap.meridian(a * rho), self._m[:, None]
         F = basis.along(rho) / np.array([1.0, a, a**2])[:, None, None, None]
@@ -71,7 +88,8 @@ class CapShell:
             S[one] += nu * S[other]
             S[other] *= np.sqrt(1 - nu**2)
         law = np.array([C, C, C * (1 - nu) / 2, D, D, 2 * D * (1 - nu)])
-        K = _products(np.sqrt(law[:, None, None, None] * area) * S)
+        np.multiply(np.sqrt(law[:, None, None, None] * area), S, out=S)
+        K = _products(S)
         f, t = slice(0, basis.Ni), slice(basis.Ni, None)
         f_s, f_t, flat = (np.sqrt(area) * of for of in (F[1], m * F[0] / r, F[0]))
         own = K[:, f, f] + T * _products(np.stack([f_s, f_t])) + k_f * _products(flat[None])
@@ -94,10 +112,10 @@ class CapShell:
         """U and V of each function of them with their derivatives by s, (2, Q, M, n)."""
         per_arc = np.array([1.0, 1 / self._basis.cap.rim_radius])[:, None, None, None]
         powers = self._m + 1, np.abs(self._m - 1)
-        A, B = (per_arc * radial(rho, m, self._count, 1)[:2] for m in powers)
+        A, B = (per_arc * radial(rho, m, self._count, 1, 2) for m in powers)
         of_u, of_v = [A, B], [A, -B]
         if self._u_free:  # one more of each, alike at the rim
-            ends = [radial(np.append(rho, 1.0), m, 1, 0)[:2] for m in powers]
+            ends = [radial(np.append(rho, 1.0), m, 1, 0, 2) for m in powers]
             one, other = (per_arc * of[:, :-1] / of[0, -1] for of in ends)
             of_u, of_v = [*of_u, one + other], [*of_v, one - other]
         U, V = np.concatenate(of_u, axis=-1), np.concatenate(of_v, axis=-1)
@@ -111,7 +129,7 @@ class CapShell:
         r, slope = along.radius[:, None, None], along.slope[:, None, None]
         m, Ni = self._m[:, None], self._basis.Ni
         (U, U1), (V, V1) = self._tangential(rho)
-        S = np.zeros((6, *F.shape[1:3], Ni + U.shape[-1]))
+        S = _parts(6, len(rho), len(m), Ni + U.shape[-1])
         f, t = S[..., :Ni], S[..., Ni:]
         f[0], f[1] = -k1 * F[0], -k2 * F[0]
         t[0], t[1], t[2] = U1, (m * V + slope * U) / r, V1 - (m * U + slope * V) / r
@@ -123,52 +141,63 @@ class CapShell:
         S[5] += (k1 + k2) / 4 * S[2]
         return S
 
-    def _waves(self, positions: Array) -> tuple[Array, Array, Array, Array]:
-        """Distance and azimuth (P,), and U and V of each function of f, (2, P, M, Ni)."""
+    def _tangential_waves(self, s: Array) -> tuple[Array, Array]:
+        """U and V of each function of f, with their derivatives, (2, P, M, Ni), at arcs s (P,)."""
+        of = np.stack(self._tangential(s / self._basis.cap.rim_radius))
+        U, V = np.moveaxis(np.moveaxis(of, 3, 2) @ self._least, 2, 3)
+        return U, V
+
+    def _polar(self, positions: Array) -> tuple[Array, Array]:
+        """Distance from the pole in m and azimuth (P,)."""
         x, y = (positions - self._basis.cap.rim_radius).T
-        a = self._basis.cap.rim_radius
-        s = np.maximum(np.hypot(x, y), _AT_POLE * a)
-        both = self._tangential(s / a)
-        U, V = (np.einsum("dpmt,mti->dpmi", of, self._least, optimize=True) for of in both)
-        return s, np.arctan2(y, x), U, V
+        return np.hypot(x, y), np.arctan2(y, x)
 
-    def _summed(self, even: Array, odd: Array, angle: Array) -> tuple[Array, Array]:
-        """Of every function (P, N): `even` (P, M, Ni) as cos m t, `odd` as sin m t of a cosine."""
+    def _by_function(self, cosines: Array, sines: Array) -> Array:
+        """Of every function (..., N), of waves (..., M, Ni) as cos m t and as sin m t."""
         Ni, Nj = self._basis.shape
+        each = np.swapaxes(np.stack([cosines, sines], axis=-1), -3, -2)
+        own = each.reshape(*each.shape[:-3], Ni, -1)  # with a sine of m = 0
+        return np.delete(own, 1, axis=-1)[..., :Nj].reshape(*own.shape[:-2], -1)
+
+    def _turned(self, angle: Array) -> tuple[Array, Array]:
+        """cos m t and sin m t (P, M, 1)."""
         turn = np.multiply.outer(angle, self._m)[..., None]
-        cos, sin = np.cos(turn), np.sin(turn)
+        return np.cos(turn), np.sin(turn)
 
-        def by_function(of_cosines: Array, of_sines: Array) -> Array:
-            both = np.stack([of_cosines, of_sines], axis=2).reshape(len(angle), -1, Ni)
-            own = np.delete(both, 1, axis=1)[:, :Nj]  # without a sine of m = 0
-            return np.swapaxes(own, 1, 2).reshape(len(angle), -1)
+    def curvature_by_wave(self, positions: Array) -> Array:
+        """Curvature xx, yy, xy (2, 3, P, M, Ni) in 1/m per m of each wave, at `positions` (P, 2).
 
-        return by_function(even * cos, even * sin), by_function(odd * sin, -odd * cos)
-
-    def tangential_at(self, positions: Array) -> Array:
-        """Tangential displacement (2, P, N) along the frame, per m of each function."""
-        _, angle, U, V = self._waves(positions)
-        u, v = self._summed(U[0], V[0], angle)
-        c, z = np.cos(angle)[:, None], np.sin(angle)[:, None]
-        return np.stack([c * u - z * v, z * u + c * v])
-
-    def curvature_at(self, positions: Array) -> Array:
-        """Curvature xx, yy, xy (3, P, N) in 1/m per m of each function at `positions` (P, 2)."""
-        found, cap, m = curvature_at(self._basis, positions), self._basis.cap, self._m[:, None]
-        if cap.stretch == 1:
-            return found
-        s, angle, (U, _), (V, V1) = self._waves(positions)
+        First of waves as cos m t around, then of those as sin m t.
+        """
+        (s, angle), cap, a = self._polar(positions), self._basis.cap, self._basis.cap.rim_radius
+        per_arc = (a ** -np.array([0, 1, 1, 2, 2, 2.0]))[:, None, None, None]
+        f, f_s, f_t, ss, st, tt = per_arc * self._basis.around_pole(s / a)
+        s = np.maximum(s, _AT_POLE * a)
         along = cap.meridian(s)
         (k1, k2), (c1, c2) = along.curvatures[..., None, None], along.changes[..., None, None]
         r, slope = along.radius[:, None, None], along.slope[:, None, None]
-        mixed = (k2 - k1) / 2 * (V1 + (m * U + slope * V) / r) + c2 * V
-        ss, st = self._summed(c1 * U, mixed, angle)
-        tt, _ = self._summed(c2 * U, mixed, angle)
-        c, z = np.cos(angle)[:, None], np.sin(angle)[:, None]
-        found[0] += c**2 * ss - 2 * c * z * st + z**2 * tt
-        found[1] += z**2 * ss + 2 * c * z * st + c**2 * tt
-        found[2] += c * z * (ss - tt) + (c**2 - z**2) * st
+        g = r / s[:, None, None]
+        ss += k1**2 * f
+        tt = tt / g**2 + (slope - 1 / g) / r * f_s + k2**2 * f
+        st = (slope / g - 1) / r * f_t - st / g
+        if cap.stretch != 1:
+            (U, _), (V, V1) = self._tangential_waves(s)
+            m = self._m[:, None]
+            ss += c1 * U
+            tt += c2 * U
+            st += (k2 - k1) / 2 * (V1 + (m * U + slope * V) / r) + c2 * V
+        (cos, sin), found = self._turned(angle), np.empty((2, 3, *f.shape))
+        c, z = np.cos(angle)[:, None, None], np.sin(angle)[:, None, None]
+        for out, even, odd in ((found[0], cos, sin), (found[1], sin, -cos)):
+            twice, mean, half = 2 * c * z * odd * st, even * (ss + tt) / 2, even * (ss - tt) / 2
+            out[0] = mean + (c**2 - z**2) * half - twice
+            out[1] = mean - (c**2 - z**2) * half + twice
+            out[2] = 2 * c * z * half + (c**2 - z**2) * odd * st
         return found
+
+    def curvature_at(self, positions: Array) -> Array:
+        """Curvature xx, yy, xy (3, P, N) in 1/m per m of each function at `positions` (P, 2)."""
+        return self._by_function(*self.curvature_by_wave(positions))
 
     def by_function(self, blocks: Array) -> Array:
         """A matrix (N, N) of the functions from its `blocks` (M, Ni, Ni) of each wave m."""
@@ -184,7 +213,7 @@ class CapWaves:
 
     def __init__(self, basis: CapBasis) -> None:
         a, m = basis.cap.rim_radius, np.arange(basis.Nj // 2 + 1)
-        rho, weights = gauss(1.0, 2 * basis.Ni + len(m) + 24)
+        rho, weights = _radii(2 * basis.Ni + len(m) + 24)
         radius = basis.cap.meridian(a * rho).radius[:, None, None]
         self._basis, self._m = basis, m
         f, f_s, _ = np.sqrt(a * weights[:, None, None] * radius) * basis.along(rho)
@@ -195,24 +224,16 @@ class CapWaves:
         self.k: Array = np.sqrt(squares)
         """Wave numbers (M, Ni) in 1/m, for each number m of waves around."""
         shapes: Array = np.swapaxes(inverse, 1, 2) @ turned
-        self._shapes, self._shares = shapes, gram @ shapes
+        self._shapes = shapes
+        self.shares: Array = gram @ shapes
+        """From the functions of each m to its waves (M, Ni, Ni): M @ shares are rows on them."""
 
     def along(self, distance: Array) -> Array:
         """Each wave along a meridian (Q, M, Ni), at each `distance` (Q,) in m from the pole.
 
         It may be negative: on the other side.
         """
-        f = self._basis.along(np.abs(distance) / self._basis.cap.rim_radius)[0]
+        f = self._basis.along(np.abs(distance) / self._basis.cap.rim_radius, 1)[0]
         odd = (distance[:, None] < 0) & (self._m % 2 == 1)
-        return np.where(odd, -1, 1)[..., None] * np.einsum("qmi,mik->qmk", f, self._shapes)
-
-    def rows(self, M: Array) -> tuple[Array, Array]:
-        """Rows M (C, N) on the functions as rows (C, M, Ni) on the waves as cos m t and sin m t."""
-        (Ni, Nj), C = self._basis.shape, len(M)
-        by_m = np.zeros((C, Ni, 2 * len(self._m)))
-        by_m[..., 0], by_m[..., 2 : Nj + 1] = (
-            M.reshape(C, Ni, Nj)[..., 0],
-            M.reshape(C, Ni, Nj)[..., 1:],
-        )
-        cos, sin = (np.einsum("cim,mik->cmk", by_m[..., k::2], self._shares) for k in (0, 1))
-        return cos, sin
+        waves = np.swapaxes(np.swapaxes(f, 0, 1) @ self._shapes, 0, 1)
+        return np.where(odd, -1, 1)[..., None] * waves

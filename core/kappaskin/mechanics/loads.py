@@ -171,6 +171,7 @@ class DistributedLoad(CentredLoad, ABC):
         """
 
     def check(self, patch: Patch) -> None:
+        check_on(self, patch, self.centre()[None])  # beyond a cap's rim, angles begin anew
         check_on(self, patch, patch.around(self.x, self.y, _INSIDE * self._rim()))
 
     def modal(self, basis: Basis) -> Array:

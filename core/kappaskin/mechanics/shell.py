@@ -1,18 +1,19 @@
 """Shells: what a bent skin that stretches reads, and how far it gives."""
 
+import itertools
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise, repeat
 from typing import Protocol
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
+from scipy import linalg
 
 from kappaskin.bases import Basis, ProductBasis, SineBasis, gauss
 from kappaskin.errors import Refusal
-from kappaskin.frames import Array
+from kappaskin.frames import Array, Mask
 from kappaskin.skin import Patch
 
 # Sanders' and Koiter's theory of a cylinder bent along x to H = 1/R, straight along y, with the
@@ -101,7 +102,7 @@ class _Arc:
         self.x, self.weights = gauss(sheet.patch.a, 2 * count + 16)
         self._fields = self.fields(self.x)
         ends = np.cumsum([0, *(field.shape[-1] for field in self._fields)]).tolist()
-        self.f, self.v, self.u = (slice(*pair) for pair in pairwise(ends))
+        self.f, self.v, self.u = (slice(*pair) for pair in itertools.pairwise(ends))
         self.size = ends[-1]
 
     def fields(self, x: Array) -> tuple[Array, Array, Array]:
@@ -211,9 +212,17 @@ class Tangential:
 
 # A shallow skin (Marguerre): strains e_x = u_x - f / Rx, e_y = v_y - f / Ry, g = u_y + v_x with u
 # along x and v along y, and the bending of a plate. Stretching adds the energy of the u and v that
-# make it least.
+# make it least. All functions are even or odd about the middle, along x and along y. An f that is
+# even along x has a u that is odd along it, and a v that is even; likewise along y: four kinds of f
+# that do not mix.
 
 _IN_PLANE = 16  # functions of u and v along a side, more than f has
+
+
+def _are_even(functions: Array) -> Mask:
+    """Which of `functions` (..., X, n) at points (X,) on either side are even about the middle."""
+    values = functions.reshape(-1, *functions.shape[-2:])[0]
+    return np.einsum("xn,xn->n", values, values[::-1]) > 0
 
 
 def shallow_stiffness(patch: Patch, C: float, nu: float, inplane: str, basis: Basis) -> Array:
@@ -231,32 +240,44 @@ def shallow_stiffness(patch: Patch, C: float, nu: float, inplane: str, basis: Ba
         loose.append(np.dstack([_lines(side, points), fixed[-1]]))
     across = fixed if inplane == "held" else loose
     along_edge = loose if inplane == "free" else fixed
-    u, v = (across[0], along_edge[1]), (along_edge[0], across[1])
-    maps, shear = basis.on_grid(rules[0][0], rules[1][0]), (1 - nu) / 2
-    f: tuple[Array, Array] = maps.X, maps.Y
-    (u_x, u_y), (v_x, v_y) = (((X[1], Y[0]), (X[0], Y[1])) for X, Y in (u, v))
+    maps, (Hx, Hy), shear = basis.on_grid(rules[0][0], rules[1][0]), patch.curvatures, (1 - nu) / 2
+    X, Y = maps.X, maps.Y
 
     def product(one: tuple[Array, Array], other: tuple[Array, Array]) -> Array:
         (_, x), (_, y) = rules
         along_x, along_y = (one[0].T * x) @ other[0], (one[1].T * y) @ other[1]
-        found = np.einsum("ij,kl->ikjl", along_x, along_y)
-        return found.reshape(len(along_x) * len(along_y), -1)
+        return np.kron(along_x, along_y).astype(float)
 
-    K_u = product(u_x, u_x) + shear * product(u_y, u_y)
-    K_v = product(v_y, v_y) + shear * product(v_x, v_x)
-    mixed = nu * product(u_x, v_y) + shear * product(u_y, v_x)
-    stiffness: Array = np.block([[K_u, mixed], [mixed.T, K_v]])
-    Hx, Hy = patch.curvatures
-    coupled = np.hstack([(Hx + nu * Hy) * product(f, u_x), (Hy + nu * Hx) * product(f, v_y)])
-    if inplane == "free":  # of two translations and a rotation, which strain nothing
-        strained = np.isin(np.arange(len(stiffness)), [0, 1, len(K_u)], invert=True)
-        stiffness, coupled = stiffness[np.ix_(strained, strained)], coupled[:, strained]
-    scale: Array = 1 / np.sqrt(np.diag(stiffness))
-    coupled *= scale
-    stiffness *= np.multiply.outer(scale, scale)
-    relief: Array = coupled @ np.linalg.solve(stiffness, coupled.T)
-    own = (Hx**2 + Hy**2 + 2 * nu * Hx * Hy) * product(f, f)
-    return C * (own - relief)
+    def half(functions: Array, even: bool) -> Array:
+        return functions[..., _are_even(functions) == even]
+
+    added = np.zeros((*basis.shape, *basis.shape))
+    for even_x, even_y in itertools.product((True, False), repeat=2):
+        f = half(X, even_x), half(Y, even_y)
+        u = half(across[0], not even_x), half(along_edge[1], even_y)
+        v = half(along_edge[0], even_x), half(across[1], not even_y)
+        (u_x, u_y), (v_x, v_y) = (((x[1], y[0]), (x[0], y[1])) for x, y in (u, v))
+        K_u = product(u_x, u_x) + shear * product(u_y, u_y)
+        K_v = product(v_y, v_y) + shear * product(v_x, v_x)
+        mixed = nu * product(u_x, v_y) + shear * product(u_y, v_x)
+        stiffness: Array = np.block([[K_u, mixed], [mixed.T, K_v]])
+        coupled = np.vstack([(Hx + nu * Hy) * product(u_x, f), (Hy + nu * Hx) * product(v_y, f)])
+        if inplane == "free" and not (even_x and even_y):  # a shift or a turn, which strain nothing
+            shift = len(K_u) if even_x else 0
+            stiffness = np.delete(np.delete(stiffness, shift, 0), shift, 1)
+            coupled = np.delete(coupled, shift, 0)
+        own = (Hx**2 + Hy**2 + 2 * nu * Hx * Hy) * product(f, f) - _relief(stiffness, coupled)
+        i, j = np.flatnonzero(_are_even(X) == even_x), np.flatnonzero(_are_even(Y) == even_y)
+        added[np.ix_(i, j, i, j)] = own.reshape((len(i), len(j)) * 2)
+    return C * added.reshape(basis.size, basis.size)
+
+
+def _relief(K: Array, coupled: Array) -> Array:
+    """C' K^-1 C (N, N) of a stiffness K (n, n) and what is `coupled` to it, C (n, N)."""
+    scale: Array = 1 / np.sqrt(np.diag(K))
+    root = np.linalg.cholesky(K * np.multiply.outer(scale, scale))
+    eased = linalg.solve_triangular(root, coupled * scale[:, None], lower=True)
+    return eased.T @ eased
 
 
 _MOST_FUNCTIONS, _MOST_WAVES = 96, 160
@@ -374,7 +395,7 @@ class Shell:
         shapes = np.stack([fx + H / 2 * v, ux, fxx + H**2 * f, f])
         cos, sin = w * np.cos(q * s * _DIAGONAL), w * np.sin(q * s * _DIAGONAL) / 2
         factors = np.stack([q * cos, -H / 2 * cos, sin, -(q**2) * sin], axis=1)
-        return repeat(xx), yy, np.tensordot(factors, shapes, 2)
+        return itertools.repeat(xx), yy, np.tensordot(factors, shapes, 2)
 
 
 def _along_gage(length: float) -> tuple[Array, Array]:

@@ -243,22 +243,27 @@ class Stretching:
         """
         L, shape = self._root, modal.shape
         target, force = L.T @ modal.ravel(), 0.0
+
+        def state(p: Array) -> tuple[Array, Array]:
+            q = (L @ p).reshape(shape)
+            return q, np.eye(len(p)) + L.T @ self.tangent(q) @ L
+
         p = 0 * target
+        q, hessian = state(p)
         for depth in depths:
             size = abs(depth) / float(target @ target) * float(np.linalg.norm(target))
             for _ in range(_CORRECTIONS):
-                q = (L @ p).reshape(shape)
                 left = force * target - p - L.T @ self.force(q).ravel()
                 further = depth - float(target @ p)
-                H = np.eye(len(p)) + L.T @ self.tangent(q) @ L
                 if np.linalg.norm(left) + abs(further) * size / abs(depth) < _ON_PATH * size:
                     break
-                step, more = np.linalg.solve(H, np.stack([left, target], axis=1)).T
+                step, more = np.linalg.solve(hessian, np.stack([left, target], axis=1)).T
                 change = (further - float(target @ step)) / float(target @ more)
                 p, force = p + step + change * more, force + change
+                q, hessian = state(p)
             else:
                 return
-            if not np.linalg.eigvalsh(H)[0] > 0:
+            if not np.linalg.eigvalsh(hessian)[0] > 0:
                 return
             yield force, q
 

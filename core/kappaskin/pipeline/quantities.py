@@ -166,4 +166,4 @@ class Quantities:
     @cached_property
     def _elements_at_rest(self) -> Array:
         """The curvature form (3, P) in 1/m of the skin at rest at its elements."""
-        return self.layout.patch.base(*self.layout.positions.T).form
+        return self.layout.patch.read_at_rest(self.layout.positions)

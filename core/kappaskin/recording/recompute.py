@@ -230,7 +230,8 @@ class Recomputation:
     def _set_up(self, setup: Setup) -> None:
         if self.sensor is None:
             raise Refusal(
-                f"{self._recording.path}: expected a device before a setup; `kappaskin repair` "
+                self._frames.trouble
+                or f"{self._recording.path}: expected a device before a setup; `kappaskin repair` "
                 "saves the intact messages"
             )
         self._pass_over(len(self._waiting))

@@ -52,6 +52,8 @@ def _sinc(t: Array) -> Array:
 
 ValuesAt = Callable[[Array], Array]
 """From positions (P, 2) in m to a quantity (..., P, N) per m of each function there."""
+ValuesAlong = Callable[[Array, Array], Array]
+"""The same from positions and unit vectors (2,) or (P, 2) of the frame there."""
 
 
 _X, _Y = _AXES = np.eye(2)
@@ -66,7 +68,9 @@ def _along(basis: Basis, positions: Array, L: float, curvature: ValuesAt, t: Arr
     if not L:
         return _normal(curvature(positions), t)
     if any(basis.patch.curvatures):
-        return _over_gage(lambda places: _normal(curvature(places), t), positions, L, t)
+        return _over_gage(
+            lambda places, ways: _normal(curvature(places), ways), basis.patch, positions, L, t
+        )
     half = L / 2 * t
     return (_slope(basis, positions + half, t) - _slope(basis, positions - half, t)) / L
 
@@ -93,18 +97,24 @@ def _slope(basis: Basis, places: Array, t: Array) -> Array:
     return t[..., :1] * basis.at(places, 1, 0) + t[..., 1:] * basis.at(places, 0, 1)
 
 
-def _over_gage(values: ValuesAt, positions: Array, L: float, t: Array) -> Array:
+def _over_gage(values: ValuesAlong, patch: Patch, positions: Array, L: float, t: Array) -> Array:
     """The mean of `values` along gages of length L along t."""
     along, weights = gauss(L, _POINTS)
     steps = zip(along - L / 2, weights / L, strict=True)
-    return np.sum([w * values(positions + s * t) for s, w in steps], axis=0)
+    return np.sum([w * values(*patch.along(positions, t, s)) for s, w in steps], axis=0)
 
 
-def _over_cell(values: ValuesAt, positions: Array, cell: tuple[float, float]) -> Array:
+def _any_way(values: ValuesAt) -> ValuesAlong:
+    return lambda places, _: values(places)
+
+
+def _over_cell(
+    values: ValuesAt, patch: Patch, positions: Array, cell: tuple[float, float]
+) -> Array:
     """The mean of `values` over rectangles of the sides `cell` in m; a side may be zero."""
     for axis, side in zip((_X, _Y), cell, strict=True):
         if side:
-            values = partial(_over_gage, values, L=side, t=axis)
+            values = partial(_over_gage, _any_way(values), patch, L=side, t=axis)
     return values(positions)
 
 
@@ -234,7 +244,7 @@ class SensorLayout:
     """P elements at `positions` (P, 2) in m, and what they read.
 
     That is the curvature xx, yy and xy of each (a curvature sensor), or the `reads`, along x and y,
-    on a cap along the frame of `Patch.local`, where elements read at a point. `live` is
+    on a cap along the frame of `Patch.local`, gages and sides of cells along the skin. `live` is
     False for dead channels: (3, P) of a curvature sensor, (R,) of other readings. `shape` is
     (m, n) for a regular grid, with element p + m q in column p (along x) and row q (along y), and
     None otherwise. Curvature is the mean over gages of `gage_length` in m, along x, y or the
@@ -268,10 +278,11 @@ class SensorLayout:
             raise Refusal(f"expected {self.shape[0]} x {self.shape[1]} elements, got {len(P)}")
         outside = np.flatnonzero(~self.patch.contains(P))  # NaN counts as outside
         if outside.size:
-            p, (x, y) = int(outside[0]), P[outside[0]]
+            p, (x, y), patch = int(outside[0]), P[outside[0]], self.patch
             raise Refusal(
-                f"{outside.size} of {len(P)} elements lie outside the {self.patch.name}: element "
-                f"{p} is at ({x:g}, {y:g}) m; positions are in metres from the corner x = y = 0"
+                f"{outside.size} of {len(P)} elements lie outside the {patch.name}: element {p} is "
+                f"at ({x:g}, {y:g}) m; positions are in metres from the corner x = y = 0, the "
+                f"middle of the skin is at ({patch.a / 2:g}, {patch.b / 2:g})"
             )
         if isinstance(self.patch, Cap):
             self._check_on_cap()
@@ -279,12 +290,10 @@ class SensorLayout:
         self._check_cells()
 
     def _check_on_cap(self) -> None:
-        slopes = self.reads is not None and "slope" in self.reads.quantity
-        if self.gage_length or any(self.cell) or slopes:
+        if self.reads is not None and "slope" in self.reads.quantity:
             raise Refusal(
-                f"expected heights, curvature and twist at a point of each element of a "
-                f"{self.patch.name}, got {'slopes' if slopes else 'a mean over gages or cells'}; "
-                "set gage_length and cell to 0"
+                f"expected heights, curvature or twist of each element of a {self.patch.name}, got "
+                "slopes, which how far the skin moves along itself changes; read curvature instead"
             )
 
     def _check_gages(self) -> None:
@@ -422,8 +431,9 @@ class SensorLayout:
     def has_room(self, positions: Array) -> Mask:
         """At which `positions` (C, 2) in m the gages and cells of an element are on the skin."""
         half = np.array(self.cell) / 2 * (1 - _ROUNDING)
-        corners = positions + half * np.array([[[1, 1]], [[1, -1]], [[-1, 1]], [[-1, -1]]])
-        on = self.patch.contains(corners.reshape(-1, 2)).reshape(4, -1).all(axis=0)
+        on, far = np.ones(len(positions), bool), math.hypot(*half)
+        for side in half * [[1, 1], [1, -1], [-1, 1], [-1, -1]] if far else ():
+            on &= self.patch.contains(self.patch.along(positions, side / far, far)[0])
         return on & (self.patch.depth(positions) * (1 + _ROUNDING) >= self.gage_length / 2)
 
     def reading_at(self, positions: ArrayLike, which: Indices) -> "SensorLayout":
@@ -641,10 +651,15 @@ class SensorLayout:
             raise Refusal(f"the layout is on {self.patch}, the basis on {basis.patch}; use one")
         curvature = plate.curvature(basis) if plate else partial(curvature_at, basis)
         if self.reads:
-            M = self._read_by(self.reads, basis, plate, curvature)
-            return M if self.scale is None else self.scale[:, None] * M
+            rows = self._read_by(self.reads, basis, plate, curvature)
+        else:
+            rows = self.mean_curvature(basis, curvature)
+        return rows if self.scale is None else self.scale[:, None] * rows
+
+    def mean_curvature(self, basis: Basis, curvature: ValuesAt) -> Array:
+        """Means over the gages (3 P, N) of the `curvature` (3, P, N) at positions (P, 2)."""
         if not self.gage_length:
-            return curvature(self.positions).reshape(self.channels, basis.size)
+            return np.concatenate(curvature(self.positions))
         along = partial(_along, basis, self.positions, self.gage_length, curvature)
         return np.concatenate([along(_X), along(_Y), _twist(along)])
 
@@ -665,11 +680,11 @@ class SensorLayout:
                 return found
 
             if name == "height":
-                M[own] = _over_cell(basis.at, at, self.cell)
+                M[own] = _over_cell(basis.at, self.patch, at, self.cell)
             elif name == "slope" and not L:
-                M[own] = _over_cell(slope, at, self.cell)
+                M[own] = _over_cell(slope, self.patch, at, self.cell)
             elif name == "slope" and H:
-                M[own] = _over_gage(slope, at, L, t)
+                M[own] = _over_gage(_any_way(slope), self.patch, at, L, t)
             elif name == "slope":
                 M[own] = (basis.at(at + L / 2 * t) - basis.at(at - L / 2 * t)) / L
             elif name == "curvature" or not L:
@@ -824,7 +839,10 @@ class NormalCurvature:
         plate: Plate | None = None,
     ) -> None:
         places, patch = layout.positions, basis.patch
-        at = list(covariant_at(basis, places)[1:3])
+        if isinstance(patch, Cap):
+            at = list(covariant_at(basis, places)[1:3])
+        else:  # by shallow shell theory x and y meet at a right angle
+            at = [basis.at(places, 1, 0), basis.at(places, 0, 1)]
         if H := patch.arc_curvature:
             v, *turns = plate.hoop(basis, places) if plate else hoop_at(basis, places)
             curvature = plate.curvature(basis)(places) if plate else curvature_at(basis, places)
@@ -845,7 +863,7 @@ class NormalCurvature:
         self._columns = np.concatenate([self._first, *self._at]).T
         self.frame_shape, self._base = layout.frame_shape, np.empty((0, 1), dtype)
         if any(patch.curvatures):
-            self._base = patch.base(*places.T).form[:, layout.element].astype(dtype)
+            self._base = patch.read_at_rest(places)[:, layout.element].astype(dtype)
 
     @property
     def maps(self) -> Array:

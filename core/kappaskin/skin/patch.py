@@ -159,10 +159,11 @@ class Base(NamedTuple):
     """A skin at rest at one place, each number, or at many, each an array.
 
     Its point in m and outward normal in space, orthonormal tangents e_x and e_y, and its curvature
-    xx, yy and xy in 1/m along these. On a cap also, on other skins empty: the rows of the matrix
-    `slopes` (2, 2) from derivatives along x and y to those along e_x and e_y, those of the matrix
-    (3, 5) from f_x, f_y, f_xx, f_xy, f_yy to the second ones, and by how much e_x turns to e_y
-    along each of them, in 1/m.
+    xx, yy and xy in 1/m along these. On caps, domes and saddles, where x and y are no lengths
+    at a right angle, also, on other skins empty: the rows of the matrix `slopes` (2, 2) from
+    derivatives along x and y to those along e_x and e_y, those of the matrix (3, 5) from f_x, f_y,
+    f_xx, f_xy, f_yy to the second ones, and by how much e_x turns to e_y along each of them, in
+    1/m.
     """
 
     point: Vector
@@ -191,6 +192,10 @@ class Base(NamedTuple):
 
         To its covariant ones along e_x and e_y.
         """
+        if isinstance(self.point[0], float) and self.slopes:  # a third of the time
+            first = ((0.0, *row, 0.0, 0.0, 0.0) for row in self.slopes)
+            value = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            return np.array([value, *first, *((0.0, *row) for row in self.second)])
         found = np.zeros((*np.shape(self.point[0]), 6, 6))
         found[...] = np.eye(6)
         for i, row in enumerate(self.slopes + self.second, 1):
@@ -238,10 +243,11 @@ class Patch:
             )
 
     def _check_shallow(self, radii: tuple[float, float]) -> None:
-        if self.strip or any(math.isnan(R) or not R for R in radii):
+        least = SIDES[0]
+        if self.strip or not all(abs(R) >= least for R in radii):  # NaN too
             raise Refusal(
-                "expected two radii other than zero in m, or infinity, of a skin that is no strip; "
-                f"got {list(radii)}, strip {self.strip}"
+                f"expected two radii of at least {least:g} m, either sign, or infinity, of a skin "
+                f"that is no strip; got {list(radii)}, strip {self.strip}"
             )
         if self.steepness > _STEEPEST:
             least = min(map(abs, radii)) * math.sqrt(self.steepness / _STEEPEST)
@@ -358,16 +364,49 @@ class Patch:
             px, pz = self.a / 2 + sx / Hx, -2 * sin(Hx * u / 2) ** 2 / Hx
         if Hy:
             py, pz = self.b / 2 + sy / Hy, pz - 2 * sin(Hy * v / 2) ** 2 / Hy
-        # The arcs' tangents (cx, 0, -sx) and (0, cy, -sy) meet at a right angle only along the
-        # middles.
-        up = 1 / (1 - (sx * sy) ** 2) ** 0.5
-        ny, nz = cx * sy * up, cx * cy * up
+        # The arcs' tangents r_x = (cx, 0, -sx) and r_y = (0, cy, -sy) meet at a right angle only
+        # along the middles: r_x . r_y = m. The frame is e_x = r_x and e_y = t r_x + up r_y.
+        m = sx * sy
+        up = 1 / (1 - m * m) ** 0.5
+        ny, nz, t = cx * sy * up, cx * cy * up, -m * up
         across, normal = (-sx * ny, cy * up, -cx * ny), (sx * cy * up, ny, nz)
-        return Base((px, py, pz), (cx, 0.0, -sx), across, normal, (Hx, Hy, 0.0))
+        base = Base((px, py, pz), (cx, 0.0, -sx), across, normal, (Hx, Hy, 0.0))
+        if not (Hx and Hy):
+            return base
+        # r_xx . e_y = p, r_yy . r_x = q and r_xy = 0.
+        p, q, b = up * Hx * cx * sy, Hy * cy * sx, Hx * cy * up
+        along = -t * p, -up * p, 1.0, 0.0, 0.0
+        across = -(up**4) * q, m * up**4 * q, 0.0, 2 * t * up, up * up
+        return base._replace(
+            curvature=(b, t * t * b + up**3 * Hy * cx, t * b),
+            slopes=((1.0, 0.0), (t, up)),
+            second=(
+                along,
+                (*(t * each for each in along[:3]), up, 0.0),
+                tuple(t * t * one + other for one, other in zip(along, across, strict=True)),
+            ),
+            turning=(p, t * p),
+        )
+
+    def read_at_rest(self, positions: Array) -> Array:
+        """Curvature xx, yy, xy (3, P) in 1/m of the skin at rest that elements are taken to have.
+
+        At `positions` (P, 2) in m; by shallow shell theory it is alike all over.
+        """
+        return np.multiply.outer([*self.curvatures, 0.0], np.ones(len(positions)))
 
     def around(self, x: float, y: float, offsets: Array) -> Array:
         """Positions (Q, 2) in m that lie from (x, y) as far along the skin as `offsets` (Q, 2)."""
-        return np.array([x, y]) + offsets
+        slopes = self.base(x, y).slopes
+        return np.array([x, y]) + (offsets @ np.array(slopes) if slopes else offsets)
+
+    def along(self, positions: Array, ways: Array, far: Number) -> tuple[Array, Array]:
+        """Positions (P, 2) in m that lie `far` in m from `positions` (P, 2) along the skin.
+
+        Along unit vectors `ways` (2,) or (P, 2) of the frame there; and the unit vectors of the
+        frame at the end along which the way goes on.
+        """
+        return positions + far * ways, ways
 
 
 @dataclass(frozen=True, init=False)
@@ -428,6 +467,7 @@ class Meridian:
 
 _STRETCHES = (0.2, 5.0)
 _LEVEL = 0.2  # of what the pole moves by across itself, along the axis, the rim does
+_HALF = 1e-4  # of pi/2: an angle so near makes a hemisphere, as 1.5708 rad does
 _NEAR_POLE = 1e-7  # of the arc to the rim: so far from the pole azimuths have a value
 
 
@@ -454,10 +494,10 @@ class Cap(Disk):
                 f"expected a cap with a radius above zero in metres and a stretch from {least:g} "
                 f"to {most:g}, got {radius} and {stretch}"
             )
-        if not 0 < angle <= math.pi / 2 * (1 + _ROUNDING):
+        if not 0 < angle <= math.pi / 2 * (1 + _HALF):
             raise Refusal(
                 "expected a cap whose rim is turned by an angle above zero, at most pi/2 (a "
-                f"hemisphere), got {angle} rad"
+                f"hemisphere), got {angle} rad; multiply degrees by pi/180"
             )
         for name, value in (("angle", min(angle, math.pi / 2)), ("stretch", stretch)):
             object.__setattr__(self, name, value)
@@ -468,7 +508,8 @@ class Cap(Disk):
     @property
     def name(self) -> str:
         of = f" stretched {self.stretch:g} times" if self.stretch != 1 else ""
-        return f"cap of radius {self.equator:g} m{of} with {math.degrees(self.angle):g} degrees"
+        rim = f"its rim at {math.degrees(self.angle):g} degrees"
+        return f"cap of radius {self.equator:g} m{of} with {rim}"
 
     @property
     def equator(self) -> float:
@@ -492,7 +533,7 @@ class Cap(Disk):
 
     @property
     def is_hemisphere(self) -> bool:
-        return math.isclose(self.angle, math.pi / 2)
+        return math.isclose(self.angle, math.pi / 2, rel_tol=_HALF)
 
     def _angle(self, distance: Number) -> Number:
         """The `angle` of the `meridian` at a `distance` in m from the pole."""
@@ -557,6 +598,9 @@ class Cap(Disk):
             (-flat / r * n, flat / r * c),
         )
 
+    def read_at_rest(self, positions: Array) -> Array:
+        return self.base(*positions.T).form
+
     def places(self, points: Array) -> Array:
         """Positions (..., 2) in m of `points` (..., 3) of the skin in space, or just off it."""
         pole, R, k = self.rim_radius, self.equator, self.stretch
@@ -568,19 +612,22 @@ class Cap(Disk):
         return np.stack([pole + out * x, pole + out * y], axis=-1)
 
     def around(self, x: float, y: float, offsets: Array) -> Array:
-        """Positions (Q, 2) in m that lie from (x, y) as far along the skin as `offsets` (Q, 2).
+        far = np.hypot(*offsets.T)[:, None]
+        ways = np.where(far > 0, offsets, (1.0, 0.0)) / np.where(far > 0, far, 1.0)
+        return self.along(np.broadcast_to((x, y), offsets.shape), ways, far[:, 0])[0]
 
-        Along circles of the skin's curvature there: of a spheroid nearly.
-        """
-        base = self.base(x, y)
-        xx, yy, xy = base.curvature
-        squares: Array = np.sum(offsets**2, axis=1)
-        forms: Array = offsets**2 @ np.array([xx, yy]) + 2 * xy * offsets[:, 0] * offsets[:, 1]
-        H = np.where(squares > 0, forms, xx) / np.where(squares > 0, squares, 1.0)
-        turn = H * np.sqrt(squares)
-        along: Array = (np.sinc(turn / np.pi)[:, None] * offsets) @ base.frame
-        fall = np.multiply.outer(2 * np.sin(turn / 2) ** 2 / H, base.normal)
-        return self.places(base.point + along - fall)
+    def along(self, positions: Array, ways: Array, far: Number) -> tuple[Array, Array]:
+        # Along circles of the skin's curvature where they begin: of a spheroid nearly.
+        ways, base = np.broadcast_to(ways, positions.shape), self.base(*positions.T)
+        (xx, yy, xy), (c, s) = base.form, ways.T
+        H = c * c * xx + s * s * yy + 2 * c * s * xy
+        turn, normal = (H * far)[:, None], np.stack(base.normal, axis=-1)
+        out: Array = np.einsum("pi,pik->pk", ways, base.frame)
+        moved = np.sin(turn) * out - 2 * np.sin(turn / 2) ** 2 * normal
+        places = self.places(np.stack(base.point, axis=-1) + moved / H[:, None])
+        onward = np.cos(turn) * out - np.sin(turn) * normal
+        ends: Array = np.einsum("pk,pik->pi", onward, self.base(*places.T).frame)
+        return places, ends / np.hypot(*ends.T)[:, None]
 
 
 @dataclass(frozen=True, init=False)

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from kappaskin._text import printable
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
+from kappaskin.mechanics import Plate
 from kappaskin.scenes import EffectSelection, Plan, Scene, Simulator, plan
 from kappaskin.scenes.effects import EFFECTS, ReadingEffect
-from kappaskin.skin import Cap
+from kappaskin.skin import Cap, Disk, Polygon
 
 _MOST = 10_000_000  # readings: 80 MB for each array of them
 
@@ -29,7 +30,7 @@ def simulated_readings(
 
     A frame that the link loses is NaN in `curvature` and -1 in `counts`, on all its channels. Of a
     sensor that reads other than xx, yy and xy the readings are `values`, each of an `element`, a
-    `quantity` and a `direction`, as `kappaskin reconstruct` takes them.
+    `quantity` and a `direction`. `kappaskin reconstruct` reads the file, forces included.
     """
     layout, skin = scene.layout, scene.plate.patch
     C, shape = layout.channels, layout.frame_shape
@@ -49,7 +50,6 @@ def simulated_readings(
         if not simulator.failure(n):
             curvature[n] = reading
             counts[n] = scene.transduction.counts(reading)
-    size = (skin.a,) if skin.strip else (skin.a, skin.b)
     places = layout.positions
     read: dict[str, NDArray[Any]] = {"curvature": curvature.reshape(frames, *shape)}
     if layout.reads:
@@ -65,15 +65,32 @@ def simulated_readings(
         "time": time,
         "contact": contact,
         "plan": np.array(json.dumps([entry.to_json() for entry in plan(scene)])),
-        "size": np.array(size),
         "positions": places[:, :1] if skin.strip else places,
-        "radius": np.array(skin.radius),
-        **(
-            {"angle": np.array(skin.angle), "stretch": np.array(skin.stretch)}
-            if isinstance(skin, Cap)
-            else {}
-        ),
+        **_skin(scene.plate),
     }
+
+
+def _skin(plate: Plate) -> dict[str, NDArray[Any]]:
+    """Size, shape and stiffness of a skin, as `kappaskin reconstruct` reads them."""
+    skin = plate.patch
+    values: dict[str, Any] = {
+        "size": (skin.a,) if skin.strip else (skin.a, skin.b),
+        "radius": skin.radius,
+        "rigidity": plate.rigidity,
+        "thickness": plate.sheet_thickness,
+        "poisson": plate.poisson,
+        "inplane": plate.inplane or None,
+    }
+    match skin:
+        case Cap():
+            values |= {"angle": skin.angle, "stretch": skin.stretch}
+        case Disk():
+            values["outline"] = skin.rim_radius
+        case Polygon():
+            values["outline"] = skin.vertices
+        case _:
+            pass
+    return {name: np.array(value) for name, value in values.items() if value is not None}
 
 
 # Computing time of each effect per frame, measured here, with its entry in the plan

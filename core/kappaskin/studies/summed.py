@@ -14,6 +14,9 @@ from kappaskin.studies.accuracy import grid_on
 _WAVES = 90  # each way: readings under discs of 1 mm radius stand to 1 % of their noise in Table 1
 
 
+_ALL = slice(None)
+
+
 class SummedResponse:
     """What `loads`, those of T moments, do to a scene's skin beyond its 15 x 15 or so functions.
 
@@ -44,12 +47,17 @@ class SummedResponse:
         return sines and scene.indenter is None
 
     def errors(
-        self, basis: Basis, fitted: Array, true: Array, contact: Array
+        self,
+        basis: Basis,
+        fitted: Array,
+        true: Array,
+        contact: Array,
+        frames: slice = _ALL,
     ) -> tuple[Array, Array]:
         """Signed errors at `contact` (T, 2), and RMS errors over the skin, (T,) in m.
 
-        Of coefficients `fitted` (T, N) of the functions of `basis`; `true` (T, Nr) in m are those
-        of the scene's true shape.
+        Of coefficients `fitted` (T, N) of the functions of `basis` in some of the `frames`; `true`
+        (T, Nr) in m are those of the scene's true shape in these.
         """
         grid = grid_on(basis.patch)
 
@@ -62,7 +70,7 @@ class SummedResponse:
             for one, c in (
                 (basis, fitted),
                 (self._reference, true),
-                (self.basis, self.coefficients),
+                (self.basis, self.coefficients[frames]),
             )
         )
         return e - e0 - e1, np.sqrt(np.mean((w - w0 - w1) ** 2, axis=(-2, -1)))

@@ -23,6 +23,7 @@ def _imports(folder: Path) -> set[str]:
     }
 
 
+@pytest.mark.cases("connection", "heatmaps", "membrane", "presenter", "recording")
 @pytest.mark.parametrize("left_out", FEATURES, ids=lambda feature: feature.name)
 def test_the_app_works_without(left_out, qapp, window_class, until) -> None:
     rest = [feature for feature in FEATURES if feature is not left_out]

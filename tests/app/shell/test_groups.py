@@ -12,9 +12,9 @@ LEFT = Qt.MouseButton.LeftButton
 
 
 def test_a_click_on_a_title_collapses_a_group_and_the_next_one_expands_it(
-    window, until, qtbot
+    shared_window, until, qtbot
 ) -> None:
-    panel, box = window.noise, window.noise.editor("noise_rms")
+    panel, box = shared_window.noise, shared_window.noise.editor("noise_rms")
     assert box.isVisible()
     high = panel.height()
 
@@ -27,17 +27,19 @@ def test_a_click_on_a_title_collapses_a_group_and_the_next_one_expands_it(
     until(lambda: panel.height() == high)
 
 
-def test_the_keyboard_collapses_a_group(window, qtbot) -> None:
-    window.noise.fold.setFocus()
-    qtbot.keyClick(window.noise.fold, Qt.Key.Key_Space)
-    assert not window.noise.editor("noise_rms").isVisible()
+def test_the_keyboard_collapses_a_group(shared_window, qtbot) -> None:
+    shared_window.noise.fold.setFocus()
+    qtbot.keyClick(shared_window.noise.fold, Qt.Key.Key_Space)
+    assert not shared_window.noise.editor("noise_rms").isVisible()
+    qtbot.keyClick(shared_window.noise.fold, Qt.Key.Key_Space)
+    assert shared_window.noise.editor("noise_rms").isVisible()
 
 
-def test_what_the_finder_goes_to_is_expanded(window, qtbot) -> None:
-    qtbot.mouseClick(window.noise.fold, LEFT)
-    found = {entry.name: entry for entry in entries_in(window, ())}
+def test_what_the_finder_goes_to_is_expanded(shared_window, qtbot) -> None:
+    qtbot.mouseClick(shared_window.noise.fold, LEFT)
+    found = {entry.name: entry for entry in entries_in(shared_window, ())}
     found["setting:noise_rms"].act()
-    assert window.noise.editor("noise_rms").isVisible()
+    assert shared_window.noise.editor("noise_rms").isVisible()
 
 
 def test_collapsed_groups_are_so_in_the_next_window(window, opened, qtbot, tmp_path: Path) -> None:

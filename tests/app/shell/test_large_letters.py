@@ -88,7 +88,7 @@ def test_titles_of_docks_have_those_letters(large: MainWindow) -> None:
     assert min(seen) >= large.fontMetrics().height()
 
 
-@pytest.mark.cases("cost", "scene", "design")
+@pytest.mark.cases("cost")
 @pytest.mark.parametrize(
     "name", ["cost", "stability", "scene", "health", "numbers", "log", "compare", "design"]
 )

@@ -9,6 +9,7 @@ from kappaskin_app.features.compare.panel import OtherForm
 from kappaskin_app.features.design.panel import DesignForm
 from kappaskin_app.shell.settings import SceneSettings, Settings, form_field, part
 from kappaskin_app.shell.settings.form_fields import Choice, Range
+from kappaskin_app.shell.settings.scene import SHAPES
 
 ASKED = [f.name for f in fields(Settings) if "form" in f.metadata]
 
@@ -187,6 +188,22 @@ def test_a_skin_that_cannot_be_is_explained_until_it_can(panels) -> None:
     shape.show_refusal("")
     shape.show_status(status, simulating=True)
     assert shape.message.text() == ""
+
+
+@pytest.mark.parametrize(("name", "value"), [("radius_x", 0.05), ("side_y", 0.25)])
+def test_the_refusal_of_a_shape_stands_below_the_field_that_was_changed(
+    panels, name, value
+) -> None:
+    shape = panels.shape
+    form, dome = shape.form, {**SHAPES["dome"].lengths, "shape": "dome"}
+    shape.show_settings(replace(Settings(), **dome))
+    for theme in ("dark", "light"):  # another setting leaves it there
+        shape.show_settings(replace(Settings(), **dome | {name: value}, theme=theme))
+        row, _ = form.getWidgetPosition(shape.editor(name))
+        assert form.getWidgetPosition(shape.message)[0] == row + 1
+    shape.show_settings(replace(Settings(), **dome))
+    assert form.indexOf(shape.message) < 0
+    assert shape.layout().indexOf(shape.message) >= 0
 
 
 def test_a_choice_without_room_for_all_its_words_says_so(panels) -> None:

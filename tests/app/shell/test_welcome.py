@@ -108,6 +108,7 @@ def test_ways_to_begin_never_cover_the_skin_and_are_not_shown_again_where_unwant
     until(lambda: window.lesson.isVisible())
 
 
+@pytest.mark.cases("1024")
 @pytest.mark.parametrize("width", [1024, 1280])
 def test_the_welcome_is_one_row_that_help_and_the_palette_bring_back(
     window: MainWindow, until, width: int

@@ -82,22 +82,22 @@ def test_noise_turned_off_leaves_only_what_the_basis_cannot_follow(
 
 
 def test_too_large_a_number_typed_becomes_the_largest_not_another(
-    window: MainWindow, qtbot
+    shared_window: MainWindow, qtbot
 ) -> None:
-    box = window.basis.editor("functions_x")
+    box = shared_window.basis.editor("functions_x")
     box.selectAll()
     qtbot.keyClicks(box, "99")
     qtbot.keyClick(box, Qt.Key.Key_Return)
-    assert window.history.settings.functions_x == 64
+    assert shared_window.history.settings.functions_x == 64
 
 
-def test_steps_of_one_setting_in_a_row_are_one_to_undo(window: MainWindow, qtbot) -> None:
-    box = window.basis.editor("functions_x")
+def test_steps_of_one_setting_in_a_row_are_one_to_undo(shared_window: MainWindow, qtbot) -> None:
+    box = shared_window.basis.editor("functions_x")
     for _ in range(3):
         qtbot.keyClick(box, Qt.Key.Key_Down)
-    assert window.history.settings.functions_x == 5
-    window.history.stack.undo()
-    assert window.history.settings.functions_x == 8
+    assert shared_window.history.settings.functions_x == 5
+    shared_window.history.stack.undo()
+    assert shared_window.history.settings.functions_x == 8
 
 
 @pytest.mark.full
@@ -168,6 +168,7 @@ def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
         else:
             window.actions_by_name["dock-design"].trigger()
         for form in window.findChildren(Form):
+            redone = False
             for editor in form.editors():
                 if not editor.isVisible():
                     continue
@@ -190,13 +191,16 @@ def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
                 assert window.history.stack.index() == index + 1
                 window.history.stack.undo()
                 assert window.history.settings == was
-                window.history.stack.redo()
-                assert window.history.settings == now
-                window.history.stack.undo()
+                if not redone:  # a step is redone as others are: once in each form
+                    window.history.stack.redo()
+                    assert window.history.settings == now
+                    window.history.stack.undo()
+                    redone = True
     asked = {f.name for f in fields(Settings) if "form" in f.metadata}
     lengths = {length for shape in SHAPES.values() for length in shape.lengths}
     hidden = {*lengths, *(f"design_{length}" for length in lengths), "size", "size_y"}
     hidden -= {"design_side_x", "design_side_y"}
+    hidden |= {"design_pattern", "design_count", "design_rings"}  # of round skins
     hidden |= {"design_height_noise", "design_slope_noise"} | {"added_noise"}  # of a device
     hidden -= set(SHAPES[shape].lengths)
     assert asked - obeyed == hidden

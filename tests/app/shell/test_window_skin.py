@@ -46,24 +46,24 @@ def test_a_load_dragged_on_the_skin_is_where_the_mouse_let_go(
     assert window.history.settings.x == 0.05
 
 
-def test_the_mark_of_a_contact_near_the_rim_is_grey(window: MainWindow, until) -> None:
-    mark = window.membrane._contacts[0]  # noqa: SLF001
+def test_the_mark_of_a_contact_near_the_rim_is_grey(shared_window: MainWindow, until) -> None:
+    mark = shared_window.membrane._contacts[0]  # noqa: SLF001
 
     def near(x: float) -> bool:
-        window.history.change("Place", -1, load_case="point", x=x, y=0.05, force=0.05)
-        until(lambda: _shown(window))
+        shared_window.history.change("Place", -1, load_case="point", x=x, y=0.05, force=0.05)
+        until(lambda: _shown(shared_window))
         until(lambda: mark.prop.color == (current().faint if x < 0.01 else "#1fd17a"))
-        return window.session.estimate.contact.near_rim
+        return shared_window.session.estimate.contact.near_rim
 
     assert [near(x) for x in (0.05, 0.004, 0.05)] == [False, True, False]
-    until(lambda: " N" in window.readouts.text("force"))
+    until(lambda: " N" in shared_window.readouts.text("force"))
 
 
-def test_letters_typed_over_the_skin_do_not_reach_vtk(window: MainWindow, qtbot) -> None:
-    window.membrane.plotter.setFocus()
+def test_letters_typed_over_the_skin_do_not_reach_vtk(shared_window: MainWindow, qtbot) -> None:
+    shared_window.membrane.plotter.setFocus()
     for key in "3wspfvr":
-        qtbot.keyClick(window.membrane.plotter, key)
-    assert not window.membrane.plotter.ren_win.GetStereoRender()
+        qtbot.keyClick(shared_window.membrane.plotter, key)
+    assert not shared_window.membrane.plotter.ren_win.GetStereoRender()
 
 
 def test_a_load_cannot_be_dragged_when_nothing_comes_in(window: MainWindow, until) -> None:
@@ -81,15 +81,15 @@ def test_two_points_are_not_called_one(window: MainWindow, until) -> None:
     until(lambda: "\N{PLUS-MINUS SIGN}" in window.readouts.text("contact"))
 
 
-def test_turning_the_camera_does_not_move_the_load(window: MainWindow, qtbot) -> None:
-    settings, corner = window.history.settings, QPoint(20, 20)
-    qtbot.mousePress(window.membrane.plotter, Qt.MouseButton.LeftButton, pos=corner)
-    qtbot.mouseMove(window.membrane.plotter, corner + QPoint(60, 30))
+def test_turning_the_camera_does_not_move_the_load(shared_window: MainWindow, qtbot) -> None:
+    settings, corner = shared_window.history.settings, QPoint(20, 20)
+    qtbot.mousePress(shared_window.membrane.plotter, Qt.MouseButton.LeftButton, pos=corner)
+    qtbot.mouseMove(shared_window.membrane.plotter, corner + QPoint(60, 30))
     qtbot.mouseRelease(
-        window.membrane.plotter, Qt.MouseButton.LeftButton, pos=corner + QPoint(60, 30)
+        shared_window.membrane.plotter, Qt.MouseButton.LeftButton, pos=corner + QPoint(60, 30)
     )
-    assert window.history.settings.camera != settings.camera
-    assert replace(window.history.settings, camera=settings.camera) == settings
+    assert shared_window.history.settings.camera != settings.camera
+    assert replace(shared_window.history.settings, camera=settings.camera) == settings
 
 
 @pytest.mark.full
@@ -118,11 +118,13 @@ def test_a_simulation_slower_than_real_time_is_marked(window: MainWindow) -> Non
     assert "real time" not in notice.text()
 
 
-def test_a_load_over_the_rim_is_explained_where_it_is_placed(window: MainWindow, until) -> None:
-    window.history.change("Load", -1, load_case="disc", x=0.001)
-    until(lambda: "extends over the rim" in window.load.message.text())
-    window.history.stack.undo()
-    until(lambda: not window.load.message.text())
+def test_a_load_over_the_rim_is_explained_where_it_is_placed(
+    shared_window: MainWindow, until
+) -> None:
+    shared_window.history.change("Load", -1, load_case="disc", x=0.001)
+    until(lambda: "extends over the rim" in shared_window.load.message.text())
+    shared_window.history.stack.undo()
+    until(lambda: not shared_window.load.message.text())
 
 
 @pytest.mark.full

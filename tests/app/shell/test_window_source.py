@@ -54,7 +54,7 @@ def test_a_scene_of_its_own_is_shown_as_it_is_and_leaves_the_load_to_itself(open
     assert window.session.simulating
 
 
-@pytest.mark.cases("circle", "off-centre")
+@pytest.mark.cases("circle")
 @pytest.mark.parametrize("name", READY_CASES)
 def test_a_ready_scene_becomes_the_load_case(opened, until, name: str) -> None:
     window = opened(f"sim:{name}")

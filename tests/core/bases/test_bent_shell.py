@@ -99,6 +99,7 @@ def deflection_at(plate, load, at, functions, sliding=False):
 FINGERTIP = Patch(ARC, 0.03, R)
 
 
+@pytest.mark.cases("0.0001-1.0", "0.00025-0.5")
 @pytest.mark.parametrize("width", [1.0, 0.5])
 @pytest.mark.parametrize("h", [1e-4, 2.5e-4])
 def test_sines_converge_to_the_full_shell(width, h):

@@ -14,6 +14,22 @@ A = CAP.rim_radius
 
 
 @pytest.mark.parametrize("edge", ["hinged", "clamped"])
+def test_derivatives_around_the_pole_are_those_along_a_meridian_also_at_the_pole(edge):
+    basis, r = basis_for(CAP, edge, 6, 9), np.array([0.0, 1e-5, 0.1, 0.5, 1.0])
+    f, f1, f2 = basis.along(r)
+    m, at = np.arange(5)[:, None], r[:, None, None]
+
+    polar = basis.around_pole(r)
+
+    with np.errstate(all="ignore"):  # at the pole itself
+        expected = f, f1, m * f / at, f2, m * (f1 - f / at) / at, (f1 - m**2 * f / at) / at
+    for found, divided in zip(polar, expected, strict=True):
+        scale = np.abs(found).max()
+        np.testing.assert_allclose(found[2:], divided[2:], rtol=0, atol=1e-12 * scale)
+        np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-3 * scale)
+
+
+@pytest.mark.parametrize("edge", ["hinged", "clamped"])
 def test_functions_are_orthogonal_in_their_coordinates_and_a_quarter_in_mean_square(edge):
     basis = basis_for(CAP, edge, 9, 12)
     points, weights = basis.quadrature()

@@ -326,6 +326,7 @@ def test_loops_of_another_make_shrink_as_well():
     assert before.std() > 3 * after.std()
 
 
+@pytest.mark.cases("Preisach")
 @pytest.mark.parametrize("loops", [sweeps.BoucWen, sweeps.Preisach, sweeps.ManyPlays])
 def test_the_error_told_covers_paths_that_were_not_calibrated_on(loops):
     found = [sweeps.off(loops, seed) for seed in range(2)]
@@ -462,6 +463,7 @@ def change_5(readings, kind, noise):
         readings[:, 5] *= 0.2
 
 
+@pytest.mark.cases("noisy", "stuck", "rail")
 @pytest.mark.parametrize(
     ("kind", "reason"),
     [

@@ -221,6 +221,7 @@ def test_every_ready_scene_is_refused_while_it_presses_and_tared_when_it_does_no
         taken(scene)
 
 
+@pytest.mark.cases("load0", "load2", "load3")
 @pytest.mark.parametrize(
     "load",
     [

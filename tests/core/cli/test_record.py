@@ -154,7 +154,8 @@ def test_no_file_is_written_over(tmp_path, capsys) -> None:
 def test_info_tells_what_is_in_it(recorded, capsys) -> None:
     assert main(["info", str(recorded)]) == 0
     told = capsys.readouterr().out
-    for words in ("Simulated skin SIM-0001", "scene-0.toml", "/kappaskin/line", "kappaskin "):
+    skin = "elements on a hinged patch of 0.1 x 0.1 m, firmware"
+    for words in ("Simulated skin SIM-0001", skin, "scene-0.toml", "/kappaskin/line", "kappaskin "):
         assert words in told
     assert main(["info", str(recorded), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)

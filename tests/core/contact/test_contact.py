@@ -107,6 +107,7 @@ def test_a_firm_contact_a_half_wave_from_the_rim_is_not_near_it(x, y, radius):
     assert not PAPER.touches(PAPER.curvature(Load(x, y, 0.2, radius))).near_rim
 
 
+@pytest.mark.cases("0.08-0.5", "0.08-3", "0.2-1.5")
 @pytest.mark.parametrize("mm", [0.5, 1, 1.5, 2, 3])
 @pytest.mark.parametrize("force", [0.2, 0.08])
 def test_a_contact_that_may_be_on_the_rim_says_so(mm, force):
@@ -207,6 +208,7 @@ def test_a_touch_as_in_table_1_is_always_seen():
     assert all(touch.present for touch in PAPER.noisy(load, 500))
 
 
+@pytest.mark.cases("place1")
 @pytest.mark.slow
 @pytest.mark.parametrize("place", [(0.05, 0.05), (0.02, 0.08), (0.043, 0.031)])
 def test_over_4000_draws_the_contact_is_efficient_unbiased_and_covered(place):

@@ -118,6 +118,7 @@ def test_with_the_same_functions_the_contact_comes_back(held_skin):
     assert touch.force == pytest.approx(load.force, rel=1e-6)
 
 
+@pytest.mark.cases("flat-clamped", "flat-hinged", "flat-sliding")
 @pytest.mark.slow
 @pytest.mark.where(which=lambda held: is_rectangle(held) and not any(held.patch.curvatures))
 def test_on_a_flat_rectangle_a_finer_series_is_found(held_skin):

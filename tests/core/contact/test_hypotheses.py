@@ -41,7 +41,7 @@ def optimum(
 def test_length_angle_and_share_are_as_likely_as_their_priors_say(length, share) -> None:
     best = optimum(length=length, share=share)
 
-    told = length_prior(FLAT, best)
+    told = length_prior(FLAT, Hypothesis(best))
 
     of_square = stats.uniform.pdf(length, 0, SIDE) / (2 * length)  # the density of its square
     expected = stats.norm.logpdf(share, 0, SHARE) - math.log(math.pi) + math.log(of_square)

@@ -181,7 +181,7 @@ def test_the_same_seed_gives_the_same_wrench_and_its_noise_is_as_told():
 # Error bars
 
 
-@pytest.mark.cases("traction0-finger", "traction1-flat")
+@pytest.mark.cases("traction0-finger")
 @pytest.mark.slow
 @SKINS
 @pytest.mark.parametrize("traction", [(0.0, 0.0), (0.2, -0.3)])

@@ -67,7 +67,7 @@ def from_the_prior(frames, noise, seed=0, height=3e-3):
     return c.reshape(frames, 15, 15), K + rng.normal(0, noise, K.shape)
 
 
-@pytest.mark.cases("0.01-False", "0.231-True")
+@pytest.mark.cases("0.231-True")
 @pytest.mark.parametrize(
     ("noise", "told"), [(0.01, False), (0.231, False), (2.31, False), (0.231, True)]
 )

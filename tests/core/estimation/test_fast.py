@@ -372,6 +372,7 @@ def test_a_grid_of_1024_by_1024_returns_its_waves():
     assert np.abs(c).max() < 1e-16
 
 
+@pytest.mark.cases("float64-0.001", "float32-1.0")
 @pytest.mark.slow
 @pytest.mark.parametrize("side", [1e-3, 1.0])
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])

@@ -69,6 +69,7 @@ def variance(information):  # the mean over the skin, where all sines weigh the 
     return np.log(np.trace(np.linalg.inv(information), axis1=1, axis2=2))
 
 
+@pytest.mark.cases("height-A", "slopes-D", "mixed-A", "heights of unknown zero-D")
 @pytest.mark.parametrize(("by", "bad"), [("D", volume), ("A", variance)])
 @pytest.mark.parametrize("read", [*READS, "heights of unknown zero"])
 def test_no_other_places_determine_more(read, by, bad):

@@ -75,9 +75,7 @@ def rms(answer, name):
     return np.sqrt(np.mean(off**2))
 
 
-@pytest.mark.cases(
-    "spike-centre", "far_off-line", "stuck-off-centre", "noisy-centre", "swapped-line"
-)
+@pytest.mark.cases("spike-centre", "swapped-line")
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("spoil", [spike, far_off, stuck, noisy, swapped])
 def test_one_element_in_twenty_bad_costs_no_more_than_one_in_twenty_dead(name, spoil):

@@ -65,7 +65,7 @@ def assert_scaled(found, expected, k, off=1e-9):
         np.testing.assert_allclose(back, np.where(known, value, 0.0), 0, off * size, err_msg=name)
 
 
-@pytest.mark.cases("fast", "bayes", "finite-slope", "tracking")
+@pytest.mark.cases("whole-tracking", "missing-fast", "missing-bayes", "whole-finite-slope")
 @every_method
 @pytest.mark.parametrize("missing", [(), (4, 5, 6)], ids=["whole", "missing"])
 @settings(max_examples=25, deadline=None)
@@ -177,6 +177,7 @@ def test_any_movement_of_an_elastic_rim_gives_error_bars_or_a_refusal(method, ri
     assert (fit.surface_sd(np.array([[0.0, 0.05]])) >= rim_sd / 10).all()
 
 
+@pytest.mark.cases("3]", "77", "308", "6]")
 @pytest.mark.parametrize("power", [3, 6, 12, 20, 40, 60, 70, 76, 77, 78, 100, 200, 300, 308])
 def test_a_spike_of_any_size_is_left_out_by_the_robust_method(power):
     spiked, missing = frame(), frame()

@@ -215,6 +215,7 @@ def test_a_still_load_is_averaged_to_the_shape_of_least_squares_with_the_right_e
     assert float(last.noise) == pytest.approx(NOISE, rel=0.05)
 
 
+@pytest.mark.cases("float32")
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_error_bars_of_a_moving_shape_of_the_functions_cover_it(dtype):
     rows, covered, noise = displacement_rows(), [], []
@@ -483,7 +484,7 @@ def test_more_functions_than_readings_have_wide_error_bars_and_no_refusal():
     assert 0.85 < np.mean(np.abs(scores) < 1.96) <= 1
 
 
-@pytest.mark.cases("float32")
+@pytest.mark.full
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_twenty_thousand_steps_leave_the_covariance_definite_and_where_it_was(dtype):
     rng = np.random.default_rng(0)

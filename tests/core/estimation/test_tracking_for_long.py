@@ -50,6 +50,7 @@ def scans(frames: int) -> Iterator[tuple[Array, Array, Array]]:
         before = now
 
 
+@pytest.mark.cases("float32")
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_it_is_as_good_at_the_end_of_a_run_as_at_its_start(dtype) -> None:
     fit, errors, sds, noises = Tracking(BASIS, LAYOUT, dtype=dtype), [], [], []

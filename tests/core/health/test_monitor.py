@@ -133,6 +133,7 @@ def test_a_stuck_channel_is_found_by_itself() -> None:
     assert finding.figure.startswith("reads +1.70 1/m while its neighbours predict ")
 
 
+@pytest.mark.cases("tilts")
 @pytest.mark.parametrize(
     ("name", "unit", "smallest"), [("camera", "\N{MICRO SIGN}m", 100), ("tilts", "mrad", 300)]
 )
@@ -228,6 +229,7 @@ def test_a_noisy_channel_is_found_in_two_seconds() -> None:
     assert told(monitor) == {142: "noisy"}
 
 
+@pytest.mark.cases("centre")
 @pytest.mark.parametrize(("name", "rate", "most"), [("circle", 0.3, 4.0), ("centre", 0.1, 1.3)])
 def test_a_channel_that_drifts_is_found_sooner_where_little_moves(name, rate, most) -> None:
     def spoil(counts, time):

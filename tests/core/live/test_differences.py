@@ -71,6 +71,7 @@ def predicted(a: Setup, b: Setup, count: int, length: int = 1) -> np.ndarray:
     return DifferenceErrors(SENSOR, a, b)(pair[0], pair[1], noise, count, 60.0)
 
 
+@pytest.mark.cases("a0-b0", "a4-b4")
 @pytest.mark.parametrize(
     ("a", "b", "length"),
     [

@@ -78,6 +78,7 @@ def device() -> Iterator[Plugged]:
     made.pull()
 
 
+@pytest.mark.cases("/dev/ttyABSENT7", "sim:nowhere")
 @pytest.mark.parametrize(
     ("source", "reason"),
     [

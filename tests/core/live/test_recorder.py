@@ -137,6 +137,7 @@ def test_every_ready_scene_is_recorded_one_that_no_file_tells_by_its_name(tmp_pa
         assert said.get("format") == 1 or text.startswith(f"# {name}: expected ")
 
 
+@pytest.mark.cases("bayes", "fast", "finite-slope", "tracking")
 @pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_what_is_recorded_from_the_middle_comes_to_the_same_again(method, tmp_path) -> None:

@@ -47,6 +47,7 @@ def elements(frame):
     return np.unique(frame.channels % 100)
 
 
+@pytest.mark.cases("skin")
 @pytest.mark.parametrize("around", ["skin", "intrinsic"])
 def test_the_region_follows_the_contact_all_the_way_round(around):
     loop = Loop(Region(around, radius=0.02, share=0.1, rate=RATE))

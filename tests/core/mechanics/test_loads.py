@@ -280,6 +280,7 @@ def test_a_rectangle_with_a_side_of_no_length_is_refused(sides):
         RectangleLoad(0.05, 0.02, *sides)
 
 
+@pytest.mark.cases("6-disc", "7-Gaussian")
 @pytest.mark.parametrize("kind", [(DiscLoad, 2e-3), (GaussianLoad, 5e-4)], ids=["disc", "Gaussian"])
 @pytest.mark.parametrize("Nj", [6, 7])
 @given(st.floats(0, 1), st.floats(0, 7))
@@ -304,3 +305,9 @@ def test_a_round_load_over_the_rim_of_a_cap_is_refused():
 
     with pytest.raises(Refusal, match="expected a load completely on the skin"):
         DiscLoad(0.001, 0.0126, 2e-3).modal(basis)
+
+
+@pytest.mark.parametrize("x", [0.03, 0.219])  # at 0.219 m the angle from the pole is a full turn
+def test_a_disc_beyond_the_rim_of_a_cap_is_refused(x):
+    with pytest.raises(Refusal, match="expected a load on the cap"):
+        DiscLoad(x, 0.0121, 2.5e-3).check(Cap(8e-3, 1.309))

@@ -503,3 +503,28 @@ def test_over_a_fluid_the_volume_stays_and_the_pressure_is_its_multiplier(patch)
         atol=1e-8 * abs(pressure) * volume.max(),
     )
     assert pressure != 0
+
+
+@pytest.mark.parametrize("edge", ["hinged", "clamped"])
+@pytest.mark.parametrize("inplane", ["held", "free", "diaphragm"])
+@pytest.mark.parametrize(
+    ("sides", "radii", "thickness"),
+    [
+        ((4e-3, 4e-3), (1e6, 0.01), 1e-6),
+        ((4e-3, 4e-3), (0.01, 1e6), 0.25e-3),
+        ((0.04, 0.03), (0.1, 0.1), 5e-3),
+        ((0.02, 0.02), (0.1, -0.1), 1e-6),
+        ((0.4, 4e-3), (0.1, 1.0), 1e-6),
+    ],
+    ids=["uneven, thin", "uneven", "thick", "saddle, thin", "long, thin"],
+)
+def test_a_shallow_skin_of_any_proportions_has_a_compliance(sides, radii, thickness, inplane, edge):
+    for nu in (0.0, 0.49):
+        plate = Plate(Patch(*sides, radii), thickness=thickness, poisson=nu, inplane=inplane)
+        basis = basis_for(plate.patch, edge, 8, 25)  # 200 functions
+
+        C = plate.compliance(basis).after(np.eye(basis.size))
+
+        np.testing.assert_allclose(C, C.T, atol=1e-14 * np.abs(C).max())
+        scale = np.sqrt(C.diagonal())
+        assert np.linalg.eigvalsh(C / np.multiply.outer(scale, scale))[0] > 1e-9

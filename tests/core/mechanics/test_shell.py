@@ -57,6 +57,9 @@ def skin(**changes):
     return replace(Plate.of_material(SKIN, **SHEET), **changes)
 
 
+@pytest.mark.cases(
+    "False-place0-0.001", "True-place1-0.002", "True-place2-0.001", "False-place1-0.002"
+)
 @pytest.mark.parametrize("sd", [1e-3, 2e-3])
 @pytest.mark.parametrize("place", [(0.3, 0.41), (0.5, 0.5), (0.9, 0.2)])
 @pytest.mark.parametrize("fluid", [False, True])

@@ -119,7 +119,7 @@ def test_intervals_of_a_contact_hold_the_truth_as_often_as_they_say(kind):
     assert force < 0.01
 
 
-@pytest.mark.cases("rosettes", "heights")
+@pytest.mark.cases("rosettes")
 @pytest.mark.slow
 @every_kind
 def test_error_bars_of_the_shape_hold_the_truth(kind):
@@ -366,6 +366,7 @@ def uneven_frames(count, load, scale=1.0):
         yield sensor, Frame(n, n / 60, n / 60, np.arange(exact.size), counts)
 
 
+@pytest.mark.cases("least-squares", "bayes")
 @pytest.mark.parametrize("method", ["least-squares", "direct", "bayes", "finite-slope", "robust"])
 def test_noises_of_one_unit_that_differ_weigh_and_the_intervals_hold(method):
     load = Load(0.032, 0.027, 0.02, sd=0.01)

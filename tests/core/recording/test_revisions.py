@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from mcap.writer import Writer
+from mcap.writer import CompressionType, Writer
 
 from kappaskin.cli import main
+from kappaskin.errors import Refusal
 from kappaskin.live import Engine
 from kappaskin.pipeline import REVISION, Pipeline, Setup
 from kappaskin.recording import Recording, Repaired, ReplayedSource, Verification
@@ -218,3 +219,25 @@ def test_recordings_before_revisions_still_come_to_what_they_held() -> None:
     assert verdict.another
     shapes = {change.name: change for change in verdict.changes}
     assert shapes.keys().isdisjoint({"sequence", "device_time", "host_time", "curvature"})
+
+
+def test_a_device_text_that_was_edited_wrongly_is_named(recording, tmp_path, capsys) -> None:
+    edited = tmp_path / "edited.mcap"
+    with recording.open("rb") as file, edited.open("wb") as copy:
+        writer = Writer(copy, compression=CompressionType.NONE)
+        writer.start("ros2", "kappaskin 9.8")
+        numbers = {
+            name: writer.register_channel(
+                name, "cdr", writer.register_schema(kind.name, "ros2msg", kind.definition)
+            )
+            for name, kind in m.TOPICS
+        }
+        for _, channel, message in make_reader(file).iter_messages(log_time_order=False):
+            data = message.data.replace(b'"strip":false', b'"strip":12345')
+            writer.add_message(numbers[channel.topic], message.log_time, data, message.log_time)
+        writer.finish()
+
+    assert main(["info", str(edited)]) == 0
+    assert "strip: expected true or false, got 12345" in capsys.readouterr().out
+    with pytest.raises(Refusal, match=r"edited\.mcap: .* strip: expected true or false, got 12345"):
+        verdict_of(edited)

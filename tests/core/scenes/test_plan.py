@@ -37,6 +37,11 @@ pytestmark = pytest.mark.slow
 
 RANDOM = {"gaussian-noise", "uniform-noise", "flicker-noise", "mains-hum", "tolerance"}
 READY = pytest.mark.parametrize("name", SCENES)
+# Each kind of skin, load, motion and reading once; the others are more objects and loads of a kind.
+KINDS = (
+    "calibration", "camera", "creep-hold", "demo", "exploring", "failing-elements", "fingertip",
+    "hot-room", "long-gages", "on-foam", "saddle", "saturation", "slipping", "sphere", "stretching",
+)  # fmt: skip
 
 
 def readings(scene, times):
@@ -64,6 +69,7 @@ def test_no_scene_presses_deeper_than_its_sheet_allows_without_saying_why(name):
         assert scene.plate.thickness
 
 
+@pytest.mark.cases(*KINDS)
 @READY
 def test_every_known_effect_is_in_the_plan_with_its_size_and_why(name):
     entries = plan(load_scene(name)).entries
@@ -74,7 +80,7 @@ def test_every_known_effect_is_in_the_plan_with_its_size_and_why(name):
     json.dumps([entry.to_json() for entry in entries], allow_nan=False)
 
 
-@pytest.mark.cases("0.1-")
+@pytest.mark.cases(*(f"0.1-{name}" for name in KINDS))
 @READY
 @pytest.mark.parametrize("accuracy", [0.01, 0.1])
 def test_what_is_left_out_changes_no_reading_by_more_than_the_accuracy(name, accuracy):
@@ -149,6 +155,7 @@ def test_the_smallest_cylinder_is_planned_for_however_long_another_is_held():
     assert "saturation" in {effect.name for effect in kept_effects(scene)}
 
 
+@pytest.mark.cases(*KINDS)
 @READY
 def test_noise_that_is_left_out_is_as_small_as_the_accuracy(name):
     scene = replace(load_scene(name), choice=EffectSelection(auto=True, accuracy=0.2))
@@ -198,11 +205,13 @@ def test_failures_are_kept_whatever_the_accuracy():
     assert {"dead", "stuck", "intermittent"} <= {effect.name for effect in kept}
 
 
+@pytest.mark.cases(*KINDS)
 @READY
 def test_what_is_kept_without_a_look_is_what_the_plan_keeps(name):
     scene = replace(load_scene(name), choice=EffectSelection(off=frozenset({"finite-slope"})))
-    assert kept_effects(scene) == plan(scene).kept
-    assert all(effects_of(scene)[effect.name] is not None for effect in plan(scene).kept)
+    kept = plan(scene).kept
+    assert kept_effects(scene) == kept
+    assert all(effects_of(scene)[effect.name] is not None for effect in kept)
 
 
 def test_what_is_left_out_is_neither_imported_nor_run():

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kappaskin import Cap, Disk, Patch, Refusal, SensorLayout, SineBasis
+from kappaskin import Cap, Disk, Patch, Plate, Refusal, SensorLayout, SineBasis, basis_for
 
 PATCH = Patch(0.1, 0.05)
 
@@ -315,3 +315,51 @@ def test_all_readings_of_a_dead_element_are_dead():
     layout = any_readings(PATCH).without([3])
 
     np.testing.assert_array_equal(layout.live, layout.element != 3)
+
+
+@pytest.mark.parametrize("of", [lambda L: {"gage_length": L}, lambda L: {"cell": (L, L / 2)}])
+@pytest.mark.parametrize("stretch", [1.0, 1.3])
+def test_gages_and_cells_on_a_cap_differ_from_a_point_by_their_size_squared(stretch, of):
+    cap = Cap(0.008, 1.2, stretch)
+    basis, layout = basis_for(cap, "clamped", 5, 7), SensorLayout.on_rings(cap, [1, 6, 12])
+    plate, c = Plate(cap), np.random.default_rng(0).normal(size=35)
+    if "cell" in of(1):
+        layout = layout.reading_each(["height"])
+
+    point, short, long = (
+        replace(layout, **of(L)).operator(basis, plate) @ c for L in (0.0, 1e-4, 2e-4)
+    )
+
+    least = 5e-3 * np.abs(long - point).max()
+    np.testing.assert_allclose(long - point, 4 * (short - point), rtol=0.02, atol=least)
+    assert least > 1e-9 * np.abs(point).max()
+
+
+def test_a_gage_on_a_cap_turns_with_the_skin():
+    cap, L = Cap(0.008), 2e-3
+    layout = replace(SensorLayout.scattered(cap, [[0.0165, 0.0165]]), gage_length=L)
+    basis = basis_for(cap, "clamped", 4, 1)  # alike all around: along a meridian and a parallel
+    turned = replace(layout, positions=np.array([[cap.rim_radius, cap.rim_radius + 0.0055]]))
+    xx, yy, xy = layout.operator(basis)
+    away = math.hypot(*(layout.positions[0] - cap.rim_radius)) - 0.0055
+
+    there = np.add(turned.positions, (0.0, away))
+    other = replace(turned, positions=there).operator(basis)
+
+    # The diagonal of the one is the meridian of the other.
+    np.testing.assert_allclose(xx, yy, rtol=1e-9)
+    np.testing.assert_allclose(2 * xy, other[1] - other[0], rtol=1e-6)
+
+
+def test_slopes_on_a_cap_are_refused():
+    with pytest.raises(Refusal, match=r"got slopes, .*; read curvature instead"):
+        SensorLayout.on_rings(Cap(0.008), [1, 6]).reading_each(["slope@0"])
+
+
+def test_a_cell_over_the_rim_of_a_cap_is_refused():
+    cap = Cap(0.008)
+    heights = SensorLayout.scattered(cap, [[2 * cap.rim_radius - 1e-3, cap.rim_radius]])
+
+    assert replace(heights.reading_each(["height"]), cell=(1.9e-3, 0.0)).cell[0]
+    with pytest.raises(Refusal, match="over the rim of the cap"):
+        replace(heights.reading_each(["height"]), cell=(2.1e-3, 0.0))

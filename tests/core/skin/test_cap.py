@@ -170,15 +170,44 @@ def test_a_wide_cap_is_a_disk():
     np.testing.assert_allclose(local.frame, disk.base(*at.T).frame, atol=1e-6)
 
 
-def test_other_skins_have_constant_forms_and_plain_derivatives():
-    patch = Patch(0.1, 0.08, (0.5, -0.4))
+@pytest.mark.parametrize("radius", [0.5, (math.inf, 0.5)], ids=["arc", "trough"])
+def test_skins_bent_one_way_have_constant_forms_and_plain_derivatives(radius):
+    patch = Patch(0.1, 0.08, radius)
     at = np.array([[0.02, 0.03], [0.07, 0.07]])
     local = patch.base(*at.T)
-    np.testing.assert_array_equal(local.form[:, 0], [2.0, -2.5, 0.0])
-    np.testing.assert_array_equal(local.covariant[1], np.eye(6))
-    np.testing.assert_allclose(
-        np.cross(local.frame[:, 0], local.frame[:, 1]), patch.at_rest(at)[1], atol=1e-12
-    )
+    np.testing.assert_array_equal(local.form.T, [[*patch.curvatures, 0.0]] * 2)
+    np.testing.assert_array_equal(local.covariant, np.stack([np.eye(6)] * 2))
+
+
+@pytest.mark.parametrize("radii", [(0.2, 0.2), (0.3, -0.2), (-0.2, 1.0)], ids=str)
+def test_the_frame_of_a_dome_and_a_saddle_is_that_of_their_surface(radii):
+    patch, h = Patch(0.1, 0.08, radii), 1e-4
+    place, (e, n) = np.array([0.093, 0.006]), h * np.eye(2)
+
+    def r(*steps):
+        return patch.at_rest(place + sum(steps, np.zeros(2)))[0]
+
+    base = patch.base(*place.tolist())
+    (e_x, e_y), normal, (xx, yy, xy) = base.frame, np.array(base.normal), base.form
+
+    jet = [
+        r(),
+        (r(e) - r(-e)) / (2 * h),
+        (r(n) - r(-n)) / (2 * h),
+        (r(e) - 2 * r() + r(-e)) / h**2,
+        (r(e, n) - r(e, -n) - r(-e, n) + r(-e, -n)) / (4 * h**2),
+        (r(n) - 2 * r() + r(-n)) / h**2,
+    ]
+    # Of the point in space the second covariant derivatives are -b_ij n (Gauss).
+    bends = [-b * normal for b in (xx, xy, yy)]
+    found = base.covariant @ np.array(jet)
+    np.testing.assert_allclose(found, [r(), e_x, e_y, *bends], atol=2e-7)
+    assert np.abs(jet[1] @ jet[2]) > 2e-3  # no right angle
+    turned = [(patch.base(*(place + s)).frame[0] - e_x) @ e_y / h for s in (e, n)]
+    np.testing.assert_allclose(base.turning, base.slopes @ np.array(turned), atol=1e-3)
+    step = np.array([2e-5, 1e-5])
+    away = patch.at_rest(patch.around(*place.tolist(), step[None])[0])[0] - r()
+    np.testing.assert_allclose(base.frame @ away, step, atol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from kappaskin import Disk, Patch, Polygon, Refusal
+from kappaskin import Cap, Disk, Patch, Polygon, Refusal
 
 PATCH = Patch(0.12, 0.05)
 
@@ -151,3 +151,16 @@ def test_corners_that_are_no_outline_are_refused(case):
 def test_a_disk_without_a_radius_is_refused(radius):
     with pytest.raises(Refusal, match="expected a disk with a radius above zero"):
         Disk(radius)
+
+
+def test_a_right_angle_in_four_decimals_is_a_hemisphere():
+    assert Cap(0.008, 1.5708).is_hemisphere
+    assert Cap(0.008, 1.5707).is_hemisphere
+    assert not Cap(0.008, 1.57).is_hemisphere
+    with pytest.raises(Refusal, match="got 75 rad; multiply degrees by pi/180"):
+        Cap(0.008, 75)
+
+
+def test_radii_too_small_for_numbers_are_refused():
+    with pytest.raises(Refusal, match="two radii of at least 1e-09 m"):
+        Patch(0.02, 0.02, (1e-308, -1e-308))

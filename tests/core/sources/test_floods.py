@@ -153,6 +153,7 @@ def pieces(stream: bytes, draw: random.Random) -> Iterable[bytes]:
         at += size
 
 
+@pytest.mark.cases("5]", "8]", "11]")
 @pytest.mark.parametrize("seed", range(12))
 def test_the_true_messages_in_a_flood_are_those_that_summing_each_anew_finds(seed: int) -> None:
     draw, parts = random.Random(seed), list[bytes]()

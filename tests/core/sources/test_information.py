@@ -297,7 +297,7 @@ BAD = {
     ),
     "cap of another size": (
         said(cap=[0.008, 1.2, 1]),
-        r"cap of radius 0.008 m with 68.7549 degrees, of size \[0.0192, 0.0192\]",
+        r"cap of radius 0.008 m with its rim at 68.7549 degrees, of size \[0.0192, 0.0192\]",
     ),
     "cap beyond a hemisphere": (said(cap=[0.008, 2, 1]), "at most pi/2 .a hemisphere."),
     "base curvature of three": (

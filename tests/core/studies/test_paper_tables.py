@@ -339,6 +339,7 @@ ON_SLOPES = {
 }
 
 
+@pytest.mark.cases("line")
 @pytest.mark.parametrize("case", CASES)
 def test_finite_slopes_explain_most_of_the_papers_error_and_can_be_undone(rows, case):
     linear, known = ON_SLOPES[case]

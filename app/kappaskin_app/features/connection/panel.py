@@ -451,10 +451,11 @@ def _sensor_text(sensor: Sensor, calibration: Calibration | None) -> str:
     if isinstance(patch, Cap):
         angle = f"{math.degrees(patch.angle):.3g}\N{DEGREE SIGN}"
         bent = f" along the skin\ncap of radius {1e3 * patch.equator:g} mm, {angle} to the rim"
+        bent += f", stretched {patch.stretch:g} times" if patch.stretch != 1 else ""
     health = f"\n{dead} of {sensing.size} channels dead" if dead else ""
     name = printable(f"{sensor.name} ({sensor.serial_number})")
     calibrated = f"\n{calibration_text(calibration)}" if calibration else ""
     rate = f", up to {sensor.rate:g} frames/s" if math.isfinite(sensor.rate) else ""
     return (
-        f"{name}\n{sensor.layout}, {sensor.edge}{health}\n{a:g} x {b:g} mm{bent}{rate}{calibrated}"
+        f"{name}\n{sensor.layout}, {sensor.edge}{rate}{health}\n{a:g} x {b:g} mm{bent}{calibrated}"
     )

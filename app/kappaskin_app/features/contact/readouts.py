@@ -44,6 +44,7 @@ FIELDS |= {header.key: (of.labels_shown[0], header.tip) for of, header in _NUMBE
 _WIDTHS |= {header.key: header.width for _, header in _NUMBERS}
 
 _DIGITS = 1.08  # average width of a character in digits, with the space between two fields
+_OF_TWO = 1.0  # mm: the places of two contacts are rounded as if their error bar was this at least
 _SMALL = 0.85  # size of a name's letters, of those of its number
 
 
@@ -59,7 +60,8 @@ def _contact(contact: Contact, second: Contact) -> str:
         return "none"
     x, y = contact.position * 1e3
     if second.present:
-        return f"{_place(contact)[0]}, {_place(second)[0]} mm"
+        first, other = (_place(each, _OF_TWO)[0] for each in (contact, second))
+        return f"{first}, {other} mm"
     if contact.near_rim:
         return f"\N{ALMOST EQUAL TO} ({x:.0f}, {y:.0f}) mm, near rim"
     if not contact.single:
@@ -68,10 +70,10 @@ def _contact(contact: Contact, second: Contact) -> str:
     return f"{place} {bar}"
 
 
-def _place(contact: Contact) -> tuple[str, str]:
-    """The position in mm, and the larger of its error bars with the unit."""
+def _place(contact: Contact, least: float = 0.0) -> tuple[str, str]:
+    """The position in mm, and the larger of its error bars with the unit, `least` mm or more."""
     sd, half = (1e3 * float(np.max(of)) for of in (contact.position_sd, contact.position_95))
-    off = Coverage.now.of(sd, half)
+    off = max(Coverage.now.of(sd, half), least)
     (x, bar), (y, _) = (rounded(1e3 * value, off, 1) for value in contact.position.tolist())
     return f"({x}, {y})", f"mm {bar}" if bar == "exact" else f"\N{PLUS-MINUS SIGN} {bar} mm"
 

@@ -11,8 +11,14 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from kappaskin.mechanics import DiscLoad, PointLoad
 from kappaskin.studies import Prospect
-from kappaskin_app.features.design.prediction import DesignPrediction, noise_settings
+from kappaskin_app.features.design.prediction import (
+    ROUND,
+    DesignPrediction,
+    noise_settings,
+    pattern_of,
+)
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.form import Form, pass_window_keys
 from kappaskin_app.shell.settings import Settings, form_field
@@ -31,13 +37,24 @@ _NOISE = ("design_noise", "design_height_noise", "design_slope_noise")
 _STEPS = 200  # of a slider
 _FACTOR = 4  # steps of a logarithmic slider, to the next number of two digits
 _WIDE = 50  # ratio of the ends of a range, beyond which its slider is logarithmic
+_PATTERNS = {"grid": ("design_x", "design_y"), "rings": ("design_rings",)}
+_PATTERNS["spiral"] = ("design_count",)
 _PREDICTED = (
     "Standard deviation of the displacement due to noise, from the covariance "
     "s\N{SUPERSCRIPT TWO} (M'M)\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT ONE} of the fit, without a "
-    "simulation. Points are the elements."
+    "simulation. Of contact position and force, the error to expect of a load at each place, away "
+    "from the rim by a fifteenth of the skin. Points are the elements."
 )
-_SIMULATED = "Standard deviation of the estimated displacement in thousands of simulated frames."
-_ALONG = "Standard deviation along x through the middle of the skin."
+_SIMULATED = (
+    "Standard deviation of the estimated displacement in thousands of simulated frames, or the "
+    "errors of contact position or force in thousands of presses all over the skin."
+)
+_MAPS = {
+    "displacement": (1e3, "mm", "Standard deviation"),
+    "contact": (1e3, "mm", "RMS error of the place"),
+    "force": (1e2, "%", "RMS error of the force"),
+}
+_ALONG = "Through the middle of the skin, along x."
 
 
 class DesignForm(Form):
@@ -86,7 +103,10 @@ class DesignForm(Form):
         shown = {f"design_{length}" for length in SHAPES[settings.design_shape].lengths}
         shown |= (noise := set(noise_settings(settings).values()))
         shown |= {"design_conversion"} if noise == {"design_noise"} else set()
-        self.show_rows(shown | (set(_NAMES) - {*_LENGTHS, *_NOISE, "design_conversion"}))
+        shown |= {*_PATTERNS[pattern_of(settings)]}
+        hidden = {*_LENGTHS, *_NOISE, "design_conversion", *sum(_PATTERNS.values(), ())}
+        hidden |= set() if SHAPES[settings.design_shape].make in ROUND else {"design_pattern"}
+        self.show_rows(shown | (set(_NAMES) - hidden))
 
 
 def _logarithmic(how: Range) -> bool:
@@ -125,8 +145,9 @@ class DesignPanel(QWidget):
         self.simulate = button(
             "Check by simulation",
             "check-design",
-            "Simulate up to 5000 frames of the design with a point load in the middle, and compare "
-            "them with the prediction. Click again to stop.",
+            "Simulate thousands of frames of the design, and compare them with the prediction. The "
+            "load is in the middle; of contact position and force, it presses everywhere in turn. "
+            "Click again to stop.",
         )
         self.save = button(
             f"Save as a scene{ELLIPSIS}",
@@ -177,38 +198,65 @@ class DesignPanel(QWidget):
     def _show_maps(self, found: Prospect | None) -> None:
         check = self._prediction.check if self._prediction else None
         sides = (1.0, 1.0) if found is None else (float(found.x[-1]), float(found.y[-1]))
-        shown = [each.sd for each in (found, check) if each is not None]
-        limit = round_up(max((1e3 * float(np.nanmax(sd)) for sd in shown), default=0.0)) or 1.0
+        scale, unit, title = _MAPS["displacement" if found is None else found.of]
+        shown = [] if found is None else [found.sd]
+        if found is not None and check is not None and found.of == "displacement":
+            shown.append(check.sd)  # of presses, a few at a place, the errors scatter
+        limit = round_up(max((scale * float(np.nanmax(sd)) for sd in shown), default=0.0)) or 1.0
         curves = list[Series]()
         for number, (view, source, name) in enumerate(
             ((self.predicted, found, "predicted"), (self.simulated, check, "simulated"))
         ):
-            sd = None if source is None else 1e3 * source.sd
+            sd = None if source is None else scale * source.sd
+            view.unit = unit
             view.show_surface(sd, (0.0, limit), "sequential", np.full(2, np.nan), sides)
             view.map.show_points(None if sd is None or found is None else found.positions)
             if sd is not None and found is not None:
                 curves.append(Series(name, 1e3 * found.x, sd[len(sd) // 2], number))
+        if (title, unit) != (self.along.y_axis.title, self.along.y_axis.unit):
+            self.along.show_axes(ChartAxis(title, unit), self.along.x_axis, _ALONG)
         self.along.show_series(curves, "No design yet.")
 
     def _show_words(self, found: Prospect | None) -> None:
         check = self._prediction.check if self._prediction else None
-        self.predicted.words.show_text("" if found is None else f"RMS {length(found.rms)}")
         frames = "Not simulated yet" if check is None else f"{check.frames} frames"
         self.simulated.words.show_text(frames)
         if found is None:
+            self.predicted.words.show_text("")
             computing = self._prediction is not None and self._prediction.predicting
             why = self._prediction.refusal if self._prediction else ""
             self.words.setText(f"Computing{ELLIPSIS}" if computing else sentence(why))
             return
         rate = f", {found.rate:.0f} frames/s" if math.isfinite(found.rate) else ""
-        words = [
-            f"{len(found.positions)} elements{rate}. Due to noise: "
-            f"{length(found.rms)} RMS over the skin, {length(found.worst)} at worst."
-        ]
-        if check is not None:
-            ratio = check.rms_sd / found.rms
-            words.append(
-                f"Simulated: {ratio:.3f} times the prediction. With the error of the basis under a "
-                f"point load in the middle: {length(check.rms)} RMS."
+        words = [f"{len(found.positions)} elements{rate}."]
+        if found.load is None:
+            self.predicted.words.show_text(f"RMS {length(found.rms)}")
+            words[0] += (
+                f" Due to noise: {length(found.rms)} RMS over the skin, {length(found.worst)} at "
+                "worst."
             )
+        else:
+            text = _share if found.of == "force" else length
+            self.predicted.words.show_text(f"Median {text(found.median)}")
+            words[0] += (
+                f" Due to noise under {found.load.force:.2g} N{_size(found.load)}: "
+                f"{text(found.median)} in the median over the skin, {text(found.worst)} at "
+                "worst."
+            )
+        if check is not None:
+            all_errors = ", all errors included" if found.load else ""
+            words.append(f"Simulated{all_errors}: {check.over(found):.3f} times the prediction.")
+            if found.load is None:
+                words[1] += (
+                    " With the error of the basis under the load in the middle: "
+                    f"{length(check.rms)} RMS."
+                )
         self.words.setText("\n".join(words))
+
+
+def _share(value: float) -> str:
+    return f"{100 * value:.2g} %"
+
+
+def _size(load: PointLoad | DiscLoad) -> str:
+    return f" on a disc of {length(load.radius)} radius" if isinstance(load, DiscLoad) else ""

@@ -4,6 +4,7 @@ import math
 from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 from PySide6.QtCore import QObject, Signal
 
@@ -11,11 +12,11 @@ from kappaskin._files import write_whole
 from kappaskin.bases import edges_of
 from kappaskin.errors import Refusal
 from kappaskin.live import Status
-from kappaskin.mechanics import Plate
-from kappaskin.scenes import Scene, write_scene
+from kappaskin.mechanics import DiscLoad, Plate, PointLoad
+from kappaskin.scenes import Scene, Stimulus, write_scene
 from kappaskin.scenes.effects import GaussianNoise
 from kappaskin.sensing import DigitalReadings, SensorLayout, Transduction, kind_of_reading
-from kappaskin.skin import Patch
+from kappaskin.skin import Cap, Disk, Patch
 from kappaskin.studies import Check, Design, Prospect, check, prospect
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.history import History
@@ -32,6 +33,10 @@ def patch_of(settings: Settings) -> Patch:
 
 
 _NOISE = {"height": "design_height_noise", "slope": "design_slope_noise"}
+ROUND = (Disk, Cap)
+"""Skins on which elements may be on rings or a spiral."""
+_DISC = 0.075  # of the shorter side: the radius of what presses a skin that curves both ways
+_ON_CAP = (15, 31)  # functions of the true shape along and around
 _RESOLUTION = 1e-9  # of readings that come as numbers: no noise is as small
 
 
@@ -41,10 +46,45 @@ def noise_settings(settings: Settings) -> dict[str, str]:
     return {name: _NOISE.get(name, "design_noise") for name in quantities}
 
 
+def pattern_of(settings: Settings) -> str:
+    """The pattern of the elements: a grid, or on a round skin the one that is selected."""
+    return settings.design_pattern if SHAPES[settings.design_shape].make in ROUND else "grid"
+
+
+def _layout(settings: Settings, patch: Patch) -> SensorLayout:
+    s, pattern = settings, pattern_of(settings)
+    if pattern == "spiral":
+        return SensorLayout.in_spiral(patch, s.design_count)
+    if pattern == "grid":
+        return SensorLayout.regular(patch, s.design_x, s.design_y)
+    try:
+        counts = [int(count) for count in s.design_rings.split(",")]
+    except ValueError as error:
+        raise Refusal(
+            "expected the number of elements on each ring, such as 1, 6, 13, got "
+            f"{s.design_rings!r:.60}"
+        ) from error
+    return SensorLayout.on_rings(patch, counts)
+
+
+def _load(plate: Plate, edge: str) -> tuple[tuple[Stimulus, ...], tuple[int, int]]:
+    """A point load in the middle and the true functions; where it curves both ways, a disc.
+
+    It has the same force: such a skin bends close around a load only.
+    """
+    point, reference = load_case_stimuli("centre", plate, edge), reference_on(plate, edge, "centre")
+    patch, force = plate.patch, cast("PointLoad", point[0].what).force
+    is_cap = isinstance(patch, Cap)
+    if not (is_cap or patch.is_shallow):
+        return point, reference
+    disc = DiscLoad(patch.a / 2, patch.b / 2, _DISC * min(patch.a, patch.b), force)
+    return (Stimulus(disc),), _ON_CAP if is_cap else reference
+
+
 def scene_of(settings: Settings) -> Scene:
-    """The design with its elements on a regular grid, and a point load in the middle."""
+    """The design with its elements in their pattern, and a load in the middle."""
     s, patch = settings, patch_of(settings)
-    layout = SensorLayout.regular(patch, s.design_x, s.design_y)
+    layout = _layout(s, patch)
     edge = SHAPES[s.design_shape].defaults.get("edge", edges_of(patch)[0])
     layout, plate, electronics = layout.reading_each(s.design_reads), Plate(patch), Transduction()
     converter = replace(electronics.converter, conversion_time=s.design_conversion)
@@ -56,19 +96,20 @@ def scene_of(settings: Settings) -> Scene:
         noise = {name: getattr(s, own) for name, own in noise_settings(s).items()}
         electronics, effects = DigitalReadings(_RESOLUTION, tuple(noise.items())), ()
     scan_time = electronics.scan_time(layout.channels)
+    stimuli, reference = _load(plate, edge)
     rate = min(SHAPES[s.design_shape].rate, 1 / scan_time if scan_time else math.inf)
     return Scene(
         "design",
         plate,
         layout,
-        load_case_stimuli("centre", plate, edge),
+        stimuli,
         effects,
         electronics,
         rate=rate if rate < 1 else math.floor(rate),
-        reference=reference_on(plate, edge, "centre"),
+        reference=reference,
         edge=edge,
         title="A design",
-        text="A design made in the panel Design, with a point load in the middle.",
+        text="A design made in the panel Design, with a load in the middle.",
     )
 
 
@@ -79,7 +120,7 @@ def design_of(settings: Settings) -> Design:
 
 
 def _prospect(settings: Settings) -> Prospect:
-    return prospect(design_of(settings))
+    return prospect(design_of(settings), settings.design_map)
 
 
 def _placed(settings: Settings, found: Prospect) -> Scene:
@@ -91,7 +132,8 @@ def _placed(settings: Settings, found: Prospect) -> Scene:
 
 
 def _checks(settings: Settings, found: Prospect) -> Generator[Check]:
-    return check(replace(design_of(settings), scene=_placed(settings, found), by="scene"))
+    placed = replace(design_of(settings), scene=_placed(settings, found), by="scene")
+    return check(placed, of=settings.design_map)
 
 
 class DesignPrediction(QObject):
@@ -154,10 +196,10 @@ class DesignPrediction(QObject):
 
     def _begin(self, settings: Settings) -> None:
         if self.predicting and self._quick:
-            return  # the result comes within a frame
+            return  # the result comes soon
         self._stop()
         self._requested, self.check, self.refusal = settings, None, ""
-        # Optimised positions and computed modes take seconds.
+        # Optimised positions and computed modes take seconds, contacts a fifth of one.
         plain = "side_x" in SHAPES[settings.design_shape].lengths
         self._quick = plain and settings.design_place in ("scene", "clustered")
         if self._quick:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 import scipy
@@ -52,6 +53,7 @@ _ROOM = 18.0  # px, side of the smallest cell with a ring around its letter
 _BEYOND = 3.0  # of a rim's radius: where points around a cap bound the cells at its rim
 
 
+@lru_cache(1)  # for all heatmaps
 def cells_of(layout: SensorLayout) -> list[Array]:
     """For each element of a cap the corners (k, 2) in m of what is nearest to it on its map.
 
@@ -69,6 +71,7 @@ def cells_of(layout: SensorLayout) -> list[Array]:
     return [found.vertices[found.regions[region]] for region in regions]
 
 
+@lru_cache(1)  # for all heatmaps
 def _square_side(layout: SensorLayout) -> float:
     """Side in m of squares at the elements that hide none: the smallest distance of two."""
     positions = layout.positions

@@ -79,6 +79,7 @@ class Caption:
     def fit(self) -> None:
         """Wrap the text at the present size of letters and view."""
         whole = self.words.replace(" mm", "\N{NO-BREAK SPACE}mm")
+        whole = whole.replace("\u03c3", "sigma")  # VTK's letters have no Greek ones
         letters = letters_of(self._plotter, self._px, self.unit)
         room = max(room_for(self._plotter, letters) - self._spared, _LEAST)
         lines = [line for part in whole.split("\n") for line in textwrap.wrap(part, room)]

@@ -37,6 +37,7 @@ _ENTRIES = {
 
 
 _SPARE, _GAP = 10, 2  # px that Qt leaves right of the words of a button; between two buttons
+_LETTERS = 0.75  # size of the letters in the presenter, of those of its captions
 
 
 class _Switch(QToolButton):
@@ -87,8 +88,11 @@ class Legend(QWidget):
         self._draw_signs()
 
     def show_unit(self, unit: float) -> None:
-        """Use large letters where a unit is so many px; 0: the usual ones."""
-        self.setFont(read_from_afar(unit))
+        """Use larger letters where a unit is so many px, so large that all entries fit in a line.
+
+        0: the usual ones.
+        """
+        self.setFont(read_from_afar(_LETTERS * unit))
         self._write()
 
     def _write(self) -> None:

@@ -41,6 +41,7 @@ _POINT, _POINTS = 5, 80  # px of an element, and of many in a row: or they would
 CONTACT = "#1fd17a"
 """The colour of what is estimated of the contact."""
 _PIN = 0.3  # of the skin's size, length of the mark of a contact
+_LATER = 20  # ms after a change of the look
 _FITTED, _TRUE = (8, 0), (16, 8)  # lines drawn: every so many, from which one on
 
 
@@ -53,6 +54,7 @@ class MembraneView(QWidget):
     """View of estimates, displaced along the normals of the skin; `drag` moves loads."""
 
     drawn = Signal()
+    look_changed = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -81,6 +83,9 @@ class MembraneView(QWidget):
         # After VTK has the new size.
         self._fit_timer = QTimer(self, singleShot=True, interval=0)  # pyright: ignore[reportCallIssue]
         self._fit_timer.timeout.connect(guarded(self._fit))
+        # What a theme changes here has a turn of its own, or it would hold the window for longer.
+        self._look_timer = QTimer(self, singleShot=True, interval=_LATER)  # pyright: ignore[reportCallIssue]
+        self._look_timer.timeout.connect(guarded(lambda: (self._fit(), self.look_changed.emit())))
         self._box = Box()
         self.setMinimumSize(300, 160)
         self.ages: deque[tuple[float, float]] = deque(maxlen=8192)
@@ -293,8 +298,9 @@ class MembraneView(QWidget):
         """Whether the picture target for last has been drawn."""
         return self._drawn
 
-    def show_loads(self, loads: Sequence[Load]) -> None:
-        """Draw the simulated loads; none while the connection is lost."""
+    def show_loads(self, loads: Sequence[Load], lifted: bool = False) -> None:
+        """Draw the simulated loads, which may all be `lifted`; none without a connection."""
+        self.drag.lifted = lifted and not self.surface.lost
         loads = [load for load in loads if load.force and not self.surface.lost]
         self.drag.handles = self._loads.show(loads, self.skin, self.lift, self._shown["load"])
 
@@ -347,12 +353,13 @@ class MembraneView(QWidget):
 
     def _apply_theme(self) -> None:
         self.plotter.set_background(current().scene, top=current().scene_top)
-        self._fit()
+        self._look_timer.start()
         self.plotter.update()
 
     def close_plotter(self) -> None:
         """Free VTK's resources before the window closes."""
         self._fit_timer.stop()
+        self._look_timer.stop()
         # Its wrapper of a QSurface, which is no QObject, outlives what Qt deletes with the window;
         # whatever comes to lie there next is then taken for it: a wrong type, or a crash.
         self.plotter._cleanup_context()  # noqa: SLF001

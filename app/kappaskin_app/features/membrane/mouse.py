@@ -39,8 +39,9 @@ class LoadDrag(QObject):
     The left button on the `skin` takes the nearest load there, on an arrow its load. While it is
     held, `dragged` follows the mouse, and the wheel, or Shift and drag, emits `pressed` with the
     factor of the force since `grabbed`. Arrow keys move, Page Up and Page Down press; Escape emits
-    `cancelled`. `handles` (k, 2) are the positions of the drawn loads: without any, or while not
-    `enabled`, the mouse moves the camera.
+    `cancelled`. `handles` (k, 2) are the positions of the drawn loads; `lifted` is whether there
+    are loads of which none presses now. Without any, or while not `enabled`, the mouse moves the
+    camera.
     """
 
     grabbed = Signal(float, float)
@@ -54,6 +55,7 @@ class LoadDrag(QObject):
         self._plotter, self._projection = plotter, Projection(plotter)
         self.skin, self.enabled = NO_SKIN, True
         self.handles: Array = np.empty((0, 2))
+        self.lifted = False
         self.holding = self._swallowing = self._taken = False
         self._factor, self._height = 1.0, 0.0
         self._at, self._offset, self._held = QPointF(), np.zeros(2), np.zeros(2)
@@ -133,26 +135,33 @@ class LoadDrag(QObject):
                 return handle
         return None
 
+    @property
+    def _presses(self) -> bool:
+        """Whether the left button on the skin presses there."""
+        return self.enabled and (self.lifted or len(self.handles) > 0)
+
     def _nearest(self, place: Array) -> Array:
-        """The handle (2,) in m nearest to `place`."""
+        """The handle (2,) in m nearest to `place`, which is `place` itself without any."""
+        if not len(self.handles):
+            return place
         return self.handles[np.argmin(np.linalg.norm(self.handles - place, axis=1))]
 
     def _take(self, event: QMouseEvent) -> bool:
         """Hold the load under the mouse, or move the nearest one there; whether there is one."""
         at = event.position()
         place = handle = self._handle_near(at)
-        if place is None and self.enabled and len(self.handles):
+        if place is None and self._presses:
             place = self.skin.hit(*self._projection.line(at))
         if place is None:
             return False
+        self._taken = handle is None
         handle = self._nearest(place) if handle is None else handle
         self._swallowing = True
         self._plotter.setFocus(Qt.FocusReason.MouseFocusReason)  # for the keys and Escape
         self._plotter.setCursor(Qt.CursorShape.ClosedHandCursor)
         self._grab(handle)
-        if place is not handle and not event.modifiers() & _SHIFT:
+        if self._taken and not event.modifiers() & _SHIFT:
             self._move_to(place)
-        self._taken = place is not handle
         self._height = float(self.skin.height_at(place[None])[0])
         self._at, self._offset = at, self._held - self._under(at)
         return True
@@ -182,7 +191,7 @@ class LoadDrag(QObject):
         """Show what the left button does at the mouse, `over` a position of the skin or None."""
         if self._swallowing:
             return
-        presses = over is not None and self.enabled and len(self.handles)
+        presses = over is not None and self._presses
         shape = Qt.CursorShape.CrossCursor if presses else Qt.CursorShape.ArrowCursor
         on_arrow = self._handle_near(self._at) is not None
         self._plotter.setCursor(Qt.CursorShape.OpenHandCursor if on_arrow else shape)

@@ -20,7 +20,7 @@ from kappaskin_app.shell.loads import loads_at
 from kappaskin_app.shell.selection import Selection
 from kappaskin_app.shell.session import Session
 from kappaskin_app.shell.settings import Settings, locked_at
-from kappaskin_app.theme import current, follow_look
+from kappaskin_app.theme import current
 from kappaskin_app.widgets.colour_bar import SkinScale
 from kappaskin_app.widgets.text import Coverage
 from kappaskin_app.widgets.tint import Tint
@@ -46,7 +46,7 @@ class SkinView(QObject):
         self._excluded = np.empty(0, np.intp)  # elements
         self._shown: Shown | None = None
         self._next_marks = 0.0
-        follow_look(self.membrane, self._redraw)
+        self.membrane.look_changed.connect(guarded(self._redraw))
         display.ages, display.limits = self._ages, [*display.limits, self._limits]
         display.restarted.connect(guarded(self._restart))
         display.status_shown.connect(guarded(self._show_status))
@@ -196,4 +196,5 @@ class SkinView(QObject):
         session = self._session
         at = session.status.playing.time(estimate.device_time)
         touches = loads_at(session.scene, at) if session.inside else ()
-        self.membrane.show_loads([touch.load for touch in touches])
+        lifted = session.inside and not touches and bool(session.scene.stimuli)
+        self.membrane.show_loads([touch.load for touch in touches], lifted)

@@ -135,6 +135,8 @@ class SceneEditing:
         self._held = GrabbedStimulus.at_place(session.scene, session.time, x, y) if writes else None
         self._grabbed_load = session.scene.loads[0] if session.scene.loads else None
         self._place = x, y
+        if self._held is not None and self._held.moves:
+            session.move(self._held.resting)
 
     @property
     def _exists(self) -> bool:
@@ -171,7 +173,11 @@ class SceneEditing:
     def release(self) -> None:
         held, written = self._held, self._history.settings.written
         self._gesture, self._held = -1, None
-        if self._exists and held is not None and written is not None and held.moved:
+        if held is None or written is None or not self._exists:
+            return
+        if not held.moved:
+            self._session.move(held.scene)  # its motion goes on
+        else:
             text = shifted(written.text, held.number, *held.by)
             text = scaled(text, held.number, held.times) if held.times != 1 else text
             self._history.change("Drag the load", -1, written=replace(written, text=text))

@@ -285,7 +285,7 @@ def _sides(skin: Any) -> tuple[float, float]:
 
 
 def shifted(text: str, touch: int, dx: float, dy: float) -> str:
-    """The text with a touch, counted from zero, moved by (dx, dy) in m, to a micrometre.
+    """The text with a touch, counted from zero, moved by (dx, dy) in m, to a micrometre, at rest.
 
     Raises `Refusal` for a text that is no TOML, or has no such touch.
     """
@@ -294,6 +294,8 @@ def shifted(text: str, touch: int, dx: float, dy: float) -> str:
     for key, by in (("x", dx), ("y", dy), ("x0", dx), ("y0", dy), ("x1", dx), ("y1", dy)):
         if key in values:
             values[key] = round(float(values[key]) + by, 6)
+    for motion in ("orbit", "path", "recorded"):
+        values.pop(motion, None)
     return tomlkit.dumps(document)
 
 

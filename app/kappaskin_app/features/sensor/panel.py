@@ -2,6 +2,7 @@
 
 import math
 from contextlib import suppress
+from typing import Any, cast
 
 from kappaskin.bases import edges_of
 from kappaskin.errors import Refusal
@@ -67,18 +68,37 @@ class ShapePanel(SimulationForm):
                 widget.setToolTip(tip)
             self.form.insertRow(row, label, self.facts[name])
         self._refusal, self._preparing = "", False
+        self._shown, self._changed, self._below = Settings(), "shape", ""
 
     def show_settings(self, settings: Settings) -> None:
         super().show_settings(settings)
+        changed = [n for n in self.names if getattr(settings, n) != getattr(self._shown, n)]
+        self._shown, self._changed = settings, changed[0] if changed else self._changed
         lengths = set(SHAPES[settings.shape].lengths)
         self.show_rows({"shape", "edge"} | lengths)
-        facts = ("", "", "")
-        with suppress(Refusal):  # a refusal is shown below
+        facts, wrong = ("", "", ""), ""
+        try:
             self.offer("edge", edges_of(patch_of(settings)))
             facts = _facts_of(patch_of(settings))
+        except Refusal:
+            wrong = self._changed
+        self._put_message(wrong)
         for fact, text in zip(self.facts.values(), facts, strict=True):
             fact.setText(text)
             self.form.setRowVisible(fact, bool(text))
+
+    def _put_message(self, name: str) -> None:
+        """Put the message below the field of a setting; below all of them without a name."""
+        if name == self._below:
+            return
+        if self._below:
+            self.form.takeRow(self.message)
+        if name:
+            row, _ = cast(tuple[int, Any], self.form.getWidgetPosition(self.editor(name)))
+            self.form.insertRow(row + 1, self.message)
+        else:
+            self._around.addWidget(self.message)
+        self._below = name
 
     def show_refusal(self, text: str) -> None:
         """Show why the requested skin is refused; nothing if it is not."""

@@ -9,12 +9,14 @@ from kappaskin_app.shell.settings.form_fields import (
     Choice,
     Range,
     Several,
+    Text,
     setting,
 )
 from kappaskin_app.shell.settings.scene import SHAPES, Skin
 
+PATTERNS = (("grid", "Grid"), ("rings", "Rings"), ("spiral", "Spiral"))
 PLACINGS = (
-    ("scene", "Regular grid"),
+    ("scene", "As the pattern"),
     ("clustered", "Clustered in the middle"),
     ("D", "D-optimal"),
     ("A", "A-optimal"),
@@ -62,6 +64,26 @@ class DesignSettings:
         0.05,
         _length(
             "Rim radius", "Distance from the middle of the skin to its rim, or to its corners."
+        ),
+    )
+    design_pattern: str = setting(
+        "grid",
+        Choice(
+            "Pattern",
+            "Where the elements are before they are placed. On rings they are evenly far apart; on "
+            "a spiral there is one to each equal area.",
+            PATTERNS,
+        ),
+    )
+    design_count: int = setting(
+        60, Range("Elements", "Number of elements on the spiral.", 4, 400, 1)
+    )
+    design_rings: str = setting(
+        "1, 6, 13, 18, 22",
+        Text(
+            "Elements on each ring",
+            "Number of elements on each ring, from the middle outward; a first ring of one is in "
+            "the middle.",
         ),
     )
     design_x: int = setting(
@@ -138,5 +160,18 @@ class DesignSettings:
             "the displacement. Both include noise only; the check by simulation includes the error "
             "of the basis.",
             PLACINGS,
+        ),
+    )
+    design_map: str = setting(
+        "displacement",
+        Choice(
+            "Map",
+            "What the map shows the error of: the displacement, or the contact position or the "
+            "force of the load of the design where it presses at that place.",
+            (
+                ("displacement", "Displacement"),
+                ("contact", "Contact position"),
+                ("force", "Contact force"),
+            ),
         ),
     )

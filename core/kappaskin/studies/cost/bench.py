@@ -46,6 +46,8 @@ from kappaskin.studies.summed import SummedResponse
 
 SETTLING, DRAWS = 8, 40
 """Frames that methods with a memory are given to settle, and those that are judged after them."""
+_JUDGED = slice(SETTLING, None)
+_EXACTLY = slice(SETTLING, None, DRAWS // 4)  # nothing is random in exact readings: fewer will do
 _TURNS, _BUDGET = (7, 41), 10e-3  # least and most of them that are timed, and about how long in s
 _CALLS, _SLOW = 5, 1e-3  # in a turn; one of a method whose frame takes longer, in s
 
@@ -184,13 +186,16 @@ class Bench:
         fit = started(read)
         setup_time = time.perf_counter() - begun
         time_per_frame, lstsq_time = _medians(fit, layout, exact, read)
-        e_exact, rms_exact = self._errors(exactly, exact)
-        e, rms = self._errors(fit, read)
+        e_exact, rms_exact = self._errors(exactly, exact, _EXACTLY)
+        e, rms = self._errors(fit, read, _JUDGED)
         summed = None
         if skin.beyond is not None:
             of_exact, of_read = (
-                self._summed_errors(fit, curvature + skin.beyond)
-                for fit, curvature in ((exactly, exact), (fit, read))
+                self._summed_errors(fit, curvature + skin.beyond, frames)
+                for fit, curvature, frames in (
+                    (exactly, exact, _EXACTLY),
+                    (fit, read, _JUDGED),
+                )
             )
             summed = ShapeErrors(*of_exact, *of_read)
         reference, w = self.scene.basis, self._truth[SETTLING:]
@@ -213,24 +218,34 @@ class Bench:
             summed,
         )
 
-    def _summed_errors(self, fit: Estimator, curvature: Array) -> tuple[float, float]:
+    def _summed_errors(
+        self, fit: Estimator, curvature: Array, frames: slice
+    ) -> tuple[float, float]:
         """Means of the errors at the load and over the skin, beside the whole response."""
-        c = fit(curvature).coefficients.reshape(len(curvature), -1).astype(float)
-        contact = np.array([pressed.contact for pressed in self._pressed])
-        response = cast("SummedResponse", self._response)
-        e, rms = response.errors(fit.basis, c, self._truth, contact)
+        response, c = cast("SummedResponse", self._response), _fitted(fit, curvature, frames)
+        contact = np.array([pressed.contact for pressed in self._pressed[frames]])
+        e, rms = response.errors(fit.basis, c, self._truth[frames], contact, frames)
         check_finite(e, rms)
-        return float(e[SETTLING:].mean()), float(rms[SETTLING:].mean())
+        return float(e.mean()), float(rms.mean())
 
-    def _errors(self, fit: Estimator, curvature: Array) -> tuple[Array, Array]:
-        """Errors (DRAWS,) at the load and over the skin in m, of the frames after the settling."""
-        c = fit(curvature).coefficients.reshape(len(curvature), -1).astype(float)[SETTLING:]
-        contact = np.array([pressed.contact for pressed in self._pressed[SETTLING:]])
-        reference, w = self.scene.basis, self._truth[SETTLING:]
+    def _errors(self, fit: Estimator, curvature: Array, frames: slice) -> tuple[Array, Array]:
+        """Errors (T,) at the load and over the skin in m, in T of the `frames`."""
+        c = _fitted(fit, curvature, frames)
+        contact = np.array([pressed.contact for pressed in self._pressed[frames]])
+        reference, w = self.scene.basis, self._truth[frames]
         e = np.vecdot(fit.basis.at(contact), c) - np.vecdot(reference.at(contact), w)
         rms = rms_distance(fit.basis, c, reference, w)
         check_finite(e, rms)
         return e, rms
+
+
+def _fitted(fit: Estimator, curvature: Array, frames: slice) -> Array:
+    """The coefficients (T, N) in m of some of the `frames`; a memory takes all of them in."""
+    if fit.has_memory:
+        found = fit(curvature).coefficients[frames]
+    else:
+        found = fit(curvature[frames]).coefficients
+    return found.reshape(-1, fit.basis.size).astype(float)
 
 
 def check_finite(*values: Array) -> None:

@@ -5,8 +5,10 @@ import statistics
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import cast
 
 import numpy as np
+import scipy
 
 from kappaskin.bases import basis_for
 from kappaskin.contact import ContactObject, PointContact, contacts_of, object_finder
@@ -21,9 +23,10 @@ from kappaskin.estimation import (
     predicted_sd,
 )
 from kappaskin.frames import Array, Contact, Mask, Truth
-from kappaskin.mechanics import Plate
-from kappaskin.scenes import Indenter, Scene, Simulator, kept_effects
-from kappaskin.skin import Patch
+from kappaskin.mechanics import DiscLoad, Plate, PointLoad
+from kappaskin.scenes import Indenter, Scene, Simulator, kept_effects, planned
+from kappaskin.sensing import SensorLayout
+from kappaskin.skin import Cap, Patch
 from kappaskin.studies.accuracy import covered, points_on, rms_distance, root_mean_square, seconds
 
 # Blocks of frames: what was true, what was read, what was fitted
@@ -147,7 +150,14 @@ def _at_load(block: FrameBlock) -> Array:
 
 def _contact(block: FrameBlock) -> Array:
     found = np.array([contact.position for contact in block.contacts])
-    return np.hypot(*(found - block.contact).T)
+    return _distance(block.scene.plate.patch, found, block.contact)
+
+
+def _distance(patch: Patch, found: Array, true: Array) -> Array:
+    """Distance (T,) in m of places `found` (T, 2) from `true` ones; on a cap, through the air."""
+    if isinstance(patch, Cap):
+        return np.linalg.norm(patch.at_rest(found)[0] - patch.at_rest(true)[0], axis=-1)
+    return np.hypot(*(found - true).T)
 
 
 def _force(block: FrameBlock) -> Array:
@@ -214,6 +224,57 @@ def _predicted(block: FrameBlock) -> Array:
     return np.array([_predicted_rms(block.estimator, noise_of(block.scene))])
 
 
+@lru_cache(2)
+def _point_contact(scene: Scene, layout: SensorLayout) -> PointContact:
+    return PointContact(scene.plate, layout, scene.edge, layout.sigma(scene.transduction.noise))
+
+
+PressedLoad = PointLoad | DiscLoad
+
+
+def pressed_load(scene: Scene) -> PressedLoad:
+    """The one load of a scene by which errors of contact and force are predicted."""
+    if len(scene.loads) == len(scene.stimuli) == 1:
+        load = scene.loads[0]
+        if isinstance(load, PressedLoad):
+            return load
+    raise Refusal("expected one point or disc that presses, to predict errors of contact and force")
+
+
+def _contact_covariance(scene: Scene, layout: SensorLayout, load: PressedLoad) -> Array:
+    """Covariance (3, 3) due to noise: of the force as a share, and of the place on the skin in m.
+
+    Along the frame of the skin there.
+    """
+    if scene.plate.unknown_material:
+        raise Refusal("expected a skin of known material to predict a force, got an unknown one")
+    x, y, s = load.x, load.y, load.radius**2 if isinstance(load, DiscLoad) else 0.0
+    found = _point_contact(scene, layout).covariance(x, y, s, load.force, noise_of(scene))
+    to_skin = np.diag([1 / load.force, 1.0, 1.0])
+    if slopes := scene.plate.patch.base(x, y).slopes:
+        to_skin[1:, 1:] = np.linalg.inv(slopes)
+    return to_skin @ found @ to_skin.T
+
+
+def _predicted_contact(block: FrameBlock) -> Array:
+    """The mean distance of normal errors with the variances u >= v along their main axes."""
+    v, u = np.linalg.eigvalsh(_covariances(block)[:, 1:, 1:]).T
+    return np.sqrt(2 * u / np.pi) * cast("Array", scipy.special.ellipe(1 - v / u))
+
+
+def _predicted_force(block: FrameBlock) -> Array:
+    return np.sqrt(2 / np.pi * _covariances(block)[:, 0, 0])
+
+
+def _covariances(block: FrameBlock) -> Array:
+    """The covariances (T, 3, 3) of the block's contacts, by noise alone."""
+    load = pressed_load(block.scene)
+    each = zip(block.contact.tolist(), block.forces().tolist(), strict=True)
+    loads = [replace(load, x=x, y=y, force=force) for (x, y), force in each]
+    layout = block.estimator.layout
+    return np.array([_contact_covariance(block.scene, layout, load) for load in loads])
+
+
 def _rate(block: FrameBlock) -> Array:
     rate = block.scene.sensor().scan().rate
     return np.array([rate if math.isfinite(rate) else math.nan])  # of readings that come at once
@@ -234,6 +295,12 @@ MEASURES = {
     "radius": StudyMeasure("error of the object's radius", "%", 1e2, _radius),
     "covered": StudyMeasure("skin within the 95 % bands", "%", 1e2, _covered, share=True),
     "predicted": StudyMeasure("RMS error due to noise alone, predicted", "mm", 1e3, _predicted),
+    "predicted-contact": StudyMeasure(
+        "error of the contact position due to noise alone, predicted", "mm", 1e3, _predicted_contact
+    ),
+    "predicted-force": StudyMeasure(
+        "error of the force due to noise alone, predicted", "%", 1e2, _predicted_force
+    ),
     "rate": StudyMeasure("highest frame rate by the conversion time", "frames/s", 1.0, _rate),
     "time": StudyMeasure("time to fit a frame", "us", 1e6, _time),
 }
@@ -246,8 +313,11 @@ All but `time` are the same wherever they are computed.
 # The accuracy that a design will have before it is built, predicted and checked by simulation
 
 _SPACING = 0.4  # of the mean distance between elements: places that are tried
-_SIDE = 41  # points along each side of the maps
-_BLOCK, _MOST = 250, 5_000  # frames at a time, and in all
+_SIDE, _PRESSED_SIDE = 41, 25  # points along each side of the maps, and of those of presses
+_BLOCK, _MOST, _MOST_PRESSES = 250, 5_000, 2_000  # frames at a time, and in all
+_NEAR_RIM = 1 / 15  # of the shorter side: nearer to the rim, no force is reported
+_AREA_STEPS = 513
+_NEAR_POLE = 1e-6  # of the box
 
 
 def placed_estimator(
@@ -278,48 +348,99 @@ class Design:
 
     def estimator(self) -> Estimator:
         """The estimator with the elements placed; raises a `Refusal` where they cannot be."""
-        layout, patch = self.scene.layout, self.scene.plate.patch
+        layout = self.scene.layout
         check_placement(layout, self.by)
-        spacing = _SPACING * math.sqrt(patch.a * patch.b / len(layout))
+        spacing = _SPACING * math.sqrt(_area(self.scene.plate.patch) / len(layout))
         return placed_estimator(self.scene, self.functions, self.by, spacing, "least-squares")
 
 
-def _shares(on: Mask) -> Array:
-    """How much of the skin each point of a map stands for, (ny, nx): half on its first and last."""
-    shares = on.astype(float)
-    shares[[0, -1]] /= 2
-    shares[:, [0, -1]] /= 2
-    return shares / shares.sum()
+def _area(patch: Patch) -> float:
+    """The area in m^2 of a cap, of other skins that of their box."""
+    if not isinstance(patch, Cap):
+        return patch.a * patch.b
+    away, step = np.linspace(0.0, patch.rim_radius, _AREA_STEPS, retstep=True)
+    return 2 * math.pi * float(np.trapezoid(patch.meridian(away).radius, dx=float(step)))
 
 
-def _over_skin(sd: Array) -> float:
-    """The square root of the mean variance over the skin, in m."""
-    on = np.isfinite(sd)
-    return float(np.sqrt(_shares(on)[on] @ sd[on] ** 2))
+@dataclass(frozen=True, eq=False)
+class _Map:
+    """Points `x` (nx,) and `y` (ny,) in m of a skin, and the `shares` (ny, nx) of it they are for.
+
+    `on` (ny, nx) are those on the skin where something is known.
+    """
+
+    x: Array
+    y: Array
+    on: Mask
+    shares: Array
+
+    @classmethod
+    def of(cls, patch: Patch, side: int, margin: float = -math.inf) -> "_Map":
+        """`side` x `side` points of a `patch`, at least `margin` in m from its rim."""
+        x, y = patch.grid(side, 2 if patch.strip else side)
+        points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        on = patch.contains(points) & (patch.depth(points) >= margin)
+        area = np.ones(len(points))
+        if isinstance(patch, Cap):  # its unrolled map is too wide around, towards the rim
+            away = np.maximum(np.linalg.norm(points - patch.rim_radius, axis=1), _NEAR_POLE * x[-1])
+            area[on] = (patch.meridian(away).radius / away)[on]
+        shares = (on * area).reshape(len(y), len(x))
+        shares[[0, -1]] /= 2  # half of a tile
+        shares[:, [0, -1]] /= 2
+        return cls(x, y, on.reshape(shares.shape), shares / shares.sum())
+
+    @property
+    def points(self) -> Array:
+        """Those (G, 2) in m that are `on`."""
+        return np.stack(np.meshgrid(self.x, self.y), axis=-1)[self.on]
+
+    def filled(self, values: Array) -> Array:
+        """A map (ny, nx) of `values` (G,) at the points; NaN elsewhere."""
+        made = np.full(self.on.shape, np.nan)
+        made[self.on] = values
+        return made
+
+
+PREDICTIONS = ("displacement", "contact", "force")
+"""What the error of is predicted."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prospect:
-    """What is predicted of a design: `sd` (ny, nx) of the displacement in m, NaN off the skin.
+    """What is predicted of a design: the error `sd` (ny, nx) due to noise, NaN where there is none.
 
-    `x` (nx,) and `y` (ny,) are in m, `positions` (P, 2) where the elements are, `rate` in 1/s what
-    the conversions allow; infinite where readings come all at once.
+    It is the standard deviation of the displacement in m, or, of the contact's position in m or of
+    the force as a share, the root of the mean square error under the scene's load at each place.
+    `x` (nx,) and `y` (ny,) are in m, `shares` (ny, nx) how much of the skin each point stands for,
+    `positions` (P, 2) where the elements are, `rate` in 1/s what the conversions allow; infinite
+    where readings come all at once. `of` is one of `PREDICTIONS`, of a contact's under its `load`.
     """
 
     x: Array
     y: Array
     sd: Array
+    shares: Array
     positions: Array
     rate: float
+    of: str = PREDICTIONS[0]
+    load: PressedLoad | None = None
 
     @property
     def rms(self) -> float:
-        """The square root of the mean variance over the skin, in m."""
-        return _over_skin(self.sd)
+        """The square root of the mean variance over the skin."""
+        return _over_skin(self.sd, self.shares)
+
+    @property
+    def median(self) -> float:
+        """What half of the skin has less than."""
+        on = np.isfinite(self.sd)
+        order = np.argsort(self.sd[on])
+        share = np.cumsum(self.shares[on][order])
+        return float(self.sd[on][order][np.searchsorted(share, 0.5)])
 
     @property
     def worst(self) -> float:
-        """The largest standard deviation on the skin, in m."""
+        """The largest on the skin."""
         return float(np.nanmax(self.sd))
 
 
@@ -327,54 +448,108 @@ class Prospect:
 class Check:
     """What came of simulating a design for so many `frames`.
 
-    `sd` (ny, nx) in m is what the displacement varied by at the points of its prospect; `rms` in m
+    `sd` (ny, nx) is what the displacement in m varied by at the points of its prospect; `rms` in m
     over the skin is the error of the reconstruction, what the functions cannot represent included.
+    Of contacts and forces both are the errors of what was estimated from the readings, in the units
+    of the prospect; `shares` (ny, nx) are its own.
     """
 
     frames: int
     sd: Array
     rms: float
+    shares: Array
 
     @property
     def rms_sd(self) -> float:
-        """The square root of the mean variance over the skin, in m, as its prospect's `rms`."""
-        return _over_skin(self.sd)
+        """The square root of the mean variance over the skin, as its prospect's `rms`."""
+        return _over_skin(self.sd, self.shares)
+
+    def over(self, predicted: Prospect) -> float:
+        """`rms_sd` over that which is predicted of the same points."""
+        known = np.where(np.isfinite(self.sd), predicted.sd, np.nan)
+        return self.rms_sd / _over_skin(known, self.shares)
 
 
-def _points(patch: Patch) -> tuple[Array, Array, Mask, Array]:
-    """The map's x and y, which of its points (ny, nx) are on the skin, and those (G, 2)."""
-    x, y = patch.grid(_SIDE, 2 if patch.strip else _SIDE)
-    grid = np.stack(np.meshgrid(x, y), axis=-1)
-    on: Mask = patch.contains(grid.reshape(-1, 2)).reshape(grid.shape[:2])
-    return x, y, on, grid[on]
+def _over_skin(sd: Array, shares: Array) -> float:
+    """The root of the mean square over the skin of errors (ny, nx), where they are known."""
+    on = np.isfinite(sd)
+    return float(np.sqrt(shares[on] @ sd[on] ** 2 / shares[on].sum()))
 
 
-def _on_map(on: Mask, values: Array) -> Array:
-    made = np.full(on.shape, np.nan)
-    made[on] = values
-    return made
+def _map_of(scene: Scene, of: str) -> _Map:
+    """The points of the skin; of contacts, those where the scene's load is away from the rim."""
+    if of not in PREDICTIONS:
+        raise Refusal(f"expected to predict one of {', '.join(PREDICTIONS)}, got {of!r}")
+    patch = scene.plate.patch
+    if of == "displacement":
+        return _Map.of(patch, _SIDE)
+    load, side = pressed_load(scene), patch.a if patch.strip else min(patch.a, patch.b)
+    radius = load.radius if isinstance(load, DiscLoad) else 0.0
+    return _Map.of(patch, _PRESSED_SIDE, max(1.001 * radius, _NEAR_RIM * side))
 
 
-def prospect(design: Design) -> Prospect:
-    """The standard deviations that the covariance predicts of a design, without a simulation."""
-    estimator = design.estimator()
-    x, y, on, points = _points(design.scene.plate.patch)
-    sd = predicted_sd(estimator, noise_of(design.scene), points)
-    scan_time = design.scene.transduction.scan_time(estimator.layout.channels)
+def prospect(design: Design, of: str = "displacement") -> Prospect:
+    """The error of one of `PREDICTIONS` by the covariance of a design, without a simulation."""
+    estimator, scene, seen = design.estimator(), design.scene, _map_of(design.scene, of)
+    layout = estimator.layout
+    if of == "displacement":
+        sd = predicted_sd(estimator, noise_of(scene), seen.points)
+    else:
+        loads = [replace(pressed_load(scene), x=x, y=y) for x, y in seen.points.tolist()]
+        each = np.array([_contact_covariance(scene, layout, load).diagonal() for load in loads])
+        sd = np.sqrt(each[:, 1:].sum(axis=1) if of == "contact" else each[:, 0])
+    scan_time = scene.transduction.scan_time(layout.channels)
     rate = 1 / scan_time if scan_time else math.inf
-    return Prospect(x, y, _on_map(on, sd), estimator.layout.positions, rate)
+    load = None if of == "displacement" else pressed_load(scene)
+    return Prospect(seen.x, seen.y, seen.filled(sd), seen.shares, layout.positions, rate, of, load)
 
 
-def check(design: Design, frames: int = _MOST) -> Generator[Check]:
+def check(design: Design, frames: int = _MOST, of: str = "displacement") -> Generator[Check]:
     """What simulating a design gives, after every few frames until there are so many.
 
-    The readings are made as all simulations make them, with every effect of the scene.
+    The readings are made as all simulations make them, with every effect of the scene. Of
+    displacements these are frames under the scene's load; of contacts and forces it presses at one
+    point of the map after the other, and what presses is found as in every frame of a sensor. Those
+    that are reported as perhaps on the rim, whose force is not determined, are left out.
     """
-    estimator = design.estimator()
-    _, _, on, points = _points(design.scene.plate.patch)
+    seen = _map_of(design.scene, of)
+    if of == "displacement":
+        yield from _check_displacement(design, seen, frames)
+    else:
+        yield from _check_contacts(design, of, seen, min(frames, _MOST_PRESSES))
+
+
+def _check_contacts(design: Design, of: str, seen: _Map, frames: int) -> Generator[Check]:
+    estimator, load = design.estimator(), pressed_load(design.scene)
+    scene = planned(replace(design.scene, layout=estimator.layout, seed=0))  # not at every press
+    simulator, scan, places = Simulator(scene), scene.sensor().scan(), seen.points
+    find = _contact_finder(estimator, scene.plate, scene.edge)
+    squares, counts, count = np.zeros(len(places)), np.zeros(len(places)), 0
+    order = np.random.default_rng(0).permutation(len(places))
+    while count < frames:
+        for n in np.take(order, np.arange(count, min(count + _BLOCK, frames)), mode="wrap"):
+            x, y = places[n].tolist()
+            simulator.change(scene.touched_by(replace(load, x=x, y=y)))
+            _, read = simulator.reading(scan, count / scene.rate)
+            readings = read.reshape(scene.layout.frame_shape)
+            contact = find(readings, estimator(readings))
+            error = contact.force / load.force - 1
+            if of == "contact":
+                error = _distance(scene.plate.patch, contact.position[None], places[[n]])[0]
+            count += 1
+            if contact.present and not contact.near_rim:
+                counts[n] += 1
+                squares[n] += error**2
+        known = np.where(counts, squares / np.maximum(counts, 1), np.nan)
+        sd = seen.filled(np.sqrt(known))
+        yield Check(count, sd, _over_skin(sd, seen.shares), seen.shares)
+
+
+def _check_displacement(design: Design, seen: _Map, frames: int) -> Generator[Check]:
+    estimator, points = design.estimator(), seen.points
     scene = replace(design.scene, layout=estimator.layout, seed=0)
     simulator, scan = Simulator(scene), scene.sensor().scan()
-    rows, shares = estimator.basis.at(points), _shares(on)[on]
+    rows, shares = estimator.basis.at(points), seen.shares[seen.on]
     true_rows = scene.basis.at(points)
     count, mean, squares, off = 0, np.zeros(len(points)), np.zeros(len(points)), 0.0
     while count < frames:
@@ -392,4 +567,4 @@ def check(design: Design, frames: int = _MOST) -> Generator[Check]:
         mean += share * (here - mean)
         count += T
         sd = np.sqrt(squares / max(count - 1, 1))
-        yield Check(count, _on_map(on, sd), float(np.sqrt(off / count)))
+        yield Check(count, seen.filled(sd), float(np.sqrt(off / count)), seen.shares)

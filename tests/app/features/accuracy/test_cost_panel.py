@@ -231,6 +231,7 @@ def test_every_row_and_column_of_effects_explains_itself(measured: MainWindow, u
     assert "% of the peak. It is omitted." in tips["Finite slope"]
 
 
+@pytest.mark.full
 def test_measuring_anew_forgets_what_was_wanted_of_the_skin_before(
     measured: MainWindow, until, qtbot
 ) -> None:

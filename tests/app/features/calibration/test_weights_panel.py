@@ -53,6 +53,7 @@ def test_weights_laid_on_in_the_window_give_the_rigidity_and_what_lay_there_retu
     assert panel.start.begin.isVisible()
 
 
+@pytest.mark.cases("5, ten")
 @pytest.mark.parametrize(
     ("masses", "reason"),
     [("5, ten", "Expected masses in g"), ("5, 10", "Expected at least 3 weights"), ("", "least 3")],

@@ -155,6 +155,7 @@ def places_of(window, text):
     )
 
 
+@pytest.mark.cases("replay")
 @pytest.mark.parametrize(
     ("source", "reason"),
     [
@@ -215,6 +216,7 @@ def test_bad_sources_each_have_one_reason_and_leave_the_simulation(window, qtbot
     assert window.display.badge.state == "SIM"
 
 
+@pytest.mark.cases("sim:")
 @pytest.mark.parametrize("scheme", ["", "sim:", "replay:"])
 def test_a_source_of_10000_characters_has_a_short_reason(window, qtbot, until, scheme):
     panel, width = window.connection, window.width()
@@ -367,6 +369,7 @@ def test_a_click_identifies_the_devices_in_the_open_list(listing, qtbot, until):
     assert speakers(panel) == [found, "silent", refused]
 
 
+@pytest.mark.full
 def test_return_identifies_the_devices_in_the_open_list(listing, qtbot, until):
     panel = listing.connection
     panel.sources.setFocus()

@@ -260,6 +260,7 @@ def test_a_bag_that_is_dropped_is_described_and_its_topic_imported(
     assert len(window.session.status.sensor.layout.positions) == 6
 
 
+@pytest.mark.full
 def test_a_table_without_times_has_a_rate(window, until, tmp_path, monkeypatch) -> None:
     table, file = tmp_path / "a.csv", tmp_path / "a.toml"
     table.write_text("".join(f"{n * 3 % 7},{n * 5 % 7}\n" for n in range(100)))
@@ -279,6 +280,7 @@ def test_a_table_without_times_has_a_rate(window, until, tmp_path, monkeypatch) 
     until(lambda: window.session.status.replay.length == pytest.approx(99 / 50))
 
 
+@pytest.mark.full
 def test_json_in_lines_is_described_by_its_keys(window, until, tmp_path, monkeypatch) -> None:
     lines, file = tmp_path / "glove.jsonl", tmp_path / "glove.toml"
     rows = ({"n": n, "skin": {"h": [n * k % 7 for k in range(1, 7)]}} for n in range(200))
@@ -333,6 +335,7 @@ def test_elements_that_are_counted_along_x_are_placed_so(
     assert columns[:4] == ["time", "height:0", "height:3", "height:6"]
 
 
+@pytest.mark.full
 def test_numbers_of_elements_that_differ_from_the_columns_are_said(window, until, lines) -> None:
     dialog = window.new_sensor
     described(dialog, until, lines)
@@ -383,6 +386,7 @@ def test_right_after_a_press_it_is_not_taken_for_the_rest(window, until, lines) 
         assert dialog.answering() == []
 
 
+@pytest.mark.full
 def test_words_after_numbers_are_said(window, until, board) -> None:
     dialog = window.new_sensor
     dialog.begin()

@@ -52,6 +52,19 @@ def test_larger_letters_stand_in_two_rows_and_are_read_whole(readouts: Readouts,
     assert all(number.whole for number, _ in readouts.parts.values())
 
 
+@pytest.mark.parametrize("width", [920, 1170, 1590])  # in windows of 1024, 1280 and 1700 px
+def test_the_places_of_two_contacts_are_read_whole(readouts: Readouts, qtbot, width) -> None:
+    estimate = _centre()
+    places = np.array([0.0164, 0.0907]), np.array([0.0943, 0.0104])
+    sd = np.full(2, 3.8e-5)
+    contacts = [replace(estimate.contact, position=place, position_sd=sd) for place in places]
+    readouts.resize(width, 60)
+    qtbot.wait(1)
+    readouts.show_estimate(replace(estimate, contact=contacts[0], second=contacts[1]))
+    assert readouts.text("contact") == "(16.4, 90.7), (94.3, 10.4) mm"
+    assert readouts.parts["contact"][0].whole
+
+
 def test_a_force_that_leaves_out_a_stretch_is_shown_as_a_lower_bound(readouts: Readouts) -> None:
     scene = load_scene("centre")
     estimate = Pipeline(scene.sensor(), Setup())(Simulator(scene).frame(0, lambda: 0.0))

@@ -33,6 +33,7 @@ def shaped(name: str) -> Settings:
     return replace(settings, **with_consequences(settings, None, "design_shape", name))
 
 
+@pytest.mark.cases("cap", "cylinder", "disk", "dome", "flat", "strip")
 @pytest.mark.parametrize("name", SHAPES)
 def test_every_outline_is_designed_with_its_usual_lengths(name: str):
     told = prospect(design_of(shaped(name)))
@@ -59,10 +60,48 @@ def test_a_design_that_reads_heights_and_slopes_is_a_scene_that_opens(name: str)
     assert scene.rate == SHAPES[name].rate
 
 
+@pytest.mark.parametrize(
+    ("pattern", "count"), [("grid", 80), ("rings", 60), ("spiral", 60)], ids=str
+)
+def test_elements_of_a_cap_are_in_the_selected_pattern(pattern: str, count: int) -> None:
+    scene = scene_of(replace(shaped("cap"), design_pattern=pattern))
+
+    assert len(scene.layout) == count
+    away = scene.layout.positions - scene.plate.patch.a / 2
+    at_pole = (np.hypot(*away.T) < 1e-9).sum()
+    assert at_pole == (pattern == "rings")
+
+
+def test_the_pattern_of_a_rectangle_is_a_grid() -> None:
+    assert scene_of(replace(Settings(), design_pattern="spiral")).layout.shape == (10, 10)
+
+
+@pytest.mark.parametrize(
+    ("rings", "words"), [("1, six", "such as 1, 6, 13"), ("0, 4", "each ring")]
+)
+def test_rings_that_cannot_be_are_refused(rings: str, words: str) -> None:
+    with pytest.raises(Refusal, match=words):
+        scene_of(replace(shaped("cap"), design_pattern="rings", design_rings=rings))
+
+
+def test_the_form_shows_what_applies_to_the_pattern(qtbot) -> None:
+    form = DesignForm()
+    qtbot.addWidget(form)
+    form.show()
+    rows = {"design_pattern", "design_count", "design_rings", "design_x", "design_y"}
+
+    def shown(settings: Settings) -> set[str]:
+        form.show_settings(settings)
+        return {name for name in rows if form.editor(name).isVisible()}
+
+    assert shown(Settings()) == {"design_x", "design_y"}
+    assert shown(shaped("cap")) == {"design_pattern", "design_count"}
+    rings = replace(shaped("cap"), design_pattern="rings")
+    assert shown(rings) == {"design_pattern", "design_rings"}
+
+
 def test_a_cap_that_reads_slopes_is_refused() -> None:
-    with pytest.raises(
-        Refusal, match="heights, curvature and twist at a point of each element of a cap"
-    ):
+    with pytest.raises(Refusal, match="heights, curvature or twist of each element of a cap"):
         scene_of(replace(shaped("cap"), design_reads=("height", "slope@0")))
 
 
@@ -174,6 +213,27 @@ def test_what_elements_read_is_selected_placed_checked_and_saved(
     window.requests.set("design_reads", ())
     until(lambda: bool(prediction.refusal))
     assert "at least one reading" in window.design.words.text()
+
+
+@pytest.mark.full
+def test_errors_of_place_and_force_on_a_cap_are_mapped_and_checked(window: MainWindow, until):
+    design, prediction = window.design, window.prediction
+    window.docks.reveal("design")
+    window.requests.set("design_shape", "cap")
+    window.requests.set("design_map", "contact")
+    until(lambda: prediction.prospect is not None and prediction.prospect.of == "contact", 60)
+    assert "on a disc of 1.7 mm radius" in design.words.text()
+    assert (design.predicted.unit, design.along.y_axis.unit) == ("mm", "mm")
+
+    window.requests.set("design_map", "force")
+    until(lambda: prediction.prospect.of == "force" and not prediction.predicting, 60)
+    assert (design.predicted.unit, design.along.y_axis.unit) == ("%", "%")
+    assert "% at worst" in design.words.text()
+    design.simulate.click()
+    until(lambda: prediction.check is not None, 60)
+    assert "times the prediction" in design.words.text()
+    design.simulate.click()
+    until(lambda: not prediction.checking)
 
 
 @pytest.mark.full

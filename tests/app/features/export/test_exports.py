@@ -341,7 +341,7 @@ def test_an_export_is_cancelled_with_nothing_left(window, recording) -> None:
     assert [path.name for path in recording.parent.iterdir()] == ["rec.mcap"]
 
 
-@pytest.mark.cases("a.stl", "a.pvd")
+@pytest.mark.cases("a.pvd")
 @pytest.mark.parametrize(
     ("name", "span", "at"), [("a.vtp", False, True), ("a.stl", False, True), ("a.pvd", True, False)]
 )

@@ -97,5 +97,18 @@ def test_the_legend_takes_one_line_in_a_small_window(window, until) -> None:
         assert button.width() >= button.iconSize().width() + 4 + words + 4
 
 
+@pytest.mark.parametrize("size", [(1024, 700), (1280, 800)])
+def test_the_legend_takes_one_line_in_the_presenter(window, until, size) -> None:
+    window.presenter.enter()
+    window.showNormal()
+    window.resize(*size)
+    entries = window.legend.buttons
+    for button in entries.values():  # as the demonstration has them
+        button.show()
+    until(lambda: window.width() == size[0] and window.legend.width() < 0.6 * size[0])
+    until(lambda: window.legend.height() < 2 * _line(entries))
+    assert len({button.y() for button in entries.values()}) == 1
+
+
 def _line(entries) -> int:
     return entries["show_fit"].height()

@@ -8,7 +8,8 @@ from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QMouseEvent, QWheelEvent
 from PySide6.QtWidgets import QApplication
 
-from kappaskin_app.shell.simulation import patch_of
+from kappaskin.scenes import scene_file
+from kappaskin_app.shell.simulation import patch_of, written
 from kappaskin_app.shell.window import MainWindow
 
 LEFT, RIGHT = Qt.MouseButton.LeftButton, Qt.MouseButton.RightButton
@@ -77,6 +78,7 @@ def test_the_left_button_on_the_skin_presses_there_and_drags(
     assert pressed.history.settings == settings
 
 
+@pytest.mark.cases("dome")
 @pytest.mark.parametrize(
     ("shape", "radius"),
     [("dome", 0.15), ("dome", -0.15), ("cap", 0.15)],
@@ -121,6 +123,60 @@ def dragged(window: MainWindow) -> tuple[float, float]:
     return window.history.settings.x, window.history.settings.y
 
 
+@pytest.fixture
+def pinched(window: MainWindow, until) -> MainWindow:
+    """The fingertip of the first window, paused while nothing presses."""
+    window.session.begin(written(scene_file("fingertip-cap")))
+    until(lambda: window.session.scene.name == "fingertip-cap" and not window.session.making)
+    window.session.run(False)
+    window.session.seek(2.7)
+    until(lambda: window.session.status.playing.at == 2.7)
+    until(lambda: window.membrane.drag.lifted and not len(window.membrane.drag.handles))
+    return window
+
+
+def test_a_press_on_the_fingertip_puts_a_load_there_that_stays(
+    pinched, qtbot, until, pixel_of
+) -> None:
+    plotter, before = pinched.membrane.plotter, pinched.history.settings
+    at, rim = pixel_of(pinched, (0.0118, 0.0098)), pixel_of(pinched, (0.0105, 0.0008))
+    move(pinched, at, held=Qt.MouseButton.NoButton)
+    until(lambda: plotter.cursor().shape() == Qt.CursorShape.CrossCursor)
+    qtbot.mousePress(plotter, LEFT, pos=at)
+    until(lambda: np.allclose(pinched.membrane.drag.handles, [(0.0118, 0.0098)], atol=4e-4))
+    qtbot.mouseRelease(plotter, LEFT, pos=at)
+    until(lambda: pinched.history.settings.written != before.written and not pinched.session.making)
+    qtbot.mousePress(plotter, LEFT, pos=rim)
+    # The disc of 2.5 mm is as near to the mouse as it fits.
+    until(lambda: np.allclose(pinched.membrane.drag.handles, [(0.0105, 0.0026)], atol=4e-4))
+    qtbot.mouseRelease(plotter, LEFT, pos=rim)
+    (handle,) = pinched.membrane.drag.handles
+    until(lambda: not pinched.session.making)
+    pinched.session.seek(0.0)  # when the contacts of the timetable begin
+    until(lambda: np.allclose(pinched.session.estimate.true_contact, handle, atol=1e-5))
+    pinched.history.stack.undo()
+    pinched.history.stack.undo()
+    assert pinched.history.settings == before
+
+
+def test_a_load_of_a_timetable_rests_while_it_is_held_and_goes_on_after_escape(
+    pinched, qtbot, until, pixel_of
+) -> None:
+    plotter, drag, before = pinched.membrane.plotter, pinched.membrane.drag, pinched.session.scene
+    pinched.session.seek(4.0)
+    until(lambda: len(drag.handles) == 1 and pinched.session.status.playing.at == 4.0)
+    (handle,) = drag.handles
+    qtbot.mousePress(plotter, LEFT, pos=pixel_of(pinched, handle))
+    pinched.session.run(True)
+    until(lambda: pinched.session.time > 4.3)
+    assert np.allclose(drag.handles, [handle])
+    qtbot.keyClick(plotter, Qt.Key.Key_Escape)
+    qtbot.mouseRelease(plotter, LEFT)
+    assert pinched.session.scene.stimuli == before.stimuli
+    until(lambda: not np.allclose(drag.handles, [handle], atol=1e-4))
+
+
+@pytest.mark.cases("window")
 def test_escape_returns_the_load_that_is_held(pressed, qtbot, pixel_of) -> None:
     plotter, settings = pressed.membrane.plotter, pressed.history.settings
     qtbot.mousePress(plotter, LEFT, pos=pixel_of(pressed, (0.03, 0.06)))
@@ -134,6 +190,7 @@ def test_escape_returns_the_load_that_is_held(pressed, qtbot, pixel_of) -> None:
     assert pressed.presenter.on == presenting
 
 
+@pytest.mark.cases("window")
 def test_keys_move_and_press_the_load(pressed, qtbot, until) -> None:
     if not pressed.presenter.on:  # which gives the view the keys itself
         pressed.membrane.setFocus()
@@ -148,6 +205,7 @@ def test_keys_move_and_press_the_load(pressed, qtbot, until) -> None:
     assert pressed.history.stack.count() == count + 1
 
 
+@pytest.mark.cases("window")
 def test_off_the_skin_and_with_the_right_button_the_mouse_turns_the_view(
     pressed, qtbot, pixel_of
 ) -> None:
@@ -166,6 +224,7 @@ def test_off_the_skin_and_with_the_right_button_the_mouse_turns_the_view(
         assert (now.x, now.y, now.force) == (settings.x, settings.y, settings.force)
 
 
+@pytest.mark.cases("window")
 def test_the_cursor_shows_what_the_left_button_does(pressed, until, pixel_of) -> None:
     plotter, none = pressed.membrane.plotter, Qt.MouseButton.NoButton
     tip = pixel_of(pressed, (0.05, 0.05))

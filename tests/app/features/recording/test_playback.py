@@ -297,7 +297,7 @@ def test_one_typed_as_a_source_is_played_with_its_settings(
     assert window.history.settings.functions_x == 8
 
 
-@pytest.mark.cases("no recording at all", "None")
+@pytest.mark.cases("no recording at all")
 @pytest.mark.parametrize(
     ("content", "why"),
     [

@@ -1,3 +1,4 @@
+import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -30,6 +31,9 @@ def read(text: str, name: str):
     return read_scene(text, scene_file(name))
 
 
+@pytest.mark.cases(
+    "camera", "demo", "failing-elements", "fingertip", "long-gages", "saddle", "slipping", "sphere"
+)
 @pytest.mark.parametrize("name", SCENES)
 def test_an_effect_forced_on_or_off_is_and_the_rest_of_the_scene_stays(name) -> None:
     scene, text = load_scene(name), text_of(name)
@@ -68,7 +72,9 @@ def test_comments_and_order_stay() -> None:
     text = text_of("pencil")
     changed = forced(shifted(text, 0, 0.001, -0.002), "saturation", OFF)
     assert "# frames/s: a rigid object takes milliseconds to compute" in changed
-    there = [line for line in text.splitlines() if not line.startswith(("x =", "y ="))]
+    resting = re.sub(r"path = \[.*?\n\]\n", "", text, flags=re.DOTALL)
+    assert resting != text
+    there = [line for line in resting.splitlines() if not line.startswith(("x =", "y ="))]
     left = iter(changed.splitlines())
     assert all(line in left for line in there)
 
@@ -105,14 +111,39 @@ def _pressed_at(scene) -> float:
     return next(time for time in times if loads_at(scene, time))
 
 
-def test_a_touch_stops_at_the_rim() -> None:
-    for name in ("sphere", "line", "two-contacts"):
-        scene = load_scene(name)
-        time = _pressed_at(scene)
-        held = GrabbedStimulus.at_place(scene, time, 0.05, 0.05)
-        assert held is not None
-        before = held.moved_to(0.055, 0.05)
-        assert held.moved_to(5.0, 0.05).stimuli == before.stimuli
+@pytest.mark.parametrize(
+    ("name", "most"),
+    [("sphere", 0.1), ("line", 0.1), ("two-contacts", 0.08), ("fingertip-cap", 0.01844)],
+)
+def test_a_touch_stops_at_the_rim(name: str, most: float) -> None:
+    scene = load_scene(name)
+    held = GrabbedStimulus.at_place(scene, _pressed_at(scene), 0.05, 0.05)
+    assert held is not None
+    held.moved_to(0.055, 0.05)
+    load = held.moved_to(5.0, 0.05).stimuli[held.number].what
+    reached = load.x1 if name == "line" else load.x
+    assert reached == pytest.approx(most, abs=2e-4)
+    read(shifted(text_of(name), held.number, *held.by), name)  # the text is a scene too
+
+
+def test_a_touch_that_is_held_rests_with_its_whole_force() -> None:
+    scene = load_scene("fingertip-cap")
+    held = GrabbedStimulus.at_place(scene, 2.7, 0.009, 0.011)  # nothing presses then
+    assert held is not None
+    assert held.moved
+    for played in (
+        held.resting,
+        read(shifted(text_of("fingertip-cap"), held.number, *held.by), ""),
+    ):
+        for time in (0.0, 2.7, 5.9):
+            load = next(each.load for each in loads_at(played, time) if each.number == held.number)
+            assert load.centre() == pytest.approx((0.009, 0.011))
+            assert load.force == 0.1
+    grabbed = GrabbedStimulus.at_place(scene, 4.0, 0.01, 0.01)
+    assert grabbed is not None
+    (rolling,) = loads_at(scene, 4.0)
+    assert not grabbed.moved  # it stands where it was until it is moved
+    assert grabbed.resting.stimuli[2].what.centre() == pytest.approx(rolling.load.centre())
 
 
 def test_of_two_touches_the_nearer_one_is_held() -> None:

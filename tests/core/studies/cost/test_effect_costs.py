@@ -66,6 +66,7 @@ def now(found: dict[str, EffectCost]) -> float:
 # Every scene
 
 
+@pytest.mark.cases("centre", "failing-elements", "fingertip", "on-foam")
 @pytest.mark.parametrize("name", ["centre", "fingertip", "failing-elements", "pencil", "on-foam"])
 def test_every_effect_that_there_is_and_no_other_is_told_as_the_plan_has_it(name) -> None:
     found = ready(name)

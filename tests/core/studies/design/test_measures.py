@@ -5,6 +5,8 @@ import pytest
 
 from kappaskin import Refusal
 from kappaskin.estimation import METHODS
+from kappaskin.skin import Cap
+from kappaskin.studies.design.measures import _distance
 from kappaskin.studies.design.results import BlockTask, run_task, version
 
 POINT = 'what = "point"\nx = 0.05\ny = 0.03\nforce = 0.1'
@@ -167,3 +169,26 @@ def test_nothing_changes_by_what_is_measured_before(study_of, method):
         return measured(study_of("", ("[fit]", f'[fit]\nmethod = "{method}"'), names))["rms"]
 
     assert rms("contact", "time") == rms("time") == rms()
+
+
+def test_errors_of_contact_and_force_are_what_is_predicted_of_noise(study_of):
+    disc = 'what = "disc"\nx = 0.06\ny = 0.035\nradius = 0.006\nforce = 0.5'
+    names = "contact", "force", "predicted-contact", "predicted-force"
+    of_disc = 'what = "point"\nx = 0.05\ny = 0.03\nforce = 0.1', disc
+    fine = "rate = 10.0", "rate = 10.0\nreference = [24, 24]"
+
+    found = measured(study_of("", fine, of_disc, measuring(*names, frames=400)))
+
+    for name in ("contact", "force"):
+        assert found[name].mean == pytest.approx(found[f"predicted-{name}"].mean, rel=0.15)
+        assert found[f"predicted-{name}"].count == 1
+
+
+def test_errors_of_the_contact_are_measured_along_a_cap():
+    cap, pole = Cap(8e-3), 8e-3 * np.pi / 2
+    at_equator = np.array([[pole + 0.99 * pole, pole]])
+    turned = pole + 0.99 * pole * np.array([[np.cos(0.1), np.sin(0.1)]])
+
+    # A tenth of a radian around, where the radius is nearly that of the sphere.
+    assert _distance(cap, turned, at_equator)[0] == pytest.approx(0.1 * 8e-3, rel=2e-3)
+    assert np.isnan(_distance(cap, np.full((1, 2), np.nan), at_equator)).all()

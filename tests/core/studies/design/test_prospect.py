@@ -6,9 +6,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kappaskin import Disk, Patch, Plate, PointLoad, Refusal, Scene, SensorLayout, predicted_sd
+from kappaskin import (
+    Disk,
+    LineLoad,
+    Patch,
+    Plate,
+    PointLoad,
+    Refusal,
+    Scene,
+    SensorLayout,
+    predicted_sd,
+)
 from kappaskin.bases import edges_of
+from kappaskin.mechanics import DiscLoad
 from kappaskin.scenes.effects import GaussianNoise
+from kappaskin.skin import Cap
 from kappaskin.studies import Design, check, prospect
 
 FLAT, DISK = Patch(0.1, 0.1), Disk(0.05)
@@ -116,3 +128,94 @@ def test_placed_elements_are_as_many_and_tell_more_of_what_they_are_placed_for()
 def test_a_design_that_cannot_be_is_refused(change, words):
     with pytest.raises(Refusal, match=words):
         prospect(replace(designed(), **change))
+
+
+CAP = Cap(8e-3, math.radians(75))
+
+
+def pressed_cap(by: str = "scene", noise: float = 0.06, patch: Patch = CAP) -> Design:
+    """60 elements on a cap, or 7 x 7 on another skin, under a disc of 1.5 mm."""
+    round_ = isinstance(patch, Cap)
+    layout = SensorLayout.in_spiral(patch, 60) if round_ else SensorLayout.regular(patch, 7, 7)
+    load = DiscLoad(patch.a / 2, patch.b / 2, 1.5e-3, 0.1)
+    plate = Plate(patch, rigidity=1e-3, thickness=1e-3)
+    edge = edges_of(patch)[0] if not round_ else "clamped"
+    scene = Scene("design", plate, layout, effects=(GaussianNoise(noise),), edge=edge)
+    scene = replace(scene, reference=(14, 29) if round_ else (24, 24)).touched_by(load)
+    return Design(scene, (5, 5), by)
+
+
+def test_the_rms_is_that_over_the_true_area_of_a_cap():
+    design = pressed_cap()
+    estimator = design.estimator()
+    points, weights = estimator.basis.quadrature()
+
+    variance = predicted_sd(estimator, 0.06, points) ** 2
+
+    assert prospect(design).rms == pytest.approx(
+        math.sqrt(np.average(variance, weights=weights)), 2e-3
+    )
+
+
+DOME = Patch(0.03, 0.03, (0.08, 0.08))
+
+
+@pytest.mark.parametrize(
+    "patch", [DOME, pytest.param(CAP, marks=pytest.mark.full)], ids=["dome", "cap"]
+)
+@pytest.mark.parametrize("of", ["contact", "force"])
+def test_presses_all_over_a_skin_err_by_about_what_is_predicted(patch, of):
+    design = pressed_cap(patch=patch)
+    predicted, found = prospect(design, of), next(check(design, 250, of))
+
+    pressed = np.isfinite(found.sd)
+    shares = found.sd[pressed] / predicted.sd[pressed]
+
+    assert found.frames == np.count_nonzero(pressed) == 250
+    # Of 250 normal errors the RMS is known to 6 %; a size that hardly shows takes the error of the
+    # force below the prediction.
+    assert 0.75 < np.sqrt(np.mean(shares**2)) < 1.2
+
+
+def test_errors_of_contact_and_force_are_proportional_to_noise_over_force():
+    once, twice, harder = (pressed_cap(patch=DOME, noise=noise) for noise in (50, 100, 100))
+    load = harder.scene.loads[0].scaled(2)
+    harder = replace(harder, scene=harder.scene.touched_by(load))
+
+    for of in ("contact", "force"):
+        error = prospect(once, of).median
+        assert prospect(twice, of).median == pytest.approx(2 * error, 1e-3)
+        assert prospect(harder, of).median == pytest.approx(error, 1e-3)
+
+
+def test_half_of_the_skin_errs_by_less_than_the_median():
+    found = prospect(pressed_cap(patch=DOME), "contact")
+
+    less = found.sd < found.median
+    known = np.isfinite(found.sd)
+    assert found.shares[less].sum() == pytest.approx(found.shares[known].sum() / 2, rel=1e-2)
+    assert found.median < found.rms < found.worst
+
+
+def test_errors_of_contacts_are_predicted_of_a_point_or_a_disc_alone():
+    design = pressed_cap()
+    line = LineLoad(0.004, 0.004, 0.006, 0.006, 0.1)
+    other = replace(design, scene=design.scene.touched_by(line))
+
+    with pytest.raises(Refusal, match="one point or disc"):
+        prospect(other, "contact")
+    with pytest.raises(Refusal, match="displacement, contact, force"):
+        prospect(design, "slip")
+
+
+@pytest.mark.parametrize("by", ["D", "A"])
+def test_elements_placed_on_a_cap_stand_apart_on_the_skin(by):
+    design = pressed_cap(by)
+    layout = design.estimator().layout
+    places = layout.patch.at_rest(layout.positions)[0]
+
+    away = np.linalg.norm(places[:, None] - places, axis=-1)[np.triu_indices(60, 1)]
+    mean = math.sqrt(2 * math.pi * 8e-3**2 * (1 - math.cos(math.radians(75))) / 60)
+    assert len(places) == 60
+    assert away.min() > 0.4 * mean * (1 - 1e-6)
+    assert prospect(design).rms < 0.6 * prospect(pressed_cap()).rms
