@@ -15,7 +15,7 @@ from scipy import linalg
 
 from kappaskin.bases import basis_for
 from kappaskin.contact.element_grid import element_grid
-from kappaskin.contact.influence import CUBICS, Single, cap_half_wave, cap_table
+from kappaskin.contact.influence import CUBICS, SPLINES, Single, cap_half_wave, cap_table
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Indices, Mask
 from kappaskin.mechanics import Plate, layer_compliance
@@ -337,9 +337,9 @@ class SkinOnCap(ElasticSkin):
     def _take(self, plate: Plate, layout: SensorLayout, edge: str, functions: int) -> None:
         places, length = layout.positions.tobytes(), layout.gage_length
         table, self._steps, _ = cap_table(plate, edge, places, length)
-        # As under a point: even in the radius of the discs, which are of 1.5 and of 0.5 steps.
-        under = (1.125 * table[:, :, 1] - 0.125 * table[:, :, 0]) / (8 * math.pi * plate.rigidity)
-        self._table = under.astype(np.float32)
+        # As under a point: even in the radius, 9/8 of the spline at 0.5 steps less 1/8 at 1.5.
+        shares = np.array([9, 36, 8, -4, -1]) / (48 * 8 * math.pi * plate.rigidity)
+        self._table = np.tensordot(shares.astype(np.float32), table[:, :, :5], (0, 2))
         self._plate, self._positions = plate, layout.positions
         self._reach = _AROUND_CONTACT * self._steps[0]
         self.side = 2 * self._reach
@@ -361,8 +361,10 @@ class SkinOnCap(ElasticSkin):
         at = cap.around(x, y, np.stack(np.meshgrid(nodes, nodes), -1).reshape(-1, 2))
         dx, dy = (at - cap.rim_radius).T
         away = np.minimum(np.hypot(dx, dy), cap.rim_radius)
-        i, turn, _ = _cubic(np.arctan2(dy, dx) % (2 * np.pi) / turns + 1, self._table.shape[1])
-        j, along, _ = _cubic(away / step + 1, len(self._table))
+        i, turn, _ = _cubic(
+            np.arctan2(dy, dx) % (2 * np.pi) / turns + 1, self._table.shape[1], SPLINES
+        )
+        j, along, _ = _cubic(away / step + 1, len(self._table), SPLINES)
         self._local = np.zeros((len(at), self._table.shape[2]), np.float32)
         for k, m in np.ndindex(4, 4):
             share = (turn[:, k] * along[:, m]).astype(np.float32)
@@ -436,7 +438,7 @@ def _green(plate: Plate, square: float, far: float) -> Array:
     return whole - r**2 * np.log(r / far * 3) / (8 * np.pi * D)
 
 
-def _cubic(at: Array, nodes: int) -> tuple[Indices, Array, Array]:
+def _cubic(at: Array, nodes: int, of: Array = CUBICS) -> tuple[Indices, Array, Array]:
     """The first (...) of four even nodes around `at` (...), their weights (..., 4), and slopes."""
     i = np.minimum(np.maximum(at.astype(int) - 1, 0), nodes - 4)
     u, powers = at - i, np.zeros((2, *at.shape, 4))
@@ -447,7 +449,7 @@ def _cubic(at: Array, nodes: int) -> tuple[Indices, Array, Array]:
     np.multiply(u, u, out=value[..., 2])
     np.multiply(value[..., 2], u, out=value[..., 3])
     np.multiply(value[..., 2], 3, out=slope[..., 3])
-    values, slopes = powers @ CUBICS
+    values, slopes = powers @ of
     return i, values, slopes
 
 

@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 from functools import lru_cache
+from itertools import product
 from typing import Protocol, cast
 
 import numpy as np
@@ -40,6 +41,14 @@ class Influence(Protocol):
 
         The readings of one that lies under the load depend on how it is spread over it: its
         variance is 1 + `share`.
+        """
+        ...
+
+    def profile(self, s: float) -> Array | None:
+        """What the readings of a Gaussian load at the last place differ by from those of `at`.
+
+        Of one as wide, with the standard deviation sqrt(s) / 2 each way, and its derivatives,
+        (4, C), on a cap, where they differ all around; else None, and `trust` is to be used.
         """
         ...
 
@@ -113,6 +122,9 @@ class _OfFunctions:
         return np.stack([f, share @ f_x, share @ f_y, outward[0] @ f_x + outward[1] @ f_y])
 
     def trust(self, s: float, share: float) -> Array | None:
+        return None
+
+    def profile(self, s: float) -> Array | None:
         return None
 
     def gives(self, x: float, y: float) -> float:
@@ -279,8 +291,10 @@ def _is_stiff(plate: Plate) -> bool:
     return max(plate.tension * near**2, plate.foundation * near**4) < D
 
 
-CUBICS = np.linalg.inv(np.vander(np.arange(4.0), increasing=True).T).T
+CUBICS = np.asarray(np.linalg.inv(np.vander(np.arange(4.0), increasing=True).T).T, float)
 """Lagrange's cubics through four even nodes, by the powers of the place."""
+SPLINES: Array = np.array([[8, -5, 4, -1], [-12, 21, -12, 3], [6, -15, 12, -3], [-1, 3, -3, 1]]) / 6
+"""The same of a cubic spline, between the second and third of four nodes."""
 _BESIDE = 2.5  # of a load's squared radius: an element as far off does not lie under it
 
 
@@ -347,6 +361,9 @@ class _OfPlate:
     def trust(self, s: float, share: float) -> Array | None:
         return _trust(self._disc.t, s, share)
 
+    def profile(self, s: float) -> Array | None:
+        return None
+
     def gives(self, x: float, y: float) -> float:
         i, j, u, v = self._among_nodes(x, y)
         of_x, of_y = np.dot(((1.0, u, u * u, u * u * u), (1.0, v, v * v, v * v * v)), CUBICS)
@@ -390,82 +407,122 @@ class _OfDirections:
     def trust(self, s: float, share: float) -> Array | None:
         return self._of.trust(s, share)
 
+    def profile(self, s: float) -> Array | None:
+        rows = self._of.profile(s)
+        if rows is None:
+            return None
+        turned: Array = np.einsum("cr,ncr->nr", self._parts, rows[:, self._channels])
+        return turned
+
     def gives(self, x: float, y: float) -> float:
         return self._of.gives(x, y)
 
 
 class _OfCap:
-    """A cap's: a table of what a load over discs of several radii makes, summed until it stands."""
+    """A cap's: a table of what discs and Gaussian loads of several sizes make.
+
+    It is summed until it stands, and a cubic spline between its nodes.
+    """
 
     sized = True
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str, out: Array) -> None:
-        self._cap = cap = cast("Cap", plate.patch)
+        self._cap = cast("Cap", plate.patch)
         self.unit = 8 * math.pi * plate.rigidity
         places, length = layout.positions.tobytes(), layout.gage_length
         self._table, self._steps, self._gives = cap_table(plate, edge, places, length)
-        self._positions, self._out = layout.positions, out
-        inverse = np.linalg.inv(cap.base(*layout.positions.T).covariant[:, 1:3, 1:3])
-        self._tangents = np.swapaxes(inverse, 1, 2)  # from steps along x and y
-        self._last = [n - 4 for n in self._table.shape[:3]]
-        self._block, self._weights = lru_cache(16)(self._block_at), np.empty((4, 4, 16))
-        self.t = np.empty(len(layout))
+        self._out = out
+        self._last, self._discs = [n - 4 for n in self._table.shape[:3]], len(_radii(1))
+        self._block, self._first = lru_cache(32)(self._block_at), (0, 0)
+        self._of_place: Array = np.empty((3, 4, 4))
+        self._difference: Array = np.empty(out.shape)
+        self._weights = np.empty((4, 4, 4, 4), np.float32)
         self.nodes: tuple[Array, Single] | None = self._searched()
 
     def _searched(self) -> tuple[Array, Single]:
         """`nodes`: rings of the table, as far apart as the places on them."""
         table, (step, step_t, step_r) = self._table, self._steps
         found = list[tuple[int, int, int]]()
-        for i in range(1, table.shape[0], _RINGS):
+        for i in range(1, table.shape[0] - 1, _RINGS):
             radius = float(self._cap.meridian(np.array((i - 1) * step)).radius)
             around = max(round(2 * math.pi * radius / (_RINGS * step)), 1)
             for n in range(around):
                 turn = 1 + n * (table.shape[1] - 3) // around
-                found += [(i, turn, size) for size in _SEARCHED_SIZES]
-        ring, turn, size = np.array(found).T
+                found += [(turn, size, i) for size in _SEARCHED_SIZES]
+        turn, size, ring = np.array(found).T
         angle, away = (turn - 1) * step_t, (ring - 1) * step
         offset = away * np.stack([np.cos(angle), np.sin(angle)])
         s = ((size - 1.5) * step_r) ** 2
         places: Array = np.column_stack([*(self._cap.rim_radius + offset), s])
-        return places, table[ring, turn, size]
+        read: Single = np.zeros((len(places), table.shape[3]), np.float32)
+        for i, j, k in product((-1, 0, 1), repeat=3):
+            share = 4.0 ** (3 - abs(i) - abs(j) - abs(k)) / 216
+            read += np.float32(share) * table[ring + i, turn + j, size + k]
+        return places, read
 
     def _block_at(self, i: int, j: int, k: int) -> Single:
         return self._table[i : i + 4, j : j + 4, k : k + 4].reshape(64, -1)
 
     def at(self, x: float, y: float, s: float) -> None:
-        r, dx, dy = math.sqrt(s), x - self._cap.rim_radius, y - self._cap.rim_radius
-        away = np.einsum("pij,pj->pi", self._tangents, self._positions - (x, y))
-        self.t = np.vecdot(away, away)
-        step, d = self._steps, math.hypot(dx, dy)
-        if d < (near := _AT_POLE * step[0]):
+        dx, dy = x - self._cap.rim_radius, y - self._cap.rim_radius
+        (step, step_t, _), d = self._steps, math.hypot(dx, dy)
+        if d < (near := _AT_POLE * step):
             dx, dy, d = (dx, dy, d) if d else (near, 0.0, near)
             dx, dy, d = dx * near / d, dy * near / d, near
-        places = (
-            d / step[0] + 1,
-            math.atan2(dy, dx) % (2 * math.pi) / step[1] + 1,
-            r / step[2] + 1.5,
-        )
-        first = [min(int(at) - 1, most) for at, most in zip(places, self._last, strict=True)]
-        (along, along_s), (turn, turn_t), (size, size_r) = (
-            np.dot(((1.0, u, u * u, u * u * u), (0.0, 1 / h, 2 * u / h, 3 * u * u / h)), CUBICS)
-            for u, h in ((at - i, h) for at, i, h in zip(places, first, step, strict=True))
-        )
-        W, cos, sin = self._weights, dx / d, dy / d
-        here = np.outer(turn, size).ravel()
-        outward, around = np.outer(along_s, here), np.outer(along, np.outer(turn_t / d, size))
-        np.outer(along, here, W[0])
+        azimuth, (last, last_t, _) = math.atan2(dy, dx) % (2 * math.pi), self._last
+        i, along, along_s = _spline(d / step + 1, step, last)
+        j, turn, turn_t = _spline(azimuth / step_t + 1, step_t, last_t)
+        cos, sin = dx / d, dy / d
+        outward, around = np.outer(along_s, turn), np.outer(along, turn_t / d)
+        W = self._of_place
+        np.outer(along, turn, W[0])
         W[1] = cos * outward - sin * around
         W[2] = sin * outward + cos * around
-        np.outer(along, np.outer(turn, size_r / (2 * r)), W[3])
-        self._out[:] = W.reshape(4, 64).astype(np.float32).dot(self._block(*first))
+        self._first = i, j
+        self._out[:] = self._under(s, 0, 1)
+
+    def _under(self, s: float, begin: int, coarser: int) -> Single:
+        """Readings and derivatives (4, C) of a load of size s, by sizes of the table."""
+        r, step, (i, j) = math.sqrt(s), coarser * self._steps[2], self._first
+        k, size, size_r = _spline(r / step + 1.5, step, self._last[2])
+        W, here = self._weights, self._of_place[..., None]
+        np.multiply(here, size, W[:3])
+        np.multiply(here[0], size_r / (2 * r), W[3])
+        return W.reshape(4, 64).dot(self._block(i, j, begin + k))
 
     def trust(self, s: float, share: float) -> Array | None:
-        return _trust(self.t, s, share)
+        return None
+
+    def profile(self, s: float) -> Array | None:
+        np.subtract(self._under(s, self._discs, _COARSER), self._out, self._difference)
+        return self._difference
 
     def gives(self, x: float, y: float) -> float:
         d = math.hypot(x - self._cap.rim_radius, y - self._cap.rim_radius)
         at = np.linspace(0, self._cap.rim_radius, len(self._gives))
         return float(np.interp(d, at, self._gives))
+
+
+def _coefficients(nodes: int) -> Array:
+    """The map (n + 1, n) from values at even nodes to the coefficients of a cubic spline.
+
+    The last coefficient is that of a node beyond.
+    """
+    A = (np.eye(nodes, k=-1) + 4 * np.eye(nodes) + np.eye(nodes, k=1)) / 6
+    B = np.eye(nodes)
+    for end, inward in ((0, slice(4)), (-1, slice(-1, -5, -1))):
+        A[end], B[end, inward] = np.eye(nodes)[end], np.array([4, 5, -4, 1]) / 6
+    inside = np.asarray(np.linalg.solve(A, B), float)
+    return np.vstack([inside, 6 * np.eye(nodes)[-1] - 4 * inside[-1] - inside[-2]])
+
+
+def _spline(at: float, step: float, last: int) -> tuple[int, Array, Array]:
+    """The first of four nodes around `at`, in steps, their weights, and those of the slope."""
+    i = min(int(at) - 1, last)
+    u = at - i
+    powers = (1.0, u, u * u, u * u * u), (0.0, 1 / step, 2 * u / step, 3 * u * u / step)
+    weights, slopes = np.dot(powers, SPLINES)
+    return i, weights, slopes
 
 
 _WAVES = 28  # functions along the meridian of a cap that a load is followed by
@@ -474,30 +531,44 @@ _AT_POLE = 1e-3  # of a step: nearer, it is taken for a place so far away
 _RINGS = 2  # steps between the places searched
 _SEARCHED_SIZES = 3, 6, 10  # of the table: radii of 1.5, 4.5 and 8.5 steps
 _SIZES = 0.2  # of the box: the largest radius of a load
+_COARSER = 2  # times the step between sizes, of Gaussian loads, whose readings are smoother
 _TINY = 1e-15  # of the largest of a sum's terms
+
+
+def _radii(steps: int) -> Array:
+    """Radii of loads in steps of the table, every so many."""
+    return steps * np.abs(np.arange(math.ceil(_SIZES * _ON_CAP / steps) + 4) - 1.5)
 
 
 @lru_cache(2)
 def cap_table(
     plate: Plate, edge: str, places: bytes, gage_length: float
 ) -> tuple[Single, tuple[float, ...], Array]:
-    """Readings (S, T, Q, C) in 1/m per N under discs, the steps, and displacements in m per N.
+    """Splines of the readings (S, T, Q, C) in 1/m per N, the steps, and displacements in m per N.
 
-    By distance from the pole from -1 step, azimuth from -1 step, and radius of the disc from -3/2
-    steps; the steps are in m, rad and m. The displacements under a point load are at even distances
-    from the pole to the rim.
+    By distance from the pole from -1 step, azimuth from -1 step, and size of the load; the steps
+    are in m, rad and m. Sizes are radii of discs from -3/2 steps, then those of Gaussian loads as
+    wide, every `_COARSER` steps. The displacements under a point load are at even distances from
+    the pole to the rim.
     """
     cap = cast("Cap", plate.patch)
     k, along, rows, gives = _waves_on_cap(plate, edge, places, gage_length)
     step, (_, M, _, C) = cap.a / _ON_CAP, rows.shape
-    radii = np.abs(np.arange(math.ceil(_SIZES * _ON_CAP) + 4) - 1.5) * step
     turns = math.ceil(np.pi * _rim_share(cap) * _ON_CAP)
-    felt = np.multiply.outer(radii, k)
-    share: Array = np.swapaxes(2 * scipy.special.j1(felt) / felt, 0, 1)
+    discs, gaussians = step * _radii(1), step * _radii(_COARSER)
+    of_discs, of_gaussians = (_coefficients(len(of))[:-1] for of in (discs, gaussians))
+    r, u = np.multiply.outer(discs, k), np.multiply.outer(gaussians, k)
+    means = (
+        np.tensordot(of_discs, 2 * scipy.special.j1(r) / r, 1),
+        np.tensordot(of_gaussians, np.exp(-u * u / 8), 1),
+    )
+    share = np.swapaxes(np.concatenate(means), 0, 1)
+    along = np.tensordot(_coefficients(len(along)), along, 1)
     azimuths = 2 * np.pi / turns * np.arange(-1.0, turns + 2)
     turn = np.multiply.outer(azimuths, np.arange(float(M)))
-    around: Single = np.hstack([np.cos(turn), np.sin(turn)]).astype(np.float32)
-    table = np.empty((len(along), len(around), len(radii), C), np.float32)
+    sharper = 3 / (2 + np.cos(turn[2]))  # the coefficients of a wave's spline over it
+    around: Single = np.hstack([sharper * np.cos(turn), sharper * np.sin(turn)]).astype(np.float32)
+    table = np.empty((len(along), len(around), share.shape[1], C), np.float32)
     # Ring by ring: what a ring is made of stays in the cache.
     for ring, shape in zip(table.reshape(*table.shape[:2], -1), along, strict=True):
         by_m: Single = (share * shape[:, None]).astype(np.float32) @ rows

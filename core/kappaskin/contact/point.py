@@ -52,7 +52,7 @@ def _waves(count: int) -> Array:
 _SIGNIFICANT = 30.0  # drop of chi-squared below which a contact may be noise found by searching
 _SEARCHED = 33  # points searched along each side
 _NODES = 64  # of them whose normal equations are kept
-_TRIED = 2  # loads on a cap that a step is taken from, before one is refined
+_TRIED = 3  # loads on a cap that a step is taken from, before one is refined
 _FUNCTIONS = 15  # along each side, of the shape searched for
 _STEPS = 20  # of Gauss-Newton at most; 1 or 2 do but for the last millimetres at the rim
 _WORTH = 2.0  # variances of the noise: after a step that gains less, another one is not worth it
@@ -67,6 +67,8 @@ _DOUBTFUL = 0.15  # of a side: within it, a contact may be one on the rim
 _RIM = 1 / 15  # of a side: within it, a load moves the skin too little to be told
 _START, _LEAST, _LARGEST = 0.03, 1e-3, 0.2  # of the shorter side: radius of a load
 _PROFILE = 0.27  # of P / (8 pi D): by so much a disc and a Gaussian differ in their middle
+_TO_GAUSSIAN = 0.5  # of the way from a disc: the profile of a load, whose standard deviation is as
+_FURTHER = -1.0, 2.0  # much; and how far along that way slopes are followed
 
 _AS_WELL = 1.2  # times the residual of the fitted shape that a single load may leave
 _REGION = 7.81  # variances: drop of chi-squared in the 95 % region of x, y and size
@@ -94,12 +96,14 @@ class _Linearised(NamedTuple):
     """The load at a place: the best step from there, and the error bars.
 
     `steps` are the force after the step, in units of the influence, and that force times the steps
-    in x, y and s; `inverse` (4, 4) or (3, 3) their covariance for unit noise. `left` is the sum of
-    squares of the readings after the step, `gain` what the step takes off it, `power` that of the
-    readings; `weights` (3 P,) are those of all these, None where all are 1.
+    in x, y and s; `profile` is that times how far the profile is from the usual one; `inverse`
+    (4, 4) or (3, 3) their covariance for unit noise. `left` is the sum of squares of the readings
+    after the step, `gain` what the step takes off it, `power` that of the readings; `weights` (R,)
+    are those of all these, None where all are 1.
     """
 
     steps: list[float]
+    profile: float
     inverse: Array
     left: float
     gain: float
@@ -116,11 +120,13 @@ class PointContact:
     contact is missed: T = M t there, with t = compliance times what each function of `basis` feels
     (Eqs. 2, 9), and T'K is one map from M'K; on a cap, where a skin bends close around a load
     only, at `Influence.nodes`, of several sizes. Gauss-Newton steps in x, y, s and P refine it with
-    the `Influence`, which no number of functions cuts short. What readings right under the load
-    depend on how it is spread is added to their variance. Along the `free` directions (d, R), as
-    those of a drift, the readings may be anything: they are fitted beside the load. So are, unless
-    others are given, the offsets of quantities of an unknown zero. Readings are weighted by
-    `sigma`, that of each.
+    the `Influence`, which no number of functions cuts short. How the load is spread over its size
+    is unknown. On a cap, where it is read all around, it is fitted: T is that of a disc and a share
+    of what a Gaussian as wide differs from it by, 1/2 with a standard deviation of 1/2. Elsewhere
+    it is read right under the load alone; that is added to the variance there. Along the `free`
+    directions (d, R), as those of a drift, the readings may be anything: they are fitted beside the
+    load. So are, unless others are given, the offsets of quantities of an unknown zero. Readings
+    are weighted by `sigma`, that of each.
     """
 
     def __init__(
@@ -139,9 +145,9 @@ class PointContact:
         self._free = layout.offsets.T if free is None else free
         if self._scale is not None:
             self._free = self._free * self._scale
-        # The readings of a load, their derivatives by x, y and s, what the elements read, and the
-        # directions along which that may be anything.
-        self._rows = np.zeros((5 + len(self._free), len(self._M)))
+        # The readings of a load, their derivatives by x, y and s, what the elements read, how a
+        # Gaussian load differs, and the directions along which what is read may be anything.
+        self._rows = np.zeros((6 + len(self._free), len(self._M)))
         self._influence = influence_of(plate, layout, edge, _FUNCTIONS, self._rows[:4])
         self._unknowns = 4 if self._influence.sized else 3
         self._theory_error = plate.theory_error
@@ -155,6 +161,7 @@ class PointContact:
             (share * side) ** 2 for share in (_START, _LEAST, _LARGEST)
         )
         self._nodes = self._influence.nodes
+        self._fits_profile = self._nodes is not None
         if self._nodes is None:
             points = np.stack(np.meshgrid(self._x, self._y), -1).reshape(-1, 2)
             self._places = np.column_stack([points, np.full(len(points), self._start)])
@@ -241,7 +248,7 @@ class PointContact:
             x, y, s = self._peak(explained, node)
             if self._stretched is not None:
                 self._stretched.begin(x, y, float(fit.jet(x, y)[0][0]))
-            here = self._linearised(x, y, s, 0.0, tables, variance)
+            here = self._linearised(x, y, s, None, tables, variance)
         return self._refined(x, y, s, here, tables, variance, fit, most)
 
     def _searched(self, K: Array) -> Array:
@@ -269,8 +276,8 @@ class PointContact:
             known, tables = np.where(used, K, 0.0), self._cache(used, self._tables)
         if len(tables.free):
             known = known - (tables.free @ known) @ tables.free
-            self._rows[5:] = 0.0
-            self._rows[5 : 5 + len(tables.free)] = tables.free
+            self._rows[6:] = 0.0
+            self._rows[6 : 6 + len(tables.free)] = tables.free
         return known, tables
 
     def _first(self, node: int) -> _Linearised:
@@ -281,7 +288,10 @@ class PointContact:
         return self._step(s, first, inverse, rows.dot(K), float(K.dot(K)), None)
 
     def _node(self, node: int) -> tuple[Array, float, Array]:
-        self._influence.at(*self._places[node].tolist())
+        x, y, s = self._places[node].tolist()
+        self._influence.at(x, y, s)
+        if (profile := self._influence.profile(s)) is not None:
+            self._rows[:4] += _TO_GAUSSIAN * profile
         rows = self._rows[: self._unknowns].copy()
         H = rows.dot(rows.T)
         return rows, H.item(0, 0), _inverse(H)
@@ -298,23 +308,30 @@ class PointContact:
         most: float,
     ) -> Contact:
         a, b, force = _FURTHEST * self.patch.a, _FURTHEST * self.patch.b, 0.0
-        hopeless = False
+        hopeless, there, cost = False, (x, y, s), math.inf
         for _ in range(_STEPS):
             if hopeless := here.left - _HOPE * here.gain > most:
                 break
-            before, (force, dx, dy, ds) = force, here.steps
-            x, y = self.patch.inward(
-                x + _clamped(-a, dx / force, a), y + _clamped(-b, dy / force, b)
-            )
-            s = _clamped(self._least, _resized(s, ds / force), self._largest)
-            variance, gain = here.left / tables.spare, here.gain
-            if self._stretched is not None:  # the readings are not linear in the force
-                self._stretched.move(force, dx, dy)
-                gain += (force - before) ** 2 / here.inverse.item(0, 0)
-            if gain <= self._worth(x, y) * variance + _NO_GAIN * here.power:
-                break
-            here = self._linearised(x, y, s, force, tables, variance)
+            worth = self._worth(x, y) * variance
+            if self._fits_profile and here.left + here.gain > cost + worth:
+                x, y, s = (x + there[0]) / 2, (y + there[1]) / 2, (s + there[2]) / 2
+            else:
+                there, cost = (x, y, s), here.left + here.gain
+                before, (force, dx, dy, ds) = force, here.steps
+                x, y = self.patch.inward(
+                    x + _clamped(-a, dx / force, a), y + _clamped(-b, dy / force, b)
+                )
+                s = _clamped(self._least, _resized(s, ds / force), self._largest)
+                variance, gain = here.left / tables.spare, here.gain
+                if self._stretched is not None:  # the readings are not linear in the force
+                    self._stretched.move(force, dx, dy)
+                    gain += (force - before) ** 2 / here.inverse.item(0, 0)
+                if gain <= self._worth(x, y) * variance + _NO_GAIN * here.power:
+                    break
+            here = self._linearised(x, y, s, here, tables, variance)
         self.rest = self._rows[4] - np.dot(here.steps[: self._unknowns], self.linear)
+        if here.profile:
+            self.rest -= here.profile * self._rows[5]
         if tables.weights is not None:
             self.rest *= tables.weights
         if len(tables.free):
@@ -327,21 +344,43 @@ class PointContact:
         return _WORTH_AT_RIM if self.patch.near_rim(x, y, _CAREFUL) else _WORTH
 
     def _linearised(
-        self, x: float, y: float, s: float, force: float, tables: _Tables, variance: float
+        self,
+        x: float,
+        y: float,
+        s: float,
+        last: _Linearised | None,
+        tables: _Tables,
+        variance: float,
     ) -> _Linearised:
-        """The best step from a load at (x, y) of size s and about this `force`."""
+        """The best step from a load at (x, y) of size s, where the `last` one led."""
         self._influence.at(x, y, s)
+        profile = self._influence.profile(s) if last and variance else None
+        force, weights = last.steps[0] if last else 0.0, tables.weights
+        if last and profile is not None:
+            self._rows[5] = profile[0]
+            self._rows[0] += _TO_GAUSSIAN * profile[0]
+            least, most = _FURTHER
+            along = _clamped(least, _TO_GAUSSIAN + last.profile / force, most)
+            self._rows[1:4] += along * profile[1:]
+        else:
+            weights = self._weights(s, force, tables, variance)
         if self._stretched is not None:
             self._rows[4] = self._readings
             self._stretched.stretch(x, y, s, self._influence.unit, self._rows)
-        weights = self._weights(s, force, tables, variance)
         rows = self._rows if weights is None else self._rows * weights
-        products = _without_free(rows.dot(self._rows.T))
-        n = self._unknowns
+        products, n = _without_free(rows.dot(self._rows.T)), self._unknowns
         self.linear = self._rows[:n]
-        H, g = products[:n, :n], products[:n, 4]
-        first = H.item(0, 0)
-        return self._step(s, first, _inverse(H), g, products.item(4, 4), weights)
+        H, g, power = products[:n, :n], products[:n, 4], products.item(4, 4)
+        if profile is None:
+            return self._step(s, H.item(0, 0), _inverse(H), g, power, weights)
+        # The profile is eliminated: it is determined by what the elements read and beforehand.
+        beside, known = products[5, :5], variance / (_TO_GAUSSIAN * force) ** 2
+        share = beside / (products.item(5, 5) + known)
+        np.subtract(H, np.multiply.outer(beside[:n], share[:n]), H)
+        g -= share.item(4) * beside[:n]
+        explained = share.item(4) * beside.item(4)
+        here = self._step(s, H.item(0, 0), _inverse(H), g, power, weights, explained)
+        return here._replace(profile=share.item(4) - float(share[:n].dot(here.steps[:n])))
 
     def _step(
         self,
@@ -351,8 +390,12 @@ class PointContact:
         g: Array,
         power: float,
         weights: Array | None,
+        by_profile: float = 0.0,
     ) -> _Linearised:
-        """The best step of a load of size `s`, from the normal equations and their `inverse`."""
+        """The best step of a load of size `s`, from the normal equations and their `inverse`.
+
+        The profile explains `by_profile` of the `power` alone.
+        """
         at_place, best = g.item(0) ** 2 / first, inverse.dot(g)
         if self._unknowns == 4 and s + best[3] / best[0] < self._least:
             # As small as can be: the best of those that are no smaller.
@@ -361,8 +404,8 @@ class PointContact:
         steps, explained = best.tolist(), float(best.dot(g))
         if self._unknowns == 3:
             steps.append(0.0)
-        left = max(power - explained, 0.0)
-        return _Linearised(steps, inverse, left, explained - at_place, power, weights)
+        left = max(power - by_profile - explained, 0.0)
+        return _Linearised(steps, 0.0, inverse, left, explained - at_place, power, weights)
 
     def _weights(self, s: float, force: float, tables: _Tables, variance: float) -> Array | None:
         """Weights (3 P,) of the readings; None where all are 1."""
@@ -446,10 +489,10 @@ def orthonormal(rows: Array) -> Array:
 
 
 def _without_free(products: Array) -> Array:
-    """The first 5 of `products` (5 + d, 5 + d) of rows, without their parts along the others."""
-    if len(products) == 5:
+    """The first 6 of `products` (6 + d, 6 + d) of rows, without their parts along the others."""
+    if len(products) == 6:
         return products
-    own, beside, free = products[:5, :5], products[:5, 5:], products[5:, 5:]
+    own, beside, free = products[:6, :6], products[:6, 6:], products[6:, 6:]
     free.flat[:: len(free) + 1] += _HARDLY  # a direction that these readings lack is a zero row
     return own - beside.dot(np.linalg.solve(free, beside.T))
 

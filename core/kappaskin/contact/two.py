@@ -201,6 +201,9 @@ class _Loads:
         return self._rows
 
     def _doubt(self, s: float, force: float) -> Array | float:
+        profile = self.influence.profile(s)
+        if profile is not None:
+            return np.square(force * profile[0])
         trust = self.influence.trust(s, (_PROFILE * force) ** 2)
         return 0.0 if trust is None else (1 / trust - 1)[self._element]
 
