@@ -74,9 +74,9 @@ class WidthOnDome(Width):
     """The same on a dome of the curvature `rest`, whose sheet is compressed as well.
 
     Its curvatures are known to the share `inexact` of the object's and the skin's, as a standard
-    deviation. A layer that gives by t per pressure widens the contact of a force F, `soft` = t F in m^3: its
-    pressure is even with a paraboloid of the relative curvature k, with the mean square distance
-    2/3 sqrt(t F / (pi k)) from its middle.
+    deviation. A layer that gives by t per pressure widens the contact of a force F, `soft` = t F in
+    m^3: its pressure is even with a paraboloid of the relative curvature k, with the mean square
+    distance 2/3 sqrt(t F / (pi k)) from its middle.
     """
 
     rest: float

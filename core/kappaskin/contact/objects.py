@@ -323,7 +323,8 @@ def _face(
     Round for a sphere; a bar's two edges as far from its axis as the force on an arc is by RMS.
     """
     per = 2.0 if kind == "sphere" else math.sqrt(2)
-    q = np.array([width.q, width.q - reach * width.measured, max(width.q, 0.0) + reach * width.measured])
+    off = reach * width.measured
+    q = np.array([width.q, width.q - off, max(width.q, 0.0) + off])
     face, low, high = per * np.sqrt(np.maximum(q, 0.0))
     if kind == "edge" and skin.is_dome:  # which its ends do not touch
         return math.nan, (math.nan, math.nan)

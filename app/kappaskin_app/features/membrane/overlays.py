@@ -11,6 +11,7 @@ from kappaskin.contact import ContactObject, placed_object
 from kappaskin.frames import Array, Estimate, Indices
 from kappaskin.mechanics import PlacedObject
 from kappaskin.scenes import Indenter
+from kappaskin.skin import Cap
 from kappaskin_app.features.membrane.annotations import UNLIT, pixels
 from kappaskin_app.features.membrane.loads import LOAD
 from kappaskin_app.features.membrane.membrane import CONTACT, MembraneView
@@ -217,7 +218,7 @@ _ABOVE = 0.35  # of the skin's size: the highest part drawn
 
 
 class ObjectMesh:
-    """Translucent lit mesh of an object, exaggerated in height as the skin is."""
+    """Translucent lit mesh of an object, exaggerated in height as the skin is unless on a cap."""
 
     def __init__(self, plotter: Any, colour: str) -> None:
         self._mesh: Any = pv.PolyData(np.zeros((_OUT * _AROUND, 3)), faces=_faces())
@@ -255,8 +256,10 @@ def _normals(points: Array) -> Array:
 def underside(stands: PlacedObject, skin: DrawnSkin, times: float) -> Array | None:
     """Points (k, 3) in mm of the underside in contact with the drawn skin.
 
-    None where the object is nowhere above the skin.
+    None where the object is nowhere above the skin. On a cap it has its true shape.
     """
+    if isinstance(skin.patch, Cap):
+        times = 1.0  # else the cap's own fall would be exaggerated with it, to a funnel
     reach, (x, y) = (
         min(float(np.hypot(*stands.object_.extent)), skin.side / MM),
         stands.place.tolist(),
@@ -276,8 +279,8 @@ def underside(stands: PlacedObject, skin: DrawnSkin, times: float) -> Array | No
     offsets = np.linspace(0, 1, _OUT)[:, None, None] * far[:, None] * _SIDES
     places = skin.patch.around(x, y, offsets.reshape(-1, 2))
     rise = np.nan_to_num(stands.over(skin.patch, places)[0] - depth, posinf=0.0)
-    rest, out = skin.at_rest(places)
-    return rest + out * (times * MM * rise)[:, None]
+    up = np.array(skin.patch.base(x, y).normal)
+    return skin.at_rest(places)[0] + np.multiply.outer(times * MM * rise, up)
 
 
 def _depth(skin: DrawnSkin, places: Array, height: Array, times: float) -> float:

@@ -248,7 +248,8 @@ class View(ColourRanges):
             "Estimated object",
             "The object that is named from the readings (plane, cylinder, sphere or edge), in "
             "translucent green at the contact, in its size, with the vertical exaggeration of the "
-            "skin; as lines where the true object is drawn. Not drawn while its radius is unknown.",
+            "skin except on a cap; as lines where the true object is drawn. Not drawn while its "
+            "radius is unknown.",
         ),
     )
     show_pressed: bool = setting(
@@ -256,7 +257,8 @@ class View(ColourRanges):
         Switch(
             "True object",
             "The rigid object of a simulated scene, in translucent red, in its size, with the "
-            "vertical exaggeration of the skin. The loads of the panel Load have no object.",
+            "vertical exaggeration of the skin except on a cap. The loads of the panel Load have no "
+            "object.",
         ),
     )
     from_x: float = setting(0.0, _cut("From", "x"))

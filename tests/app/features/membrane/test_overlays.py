@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from kappaskin import Patch, load_scene
+from kappaskin import Cap, Patch, load_scene
 from kappaskin.contact import ContactObject
-from kappaskin.mechanics import PlacedObject
+from kappaskin.mechanics import PlacedObject, Sphere
 from kappaskin_app.features.membrane.overlays import _normals, underside
 from kappaskin_app.shell.drawn_skin import DrawnSkin
 from kappaskin_app.shell.window import MainWindow
@@ -83,6 +83,16 @@ def test_the_normals_of_a_drawn_object_point_to_one_side_of_it() -> None:
     centre = points[0] + (0.0, 0.0, 20.0)
     towards = (centre - points) / 20.0
     np.testing.assert_allclose(np.vecdot(_normals(points), towards), 1.0, atol=0.05)
+
+
+@pytest.mark.parametrize("place", [(0.0105, 0.0105), (0.0135, 0.0085)])
+def test_a_ball_on_a_cap_is_drawn_round_however_the_skin_is_exaggerated(place) -> None:
+    cap = Cap(0.008, 1.3)
+    skin = DrawnSkin(cap, 65, 65)
+    points = underside(PlacedObject(Sphere(0.006), np.array(place), 0.0), skin, 6.0)
+    assert points is not None
+    centre = points[0] + 6.0 * np.array(cap.base(*place).normal)
+    np.testing.assert_allclose(np.linalg.norm(points - centre, axis=1), 6.0, atol=1e-6)
 
 
 def test_the_legend_takes_one_line_in_a_small_window(window, until) -> None:
