@@ -257,8 +257,8 @@ class View(ColourRanges):
         Switch(
             "True object",
             "The rigid object of a simulated scene, in translucent red, in its size, with the "
-            "vertical exaggeration of the skin except on a cap. The loads of the panel Load have no "
-            "object.",
+            "vertical exaggeration of the skin except on a cap. The loads of the panel Load have "
+            "no object.",
         ),
     )
     from_x: float = setting(0.0, _cut("From", "x"))
