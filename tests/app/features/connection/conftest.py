@@ -1,11 +1,12 @@
 """What the tests of connecting share."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
 
 from kappaskin.sources import Port
 from kappaskin_app.features.connection.panel import ConnectionPanel
+from kappaskin_app.shell.window import MainWindow
 
 
 @pytest.fixture
@@ -20,3 +21,17 @@ def shown(qtbot) -> Callable[[ConnectionPanel, list[Port]], ConnectionPanel]:
         return panel
 
     return show
+
+
+@pytest.fixture
+def window(shared_window: MainWindow, until) -> Iterator[MainWindow]:
+    """The window that the tests of a file share, on its simulation before and after each."""
+    session = shared_window.session
+
+    def simulates() -> bool:
+        asked = session.engine.requested.changed.get("source", 0)
+        return session.status.requested >= asked and session.estimate is not None
+
+    until(simulates)
+    yield shared_window
+    session.connect_to("sim:")
