@@ -24,14 +24,7 @@ def shown(qtbot) -> Callable[[ConnectionPanel, list[Port]], ConnectionPanel]:
 
 
 @pytest.fixture
-def window(shared_window: MainWindow, until) -> Iterator[MainWindow]:
-    """The window that the tests of a file share, on its simulation before and after each."""
-    session = shared_window.session
-
-    def simulates() -> bool:
-        asked = session.engine.requested.changed.get("source", 0)
-        return session.status.requested >= asked and session.estimate is not None
-
-    until(simulates)
+def window(shared_window: MainWindow) -> Iterator[MainWindow]:
+    """The window that the tests of a file share, without what was typed before each."""
     yield shared_window
-    session.connect_to("sim:")
+    shared_window.session.connect_to("sim:")
