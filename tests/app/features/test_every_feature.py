@@ -7,16 +7,27 @@ from pathlib import Path
 import pytest
 
 import kappaskin_app
+from kappaskin import Engine
 from kappaskin_app.features import FEATURES
 from kappaskin_app.features.membrane import MembraneFeature
 
 APP = Path(kappaskin_app.__file__).parent
 
 
+@pytest.fixture(scope="module")
+def engine():
+    """One engine for all windows, idle until a test connects a source."""
+    made = Engine()
+    yield made
+    made.close()
+
+
 @pytest.fixture
-def without(left_out, qapp, window_class):
+def without(left_out, engine, qapp, window_class, monkeypatch):
     """A window without a feature."""
-    window = window_class("sim:", installed=[made for made in FEATURES if made is not left_out])
+    monkeypatch.setattr(engine, "close", lambda: None)
+    rest = [made for made in FEATURES if made is not left_out]
+    window = window_class("sim:", engine, rest)
     yield window
     window.close()
     window.deleteLater()
@@ -33,9 +44,19 @@ def _imports(folder: Path) -> set[str]:
     }
 
 
+@pytest.mark.parametrize("left_out", FEATURES, ids=lambda feature: feature.name)
+def test_the_app_starts_and_changes_a_setting_without(left_out, without, qapp) -> None:
+    without.requests.set("functions_x", 5)
+    without.session.tick()
+    qapp.processEvents()
+    assert without.display.settings.functions_x == 5
+    assert set(without.features) == {made.name for made in FEATURES if made is not left_out}
+
+
 @pytest.mark.cases("heatmaps", "membrane")
 @pytest.mark.parametrize("left_out", FEATURES, ids=lambda feature: feature.name)
 def test_the_app_draws_without(left_out, without, until) -> None:
+    without.session.connect_to("sim:")
     without.show()
     if left_out is MembraneFeature:
         until(lambda: without.session.estimate is not None)
@@ -46,15 +67,6 @@ def test_the_app_draws_without(left_out, without, until) -> None:
     without.requests.set("theme", "light")
     until(lambda: without.session.estimate.generation > before)
     assert without.session.estimate.coefficients.shape[-2:] == (5, 8)
-
-
-@pytest.mark.parametrize("left_out", FEATURES, ids=lambda feature: feature.name)
-def test_the_app_starts_and_changes_a_setting_without(left_out, without, qapp) -> None:
-    without.requests.set("functions_x", 5)
-    without.session.tick()
-    qapp.processEvents()
-    assert without.display.settings.functions_x == 5
-    assert set(without.features) == {made.name for made in FEATURES if made is not left_out}
 
 
 @pytest.mark.parametrize("feature", FEATURES, ids=lambda feature: feature.name)
