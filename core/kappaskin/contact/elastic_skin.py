@@ -284,12 +284,13 @@ class ElasticSkin:
         from scipy.optimize import nnls  # slow to import, and seldom needed
 
         G = self._given(points)
-        G[np.diag_indices_from(G)] *= 1 + _SOFT
-        L = linalg.cholesky(G, lower=True)
+        # By eigenvalues: those of a table, or of places on the rim, may be none above zero.
+        values, V = linalg.eigh(G)
+        root = np.sqrt(np.maximum(values, _SOFT * values[-1]))
         # The least p'Gp / 2 + p'gap with a given sum: the sum as one more, heavy row.
         heavy = _HEAVY * math.sqrt(G.max())
-        A = np.vstack([L.T, np.full(len(gap), heavy)])
-        b = np.append(linalg.solve_triangular(L, -gap, lower=True), heavy * force)
+        A = np.vstack([root[:, None] * V.T, np.full(len(gap), heavy)])
+        b = np.append(gap @ V / -root, heavy * force)
         return nnls(A, b)[0]
 
     def unresolved(self, forces: PointForces) -> Array:

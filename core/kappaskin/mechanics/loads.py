@@ -205,6 +205,9 @@ def _gauss(count: int) -> tuple[Array, Array]:
     return t, w / 2
 
 
+_CORNERS = 64  # of a round load's rim, where it is checked
+
+
 def _circle(count: int) -> Array:
     angle = 2 * np.pi * np.arange(count) / count
     return np.column_stack([np.cos(angle), np.sin(angle)])
@@ -234,7 +237,7 @@ class DiscLoad(DistributedLoad):
         return 2 * scipy.special.j1(turn) / turn
 
     def _rim(self) -> Array:
-        return self.radius * _circle(64)
+        return self.radius * _circle(_CORNERS)
 
     def quadrature(self, count: int) -> tuple[Array, Array]:
         t, w = _gauss(count)
@@ -262,7 +265,7 @@ class GaussianLoad(DistributedLoad):
         return np.exp(-(k**2 + l**2) * self.sd**2 / 2)
 
     def _rim(self) -> Array:
-        return 4 * self.sd * _circle(64)
+        return 4 * self.sd * _circle(_CORNERS)
 
     def quadrature(self, count: int) -> tuple[Array, Array]:
         t, w = _gauss(count)
@@ -310,6 +313,8 @@ class _RoundOnCap:
         size = load.radius if isinstance(load, DiscLoad) else 4 * load.sd
         self._rim, (Ni, Nj) = basis.cap.rim_radius, basis.shape
         self._reach, self._shape = self._rim - size, basis.shape
+        # Between the points of its rim that are checked, a load may pass the skin's by this much.
+        self._most = self._reach * (1 + 1e-9) + size * (1 - math.cos(math.pi / _CORNERS))
         self._degrees = np.arange(2 * Ni + Nj // 2 + 10)
         if self._reach <= 0:
             return
@@ -332,7 +337,7 @@ class _RoundOnCap:
         """The means (Ni, Nj) under the load at (x, y) in m; None where it goes over the rim."""
         u, v = x - self._rim, y - self._rim
         far = math.hypot(u, v)
-        if far > self._reach * (1 + 1e-9) or self._reach <= 0:
+        if far > self._most or self._reach <= 0:
             return None
         turn, t = math.atan2(v, u), math.acos(min(2 * far / self._reach - 1, 1.0))
         felt = (np.cos(t * self._degrees) @ self._series).reshape(self._shape)

@@ -300,6 +300,22 @@ def test_a_round_load_is_felt_all_over_a_cap_as_by_quadrature(kind, Nj, share, t
     np.testing.assert_allclose(felt.ravel(), expected, rtol=0, atol=1e-9 * scale)
 
 
+def test_a_disc_that_touches_the_rim_of_a_cap_is_felt_at_no_cost_per_frame(monkeypatch):
+    """As the mouse drags it there: between the points of its rim that are checked, 2 um over."""
+    cap = Cap(8e-3, np.radians(75))
+    basis = basis_for(cap, "clamped", 5, 7)
+    load = DiscLoad(2.5800646314697254e-3, 9.329945612915037e-3, 2.5e-3)
+    load.check(cap)
+    points, weights = load.quadrature(12)
+    expected = weights @ basis.at(cap.around(load.x, load.y, points))
+    load.modal(basis)
+    monkeypatch.setattr(type(basis), "at", None)
+
+    felt = load.modal(basis).ravel()
+
+    np.testing.assert_allclose(felt, expected, rtol=0, atol=5e-3 * np.abs(expected).max())
+
+
 def test_a_round_load_over_the_rim_of_a_cap_is_refused():
     basis = basis_for(Cap(8e-3), "clamped", 5, 6)
 

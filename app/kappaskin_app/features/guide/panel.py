@@ -87,7 +87,7 @@ class GuidePanel(QWidget):
         self.forward = button("\N{RIGHTWARDS ARROW}", "guide-forward", forward)
         for way, name in ((self.back, "Back"), (self.forward, "Forward")):
             way.setAccessibleName(name)
-            way.setFixedWidth(2 * way.sizeHint().height())
+            way.setFixedWidth(3 * way.sizeHint().height() // 2)
         for page in pages():
             self.contents.addItem(page.title)
         self._lay_out()

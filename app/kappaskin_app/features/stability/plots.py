@@ -31,7 +31,7 @@ class ModeMap(QWidget):
         )
 
     def sizeHint(self) -> QSize:
-        return QSize(170, 130)
+        return QSize(170, 70)  # else the text below has no room
 
     def show_surface(self, surface: Array | None, layout: SensorLayout | None) -> None:
         self._surface, self._layout = surface, layout
