@@ -345,6 +345,10 @@ class Patch:
         """Which of `positions` (P, 2) are far enough inside the rim for the skin to move there."""
         return self.depth(positions) >= 0.9 * _MARGIN * min(self.a, self.b)
 
+    def area(self, positions: Array) -> Array:
+        """The area (P,) of the skin per area of x and y at `positions` (P, 2); of a cap below 1."""
+        return np.ones(len(positions))
+
     def at_rest(self, positions: Array) -> tuple[Array, Array]:
         """Points (..., 3) in m and outward unit normals (..., 3) of the skin at rest."""
         base = self.base(positions[..., 0], positions[..., 1])
@@ -597,6 +601,10 @@ class Cap(Disk):
             second,
             (-flat / r * n, flat / r * c),
         )
+
+    def area(self, positions: Array) -> Array:
+        away = np.maximum(np.hypot(*(positions - self.rim_radius).T), _NEAR_POLE * self.rim_radius)
+        return self.meridian(away).radius / away
 
     def read_at_rest(self, positions: Array) -> Array:
         return self.base(*positions.T).form

@@ -32,7 +32,8 @@ def _lengths(basis: Basis, reference: Basis) -> tuple[Array, Array, Array]:
     By RMS over the skin. The functions of both on G points are Q R, and Q changes no lengths.
     """
     points, N = points_on(basis.patch), basis.size
-    functions = np.hstack([basis.at(points), reference.at(points)]) / np.sqrt(len(points))
+    shares = shares_of(basis.patch, points)
+    functions = np.hstack([basis.at(points), reference.at(points)]) * np.sqrt(shares)[:, None]
     R = cast("Array", np.linalg.qr(functions, mode="r")).T
     return R[:N, :N].copy(), R[N:, :N].copy(), R[N:, N:].copy()
 
@@ -72,7 +73,14 @@ def covered(fit: Fit, reference: Basis, true: Array) -> Array:
     fitted = c.reshape(len(c), -1) @ fit.estimator.basis.at(points).T
     reach = scipy.special.stdtrit(np.maximum(fit.spare, 1), 0.975)
     bands = np.reshape(reach, (-1, 1)) * fit.surface_sd(points)
-    return np.mean(np.abs(fitted - true @ reference.at(points).T) <= bands, axis=1)
+    held = np.abs(fitted - true @ reference.at(points).T) <= bands
+    return np.average(held, axis=1, weights=patch.area(points))
+
+
+def shares_of(patch: Patch, points: Array) -> Array:
+    """The shares (G,) of the skin's area that evenly spaced `points` (G, 2) of x and y are for."""
+    area = patch.area(points)
+    return area / area.sum()
 
 
 def points_on(patch: Patch) -> Array:

@@ -17,6 +17,14 @@ _WAVES = 90  # each way: readings under discs of 1 mm radius stand to 1 % of the
 _ALL = slice(None)
 
 
+def summed_functions(scene: Scene) -> tuple[int, int]:
+    """Functions of a true shape that readings no longer change with; the scene's if unknown."""
+    (Ri, Rj), strip = scene.reference, scene.plate.patch.strip
+    if not SummedResponse.is_known(scene):
+        return Ri, Rj
+    return max(Ri, _WAVES), 1 if strip else max(Rj, _WAVES)
+
+
 class SummedResponse:
     """What `loads`, those of T moments, do to a scene's skin beyond its 15 x 15 or so functions.
 
@@ -29,9 +37,7 @@ class SummedResponse:
         self._plate, patch = scene.plate, scene.plate.patch
         self._reference = reference = scene.basis
         Ri, Rj = reference.shape
-        self.basis: Basis = basis_for(
-            patch, scene.edge, max(Ri, _WAVES), 1 if patch.strip else max(Rj, _WAVES)
-        )
+        self.basis: Basis = basis_for(patch, scene.edge, *summed_functions(scene))
         known: dict[tuple[Load, ...], Array] = {}
         for those in loads:
             if those not in known:

@@ -27,7 +27,8 @@ from kappaskin.mechanics import DiscLoad, Plate, PointLoad
 from kappaskin.scenes import Indenter, Scene, Simulator, kept_effects, planned
 from kappaskin.sensing import SensorLayout
 from kappaskin.skin import Cap, Patch
-from kappaskin.studies.accuracy import covered, points_on, rms_distance, root_mean_square, seconds
+from kappaskin.studies.accuracy import covered, points_on, rms_distance, seconds, shares_of
+from kappaskin.studies.summed import summed_functions
 
 # Blocks of frames: what was true, what was read, what was fitted
 
@@ -214,8 +215,9 @@ def noise_of(scene: Scene) -> float:
 
 @lru_cache(8)
 def _predicted_rms(estimator: Estimator, noise: float) -> float:
-    sd = predicted_sd(estimator, noise, points_on(estimator.basis.patch))
-    return root_mean_square(sd)
+    patch = estimator.basis.patch
+    points = points_on(patch)
+    return math.sqrt(predicted_sd(estimator, noise, points) ** 2 @ shares_of(patch, points))
 
 
 def _predicted(block: FrameBlock) -> Array:
@@ -317,7 +319,6 @@ _SIDE, _PRESSED_SIDE = 41, 25  # points along each side of the maps, and of thos
 _BLOCK, _MOST, _MOST_PRESSES = 250, 5_000, 2_000  # frames at a time, and in all
 _NEAR_RIM = 1 / 15  # of the shorter side: nearer to the rim, no force is reported
 _AREA_STEPS = 513
-_NEAR_POLE = 1e-6  # of the box
 
 
 def placed_estimator(
@@ -380,11 +381,8 @@ class _Map:
         x, y = patch.grid(side, 2 if patch.strip else side)
         points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
         on = patch.contains(points) & (patch.depth(points) >= margin)
-        area = np.ones(len(points))
-        if isinstance(patch, Cap):  # its unrolled map is too wide around, towards the rim
-            away = np.maximum(np.linalg.norm(points - patch.rim_radius, axis=1), _NEAR_POLE * x[-1])
-            area[on] = (patch.meridian(away).radius / away)[on]
-        shares = (on * area).reshape(len(y), len(x))
+        shares = np.zeros((len(y), len(x)))
+        shares.ravel()[on] = patch.area(points[on])
         shares[[0, -1]] /= 2  # half of a tile
         shares[:, [0, -1]] /= 2
         return cls(x, y, on.reshape(shares.shape), shares / shares.sum())
@@ -521,7 +519,9 @@ def check(design: Design, frames: int = _MOST, of: str = "displacement") -> Gene
 
 def _check_contacts(design: Design, of: str, seen: _Map, frames: int) -> Generator[Check]:
     estimator, load = design.estimator(), pressed_load(design.scene)
-    scene = planned(replace(design.scene, layout=estimator.layout, seed=0))  # not at every press
+    scene, reference = design.scene, summed_functions(design.scene)
+    scene = replace(scene, layout=estimator.layout, seed=0, reference=reference)
+    scene = planned(scene)  # not at every press
     simulator, scan, places = Simulator(scene), scene.sensor().scan(), seen.points
     find = _contact_finder(estimator, scene.plate, scene.edge)
     squares, counts, count = np.zeros(len(places)), np.zeros(len(places)), 0
