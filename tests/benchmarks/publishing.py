@@ -24,7 +24,7 @@ def deafened(target: str) -> socket.socket:
         b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n"
         b"Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n"
     )
-    for number in range(1, 7):
+    for number in range(1, 8):
         pair = {"id": number, "channelId": number}
         words = json.dumps({"op": "subscribe", "subscriptions": [pair]}).encode()
         made.sendall(b"\x81" + bytes([0x80 | len(words)]) + bytes(4) + words)

@@ -426,7 +426,8 @@ def reconstruct(
     `datum` the quantities of an unknown zero. A `size` (1,) with `positions` (P, 1) is a strip, for
     which only curvature xx is used. An `outline` in m is a polygon (V, 2) or the radius of a disk.
     With a `rigidity` in N m, forces are computed too; without it contacts are found by the shape
-    alone. A `thickness` in m, `poisson` and `inplane`
+    alone. A `gage_length` in m is that of gages, `cell` (2,) in m the sides that heights and slopes
+    are the mean over. A `thickness` in m, `poisson` and `inplane`
     (held, diaphragm, free; hoop of a bent skin) say how the skin stretches.
 
     Example: `kappaskin reconstruct in.npz --basis 8x8 --out out.npz --grid 101x101`

@@ -5,6 +5,7 @@ import math
 import os
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,7 @@ _NEEDED = (
 )
 
 _SKIN = ("rigidity", "thickness", "poisson")
+_AVERAGED = {"gage_length": 1, "cell": 2}  # what a reading is the mean over: sides in m
 _READ = ("element", "quantity", "direction", "datum")  # what values are
 _NAMES = (
     "size",
@@ -56,6 +58,7 @@ _NAMES = (
     "angle",
     "stretch",
     "outline",
+    *_AVERAGED,
     *_SKIN,
     "inplane",
 )
@@ -199,6 +202,19 @@ def _layout(path: Path, patch: Patch, positions: Array) -> SensorLayout:
     return SensorLayout.scattered(patch, positions)
 
 
+def _averaged(path: Path, found: dict[str, Array]) -> dict[str, Any]:
+    """What the readings in the file are the mean over, as a layout has it."""
+    given = {name: found[name] for name in _AVERAGED if name in found}
+    for name, values in given.items():
+        if values.size != _AVERAGED[name]:
+            sides = "one number" if _AVERAGED[name] == 1 else "two numbers"
+            raise Refusal(f"{path}: expected {name} to be {sides} in m, got shape {values.shape}")
+    return {
+        name: tuple(values.tolist()) if values.size > 1 else values.item()
+        for name, values in given.items()
+    }
+
+
 def _reading(
     path: Path, layout: SensorLayout, found: dict[str, Array], texts: dict[str, NDArray[np.str_]]
 ) -> SensorLayout:
@@ -299,6 +315,7 @@ def reconstruct(
     layout = _layout(readings, patch, found["positions"])
     if name == "values":
         layout = _reading(readings, layout, found, texts)
+    layout = replace(layout, **_averaged(readings, found))
     frames = _frames(readings, name, found[name], layout)
     one = layout.frame_shape
     if sigma is not None and sigma.ndim > len(one) and sigma.shape != frames.shape:

@@ -56,6 +56,10 @@ def simulated_readings(
         own = layout.reads
         read = {"values": curvature, "element": own.element, "quantity": own.quantity}
         read["direction"] = own.direction
+    if layout.gage_length:
+        read["gage_length"] = np.array(layout.gage_length)
+    if any(layout.cell):
+        read["cell"] = np.array(layout.cell)
     if (sigma := scene.sensor().sigma) is not None:
         read["sigma"] = sigma
     return {

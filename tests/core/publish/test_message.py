@@ -220,7 +220,7 @@ def test_skins_of_other_shapes_have_something_to_say(messages_of, patch: Patch) 
     (told,) = messages_of(scene, 1, Setup(4, 4))
     assert read(told.contact)["number"] == 0
     assert read(told.shape)["functions_x"] == 4
-    points = json.loads(cloud.Cloud()(told))
+    points = json.loads(cloud.SkinMessages()(cloud.SKIN, told))
     data = np.frombuffer(base64.b64decode(points["data"]), "<f4").reshape(-1, len(cloud.NAMES))
     assert np.isfinite(data).all()
     assert (len(data) < cloud.POINTS**2) == isinstance(patch, Disk)
@@ -278,7 +278,7 @@ def test_the_guide_names_every_key_with_the_words_of_the_code() -> None:
 
 
 def test_the_guide_names_every_topic_with_its_schema() -> None:
-    rows = re.findall(r"^\| `(/[\w/]+)` \| `([\w.]+)` \|", GUIDE, re.MULTILINE)
+    rows = re.findall(r"^\| `(/[\w/]+)` \| `([\w./]+)` \|", GUIDE, re.MULTILINE)
     assert rows == [(channel.topic, channel.name) for channel in channels.CHANNELS]
     for name in cloud.NAMES[3:]:
         assert f"`{name}`" in GUIDE
