@@ -202,16 +202,24 @@ def _one_window(qapp: QApplication, until: Wait) -> Iterator[TestedWindow]:
 def shared_window(
     _one_window: TestedWindow, qapp: QApplication, until: Wait
 ) -> Iterator[TestedWindow]:
-    """One window for the tests of a file that leave it as it was; undo takes back settings."""
+    """One window for the tests of a file that leave it as it was but for settings and source."""
+    session = _one_window.session
     _one_window.show()
 
     def ready() -> bool:
         _one_window.activateWindow()  # which is lost on a window that is not on the screen yet
-        return _one_window.isActiveWindow() and _one_window.display.badge.state == "SIM"
+        asked = session.engine.requested.changed.get("source", 0)
+        simulates = session.status.requested >= asked and session.estimate is not None
+        active = _one_window.isActiveWindow()
+        return active and simulates and _one_window.display.badge.state == "SIM"
 
     until(ready)
     _one_window.history.stack.clear()
     yield _one_window
+    if session.connecting or session.source != "sim:":
+        session.connect_to("sim:")
+    if not session.running:
+        session.run(True)
     _one_window.history.stack.setIndex(0)
     qapp.processEvents()
     _one_window.hide()

@@ -119,7 +119,7 @@ def test_no_sure_name_is_wrong_and_radii_and_forces_are_covered(place):
                     continue
                 named += 1
                 low, high = found.radius_95
-                within = low <= shape.radius <= high or shape.kind == "edge"
+                within = low <= (0.0 if shape.kind == "edge" else shape.radius) <= high
                 alike = {found.kind, shape.kind} <= {"edge", "cylinder"} and within
                 right += found.kind == shape.kind or alike
                 if found.kind in ("sphere", "cylinder"):

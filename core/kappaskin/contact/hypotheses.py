@@ -45,11 +45,13 @@ class Width:
     """The relation of the object's curvature to q, the squared width of its contact.
 
     The skin inside a ring or an arc that is e times as wide is bent `bend` less:
-    curvature(q) = k0 - bend / 2 ln(q / q0).
+    curvature(q) = k0 - bend / 2 ln(q / q0). Of the standard deviation `sd` in m^2 of q the readings
+    make `measured`, and the rest is what the relation leaves out.
     """
 
     q: float
     sd: float
+    measured: float
     k0: float
     q0: float
     bend: float
@@ -71,13 +73,15 @@ class Width:
 class WidthOnDome(Width):
     """The same on a dome of the curvature `rest`, whose sheet is compressed as well.
 
-    A layer that gives by t per pressure widens the contact of a force F, `soft` = t F in m^3: its
+    Its curvatures are known to the share `inexact` of the object's and the skin's, as a standard
+    deviation. A layer that gives by t per pressure widens the contact of a force F, `soft` = t F in m^3: its
     pressure is even with a paraboloid of the relative curvature k, with the mean square distance
     2/3 sqrt(t F / (pi k)) from its middle.
     """
 
     rest: float
     soft: float
+    inexact: float
 
     def curvature(self, q: float) -> float:
         tried = self.rest * (_RELATIVE - 1)
@@ -91,10 +95,10 @@ class WidthOnDome(Width):
         # It widens less what the bending spreads already: so the contact solver has it, to 5 %.
         return thin + layer / (1 + (thin / (2 * layer)) ** 3)
 
-    def uncertain(self, off: float) -> "WidthOnDome":
-        """The same where curvatures of objects are known to `off` of themselves and the skin's."""
+    def uncertain(self) -> "WidthOnDome":
+        """The same with what is `inexact` in its deviation."""
         k = min(max(self.curvature(self.q), 0.0), _RELATIVE[-1] * self.rest)
-        low, high = self.of_curvature(k + off * (self.rest + k) * np.array([-1.0, 1.0]))
+        low, high = self.of_curvature(k + self.inexact * (self.rest + k) * np.array([-1.0, 1.0]))
         return replace(self, sd=math.hypot(self.sd, float(low - high) / 2))
 
 
@@ -256,10 +260,9 @@ def _measured_width(skin: ElasticSkin, optimum: Optimum) -> tuple[float, float, 
 def _width(skin: ElasticSkin, optimum: Optimum, curvature: float, force: float) -> Width:
     q, q0, sd = _measured_width(skin, optimum)
     if not skin.is_dome:
-        return Width(q, sd, curvature, q0, skin.bend * abs(force))
-    of_skin = float(skin.form[:2].sum()) / 2, skin.layer * abs(force)
-    width = WidthOnDome(q, sd, curvature, q0, skin.bend * abs(force), *of_skin)
-    return width.uncertain(1.25 * INEXACT_BENT)
+        return Width(q, sd, sd, curvature, q0, skin.bend * abs(force))
+    of_skin = float(skin.form[:2].sum()) / 2, skin.layer * abs(force), 1.25 * INEXACT_BENT
+    return WidthOnDome(q, sd, sd, curvature, q0, skin.bend * abs(force), *of_skin).uncertain()
 
 
 def fitted_sphere(skin: ElasticSkin, sphere: Optimum) -> Hypothesis:
@@ -415,7 +418,8 @@ def _straight(skin: ElasticSkin, best: Optimum, length: float) -> Hypothesis:
         # Squared, as about as much force acts inside the ellipse instead: to 5 % of what `pressed`
         # finds, up to half lengths of 1.3 times that over which a dent fades.
         bent = bend * _unevenness(skin, best) ** 2
-        width = WidthOfCylinder(q, sd, 0.0, q, bent, rest, soft, bears).uncertain(2 * INEXACT_BENT)
+        of_skin = rest, soft, 2 * INEXACT_BENT
+        width = WidthOfCylinder(q, sd, sd, 0.0, q, bent, *of_skin, bears).uncertain()
         k = width.curvature(q)
         narrow = bears * max(bent - k, 0.0) / (bent + k)
         for _ in range(20):  # as straight as along the edge

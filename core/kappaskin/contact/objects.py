@@ -13,6 +13,7 @@ from kappaskin.contact.hypotheses import (
     Hypotheses,
     Hypothesis,
     Width,
+    WidthOnDome,
     fit_hypotheses,
     log_likelihoods,
     oval_likelihood,
@@ -96,13 +97,16 @@ class ContactObject:
         """
         if not self.kind:
             return False
-        alike = {self.kind, "cylinder"} if self.kind == "edge" else {self.kind}
-        likely = sum(self.probability[kind] for kind in alike) >= _CERTAIN
+        likely = sum(self.probability[kind] for kind in self._named) >= _CERTAIN
         bounded = self.radius_95[0] > 0 and self.radius_95[1] < math.inf
         on_dome = math.isnan(self.length)
         long = self.radius_95[1] < math.inf if on_dome else self.length > self.length_95
         sized = {"plane": True, "edge": long}
         return likely and sized.get(self.kind, bounded)
+
+    @property
+    def _named(self) -> set[str]:
+        return {self.kind, "cylinder"} if self.kind == "edge" else {self.kind}
 
     def describe(self) -> str:
         """One line in millimetres and degrees: the kind only where it is `sure`."""
@@ -110,7 +114,7 @@ class ContactObject:
             return "no contact"
         if not self.sure:
             return f"shape unknown{self._bounds()}"
-        second, chance = self.ranked[1]
+        second, chance = next(one for one in self.ranked if one[0] not in self._named)
         parts = [self.kind]
         if self.kind in ("cylinder", "sphere"):
             low, high = map(_millimetres, self.radius_95)
@@ -295,14 +299,18 @@ def _length(found: Hypothesis, reach: float) -> tuple[float, float]:
 
 def _radius(skin: ElasticSkin, width: Width, reach: float) -> tuple[float, tuple[float, float]]:
     """The radius in m and its interval of `reach` standard deviations."""
-    bent = 0.0 if skin.is_dome else max(map(abs, skin.patch.curvatures))  # in its deviation there
-    low, high = width.q - reach * width.sd, max(width.q, 0.0) + reach * width.sd
+    rest, inexact = max(map(abs, skin.patch.curvatures)), INEXACT_BENT
+    resolved = not rest or width.q > skin.half_wave**2
+    if isinstance(width, WidthOnDome):
+        rest, inexact, resolved = width.rest, reach * width.inexact, True
+    elif not rest:
+        inexact = _INEXACT
+    off = reach * width.measured
+    low, high = width.q - off, max(width.q, 0.0) + off
     flattest, best = width.curvature(high), width.curvature(width.q)
-    resolved = not bent or width.q > skin.half_wave**2
-    if width.q < _SEEN * width.sd or low <= 0 or not resolved:
-        off = INEXACT_BENT * (flattest + bent) if bent else _INEXACT * flattest
-        return math.nan, (0.0, _inverse(flattest - off))
-    off = INEXACT_BENT * (best + bent) if bent else _INEXACT * best
+    if width.q < _SEEN * width.measured or low <= 0 or not resolved:
+        return math.nan, (0.0, _inverse(flattest - inexact * (flattest + rest)))
+    off = inexact * (best + rest)
     up, down = math.hypot(width.curvature(low) - best, off), math.hypot(best - flattest, off)
     return _inverse(best), (_inverse(best + up), _inverse(best - down))
 
@@ -315,11 +323,11 @@ def _face(
     Round for a sphere; a bar's two edges as far from its axis as the force on an arc is by RMS.
     """
     per = 2.0 if kind == "sphere" else math.sqrt(2)
-    q = np.array([width.q, width.q - reach * width.sd, max(width.q, 0.0) + reach * width.sd])
+    q = np.array([width.q, width.q - reach * width.measured, max(width.q, 0.0) + reach * width.measured])
     face, low, high = per * np.sqrt(np.maximum(q, 0.0))
     if kind == "edge" and skin.is_dome:  # which its ends do not touch
         return math.nan, (math.nan, math.nan)
-    if kind == "edge" or width.q < _SEEN * width.sd or low == 0:
+    if kind == "edge" or width.q < _SEEN * width.measured or low == 0:
         return math.nan, (0.0, float(high))
     return float(face), (float(low), float(high))
 

@@ -12,6 +12,7 @@ from kappaskin.pipeline.reported import COLUMN as COLUMN
 from kappaskin.pipeline.reported import ELEMENT as ELEMENT
 from kappaskin.pipeline.reported import REPORTED as REPORTED
 from kappaskin.pipeline.reported import ROW as ROW
+from kappaskin.pipeline.reported import SEQUENTIAL as SEQUENTIAL
 from kappaskin.pipeline.reported import Axes as Axes
 from kappaskin.pipeline.reported import Getter as Getter
 from kappaskin.pipeline.reported import Number as Number

@@ -1195,6 +1195,10 @@ def stored() -> dict[str, ReportedQuantity]:
     return of_sd | {of.value: of for of in REPORTED if isinstance(of.value, str)}
 
 
+SEQUENTIAL = ("#1a2a5e", "#2c5282", "#3f7f8f", "#63a878", "#a9c95b", "#f5e663")
+"""The anchors of the app's colour map of one sign: dark blue to yellow."""
+
+
 @cache
 def skin_colours() -> dict[str, SkinColour]:
     """All that the skin may be coloured by, by name."""

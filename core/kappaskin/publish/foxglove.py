@@ -3,7 +3,7 @@
 The protocol is foxglove.websocket.v1, and foxglove.sdk.v1, its name since 2025. The thread that
 computes writes a message straight into the socket of each client that requests it; what a client
 does not accept is dropped. Another thread accepts clients, reads what they send, and computes
-the skin as a cloud of points, when one of them shows it.
+the skin as a mesh or as points, when one of them shows it.
 """
 
 import json
@@ -30,12 +30,13 @@ from kappaskin.publish.foxglove_channels import (
     CHANNELS,
     CONTACT,
     LOG,
+    MESH,
     POSE,
     SHAPE,
     SKIN,
     STATUS,
     Channel,
-    Cloud,
+    SkinMessages,
     logged,
     pose,
 )
@@ -330,7 +331,7 @@ class Foxglove:
         self._disconnected = (0, 0)
         self._latest: EstimateMessage | None = None
         self._drawn: EstimateMessage | None = None
-        self._cloud, self._next_cloud = Cloud(), 0.0
+        self._skin, self._next_drawing = SkinMessages(), 0.0
         self._ending, self._wake = socket.socketpair()
         self._selector = selectors.DefaultSelector()
         for each in (server, self._ending):
@@ -390,7 +391,7 @@ class Foxglove:
 
     def _turn(self) -> bool:
         """Wait for the next event, and handle it; True at the end."""
-        watched = any(SKIN in client.subscribed for client in self._clients)
+        watched = any({SKIN, MESH} & {*client.subscribed} for client in self._clients)
         for key, _ in self._selector.select(FRAME if watched else _TICK):
             if key.fileobj is self._ending:
                 return True
@@ -442,9 +443,11 @@ class Foxglove:
     def _draw(self) -> None:
         """Send the present skin to its subscribers, if it differs from the last one sent."""
         now, message = time.monotonic(), self._latest
-        if message is None or message is self._drawn or now < self._next_cloud:
+        if message is None or message is self._drawn or now < self._next_drawing:
             return
-        self._next_cloud, self._drawn = now + FRAME, message
-        if (data := self._cloud(message)) is not None:
-            for client in self._clients:
-                client.offer(SKIN, message.timestamp, data)
+        self._next_drawing, self._drawn = now + FRAME, message
+        for channel in (SKIN, MESH):
+            watching = [client for client in self._clients if channel in client.subscribed]
+            if watching and (data := self._skin(channel, message)) is not None:
+                for client in watching:
+                    client.offer(channel, message.timestamp, data)

@@ -1,7 +1,8 @@
-"""Channels of the Foxglove transport: their schemas, and the skin as a cloud of points."""
+"""Channels of the Foxglove transport: their schemas, and the skin as a mesh and as points."""
 
 import base64
 import json
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,11 +10,13 @@ import numpy as np
 import scipy
 
 from kappaskin._text import printable
-from kappaskin.bases import CurvatureMap
-from kappaskin.frames import COMPONENTS, Array, Event
-from kappaskin.pipeline import Pipeline
+from kappaskin.bases import curvature_at
+from kappaskin.frames import COMPONENTS, Array, Estimate, Event
+from kappaskin.pipeline import SEQUENTIAL, Pipeline
 from kappaskin.publish.message import CONTACT as CONTACT_NUMBERS
 from kappaskin.publish.message import SECOND, STATUS_NUMBERS, SWITCHES, EstimateMessage
+from kappaskin.recording import SCENE_UPDATE, MessageLayout
+from kappaskin.skin import RestMesh
 
 FRAME = "skin"
 """The frame of reference: that of `Patch`, x along the skin, z outward at its middle."""
@@ -26,22 +29,24 @@ Schema = dict[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """A stream of JSON: its `number`, the `topic` it is called by and what it holds."""
+    """A stream of messages: its `number`, the `topic` it is called by and what it holds."""
 
     number: int
     topic: str
     name: str
     schema: str
+    encoding: str = "json"
+    language: str = "jsonschema"
 
     @property
     def advertised(self) -> dict[str, object]:
         return {
             "id": self.number,
             "topic": self.topic,
-            "encoding": "json",
+            "encoding": self.encoding,
             "schemaName": self.name,
             "schema": self.schema,
-            "schemaEncoding": "jsonschema",
+            "schemaEncoding": self.language,
         }
 
 
@@ -105,8 +110,11 @@ SHAPE = _channel(3, "/shape", "kappaskin.Shape", _SHAPE)
 SKIN = _channel(4, "/skin", "foxglove.PointCloud", _SKIN)
 STATUS = _channel(5, "/status", "kappaskin.Status", _STATUS)
 LOG = _channel(6, "/log", "foxglove.Log", _LOG)
+MESH = Channel(
+    *(7, "/skin/mesh", SCENE_UPDATE.name, SCENE_UPDATE.definition.decode()), "cdr", "ros2msg"
+)
 
-CHANNELS = (CONTACT, POSE, SHAPE, SKIN, STATUS, LOG)
+CHANNELS = (CONTACT, POSE, SHAPE, SKIN, STATUS, LOG, MESH)
 
 
 def moment(seconds: float) -> str:
@@ -126,7 +134,7 @@ def logged(event: Event, when: float) -> bytes:
 
 
 POINTS = 33
-"""Points of the cloud along each side of the skin, edges included."""
+"""Points of the skin along each of its sides, edges included."""
 
 NAMES = ("x", "y", "z", "displacement", *(f"curvature_{name}" for name in COMPONENTS))
 """What each point has: place and displacement in m, change of curvature in 1/m."""
@@ -137,47 +145,149 @@ _FIELDS = json.dumps(
     [{"name": name, "offset": 4 * k, "type": _FLOAT32} for k, name in enumerate(NAMES)]
 )
 
+_ANCHORS: Array = np.array([[*bytes.fromhex(anchor[1:]), 255] for anchor in SEQUENTIAL]) / 255
+_PLACES = np.linspace(0, len(_ANCHORS) - 1, 256)
+_COLOURS: Array = np.column_stack(
+    [np.interp(_PLACES, np.arange(len(_ANCHORS)), _ANCHORS[:, k]) for k in range(4)]
+)
+_LEAST = 1e-4  # of the longer side: the largest displacement that the colours show at least
+_PATIENCE = 2.0  # s that displacement must stay small before the colours show less
+_LIFT = 2e-3  # of the longer side: how high above the skin the line lies
+_AROUND = 2 * np.pi * np.arange(48) / 48
+_SIDES = np.stack([np.cos(_AROUND), np.sin(_AROUND)], axis=-1)
+_ENTITY, _LINE, _TRIANGLES = "entities.0.", "entities.0.lines.0.", "entities.0.triangles.0."
+_NO_LISTS = dict.fromkeys(
+    (
+        "deletions",
+        *(f"{_ENTITY}{kind}s" for kind in ("arrow", "cube", "sphere", "cylinder", "text", "model")),
+        f"{_LINE}colors",
+        f"{_LINE}indices",
+    ),
+    0,
+)
+_LINE_LOOK = {
+    f"{_LINE}{name}": value
+    for name, value in {
+        "type": 1,  # it ends where it begins
+        "pose.orientation.w": 1,
+        "thickness": 3,  # pixels
+        "scale_invariant": True,
+        **{f"color.{c}": v / 255 for c, v in zip("rgba", (31, 209, 122, 255), strict=True)},
+    }.items()
+}
 
-class _Grid:
-    """Points of a skin, and the maps from coefficients to what they have; made once a setup."""
+
+class _SkinPoints:
+    """The points of a skin's mesh and the maps from coefficients to what they have.
+
+    They are made once per setup.
+    """
 
     def __init__(self, pipeline: Pipeline) -> None:
-        basis = pipeline.basis
-        x, y = basis.patch.grid(POINTS, POINTS)
-        places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        self._on_skin = basis.patch.contains(places)
-        self._at_rest, self._outward = basis.patch.at_rest(places[self._on_skin])
-        self._maps = [
-            basis.on_grid(x, y),
-            *(CurvatureMap(basis, component, x, y) for component in COMPONENTS),
-        ]
+        self.pipeline, self._basis = pipeline, pipeline.basis
+        self._patch = patch = pipeline.basis.patch
+        self._rest = rest = RestMesh(patch, POINTS, POINTS)
+        self._values = self._basis.at(rest.positions)
+        self._curvature = curvature_at(self._basis, rest.positions)
+        self._side = max(patch.a, patch.b)
+        self._limit, self._until = 0.0, 0.0
+        self._layouts: dict[tuple[float, bool], MessageLayout] = {}
 
-    def __call__(self, coefficients: Array) -> Array:
-        """What the points have, (points, 7)."""
-        values = [of(coefficients).ravel()[self._on_skin] for of in self._maps]
-        points = self._at_rest - values[0][:, None] * self._outward
-        return np.column_stack([points, *values])
-
-
-class Cloud:
-    """Messages to clouds of points."""
-
-    def __init__(self) -> None:
-        self._pipeline: Pipeline | None = None
-        self._grid: _Grid | None = None
-
-    def __call__(self, message: EstimateMessage) -> bytes | None:
-        """The skin as a foxglove.PointCloud in JSON; None when its shape is not known."""
-        coefficients = message.estimate.coefficients
-        if not np.isfinite(coefficients).all():
-            return None
-        if self._grid is None or self._pipeline is not message.pipeline:
-            self._pipeline, self._grid = message.pipeline, _Grid(message.pipeline)
-        data = base64.b64encode(self._grid(coefficients).astype("<f4").tobytes()).decode()
+    def cloud(self, message: EstimateMessage) -> bytes:
+        """The skin as a foxglove.PointCloud in JSON."""
+        flat = message.estimate.coefficients.ravel()
+        displacement = self._values @ flat
+        columns = *self._at(displacement).T, displacement, *(self._curvature @ flat)
+        data = base64.b64encode(np.column_stack(columns).astype("<f4").tobytes()).decode()
         return (
             f'{{"timestamp":{moment(message.timestamp)},"frame_id":"{FRAME}","pose":{_AT_ORIGIN},'
             f'"point_stride":{4 * len(NAMES)},"fields":{_FIELDS},"data":"{data}"}}'
         ).encode()
+
+    def _at(self, displacement: Array) -> Array:
+        """Where the points (k, 3) in m are when displaced by (k,) in m."""
+        return self._rest.points - displacement[:, None] * self._rest.normals
+
+    def mesh(self, message: EstimateMessage) -> bytes:
+        """The skin as triangles, and the error bars of the contact's place as a line on it.
+
+        A SceneUpdate in CDR, coloured by displacement.
+        """
+        displacement = self._values @ message.estimate.coefficients.ravel()
+        deep = np.abs(displacement)
+        limit = self._limit_of(float(deep.max()), message.timestamp)
+        line = self._line(message.estimate)
+        sec, nanosec = divmod(round(message.timestamp * 1e9), 10**9)
+        values: dict[str, Any] = {
+            f"{_ENTITY}timestamp.sec": sec,
+            f"{_ENTITY}timestamp.nanosec": nanosec,
+            f"{_TRIANGLES}pose.orientation.w": 1,
+            f"{_TRIANGLES}points": self._at(displacement),
+            f"{_TRIANGLES}colors": _COLOURS[(255 * np.minimum(deep / limit, 1)).astype(int)],
+            f"{_TRIANGLES}indices": self._rest.triangles.ravel(),
+        }
+        if line is not None:
+            values |= {**_LINE_LOOK, f"{_LINE}points": line}
+        return self._layout(limit, line is not None)(values)
+
+    def _limit_of(self, largest: float, now: float) -> float:
+        """The displacement of the last colour, which follows the `largest`: down after a delay."""
+        largest = max(largest, _LEAST * self._side)
+        power = 10.0 ** math.floor(math.log10(largest))
+        wanted = next(times * power for times in (1, 2, 5, 10) if times * power >= largest)
+        if wanted >= self._limit or now > self._until:
+            self._limit, self._until = wanted, now + _PATIENCE
+        return self._limit
+
+    def _line(self, estimate: Estimate) -> Array | None:
+        """Points (48, 3) in m just above the skin, a standard deviation from the contact."""
+        contact, patch = estimate.contact, self._patch
+        if not (contact.present and np.isfinite(contact.position_sd).all()):
+            return None
+        x0, y0 = contact.position.tolist()
+        places = patch.around(x0, y0, contact.position_sd * _SIDES)
+        for n in np.flatnonzero(~patch.contains(places)):
+            places[n] = patch.inward(*places[n].tolist())
+        rest, out = patch.at_rest(places)
+        height = _LIFT * self._side - self._basis.at(places) @ estimate.coefficients.ravel()
+        return rest + height[:, None] * out
+
+    def _layout(self, limit: float, with_line: bool) -> MessageLayout:
+        found = self._layouts.get((limit, with_line))
+        if found is None:
+            count = len(self._rest.points)
+            fixed: dict[str, str | int] = {
+                "entities": 1,
+                f"{_ENTITY}frame_id": FRAME,
+                f"{_ENTITY}id": "skin",
+                f"{_ENTITY}metadata": 1,
+                f"{_ENTITY}metadata.0.key": "displacement of the brightest colour",
+                f"{_ENTITY}metadata.0.value": f"{limit:g} m",
+                f"{_ENTITY}lines": int(with_line),
+                f"{_LINE}points": len(_SIDES),
+                f"{_ENTITY}triangles": 1,
+                f"{_TRIANGLES}points": count,
+                f"{_TRIANGLES}colors": count,
+                f"{_TRIANGLES}indices": self._rest.triangles.size,
+            }
+            found = MessageLayout(SCENE_UPDATE, fixed | _NO_LISTS)
+            self._layouts[limit, with_line] = found
+        return found
+
+
+class SkinMessages:
+    """Messages of estimates to messages of the channels `SKIN` and `MESH`."""
+
+    def __init__(self) -> None:
+        self._points: _SkinPoints | None = None
+
+    def __call__(self, channel: Channel, message: EstimateMessage) -> bytes | None:
+        """The skin for one of its channels; None when its shape is not known."""
+        if not np.isfinite(message.estimate.coefficients).all():
+            return None
+        if self._points is None or self._points.pipeline is not message.pipeline:
+            self._points = _SkinPoints(message.pipeline)
+        return self._points.mesh(message) if channel is MESH else self._points.cloud(message)
 
 
 def pose(message: EstimateMessage) -> bytes:

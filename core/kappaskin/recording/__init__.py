@@ -1,5 +1,6 @@
 """Recordings: MCAP files written, read, replayed, verified, repaired and exported, imported."""
 
+from kappaskin.recording.cdr import MessageLayout as MessageLayout
 from kappaskin.recording.disk import ReservedFile as ReservedFile
 from kappaskin.recording.disk import is_written as is_written
 from kappaskin.recording.export.request import PRESETS as PRESETS
@@ -13,6 +14,7 @@ from kappaskin.recording.foreign import is_foreign as is_foreign
 from kappaskin.recording.importing import Imported as Imported
 from kappaskin.recording.importing import ImportRequest as ImportRequest
 from kappaskin.recording.importing import ImportTask as ImportTask
+from kappaskin.recording.messages import SCENE_UPDATE as SCENE_UPDATE
 from kappaskin.recording.reading import Recording as Recording
 from kappaskin.recording.reading import contacts_in as contacts_in
 from kappaskin.recording.reading import made_by as made_by

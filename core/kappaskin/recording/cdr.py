@@ -85,7 +85,8 @@ class MessageLayout:
     """The bytes of messages of one type whose texts and lengths of lists are always the same.
 
     `fixed` has by the path of a field (such as `header.frame_id`) its text, or the length of its
-    list. A call gives the bytes of a message, its other fields by path.
+    list. A call gives the bytes of a message, its other fields by path; a list of messages of
+    numbers of one kind, such as points, is one array of a row for each.
     """
 
     def __init__(self, kind: MessageType, fixed: Mapping[str, str | int]) -> None:
@@ -124,6 +125,10 @@ class MessageLayout:
                 if count:
                     self._add(path, primitive, count)
                 continue
+            if even := _even(kind.inside[field.kind]):
+                if count:
+                    self._add(path, np.dtype(even), count)
+                continue
             for n in range(count):
                 self._place_one(kind, field.kind, f"{path}.{n}")
 
@@ -146,7 +151,7 @@ class MessageLayout:
         aligned: int = 0,
     ) -> None:
         head = len(_LITTLE_ENDIAN)
-        step = aligned or kind.itemsize
+        step = aligned or kind.base.itemsize
         at = head + -(-(self._end - head) // step) * step
         self._names.append(path)
         self._formats.append(kind if count is None else (kind, (count,)))
@@ -161,6 +166,14 @@ class MessageLayout:
         for path, value in values.items():
             record[path] = value
         return data.tobytes()
+
+
+def _even(kind: MessageType) -> "tuple[np.dtype[Any], tuple[int]] | None":
+    """The kind and shape of the numbers in a message that has no other fields."""
+    (first, *others) = ((_PRIMITIVES.get(field.kind), field.count) for field in kind.fields)
+    if first[0] is None or first[1] is not None or any(other != first for other in others):
+        return None
+    return first[0], (len(kind.fields),)
 
 
 def encode(kind: MessageType, values: Mapping[str, Any]) -> bytes:

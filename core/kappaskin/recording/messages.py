@@ -1,4 +1,4 @@
-"""Message types of a recording: those of ROS 2, and our own with units."""
+"""Message types: those of ROS 2, our own of a recording with units, and a scene in 3-D."""
 
 import struct
 from collections.abc import Iterable
@@ -59,6 +59,59 @@ bool is_dense
     HEADER,
     _POINT_FIELD,
 )
+
+_DURATION = MessageType("builtin_interfaces/msg/Duration", "int32 sec\nuint32 nanosec")
+_VECTOR = MessageType("geometry_msgs/msg/Vector3", "float64 x\nfloat64 y\nfloat64 z")
+_COLOUR = MessageType("foxglove_msgs/msg/Color", "float64 r\nfloat64 g\nfloat64 b\nfloat64 a")
+_PAIR = MessageType("foxglove_msgs/msg/KeyValuePair", "string key\nstring value")
+_POSED, _COLOURED = "geometry_msgs/Pose pose\n", "foxglove_msgs/Color color\n"
+_BOX = f"{_POSED}geometry_msgs/Vector3 size\n"
+_VERTICES = (
+    f"geometry_msgs/Point[] points\n{_COLOURED}foxglove_msgs/Color[] colors\nuint32[] indices"
+)
+_PRIMITIVES = {
+    "Arrow": f"{_POSED}float64 shaft_length\nfloat64 shaft_diameter\n"
+    f"float64 head_length\nfloat64 head_diameter\n{_COLOURED}",
+    "Cube": _BOX + _COLOURED,
+    "Sphere": _BOX + _COLOURED,
+    "Cylinder": f"{_BOX}float64 bottom_scale\nfloat64 top_scale\n{_COLOURED}",
+    "Line": f"uint8 type\n{_POSED}float64 thickness\nbool scale_invariant\n{_VERTICES}",
+    "TriangleList": _POSED + _VERTICES,
+    "Text": f"{_POSED}bool billboard\nfloat64 font_size\nbool scale_invariant\n"
+    f"{_COLOURED}string text",
+    "Model": f"{_POSED}geometry_msgs/Vector3 scale\n{_COLOURED}bool override_color\n"
+    "string url\nstring media_type\nuint8[] data",
+}
+SCENE_UPDATE = MessageType(
+    "foxglove_msgs/msg/SceneUpdate",
+    "foxglove_msgs/SceneEntityDeletion[] deletions\nfoxglove_msgs/SceneEntity[] entities",
+    MessageType(
+        "foxglove_msgs/msg/SceneEntityDeletion",
+        "builtin_interfaces/Time timestamp\nuint8 type\nstring id",
+        TIME,
+    ),
+    MessageType(
+        "foxglove_msgs/msg/SceneEntity",
+        """
+builtin_interfaces/Time timestamp
+string frame_id
+string id
+builtin_interfaces/Duration lifetime
+bool frame_locked
+foxglove_msgs/KeyValuePair[] metadata
+"""
+        + "".join(
+            f"foxglove_msgs/{name}Primitive[] {name.removesuffix('List').lower()}s\n"
+            for name in _PRIMITIVES
+        ),
+        *(TIME, _DURATION, _PAIR),
+        *(
+            MessageType(f"foxglove_msgs/msg/{name}Primitive", text, _POSE, _POINT, _VECTOR, _COLOUR)
+            for name, text in _PRIMITIVES.items()
+        ),
+    ),
+)
+"""Shapes in space, as viewers draw them."""
 
 LINE = MessageType(
     "kappaskin_msgs/msg/Line",

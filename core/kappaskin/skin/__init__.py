@@ -9,6 +9,7 @@ from kappaskin.skin.patch import Patch as Patch
 from kappaskin.skin.patch import Polygon as Polygon
 from kappaskin.skin.patch import doubled_area as doubled_area
 from kappaskin.skin.surface import Distances as Distances
+from kappaskin.skin.surface import RestMesh as RestMesh
 from kappaskin.skin.surface import distances as distances
 from kappaskin.skin.surface import interpolated as interpolated
 from kappaskin.skin.surface import snapped_to_rim as snapped_to_rim

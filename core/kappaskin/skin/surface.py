@@ -38,6 +38,37 @@ def snapped_to_rim(patch: Patch, grid: Array, on: Mask) -> tuple[Array, Indices]
     return moved, shown.ravel()
 
 
+class RestMesh:
+    """The skin of `patch` at rest at nx x ny points; those outside its rim are moved onto it.
+
+    At `positions` (k, 2) in m on the skin are the `points` (k, 3) in m in space with outward
+    `normals`; the `triangles` (n, 3) of them turn left as seen from outside.
+    """
+
+    def __init__(self, patch: Patch, nx: int, ny: int) -> None:
+        grid = np.stack(np.meshgrid(*patch.grid(nx, ny)), axis=-1)
+        on = patch.contains(grid.reshape(-1, 2)).reshape(ny, nx)
+        if not on.all():
+            grid, _ = snapped_to_rim(patch, grid, on)
+        self.triangles: Indices
+        used, self.triangles = np.unique(_triangles(on), return_inverse=True)
+        self.positions: Array = grid.reshape(-1, 2)[used]
+        self.points, self.normals = patch.at_rest(self.positions)
+
+
+def _triangles(on: Mask) -> Indices:
+    """Two for each square with a corner `on` the skin, turning left as seen from outside."""
+    index = np.arange(on.size).reshape(on.shape)
+    square = (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1])
+    corners = np.stack(square, axis=-1).reshape(-1, 4)
+    inside = on.ravel()[corners]
+    # The diagonal ends at a corner on the skin: three points of the rim would face anywhere.
+    turned = ~inside[:, 0] & ~inside[:, 2]
+    corners[turned] = np.roll(corners[turned], 1, axis=1)
+    corners = corners[inside.any(axis=1)]
+    return np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
+
+
 _STEPS = 256  # of the line along the skin
 
 

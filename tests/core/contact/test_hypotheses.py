@@ -25,7 +25,7 @@ BENT, FLAT = (
     ElasticSkin(Plate(patch), SensorLayout.regular(patch, 3, 3), "hinged", 5)
     for patch in (Patch(SIDE, 0.12, 10.0), Patch(SIDE, 0.12))
 )
-WIDTH = Width(q=4e-6, sd=1e-7, k0=80.0, q0=4e-6, bend=20.0)
+WIDTH = Width(q=4e-6, sd=1e-7, measured=1e-7, k0=80.0, q0=4e-6, bend=20.0)
 
 
 def optimum(
@@ -50,7 +50,7 @@ def test_length_angle_and_share_are_as_likely_as_their_priors_say(length, share)
 
 @pytest.mark.parametrize("k0", [10.0, 80.0, 300.0])
 def test_a_radius_is_as_likely_as_any_multiple_of_it(k0: float) -> None:
-    width = Width(q=4e-6, sd=0.05 * 4e-6, k0=k0, q0=4e-6, bend=k0)
+    width = Width(q=4e-6, sd=2e-7, measured=2e-7, k0=k0, q0=4e-6, bend=k0)
 
     told = radius_prior(FLAT, width)
 

@@ -7,17 +7,22 @@ import struct
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, suppress
 from copy import copy
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from mcap.records import Schema
+from mcap_ros2.decoder import DecoderFactory
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from kappaskin import Event, Refusal, load_scene
+from kappaskin.bases import basis_for
 from kappaskin.publish import Access, SourceState, foxglove, targets_of
 from kappaskin.publish.foxglove import (
     LARGEST,
@@ -27,9 +32,10 @@ from kappaskin.publish.foxglove import (
     Foxglove,
     FoxgloveClient,
 )
-from kappaskin.publish.foxglove_channels import CHANNELS, NAMES, POINTS
+from kappaskin.publish.foxglove_channels import CHANNELS, MESH, NAMES, POINTS, SkinMessages
 from kappaskin.publish.message import EstimateMessage
 from kappaskin.publish.publishing import opened, target_of
+from kappaskin.skin import Cap, Disk, Patch, Polygon
 
 pytestmark = pytest.mark.slow
 
@@ -156,8 +162,10 @@ def test_a_client_is_told_who_serves_and_what_there_is(client, protocol: str) ->
     assert information["capabilities"] == []
     assert {channel["topic"]: channel["id"] for channel in advertised["channels"]} == TOPICS
     for channel in advertised["channels"]:
-        assert (channel["encoding"], channel["schemaEncoding"]) == ("json", "jsonschema")
-        assert json.loads(channel["schema"])["type"] == "object"
+        mesh = channel["topic"] == "/skin/mesh"
+        encodings = ("cdr", "ros2msg") if mesh else ("json", "jsonschema")
+        assert (channel["encoding"], channel["schemaEncoding"]) == encodings
+        assert mesh or json.loads(channel["schema"])["type"] == "object"
 
 
 def test_a_client_of_another_protocol_is_refused(server) -> None:
@@ -169,8 +177,9 @@ def test_a_client_of_another_protocol_is_refused(server) -> None:
 
 
 def test_every_channel_holds_what_its_schema_says(client, server, message) -> None:
-    one = client(*TOPICS)
-    schemas = {c["id"]: json.loads(c["schema"]) for c in one.first[1]["channels"]}
+    topics = [topic for topic in TOPICS if topic != "/skin/mesh"]
+    one = client(*topics)
+    schemas = {c["id"]: c["schema"] for c in one.first[1]["channels"]}
     contact, shape = json.loads(message.contact), json.loads(message.shape)
     told: dict[int, Told] = {}
 
@@ -179,17 +188,18 @@ def test_every_channel_holds_what_its_schema_says(client, server, message) -> No
         server.send(copy(message))
         server.report(STATE)
         with suppress(TimeoutError):
-            while len(told) < len(TOPICS):
+            while len(told) < len(topics):
                 number, when, content = parsed(one.recv(0.5))
                 told[number - 70] = content
                 assert abs(when - time.time()) < 60 or number - 70 == TOPICS["/log"]
-        return len(told) == len(TOPICS)
+        return len(told) == len(topics)
 
     until(all_of_it)
     for number, content in told.items():
-        assert obeys(content, schemas[number]), content
+        schema = json.loads(schemas[number])
+        assert obeys(content, schema), content
         if content.get("kind"):
-            assert content.keys() == schemas[number]["properties"].keys()
+            assert content.keys() == schema["properties"].keys()
     assert told[TOPICS["/contact"]] == contact
     assert told[TOPICS["/shape"]] == shape
     assert told[TOPICS["/log"]]["message"] == "gap: 3 messages lost"
@@ -213,6 +223,133 @@ def test_the_skin_is_a_cloud_of_points_on_the_deflected_surface(client, server, 
     )
     assert np.isfinite(yy).all()
     assert np.abs(xy).max() > 1
+
+
+def decoded(channel: Told, data: bytes) -> Any:
+    """The entity in a message, by another project's decoder and the schema that was advertised."""
+    schema = Schema(
+        id=1,
+        name=channel["schemaName"],
+        encoding=channel["schemaEncoding"],
+        data=channel["schema"].encode(),
+    )
+    decoder = DecoderFactory().decoder_for(channel["encoding"], schema)
+    assert decoder is not None
+    scene = decoder(data)
+    assert not scene.deletions
+    (entity,) = scene.entities
+    assert (entity.frame_id, entity.id) == ("skin", "skin")
+    return entity
+
+
+def numbers(of: Sequence[Any], names: str) -> np.ndarray:
+    return np.array([[getattr(each, name) for name in names] for each in of])
+
+
+def surface_of(entity: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Its points (k, 3), triangles (n, 3) and colours (k, 4)."""
+    (mesh,) = entity.triangles
+    assert mesh.pose.orientation.w == 1
+    triangles = np.array(mesh.indices).reshape(-1, 3)
+    return numbers(mesh.points, "xyz"), triangles, numbers(mesh.colors, "rgba")
+
+
+def loops_around(triangles: np.ndarray) -> int:
+    """How many closed lines the edges are that belong to one triangle alone."""
+    edges = Counter((t[i - 1], t[i]) for t in triangles.tolist() for i in range(3))
+    assert max(edges.values()) == 1  # neighbours turn the same way
+    onward = {a: b for a, b in edges if (b, a) not in edges}
+    assert sorted(onward) == sorted(onward.values())
+    loops = 0
+    while onward:
+        at, loops = next(iter(onward)), loops + 1
+        while at in onward:
+            at = onward.pop(at)
+    return loops
+
+
+def area_of_dome(patch: Patch) -> float:
+    """Of an arc along x that is carried along an arc along y, by the midpoint rule."""
+    turns = [((np.arange(400) + 0.5) / 400 - 0.5) * patch.a / R for R in patch.radii]
+    x, y = turns[0], turns[1][:, None]
+    area = np.sqrt(1 + np.tan(x) ** 2 + np.tan(y) ** 2) * np.cos(x) * np.cos(y)
+    return float(area.mean()) * patch.a * patch.b
+
+
+DOME, DISK, CAP = Patch(0.03, 0.03, (0.07, -0.1)), Disk(0.02), Cap(0.008)
+L_SHAPE = Polygon([[0, 0], [0.04, 0], [0.04, 0.02], [0.02, 0.02], [0.02, 0.04], [0, 0.04]])
+AREAS = {
+    "flat": (Patch(0.1, 0.06), 6e-3),
+    "bent": (Patch(0.03, 0.02, 0.01), 6e-4),
+    "dome": (DOME, area_of_dome(DOME)),
+    "disk": (DISK, np.pi * 0.02**2),
+    "polygon": (L_SHAPE, 1.2e-3),
+    "cap": (CAP, 2 * np.pi * 0.008**2),
+    "egg": (Cap(0.008, 1.2, 1.0), 2 * np.pi * 0.008**2 * (1 - np.cos(1.2))),
+}
+
+
+@pytest.mark.parametrize("kind", AREAS)
+def test_the_mesh_is_one_piece_of_the_skin_seen_from_outside(kind: str) -> None:
+    patch, area = AREAS[kind]
+    basis = basis_for(patch, "clamped" if kind in ("disk", "polygon", "cap") else "hinged", 4, 4)
+    rng = np.random.default_rng(3)
+    coefficients = rng.normal(size=basis.shape)
+    places = rng.uniform(0, (patch.a, patch.b), (500, 2))
+    displacement = basis.at(places[patch.contains(places)]) @ coefficients.ravel()
+    coefficients *= 1e-3 * patch.b / np.abs(displacement).max()
+    message: Any = SimpleNamespace(
+        pipeline=SimpleNamespace(basis=basis),
+        timestamp=12.5,
+        estimate=SimpleNamespace(coefficients=coefficients, contact=SimpleNamespace(present=False)),
+    )
+    data = SkinMessages()(MESH, message)
+    assert data is not None
+    entity = decoded(MESH.advertised, data)
+    assert (entity.timestamp.sec, entity.timestamp.nanosec) == (12, 500_000_000)
+    assert not entity.lines
+    points, triangles, colours = surface_of(entity)
+    assert loops_around(triangles) == 1
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    turned = np.cross(b - a, c - a) / 2
+    sizes = np.linalg.norm(turned, axis=1)
+    assert sizes.sum() == pytest.approx(area, rel=0.01)
+    outward = np.array([0.0, 0.0, 1.0])
+    if isinstance(patch, Cap):
+        outward = (a + b + c) / 3 - (patch.a / 2, patch.b / 2, -0.008)
+    elif kind == "bent":
+        outward = ((a + b + c) / 3 - (patch.a / 2, 0, -0.01)) * (1, 0, 1)
+    assert (np.sum(turned * outward, axis=1)[sizes > 1e-6 * sizes.max()] > 0).all()
+    assert (colours[:, 3] == 1).all()
+    assert np.ptp(colours[:, 1]) > 0.3
+
+
+def test_the_mesh_is_the_deflected_surface_with_the_contact_s_error_bars_on_it(
+    client, server, message
+) -> None:
+    one = client("/skin/mesh")
+    (channel,) = (c for c in one.first[1]["channels"] if c["topic"] == "/skin/mesh")
+    server.send(message)
+    data = one.recv(PATIENCE)
+    number, nanoseconds = struct.unpack("<IQ", data[1:13])
+    entity = decoded(channel, data[13:])
+    assert number == 70 + channel["id"]
+    assert entity.timestamp.sec * 10**9 + entity.timestamp.nanosec == nanoseconds
+    points, _, colours = surface_of(entity)
+    surface = message.estimate.surface[::2, ::2]
+    assert points[:, 2] == pytest.approx(-surface.ravel(), abs=1e-8)
+    (told,) = entity.metadata
+    limit = float(told.value.removesuffix(" m"))
+    assert surface.max() <= limit < 2.6 * surface.max()
+    assert colours[0, :3] * 255 == pytest.approx([0x1A, 0x2A, 0x5E])
+    (line,) = entity.lines
+    assert (line.type, line.scale_invariant, len(line.colors)) == (1, True, 0)
+    x, y, z = numbers(line.points, "xyz").T
+    contact = message.estimate.contact
+    away = (np.stack([x, y]) - contact.position[:, None]) / contact.position_sd[:, None]
+    assert np.hypot(*away) == pytest.approx(1)
+    assert (z + contact.displacement > 0).all()
+    assert (z + contact.displacement < 0.004 * 0.1).all()
 
 
 def test_the_pose_stands_on_the_skin_along_its_normal(client, server, message) -> None:

@@ -681,6 +681,7 @@ def long(tmp_path_factory) -> Path:
     return path
 
 
+@pytest.mark.cases("csv-asked1", "csv-asked2", "npz", "pvd", "vtp")
 @pytest.mark.parametrize(
     ("name", "asked"),
     [

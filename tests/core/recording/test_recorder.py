@@ -123,7 +123,7 @@ SETUPS = {
 }
 
 
-@pytest.mark.cases("least squares", "calibrated")
+@pytest.mark.cases("calibrated")
 @pytest.mark.parametrize("name", SETUPS)
 def test_what_was_live_comes_out_of_its_bytes_again_bit_for_bit(name, engine, tmp_path) -> None:
     """Begun in the middle, with all that is remembered; then with other settings."""

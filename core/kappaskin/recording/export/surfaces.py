@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +15,10 @@ from kappaskin._text import printable
 from kappaskin.bases import Basis
 from kappaskin.contact import surface_geometry
 from kappaskin.errors import Refusal
-from kappaskin.frames import COMPONENTS, Array
+from kappaskin.frames import COMPONENTS, Array, Indices
 from kappaskin.pipeline import Pipeline
 from kappaskin.recording.export.request import ExportedFrame, ExportRequest, RecordingInfo
-from kappaskin.skin import snapped_to_rim
-
-Triangles: TypeAlias = "NDArray[np.int64]"
+from kappaskin.skin import RestMesh
 
 _AT_ONCE = 2**20  # values of functions that are worked out at once
 
@@ -35,7 +33,7 @@ class SkinSurface:
 
     points: Array
     normals: Array
-    triangles: Triangles
+    triangles: Indices
     displacement: Array
     curvature: Array
 
@@ -44,44 +42,27 @@ class SkinMesh:
     """The skin of a `basis` at nx x ny points; those outside its rim are moved onto it."""
 
     def __init__(self, basis: Basis, nx: int, ny: int) -> None:
-        self._basis, patch = basis, basis.patch
-        grid = np.stack(np.meshgrid(*patch.grid(nx, ny)), axis=-1)
-        on = patch.contains(grid.reshape(-1, 2)).reshape(ny, nx)
-        if not on.all():
-            grid, _ = snapped_to_rim(patch, grid, on)
-        corners = _triangles(on)
-        self.triangles: Triangles
-        used, self.triangles = np.unique(corners, return_inverse=True)
-        self._positions = grid.reshape(-1, 2)[used]
-        self._rest, self._out = patch.at_rest(self._positions)
+        self._basis = basis
+        self._rest = RestMesh(basis.patch, nx, ny)
 
     def __call__(self, coefficients: Array) -> SkinSurface:
         """The surface with `coefficients` (Ni, Nj) in m."""
-        step = max(_AT_ONCE // self._basis.size, 1)
+        rest, step = self._rest, max(_AT_ONCE // self._basis.size, 1)
         parts = [
-            surface_geometry(self._basis, coefficients, self._positions[n : n + step], _no_error)
-            for n in range(0, len(self._positions), step)
+            surface_geometry(self._basis, coefficients, rest.positions[n : n + step], _no_error)
+            for n in range(0, len(rest.positions), step)
         ]
         points = np.concatenate([part.position for part in parts])
         K = np.concatenate([part.curvature_form for part in parts])
-        displacement = np.einsum("pi,pi->p", self._rest - points, self._out)
+        displacement = np.einsum("pi,pi->p", rest.points - points, rest.normals)
         normals = np.concatenate([part.normal for part in parts])
         curvature = np.stack([K[:, 0, 0], K[:, 1, 1], K[:, 0, 1]], axis=-1)
-        return SkinSurface(points, normals, self.triangles, displacement, curvature)
+        return SkinSurface(points, normals, rest.triangles, displacement, curvature)
 
 
 def _no_error(rows: Array) -> Array:
     """The covariance (..., 6, 6) of the given shape."""
     return np.zeros((*rows.shape[:-1], rows.shape[-2]))
-
-
-def _triangles(on: NDArray[np.bool_]) -> Triangles:
-    """Two for each square with a corner `on` the skin, turning left as seen from outside."""
-    index = np.arange(on.size).reshape(on.shape)
-    square = (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1])
-    corners = np.stack(square, axis=-1).reshape(-1, 4)
-    corners = corners[on.ravel()[corners].any(axis=1)]
-    return np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
 
 
 class SurfaceWriter(ABC):

@@ -11,6 +11,7 @@ import numpy as np
 from kappaskin._text import printable
 from kappaskin.errors import lacking
 from kappaskin.frames import Array
+from kappaskin.pipeline import SEQUENTIAL
 
 Figure = Any
 """matplotlib.figure.Figure: Matplotlib is loaded when a figure is drawn, not to check types."""
@@ -24,8 +25,7 @@ INK, FAINT, GREY, LINE, FILL = "#16191d", "#5b6470", "#9aa3ad", "#c6ccd4", "#e9e
 BLUE, ORANGE = "#2166ac", "#bd5a14"
 DIVERGING = ("#08306b", "#2166ac", "#5b9fd0", "#b6d5ea", "#f6f6f4", "#f9cfa5", "#e8954a",
              "#bd5a14", "#6e2a04")  # fmt: skip
-SEQUENTIAL = ("#1a2a5e", "#2c5282", "#3f7f8f", "#63a878", "#a9c95b", "#f5e663")
-"""The anchors of the app's colour maps: blue to white to orange, dark blue to yellow."""
+"""The anchors of the app's colour map of both signs: blue to white to orange."""
 
 _RULES = {
     "font.family": "sans-serif",

@@ -1,11 +1,12 @@
 """What the tests of connecting share."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
 
 from kappaskin.sources import Port
 from kappaskin_app.features.connection.panel import ConnectionPanel
+from kappaskin_app.shell.window import MainWindow
 
 
 @pytest.fixture
@@ -20,3 +21,10 @@ def shown(qtbot) -> Callable[[ConnectionPanel, list[Port]], ConnectionPanel]:
         return panel
 
     return show
+
+
+@pytest.fixture
+def window(shared_window: MainWindow) -> Iterator[MainWindow]:
+    """The window that the tests of a file share, without what was typed before each."""
+    yield shared_window
+    shared_window.session.connect_to("sim:")

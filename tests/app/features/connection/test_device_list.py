@@ -322,11 +322,18 @@ def silent():
 
 
 @pytest.fixture
-def listing(window, monkeypatch, device, silent, until, qtbot):
-    """The window that lists a device, a silent port, and one that may not be opened."""
-    ports = [Port(device.port), Port(silent), Port("/dev/ttyUSB9", opened=False)]
-    monkeypatch.setattr(Port, "found", staticmethod(lambda: list(ports)))
-    until(lambda: window.connection.sources.count() == 5)
+def ports(monkeypatch, device, silent):
+    """What is plugged in: a device, a silent port, and one that may not be opened."""
+    found = [Port(device.port), Port(silent), Port("/dev/ttyUSB9", opened=False)]
+    monkeypatch.setattr(Port, "found", staticmethod(lambda: list(found)))
+    return found
+
+
+@pytest.fixture
+def listing(ports, window, until):
+    """The window that lists these ports."""
+    listed = window.connection.sources.itemData
+    until(lambda: [listed(row) for row in (1, 2, 3)] == [port.port for port in ports])
     return window
 
 
@@ -420,14 +427,16 @@ def test_the_device_in_use_is_not_opened_to_identify_it(listing, device, qtbot, 
     assert streams_from(listing, device.port)
 
 
-def test_closing_the_window_ends_the_identification(listing, silent, qtbot, until):
-    panel = listing.connection
+def test_closing_the_window_ends_the_identification(ports, opened, silent, qtbot, until):
+    window = opened("sim:")
+    panel = window.connection
+    until(lambda: window.isActiveWindow() and panel.sources.count() == 5)
     opened_by_click(panel, qtbot)
     clicked(panel, qtbot, 4)
     until(lambda: speakers(panel)[1].startswith("listening"))
     qtbot.keyClick(panel.sources.view(), Qt.Key.Key_Escape)
     began = time.monotonic()
-    listing.close()
+    window.close()
     assert time.monotonic() - began < 2.5  # the silent port is listened to for longer
     assert "identified_ports" not in [thread.name for thread in threading.enumerate()]
     open_port(silent).close()

@@ -16,6 +16,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog
 
 from kappaskin.sources import Recogniser, load_description
+from kappaskin_app.features.connection.wizard import NewSensorDialog
+from kappaskin_app.shell.background import Tasks
 
 tty = pytest.importorskip("tty", reason="no pseudo-terminals on this system")
 pytestmark = pytest.mark.slow
@@ -65,6 +67,14 @@ def board():
     yield made
     if not made.over.is_set():
         made.unplug()
+
+
+@pytest.fixture
+def dialog(qtbot) -> NewSensorDialog:
+    """The dialog alone."""
+    made = NewSensorDialog(Tasks())
+    qtbot.addWidget(made)
+    return made
 
 
 def click(widget) -> None:
@@ -120,9 +130,8 @@ def test_a_board_becomes_a_live_skin(window, until, board, tmp_path, monkeypatch
     assert not dialog.isVisible()
 
 
-def test_columns_are_set_by_selection_and_what_cannot_be_is_said(window, until, board) -> None:
-    window.actions_by_name["new-sensor"].trigger()
-    dialog = window.new_sensor
+def test_columns_are_set_by_selection_and_what_cannot_be_is_said(dialog, until, board) -> None:
+    dialog.begin()
     typed(dialog.ports.lineEdit(), board.port)
     click(dialog.read)
     until(lambda: dialog.next.isEnabled() and dialog.found.roles[:1] == ("time_ms",))
@@ -150,11 +159,10 @@ def test_columns_are_set_by_selection_and_what_cannot_be_is_said(window, until, 
     assert not dialog.isVisible()
 
 
-def test_unplugged_in_the_middle_it_says_so_and_goes_on(window, until, tmp_path) -> None:
+def test_unplugged_in_the_middle_it_says_so_and_goes_on(dialog, until, tmp_path) -> None:
     board = Board()
     link = tmp_path / "ttyBoard"
     link.symlink_to(board.port)
-    dialog = window.new_sensor
     dialog.begin()
     typed(dialog.ports.lineEdit(), str(link))
     click(dialog.read)
@@ -187,10 +195,9 @@ def test_unplugged_in_the_middle_it_says_so_and_goes_on(window, until, tmp_path)
     dialog.reject()
 
 
-def test_a_port_that_is_plugged_in_is_read_by_itself(window, until, board) -> None:
+def test_a_port_that_is_plugged_in_is_read_by_itself(dialog, until, board) -> None:
     from kappaskin.sources import Port
 
-    dialog = window.new_sensor
     dialog.begin()
     dialog.show_ports([Port("/dev/ttyS0")])
     assert dialog.lines is None
@@ -280,15 +287,12 @@ def test_a_table_without_times_has_a_rate(window, until, tmp_path, monkeypatch) 
     until(lambda: window.session.status.replay.length == pytest.approx(99 / 50))
 
 
-@pytest.mark.full
-def test_json_in_lines_is_described_by_its_keys(window, until, tmp_path, monkeypatch) -> None:
+def test_json_in_lines_is_described_by_its_keys(dialog, until, tmp_path, monkeypatch) -> None:
     lines, file = tmp_path / "glove.jsonl", tmp_path / "glove.toml"
     rows = ({"n": n, "skin": {"h": [n * k % 7 for k in range(1, 7)]}} for n in range(200))
     lines.write_text("".join(json.dumps(row) + "\n" for row in rows))
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(file), ""))
-    dialog = window.new_sensor
     made = list[tuple[Path, str, str]]()
-    dialog.made.disconnect()
     dialog.made.connect(lambda *what: made.append(what))
     dialog.begin(lines)
     until(lambda: "A JSON object in each line; 7 columns" in dialog.fact.text())
@@ -321,11 +325,10 @@ def lines(tmp_path):
 
 
 def test_elements_that_are_counted_along_x_are_placed_so(
-    window, until, lines, tmp_path, monkeypatch
+    dialog, until, lines, tmp_path, monkeypatch
 ) -> None:
-    dialog, file = window.new_sensor, tmp_path / "rows.toml"
+    file = tmp_path / "rows.toml"
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(file), ""))
-    dialog.made.disconnect()
     described(dialog, until, lines)
     dialog.along.setCurrentIndex(1)
     click(dialog.next)
@@ -335,9 +338,7 @@ def test_elements_that_are_counted_along_x_are_placed_so(
     assert columns[:4] == ["time", "height:0", "height:3", "height:6"]
 
 
-@pytest.mark.full
-def test_numbers_of_elements_that_differ_from_the_columns_are_said(window, until, lines) -> None:
-    dialog = window.new_sensor
+def test_numbers_of_elements_that_differ_from_the_columns_are_said(dialog, until, lines) -> None:
     described(dialog, until, lines)
     dialog.grid[0].setValue(3)
     until(lambda: not dialog.next.isEnabled())
@@ -347,8 +348,7 @@ def test_numbers_of_elements_that_differ_from_the_columns_are_said(window, until
     assert dialog.fact.text() == "Of 5 x 3 = 15 elements 3 have no column."
 
 
-def test_a_dialog_that_is_opened_again_begins_anew(window, until, lines) -> None:
-    dialog = window.new_sensor
+def test_a_dialog_that_is_opened_again_begins_anew(dialog, until, lines) -> None:
     described(dialog, until, lines)
     QTest.keyClick(dialog, Qt.Key.Key_Escape)
     until(lambda: not dialog.isVisible())
@@ -361,8 +361,7 @@ def test_a_dialog_that_is_opened_again_begins_anew(window, until, lines) -> None
     until(lambda: "13 columns" in dialog.fact.text())
 
 
-def test_right_after_a_press_it_is_not_taken_for_the_rest(window, until, lines) -> None:
-    dialog = window.new_sensor
+def test_right_after_a_press_it_is_not_taken_for_the_rest(dialog, until, lines) -> None:
     dialog.begin(lines)
     until(lambda: "13 columns" in dialog.fact.text())
     dialog.lines.poll = lambda: None
@@ -386,9 +385,7 @@ def test_right_after_a_press_it_is_not_taken_for_the_rest(window, until, lines) 
         assert dialog.answering() == []
 
 
-@pytest.mark.full
-def test_words_after_numbers_are_said(window, until, board) -> None:
-    dialog = window.new_sensor
+def test_words_after_numbers_are_said(dialog, until, board) -> None:
     dialog.begin()
     QTest.keyClicks(dialog.ports.lineEdit(), board.port)
     QTest.keyClick(dialog.ports.lineEdit(), Qt.Key.Key_Return)

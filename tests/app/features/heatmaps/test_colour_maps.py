@@ -13,6 +13,11 @@ from kappaskin_app.widgets.layout import scroll_to
 LEFT = Qt.MouseButton.LeftButton
 
 
+@pytest.fixture
+def window(shared_window: MainWindow) -> MainWindow:
+    return shared_window
+
+
 def away(widget: QWidget, at: QPoint, colours: np.ndarray) -> float:
     """How far a pixel is from the nearest of some colours, in RGB."""
     pixel = QColor(widget.grab().toImage().pixel(at)).getRgb()[:3]
@@ -44,7 +49,7 @@ def test_a_map_selected_from_the_list_colours_skin_heatmaps_and_scales(
         until(lambda made=made, near=near: away(xx.bar, near, made.diverging) < 12)
         until(lambda made=made, inside=inside: away(xx.cells, inside, made.diverging) < 12)
         lookup = window.membrane.surface.actor.mapper.lookup_table
-        assert np.array_equal(lookup.values[:, :3], made.sequential)
+        until(lambda made=made, of=lookup: np.array_equal(of.values[:, :3], made.sequential))
         qtbot.wait(1100)  # changes that follow each other sooner are one step to undo
     window.history.stack.undo()
     assert window.history.settings.colour_map == "viridis"

@@ -1,6 +1,7 @@
 """The mouse and keys on the skin move and press a simulated load, or else turn the camera."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -31,8 +32,13 @@ def notch(window: MainWindow, at: QPoint, times: int, held=LEFT) -> None:
     QApplication.sendEvent(plotter, event)
 
 
+@pytest.fixture
+def window(shared_window: MainWindow) -> MainWindow:
+    return shared_window
+
+
 @pytest.fixture(params=["window", "presenter"])
-def pressed(request: pytest.FixtureRequest, window: MainWindow, until) -> MainWindow:
+def pressed(request: pytest.FixtureRequest, window: MainWindow, until) -> Iterator[MainWindow]:
     """The window with a point load at rest, or the same in the presenter."""
     window.history.change("Point", -1, load_case="point", x=0.05, y=0.05, force=0.1)
     if request.param == "presenter":
@@ -41,7 +47,9 @@ def pressed(request: pytest.FixtureRequest, window: MainWindow, until) -> MainWi
         QApplication.processEvents()
     until(lambda: window.membrane.drag.handles.tolist() == [[0.05, 0.05]])
     until(lambda: abs(window.session.estimate.true_contact[0] - 0.05) < 1e-6)
-    return window
+    yield window
+    if window.presenter.on:
+        window.presenter.leave()
 
 
 def test_the_left_button_on_the_skin_presses_there_and_drags(
@@ -267,11 +275,12 @@ def test_while_measuring_a_click_measures_and_presses_nothing(
 
 
 def test_on_a_recording_the_left_button_turns_the_view(
-    opened, recording, until, qtbot, pixel_of
+    window, recording, until, qtbot, pixel_of
 ) -> None:
-    window = opened(f"replay:{recording}")
+    window.session.connect_to(f"replay:{recording}")
     until(lambda: window.display.badge.state.startswith("REPLAY") and window.session.estimate)
-    until(lambda: len(window.membrane.ages) > 2)
+    drawn = len(window.membrane.ages)
+    until(lambda: len(window.membrane.ages) > drawn + 2)
     plotter, start = window.membrane.plotter, pixel_of(window, (0.03, 0.06))
     move(window, start, held=Qt.MouseButton.NoButton)
     qtbot.mousePress(plotter, LEFT, pos=start)
@@ -308,8 +317,8 @@ def test_the_legend_hides_what_is_clicked_and_shows_it_again(window, until, qtbo
     assert legend["show_fit"].focusPolicy() & Qt.FocusPolicy.TabFocus
 
 
-def test_the_legend_names_what_the_source_has(opened, recording, until) -> None:
-    window = opened("sim:demo")
+def test_the_legend_names_what_the_source_has(window, recording, until) -> None:
+    window.session.connect_to("sim:demo")
     always = {"show_fit", "show_elements", "show_contact", "show_frame", "show_object"}
     until(lambda: shown(window) == always | {"show_truth", "show_pressed", "show_load"})
     window.session.connect_to(f"replay:{recording}")
@@ -317,9 +326,9 @@ def test_the_legend_names_what_the_source_has(opened, recording, until) -> None:
 
 
 def test_what_is_hidden_while_a_recording_is_paused_is_hidden_at_once(
-    opened, recording, until, qtbot
+    window, recording, until, qtbot
 ) -> None:
-    window = opened(f"replay:{recording}")
+    window.session.connect_to(f"replay:{recording}")
     until(lambda: window.display.badge.state.startswith("REPLAY") and window.session.estimate)
     window.playback.go(False)
     window.playback.seek(0.3)
