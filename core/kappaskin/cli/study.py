@@ -138,7 +138,7 @@ def cost(
 ) -> int:
     """Measure the cost of accuracy: error, time and memory of every method and setting.
 
-    Takes about a minute. Bases, elements, precisions and channels are combined with each method;
+    Takes many minutes. Bases, elements, precisions and channels are combined with each method;
     the settings that no other one beats in both error and time are marked. A second table shows
     the cost of each effect of the scene, and the error of the shape without it.
 

@@ -189,24 +189,31 @@ class PointContact:
         """Covariance (3, 3) of force in N, x and y in m, due to a `noise` of the readings.
 
         Of a load of this `force` in N at (x, y) in m, over a disc of radius sqrt(s) in m, whose
-        size is unknown too. The noise is in the readings' unit, or in units of `sigma`. That a skin
-        stretches is left out.
+        size is unknown too, on a cap its profile as well. The noise is in the readings' unit, or in
+        units of `sigma`. That a skin stretches is left out.
         """
         tables, s, n = self._used(self._none)[1], max(s, self._least), self._unknowns
         strength = force / self._influence.unit
         self._influence.at(x, y, s)
+        if (profile := self._influence.profile(s)) is not None:
+            self._rows[5] = profile[0]
         weights = self._weights(s, strength, tables, noise**2)
         weights = np.ones(len(self._M)) if weights is None else weights
         rows = self._rows * weights
-        free = rows[5:]
+        free = rows[6:]
         if len(free):
             rows -= rows @ free.T @ np.linalg.pinv(free @ free.T) @ free
-        # Of readings with weights w other than over their noise, (T w)' K / (T w)' (T w).
         T = rows[:n]
-        inverse = _inverse(T @ T.T)
-        of_noise = inverse @ (T * weights)
+        if profile is None:
+            # Of readings with weights w other than over their noise, (T w)' K / (T w)' (T w).
+            of_noise = _inverse(T @ T.T) @ (T * weights)
+            covariance = of_noise @ of_noise.T
+        else:
+            beside, known = T @ rows[5], (noise / (_TO_GAUSSIAN * strength)) ** 2
+            share = beside / (rows[5] @ rows[5] + known)
+            covariance = _inverse(T @ T.T - np.multiply.outer(beside, share))
         unit = np.array([self._influence.unit, 1 / strength, 1 / strength])
-        return noise**2 * np.multiply.outer(unit, unit) * (of_noise @ of_noise.T)[:3, :3]
+        return noise**2 * np.multiply.outer(unit, unit) * covariance[:3, :3]
 
     def _tables(self, used: Mask) -> _Tables:
         """The tables for the readings `used` (3 P,)."""

@@ -9,20 +9,23 @@ from kappaskin.frames import Array
 from kappaskin.mechanics import Load
 from kappaskin.scenes import Scene
 from kappaskin.sensing import SensorLayout
+from kappaskin.skin import Cap
 from kappaskin.studies.accuracy import grid_on
 
 _WAVES = 90  # each way: readings under discs of 1 mm radius stand to 1 % of their noise in Table 1
-
+_ON_CAP = 30, 61  # along and around: contacts under discs of 1.5 mm on a fingertip stand to 5 %
 
 _ALL = slice(None)
 
 
 def summed_functions(scene: Scene) -> tuple[int, int]:
     """Functions of a true shape that readings no longer change with; the scene's if unknown."""
-    (Ri, Rj), strip = scene.reference, scene.plate.patch.strip
+    (Ri, Rj), patch = scene.reference, scene.plate.patch
+    if isinstance(patch, Cap):
+        return max(Ri, _ON_CAP[0]), max(Rj, _ON_CAP[1])
     if not SummedResponse.is_known(scene):
         return Ri, Rj
-    return max(Ri, _WAVES), 1 if strip else max(Rj, _WAVES)
+    return max(Ri, _WAVES), 1 if patch.strip else max(Rj, _WAVES)
 
 
 class SummedResponse:

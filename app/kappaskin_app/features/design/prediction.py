@@ -35,7 +35,7 @@ def patch_of(settings: Settings) -> Patch:
 _NOISE = {"height": "design_height_noise", "slope": "design_slope_noise"}
 ROUND = (Disk, Cap)
 """Skins on which elements may be on rings or a spiral."""
-_DISC = 0.075  # of the shorter side: the radius of what presses a skin that curves both ways
+_DISC = 0.075  # of the shorter side: the radius of what presses a curved skin
 _ON_CAP = (15, 31)  # functions of the true shape along and around
 _RESOLUTION = 1e-9  # of readings that come as numbers: no noise is as small
 
@@ -68,17 +68,16 @@ def _layout(settings: Settings, patch: Patch) -> SensorLayout:
 
 
 def _load(plate: Plate, edge: str) -> tuple[tuple[Stimulus, ...], tuple[int, int]]:
-    """A point load in the middle and the true functions; where it curves both ways, a disc.
+    """A point load in the middle and the true functions; where the skin is curved, a disc.
 
-    It has the same force: such a skin bends close around a load only.
+    It has the same force: such a skin bends close around a load only. A strip has a point load.
     """
     point, reference = load_case_stimuli("centre", plate, edge), reference_on(plate, edge, "centre")
     patch, force = plate.patch, cast("PointLoad", point[0].what).force
-    is_cap = isinstance(patch, Cap)
-    if not (is_cap or patch.is_shallow):
+    if patch.strip or not any(patch.curvatures):
         return point, reference
     disc = DiscLoad(patch.a / 2, patch.b / 2, _DISC * min(patch.a, patch.b), force)
-    return (Stimulus(disc),), _ON_CAP if is_cap else reference
+    return (Stimulus(disc),), _ON_CAP if isinstance(patch, Cap) else reference
 
 
 def scene_of(settings: Settings) -> Scene:

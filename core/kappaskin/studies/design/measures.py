@@ -155,10 +155,13 @@ def _contact(block: FrameBlock) -> Array:
 
 
 def _distance(patch: Patch, found: Array, true: Array) -> Array:
-    """Distance (T,) in m of places `found` (T, 2) from `true` ones; on a cap, through the air."""
+    """Distance (T,) in m of places `found` (T, 2) from `true` ones.
+
+    On a cap, through the air; on a strip, along x.
+    """
     if isinstance(patch, Cap):
         return np.linalg.norm(patch.at_rest(found)[0] - patch.at_rest(true)[0], axis=-1)
-    return np.hypot(*(found - true).T)
+    return np.linalg.norm((found - true)[:, : 1 if patch.strip else 2], axis=-1)
 
 
 def _force(block: FrameBlock) -> Array:

@@ -219,3 +219,18 @@ def test_elements_placed_on_a_cap_stand_apart_on_the_skin(by):
     assert len(places) == 60
     assert away.min() > 0.4 * mean * (1 - 1e-6)
     assert prospect(design).rms < 0.6 * prospect(pressed_cap()).rms
+
+
+def test_presses_with_few_functions_err_as_predicted_for_the_check_sums_more():
+    flat = designed(m=10)
+    predicted, found = prospect(flat, "contact"), next(check(flat, 250, "contact"))
+
+    assert flat.scene.reference == (15, 15)
+    assert found.over(predicted) == pytest.approx(1, abs=0.15)
+
+
+def test_a_place_on_a_strip_is_judged_along_it_alone():
+    made = designed(Patch(0.1, 0.02, strip=True), m=10)
+    strip = replace(made, scene=replace(made.scene, reference=(15, 1)), functions=(5, 1))
+
+    assert next(check(strip, 250, "contact")).rms < 1e-3
