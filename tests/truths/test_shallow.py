@@ -183,21 +183,30 @@ def test_the_error_bar_of_a_force_on_a_saddle_includes_its_theory(radii, inplane
     plate = skin(radii, inplane, (0.04, 0.04))
 
     assert plate.theory_error == pytest.approx(share, abs=1e-3)
-    strong, weak = (force_sd(plate, noise) for noise in (1e-6, 0.2))
-    assert strong == pytest.approx(plate.theory_error, rel=0.01, abs=1e-6)
-    assert weak > strong
+    strong, weak = (contact_under(plate, noise) for noise in (1e-6, 0.2))
+    assert strong.force_sd == pytest.approx(plate.theory_error, rel=0.01, abs=1e-6)
+    assert weak.force_sd > strong.force_sd
+    off = np.abs(strong.position - 0.02)  # from the middle
+    np.testing.assert_allclose(strong.position_sd, plate.theory_error * off, rtol=0.02, atol=1e-7)
 
 
-def force_sd(plate, noise):
-    """Standard deviation of a force of 1 N, under so much noise in 1/m."""
+def contact_under(plate, noise):
+    """The contact of a force of 1 N, under so much noise in 1/m."""
     layout = SensorLayout.regular(plate.patch, 10, 8)
     curvature = read(plate, layout)
     curvature = curvature + np.random.default_rng(0).normal(0, noise, curvature.shape)
     fit = LeastSquares(basis_for(plate.patch, "hinged", 6, 6), layout)
-    return PointContact(plate, layout)(curvature, fit(curvature)).force_sd
+    return PointContact(plate, layout)(curvature, fit(curvature))
 
 
 def test_a_saddle_with_free_edges_that_is_too_steep_is_refused():
     with pytest.raises(Refusal, match=r"err by 3\.2% in a force .* hold the edges in plane"):
         skin(SADDLE, "free", sides=(0.04, 0.04))
     assert skin(DOME, "free", sides=(0.04, 0.04)).theory_error < 1e-3
+
+
+def test_a_dome_too_thin_for_its_loads_to_be_found_is_refused():
+    plate = Plate(Patch(0.04, 0.04, radius=(0.1, 0.1)), thickness=12e-6)
+    layout = SensorLayout.regular(plate.patch, 10, 8)
+    with pytest.raises(Refusal, match=r"felt over 0\.85 mm at least, got 0\.6 mm"):
+        PointContact(plate, layout)

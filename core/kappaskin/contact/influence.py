@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from kappaskin.bases import Basis, CapBasis, ProductBasis, SineBasis, basis_for
+from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics import CapWaves, Compliance, Plate, Shell, cap_shell
 from kappaskin.sensing import SensorLayout
@@ -67,6 +68,7 @@ def influence_of(
     """
     is_cap = isinstance(plate.patch, Cap)
     is_rectangle = type(plate.patch) is Patch and not plate.patch.strip
+    _check_decay(plate, functions)
     if not is_cap and not (is_rectangle and _is_stiff(plate)):
         return _OfFunctions(plate, layout, edge, functions, out)
     if not layout.senses_curvature_only or (layout.reads and layout.gage_length):
@@ -705,6 +707,20 @@ def _decay(plate: Plate) -> float:
     square = (3 * Hx**2 + 3 * Hy**2 + 2 * Hx * Hy) / 8
     stretch = (1 - plate.poisson**2) * plate.membrane_stiffness * square
     return (plate.rigidity / stretch) ** 0.25 if stretch else math.inf
+
+
+def _check_decay(plate: Plate, functions: int) -> None:
+    """Refuse a shallow skin on which loads are felt nearer than so many functions can follow.
+
+    What a load makes goes once up and down over pi times the `_decay`, in a half wave of them.
+    """
+    least = max(plate.patch.a, plate.patch.b) / functions / math.pi
+    if (decay := _decay(plate)) < least:
+        raise Refusal(
+            f"expected a skin on which a load is felt over {1e3 * least:.2g} mm at least, got "
+            f"{1e3 * decay:.2g} mm on a {plate.patch.name}: it is too thin for its radii to find "
+            "contacts; check thickness and radii"
+        )
 
 
 def _nodes(plate: Plate, elements: int) -> tuple[int, int]:

@@ -434,9 +434,11 @@ class PointContact:
         under = force * self._influence.gives(x, y)
         if self._stretched is not None:
             under += self._stretched.more(x, y, force)
+        place = np.array([x, y])
+        by_theory = self._theory_error * (place - (self.patch.a / 2, self.patch.b / 2))
         return Contact(
-            np.array([x, y]),
-            sd[1:3] / strength,
+            place,
+            np.hypot(sd[1:3] / strength, by_theory),
             force,
             math.hypot(float(sd[0]) * unit, self._theory_error * force),
             *self._displacement(fit, x, y, under),

@@ -209,7 +209,9 @@ class Plate:
 
     @property
     def theory_error(self) -> float:
-        """Standard deviation of a force by the theory of shallow skins, as a share of it.
+        """Standard deviation by the theory of shallow skins: as a share of a force.
+
+        And of the distance of its place from the middle of the skin.
 
         1 / (R k)^2 of the longest wave times its share of bending, twice where the edges are
         diaphragms, four times where they are free, not where they are held: a saddle's, mostly,
