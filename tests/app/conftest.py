@@ -55,7 +55,8 @@ def no_window_and_no_failure_left(
     yield
     guard.forget(failures.append)
     qapp.processEvents()
-    left = [widget for widget in qapp.topLevelWidgets() if widget.isVisible()]
+    shown = [widget for widget in qapp.topLevelWidgets() if widget.isVisible()]
+    left = [widget for widget in shown if not getattr(widget, "shared", False)]
     for widget in left:
         widget.close()
     # Outside of an event loop nothing else does, and each palette would be told to all there were.
@@ -72,7 +73,7 @@ class TestedWindow(MainWindow):
     """A window with all features, or those given, whose parts are found by their names alone."""
 
     __test__ = False
-    left_out = ""
+    left_out, shared = "", False
 
     def __init__(
         self,
@@ -191,6 +192,7 @@ def window(opened: Callable[..., MainWindow], until: Wait) -> MainWindow:
 def _one_window(qapp: QApplication, until: Wait) -> Iterator[TestedWindow]:
     qapp.setStyle("Fusion")
     window = TestedWindow("sim:")
+    window.shared = True  # it stays: hidden and shown again, it does not get the keyboard back
     window.show()
     until(lambda: window.display.badge.state == "SIM" and len(window.membrane.ages) > 1)
     yield window
@@ -222,7 +224,6 @@ def shared_window(
         session.run(True)
     _one_window.history.stack.setIndex(0)
     qapp.processEvents()
-    _one_window.hide()
 
 
 @pytest.fixture(scope="session")
