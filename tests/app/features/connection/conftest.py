@@ -27,4 +27,5 @@ def shown(qtbot) -> Callable[[ConnectionPanel, list[Port]], ConnectionPanel]:
 def window(shared_window: MainWindow) -> Iterator[MainWindow]:
     """The window that the tests of a file share, without what was typed before each."""
     yield shared_window
+    shared_window.connection.sources.hidePopup()
     shared_window.session.connect_to("sim:")

@@ -430,7 +430,7 @@ def test_the_device_in_use_is_not_opened_to_identify_it(listing, device, qtbot, 
 def test_closing_the_window_ends_the_identification(ports, opened, silent, qtbot, until):
     window = opened("sim:")
     panel = window.connection
-    until(lambda: window.isActiveWindow() and panel.sources.count() == 5)
+    until(lambda: panel.sources.count() == 5 and panel.isVisible())
     opened_by_click(panel, qtbot)
     clicked(panel, qtbot, 4)
     until(lambda: speakers(panel)[1].startswith("listening"))
