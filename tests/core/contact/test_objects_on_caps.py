@@ -9,7 +9,7 @@ from kappaskin import Cap, DiscLoad, LeastSquares, ObjectFinder, Plate, SensorLa
 from kappaskin.contact import Contacts, as_one
 from kappaskin.mechanics import Block, Cylinder, IndentationSolver, Sphere
 
-pytestmark = [pytest.mark.slow, pytest.mark.full]
+pytestmark = pytest.mark.slow
 NOISE, PLACE, TURN = 0.1, (0.0125, 0.0105), 0.4
 
 
@@ -41,8 +41,8 @@ def fingertip(stretch=1.0):
     return Fingertip(stretch)
 
 
-@pytest.mark.parametrize("stretch", [1.0, 1.2])
-@pytest.mark.parametrize("radius", [0.003, 0.006])
+@pytest.mark.parametrize("stretch", [1.0, pytest.param(1.2, marks=pytest.mark.full)])
+@pytest.mark.parametrize("radius", [0.006, pytest.param(0.003, marks=pytest.mark.full)])
 def test_a_ball_has_its_own_radius_on_a_fingertip(stretch, radius):
     found = [one for one in fingertip(stretch).under(Sphere(radius), 3.0) if one.sure]
     assert len(found) >= 3
@@ -53,6 +53,7 @@ def test_a_ball_has_its_own_radius_on_a_fingertip(stretch, radius):
         assert one.force == pytest.approx(3.0, rel=0.02)
 
 
+@pytest.mark.full
 def test_a_rod_on_a_fingertip_is_one_or_an_edge():
     for one in fingertip().under(Cylinder(0.004, 0.03), 3.0):
         assert one.sure
@@ -61,11 +62,13 @@ def test_a_rod_on_a_fingertip_is_one_or_an_edge():
         assert one.axis == pytest.approx(TURN, abs=0.05)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("rigid", [Block(0.04, 0.04), Sphere(0.006)])
 def test_a_light_touch_of_a_fingertip_has_no_name(rigid):
     assert not any(one.sure for one in fingertip().under(rigid, 0.1))
 
 
+@pytest.mark.full
 def test_a_mould_of_a_fingertip_is_none_of_the_objects():
     mould = DiscLoad(*PLACE, 0.0025, 1.0)
 
