@@ -122,7 +122,7 @@ def least_squares(A: Array, free: Array | None, b: Array) -> Solution | None:
         seen = Q.T @ f.high
         step = linalg.solve_triangular(R, seen - u)
         g, r = g + DoubleDouble.of(step), r + DoubleDouble.of(f.high + Q @ (u - seen))
-        change, size = float(linalg.norm(step)), float(linalg.norm(g.high))
+        change, size = float(np.linalg.norm(step)), float(np.linalg.norm(g.high))
         if not change > _DONE * size:
             return Solution(g, r)
         if not change <= _CONTRACTS * last:
@@ -188,16 +188,16 @@ class Reference:
     def near(self, coefficients: Array, other: Array, eps: float) -> bool:
         """Whether two answers differ by rounding alone, which must leave two digits of them."""
         g, h = self.scaled(coefficients), self.scaled(other)
-        size = float(linalg.norm(h))
+        size = float(np.linalg.norm(h))
         allowed = self.allowed(size, eps)
-        return allowed <= _TWO_DIGITS * size and float(linalg.norm(g - h)) <= allowed
+        return allowed <= _TWO_DIGITS * size and float(np.linalg.norm(g - h)) <= allowed
 
     def digits_lost(self, coefficients: Array, eps: float) -> float | None:
         """-log10(eps) less the correct digits of the scaled unknowns, at least 0."""
         if self.answer is None:
             return None
         g, h = self.scaled(coefficients), self.scaled(self.answer)
-        off, size = float(linalg.norm(g - h)), float(linalg.norm(h))
+        off, size = float(np.linalg.norm(g - h)), float(np.linalg.norm(h))
         if not math.isfinite(off):
             return -math.log10(eps)
         if off <= eps * size:
@@ -219,7 +219,7 @@ def reference_of(case: HardCase) -> Reference:
     values = singular_values(case.basis, layout)[0][: len(length)]
     k = _condition(values, A.shape)
     bare = _condition(np.linalg.svd(M, compute_uv=False).astype(float), M.shape)
-    R, size = len(b), cast("float", linalg.norm(b))
+    R, size = len(b), float(np.linalg.norm(b))
     if not math.isfinite(k):
         return Reference(W, length, k, bare, float(values.max(initial=0.0)), R, size, size, None)
     # Scaled by powers of two, which round nothing.
@@ -229,7 +229,7 @@ def reference_of(case: HardCase) -> Reference:
         return Reference(W, length, k, bare, float(values[0]), R, size, size, None)
     g = found.unknowns.high / two
     answer = g if W is None else W @ g
-    left = float(linalg.norm(found.residual.high))
+    left = float(np.linalg.norm(found.residual.high))
     return Reference(W, length, k, bare, float(values[0]), R, size, left, answer)
 
 
