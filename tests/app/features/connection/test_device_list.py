@@ -322,6 +322,14 @@ def silent():
 
 
 @pytest.fixture
+def window(opened, until):
+    """One for each test: what is listed and identified in one must not show in the next."""
+    made = opened("sim:")
+    until(lambda: made.isActiveWindow() and made.display.badge.state == "SIM")
+    return made
+
+
+@pytest.fixture
 def ports(monkeypatch, device, silent):
     """What is plugged in: a device, a silent port, and one that may not be opened."""
     found = [Port(device.port), Port(silent), Port("/dev/ttyUSB9", opened=False)]
