@@ -6,7 +6,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from kappaskin import LeastSquares, Patch, Plate, PointContact, Refusal, SensorLayout, basis_for
+from kappaskin import (
+    Cap,
+    LeastSquares,
+    Patch,
+    Plate,
+    PointContact,
+    Refusal,
+    SensorLayout,
+    basis_for,
+)
 from kappaskin.contact.influence import influence_of
 from kappaskin.mechanics import DiscLoad
 from koiter import Panel
@@ -205,8 +214,15 @@ def test_a_saddle_with_free_edges_that_is_too_steep_is_refused():
     assert skin(DOME, "free", sides=(0.04, 0.04)).theory_error < 1e-3
 
 
-def test_a_dome_too_thin_for_its_loads_to_be_found_is_refused():
-    plate = Plate(Patch(0.04, 0.04, radius=(0.1, 0.1)), thickness=12e-6)
-    layout = SensorLayout.regular(plate.patch, 10, 8)
-    with pytest.raises(Refusal, match=r"felt over 0\.85 mm at least, got 0\.6 mm"):
-        PointContact(plate, layout)
+@pytest.mark.parametrize(
+    ("patch", "thickness", "text"),
+    [
+        (Patch(0.04, 0.04, (0.1, 0.1)), 12e-6, r"felt over 0\.85 mm at least, got 0\.6 mm"),
+        (Patch(0.04, 0.04, (0.1, -0.1)), 1e-6, r"felt over 0\.85 mm at least, got 0\.21 mm"),
+        (Cap(8e-3, 1.309), 25e-6, r"felt over 0\.3 mm at least, got 0\.25 mm"),
+    ],
+)
+def test_a_skin_too_thin_for_its_loads_to_be_found_is_refused(patch, thickness, text):
+    layout = SensorLayout.scattered(patch, [[patch.a / 2, patch.b / 2], [patch.a / 3, patch.b / 2]])
+    with pytest.raises(Refusal, match=text):
+        PointContact(Plate(patch, thickness=thickness), layout)

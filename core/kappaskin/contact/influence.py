@@ -699,26 +699,34 @@ def _of_shell(
 
 
 def _decay(plate: Plate) -> float:
-    """Distance in m over which what stretching adds to a load on a shallow skin fades.
+    """Distance in m over which what stretching adds to a load on a domed skin fades.
 
     (D / (E h H^2))^(1/4), with the mean over all directions of H^2 = (c^2 / Ry + s^2 / Rx)^2.
     """
-    Hx, Hy = plate.patch.curvatures if plate.patch.is_shallow else (0.0, 0.0)
+    patch = plate.patch
+    Hx, Hy = patch.curvatures if patch.is_shallow or isinstance(patch, Cap) else (0.0, 0.0)
     square = (3 * Hx**2 + 3 * Hy**2 + 2 * Hx * Hy) / 8
     stretch = (1 - plate.poisson**2) * plate.membrane_stiffness * square
     return (plate.rigidity / stretch) ** 0.25 if stretch else math.inf
 
 
-def _check_decay(plate: Plate, functions: int) -> None:
-    """Refuse a shallow skin on which loads are felt nearer than so many functions can follow.
+_FOLLOWED = 0.8  # half waves on a cap: over less a load is not felt as the table has it
 
-    What a load makes goes once up and down over pi times the `_decay`, in a half wave of them.
+
+def _check_decay(plate: Plate, functions: int) -> None:
+    """Refuse a domed skin on which loads are felt nearer than they can be followed.
+
+    What a load makes on a shallow one goes once up and down over pi times the `_decay`, in a half
+    wave of so many functions.
     """
-    least = max(plate.patch.a, plate.patch.b) / functions / math.pi
+    patch = plate.patch
+    least = max(patch.a, patch.b) / functions / math.pi
+    if isinstance(patch, Cap):
+        least = _FOLLOWED * cap_half_wave(patch)
     if (decay := _decay(plate)) < least:
         raise Refusal(
             f"expected a skin on which a load is felt over {1e3 * least:.2g} mm at least, got "
-            f"{1e3 * decay:.2g} mm on a {plate.patch.name}: it is too thin for its radii to find "
+            f"{1e3 * decay:.2g} mm on a {patch.name}: it is too thin for its radii to find "
             "contacts; check thickness and radii"
         )
 
