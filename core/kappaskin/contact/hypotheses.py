@@ -410,8 +410,8 @@ def _straight(skin: ElasticSkin, best: Optimum, length: float) -> Hypothesis:
     force, angle = abs(best.parameters[2]), best.parameters[3]
     bend, half = skin.bend * force, length / 2
     along = np.array([math.cos(angle), math.sin(angle)])
-    inexact = INEXACT_BENT * 2 * float(skin.sag(along)) / bend
     width, rest, soft = None, 2 * float(skin.sag(along)), skin.layer * force
+    inexact = INEXACT_BENT * rest / bend
     if len(best.parameters) > 6:
         q, _, sd = _measured_width(skin, best)
         bears = math.sqrt(best.parameters[4]) / 2
