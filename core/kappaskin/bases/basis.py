@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +12,6 @@ from numpy.typing import NDArray
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Array
 from kappaskin.skin import Cap, MeshSkin, Patch
-
-if TYPE_CHECKING:
-    from kappaskin.bases.modes import MeshBasis
 
 Order = tuple[int, int]
 ORDERS: tuple[Order, ...] = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
@@ -139,7 +136,7 @@ def curvature_at(basis: Basis, positions: Array) -> Array:
     if isinstance(basis.patch, Cap):
         return _on_cap(basis, basis.patch, positions)
     if isinstance(basis.patch, MeshSkin):
-        return cast("MeshBasis", basis).curvature_at(positions)
+        return cast("Any", basis).curvature_at(positions)  # a `MeshBasis` has its own
     return np.stack(
         [
             sum(
