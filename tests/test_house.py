@@ -120,7 +120,7 @@ def test_a_background_task_is_the_one_way_to_run_something_beside_the_window() -
 
 _WRITE = {"write_text", "write_bytes", "rename", "mkstemp", "touch"}
 _WRITERS = {
-    "kappaskin.bases.argyris": "touches a file of the cache that it has read",
+    "kappaskin._files": "touches a file of the cache that it has read",
     "kappaskin.live.resume": "makes a key that only this user can read",
     "kappaskin.recording.disk": "a live recording is written as it comes, under its name and .part;"
     " all files of an export or import get their names at once",
