@@ -430,6 +430,8 @@ def _faults(surface: Surface, outward: Array | None) -> Iterator[Fault]:
     yield _fault("duplicate", surface.centres[copy])
     yield _fault("no area", surface.centres[~copy & (surface.smallest < _FLAT)])
     surface = repaired(surface, "remove")
+    if not len(surface.triangles):
+        return
     yield _fault("sliver", surface.centres[surface.smallest < _SHARPEST])
     walls = surface.edges[surface.counts > 2]
     yield _fault("wall", surface.nodes[walls].mean(axis=1))
@@ -445,9 +447,8 @@ def _faults(surface: Surface, outward: Array | None) -> Iterator[Fault]:
     yield _fault("pinched", surface.nodes[_pinched(surface)])
     yield _fault("closed", nowhere if len(surface.rim) else middle)
     sides = surface.nodes[surface.rim]
-    _, loop = np.unique(
-        _linked(surface.rim, len(surface.nodes))[surface.rim[:, 0]], return_inverse=True
-    )
+    group = _linked(surface.rim, len(surface.nodes))[surface.rim[:, 0]]
+    loop = np.unique(group, return_inverse=True)[1]
     length = 1e3 * np.bincount(loop, np.linalg.norm(sides[:, 1] - sides[:, 0], axis=1), 1)
     holes = np.delete(length, longest := int(length.argmax()))
     inner = sides[loop != longest].mean(axis=1)
@@ -516,6 +517,10 @@ def _next(side: Indices) -> Indices:
     return side // 3 * 3 + (side + 1) % 3
 
 
+REPAIRS = ("merge", "remove", "orient", "keep largest part", "decimate")
+"""The safe repairs of a surface."""
+
+
 def repaired(
     surface: Surface, repair: str, outward: Array | None = None, most: int = _COUNTS[1]
 ) -> Surface:
@@ -527,36 +532,40 @@ def repaired(
     largest part` is by area; `decimate` collapses edges, those first that are short and on flat
     places, to `most` triangles, and keeps the shape of the rim.
     """
-    if repair not in REPAIRS:
-        raise Refusal(f"expected a repair, one of {', '.join(REPAIRS)}, got {repair}")
-    return _used(REPAIRS[repair](surface, outward, most))
+    match repair:
+        case "merge":
+            surface = _joined(surface, _coincident(surface))
+        case "remove":
+            surface = _remove(surface)
+        case "orient":
+            surface = _orient(surface, outward)
+        case "keep largest part":
+            part, largest = _parts(surface)
+            surface = surface.part(part == largest)
+        case "decimate":
+            surface = _decimate(surface, most)
+        case _:
+            raise Refusal(f"expected a repair, one of {', '.join(REPAIRS)}, got {repair}")
+    return _used(surface)
 
 
-def _merge(surface: Surface, *_: Any) -> Surface:
-    return _joined(surface, _coincident(surface))
-
-
-def _keep_largest(surface: Surface, *_: Any) -> Surface:
-    part, largest = _parts(surface)
-    return surface.part(part == largest)
-
-
-def _orient(surface: Surface, outward: Array | None, _: int) -> Surface:
+def _orient(surface: Surface, outward: Array | None) -> Surface:
     turned, one_sided = _turned(surface)
     turned &= ~one_sided
-    normal = np.where(turned, -1, 1) @ surface.normals
+    normal: Array = np.where(turned, -1.0, 1.0) @ surface.normals
     if outward is not None and normal @ outward < 0:
         turned = ~turned
     triangles = np.where(turned[:, None], surface.triangles[:, ::-1], surface.triangles)
     return Surface(surface.nodes, triangles) if turned.any() else surface
 
 
-def _remove(surface: Surface, *_: Any) -> Surface:
+def _remove(surface: Surface) -> Surface:
     copy = _copies(surface.triangles)
     surface = surface.part(~copy & _distinct(surface.triangles))
     while len(flat := np.flatnonzero(surface.smallest < _FLAT)):
-        short = 3 * flat + _lengths(surface).reshape(-1, 3)[flat].argmin(axis=1)
-        of = np.isin(np.arange(len(surface.edges)), surface.edge_of[short])
+        along = np.roll(surface.corners[flat], -1, axis=1) - surface.corners[flat]
+        short = surface.edge_of[3 * flat + np.linalg.norm(along, axis=-1).argmin(axis=1)]
+        of = np.isin(np.arange(len(surface.edges)), short)
         mended = _collapsed(surface, _errors(surface), of, len(of))[0]
         if len(mended.triangles) == len(surface.triangles):
             break
@@ -564,12 +573,7 @@ def _remove(surface: Surface, *_: Any) -> Surface:
     return surface
 
 
-def _lengths(surface: Surface) -> Array:
-    """The lengths (3F,) in m of the sides."""
-    return np.linalg.norm(np.diff(surface.nodes[surface.sides], axis=1)[:, 0], axis=1)
-
-
-def _decimate(surface: Surface, _: Array | None, most: int) -> Surface:
+def _decimate(surface: Surface, most: int) -> Surface:
     errors, before = _errors(surface), 0
     while (excess := len(surface.triangles) - most) > 0 and len(surface.triangles) != before:
         before, every = len(surface.triangles), np.ones(len(surface.edges), bool)
@@ -630,21 +634,23 @@ def _collapsed(surface: Surface, errors: Array, of: Mask, most: int) -> tuple[Su
     cost = error.min(axis=0) + _EVEN * np.linalg.norm(nodes[i] - nodes[j], axis=1) ** 4
     of = of & (surface.counts < 3) & ~(rim[i] & rim[j] & (surface.counts == 2))
     # Any of the cheaper ones: neighbours cost alike, so that few are the least of all around.
-    of &= cost <= np.quantile(cost[of], _CHEAPER, method="higher") if of.any() else of
+    cheap = of & (cost <= np.quantile(cost[of], _CHEAPER)) if of.any() else of
     turn = np.random.default_rng(0).permutation(len(i))
-    links = _links(surface)
-    for _ in range(_PASSES):
-        best = _apart(i, j, np.where(of, turn, len(i)), n)[:most]
+    links, free = _links(surface), np.ones(len(i), bool)
+    for some in (*[cheap] * _PASSES, of):
+        if some is of and (into != np.arange(n)).any():
+            break
+        best = _apart(i, j, np.where(some & free, turn, len(i)), n)[:most]
         # An edge is collapsed where only its own triangles lie beside both of its ends.
         good = links[i[best]].multiply(links[j[best]]).sum(axis=1) == surface.counts[best]
         good[_spoiling(surface, nodes, i[best], j[best], place[best])] = False
-        of[best] = False
+        free[best] = False
         best = best[good]
         most -= len(best)
         into[j[best]], nodes[i[best]] = i[best], place[best]
         done = np.isin(np.arange(n), surface.edges[best])
         beside = np.isin(np.arange(n), surface.edges[done[i] | done[j]])
-        of &= ~(beside[i] | beside[j])
+        free &= ~(beside[i] | beside[j])
     gone = np.flatnonzero(into != np.arange(n))
     errors = errors.copy()
     errors[into[gone]] += errors[gone]
@@ -694,17 +700,6 @@ def _spoiling(surface: Surface, nodes: Array, i: Indices, j: Indices, places: Ar
     turned &= before.smallest > _FLAT
     squeezed = after.smallest < np.minimum(before.smallest, _SQUEEZED)
     return owners[one].max(axis=1)[turned | squeezed]
-
-
-_Repair = Callable[[Surface, Array | None, int], Surface]
-REPAIRS: dict[str, _Repair] = {
-    "merge": _merge,
-    "remove": _remove,
-    "orient": _orient,
-    "keep largest part": _keep_largest,
-    "decimate": _decimate,
-}
-"""The safe repairs of a surface."""
 
 
 def placed(surface: Surface, points: Array) -> tuple[Indices, Array, Array]:
@@ -827,11 +822,11 @@ def principal_directions(surface: Surface) -> tuple[Array, Array]:
     square += 1e-12 * np.eye(5)  # for a node with less than five others around
     right: Array = sums @ (terms * -w[:, None])
     a, b, c, d, e = np.linalg.solve(square, right[..., None])[..., 0].T
-    turn, spread = np.arctan2(2 * b, a - c) / 2, np.hypot((a - c) / 2, b)
+    turn, half = np.arctan2(2 * b, a - c) / 2, np.hypot((a - c) / 2, b)
     along = np.stack([first - d[:, None] * unit, second - e[:, None] * unit], axis=1)
     cos, sin = np.cos(turn), np.sin(turn)
     ways = np.stack([cos, sin, -sin, cos], axis=1).reshape(n, 2, 2)
-    curvatures = np.column_stack([(a + c) / 2 + spread, (a + c) / 2 - spread])
+    curvatures = np.column_stack([(a + c) / 2 + half, (a + c) / 2 - half])
     return _unit(ways @ along), curvatures / step[:, None]
 
 

@@ -186,15 +186,12 @@ def test_places_are_the_nearest_of_many_on_the_surface():
     np.testing.assert_allclose(shares.sum(axis=1), 1)
     on = np.einsum("pk,pkx->px", shares, DOME.corners[triangle])
     np.testing.assert_allclose(np.linalg.norm(on - points, axis=1), distance)
-    s, t = np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 1, 41))
+    s, t = np.meshgrid(np.linspace(0, 1, 16), np.linspace(0, 1, 16))
     s, t = s[s + t <= 1], t[s + t <= 1]
     many = np.einsum("ks,fkx->fsx", [1 - s - t, s, t], DOME.corners).reshape(-1, 3)
-    nearest = np.min(
-        [np.linalg.norm(many[i::7] - points[:, None], axis=-1).min(axis=1) for i in range(7)],
-        axis=0,
-    )
+    nearest = np.array([np.linalg.norm(many - point, axis=1).min() for point in points])
     assert (distance <= nearest + 1e-12).all()
-    assert (nearest - distance).max() < 1e-4
+    assert (nearest - distance).max() < 5e-5
 
 
 def test_points_of_the_surface_are_their_own_places():
@@ -384,6 +381,11 @@ def test_triangles_without_area_are_found_and_collapsed():
     )
 
 
+def test_a_mesh_without_any_area_is_found():
+    line = sheet(lambda x, y: (30e-3 * x + 1e-3 * y, 0 * x, 0 * x))
+    assert "no area" in kinds(line)
+
+
 def test_slivers_are_found():
     thin = sheet(lambda x, y: (30e-3 * x, 0.5e-3 * y, 0 * x), 21, 15)
     fault = found(thin, "sliver")
@@ -492,7 +494,7 @@ def test_more_places_than_triangles_are_refused():
         spread(DOME, 561)
 
 
-def on_ellipsoid(axes, count=49, most=1.2):
+def on_ellipsoid(axes, count=65, most=0.8):
     """A patch of an ellipsoid around its pole at z, by two angles of equal steps."""
 
     def shape(x, y):
@@ -515,12 +517,12 @@ def ellipsoid_curvatures(nodes, axes):
 
 @pytest.mark.parametrize("axes", [(8e-3, 8e-3, 8e-3), (9e-3, 7e-3, 6e-3), (7e-3, 12e-3, 5e-3)])
 def test_principal_curvatures_of_ellipsoids(axes):
-    surface = on_ellipsoid(axes, most=0.8)
+    surface = on_ellipsoid(axes)
     directions, curvatures = principal_directions(surface)
     true, along = ellipsoid_curvatures(surface.nodes, axes)
     rim = np.isin(np.arange(len(true)), surface.rim)
-    np.testing.assert_allclose(curvatures[~rim], true[~rim], rtol=0.025)
-    np.testing.assert_allclose(curvatures[rim], true[rim], rtol=0.06)
+    np.testing.assert_allclose(curvatures[~rim], true[~rim], rtol=0.02)
+    np.testing.assert_allclose(curvatures[rim], true[rim], rtol=0.05)
     np.testing.assert_allclose(
         directions @ directions.transpose(0, 2, 1),
         np.broadcast_to(np.eye(2), (len(true), 2, 2)),
