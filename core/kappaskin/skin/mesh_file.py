@@ -131,7 +131,7 @@ class Surface:
         return float(np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1).sum())
 
     @cached_property
-    def tree(self) -> tuple[scipy.spatial.cKDTree, float]:
+    def tree(self) -> "tuple[scipy.spatial.cKDTree, float]":
         """A tree of the triangles' centres, and how far at most their corners are from them."""
         away = np.linalg.norm(self.corners - self.centres[:, None], axis=-1)
         return scipy.spatial.cKDTree(self.centres), float(away.max())
@@ -157,7 +157,8 @@ def read_surface(path: str | Path, unit: str) -> Surface:
         raise Refusal(f"{path}: {error}; export the mesh again") from error
     except _UNREADABLE as error:
         raise Refusal(
-            f"{path}: expected a mesh as its name says{why_unread(error)}; export the mesh again"
+            f"cannot read a mesh from {path}{why_unread(error)}; expected an STL, OBJ or PLY file "
+            "as its name says; export the mesh again"
         ) from error
     if not 0 < len(triangles) <= _MOST_TRIANGLES:
         raise Refusal(
@@ -466,8 +467,10 @@ def _coincident(surface: Surface) -> Indices:
     rim = np.unique(surface.rim)
     number = _equal(surface.nodes[rim])
     first = rim[np.unique(number, return_index=True)[1]]
-    tolerance = _JOINT * np.ptp(surface.nodes, axis=0).max()
-    near = scipy.spatial.cKDTree(surface.nodes[first]).query_pairs(tolerance, output_type="ndarray")
+    size = np.ptp(surface.nodes, axis=0).max() or 1.0
+    near = scipy.spatial.cKDTree(surface.nodes[first] / size).query_pairs(
+        _JOINT, output_type="ndarray"
+    )
     pairs = np.concatenate([np.column_stack([rim, first[number]]), first[near]])
     return _linked(pairs, len(surface.nodes))
 
@@ -610,7 +613,7 @@ def _errors(surface: Surface) -> Array:
     return (_at(nodes, len(surface.nodes)) @ own).reshape(-1, 4, 4)
 
 
-def _at(nodes: Indices, count: int) -> scipy.sparse.csr_array:
+def _at(nodes: Indices, count: int) -> "scipy.sparse.csr_array":
     """The matrix (count, F) that adds up at each node what triangles of `nodes` (F, 3) have."""
     column = np.repeat(np.arange(len(nodes)), nodes.shape[1])
     shape = (count, len(nodes))
@@ -663,7 +666,7 @@ def _distinct(triangles: Indices) -> Mask:
     return (a != b) & (b != c) & (c != a)
 
 
-def _links(surface: Surface) -> scipy.sparse.csr_array:
+def _links(surface: Surface) -> "scipy.sparse.csr_array":
     """The matrix (n, n) that has 1 where two nodes are linked by an edge."""
     i, j = np.concatenate([surface.edges, surface.edges[:, ::-1]]).T
     n = len(surface.nodes)

@@ -101,14 +101,14 @@ def test_a_file_that_is_cut_is_refused_or_its_part_is_whole(tmp_path, name, shar
     if name.endswith("OBJ") and share > 0.5:  # has no count, nor an end
         assert len(read_surface(tmp_path / name, "m").triangles) < len(DOME.triangles)
         return
-    with pytest.raises(Refusal, match=rf"{name}: .*export the mesh again"):
+    with pytest.raises(Refusal, match=rf"{name}.*export the mesh again"):
         read_surface(tmp_path / name, "m")
 
 
 @pytest.mark.parametrize("name", WRITTEN)
 def test_other_contents_and_places_are_refused(tmp_path, name):
     (tmp_path / name).write_bytes(bytes(range(256)) * 20)
-    with pytest.raises(Refusal, match=f"{name}: "):
+    with pytest.raises(Refusal, match=name):
         read_surface(tmp_path / name, "m")
     (tmp_path / f"folder {name}").mkdir()
     with pytest.raises(Refusal, match=r"\(Is a directory\)"):
