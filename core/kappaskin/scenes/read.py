@@ -61,7 +61,7 @@ from kappaskin.sensing import (
     SensorLayout,
     Transduction,
 )
-from kappaskin.skin import UNITS, Cap, Disk, MeshSkin, Patch, Polygon, read_surface
+from kappaskin.skin import UNITS, Cap, Disk, MeshSkin, Patch, Polygon, held_edges, read_surface
 
 TABLE_1_NOISE = 0.40 / math.sqrt(3)
 """RMS of the noise of Table 1 in 1/m: uniform between -0.40 and 0.40."""
@@ -236,7 +236,7 @@ def _mesh(table: TomlTable, find: _Find) -> MeshSkin:
         raise table.refusal("expected the thickness of the mesh in m, got none", "shape")
     surface, held = read_surface(find(table, "file"), unit), SKIN.value(table, "held")
     if held is not None:
-        held = surface.rim_between(*(UNITS[unit] * np.array(held)))
+        held = np.unique(held_edges(surface, UNITS[unit] * np.array(held)))
     return MeshSkin(surface.nodes, surface.triangles, thickness, held)
 
 
