@@ -61,7 +61,17 @@ from kappaskin.sensing import (
     SensorLayout,
     Transduction,
 )
-from kappaskin.skin import UNITS, Cap, Disk, MeshSkin, Patch, Polygon, read_surface
+from kappaskin.skin import (
+    UNITS,
+    Cap,
+    Disk,
+    MeshSkin,
+    Patch,
+    Polygon,
+    faults,
+    held_edges,
+    read_surface,
+)
 
 TABLE_1_NOISE = 0.40 / math.sqrt(3)
 """RMS of the noise of Table 1 in 1/m: uniform between -0.40 and 0.40."""
@@ -229,15 +239,24 @@ def read_skin(table: TomlTable, find: _Find) -> tuple[Plate, str]:
 
 
 def _mesh(table: TomlTable, find: _Find) -> MeshSkin:
-    if (text := SKIN.value(table, "mesh")) is not None:
-        return MeshSkin.of_text(text)
-    unit, thickness = SKIN.value(table, "unit"), SKIN.value(table, "thickness")
+    unit, thickness, held, text = (
+        SKIN.value(table, key, default=None) for key in ("unit", "thickness", "held", "mesh")
+    )
+    if text is not None:
+        if "file" in table:
+            raise table.refusal("expected a file or the mesh itself, got both", "file")
+        with table.blamed("mesh"):
+            return MeshSkin.of_text(text)
     if thickness is None:
-        raise table.refusal("expected the thickness of the mesh in m, got none", "shape")
-    surface, held = read_surface(find(table, "file"), unit), SKIN.value(table, "held")
-    if held is not None:
-        held = surface.rim_between(*(UNITS[unit] * np.array(held)))
-    return MeshSkin(surface.nodes, surface.triangles, thickness, held)
+        raise table.refusal("expected a thickness in m, got none; give that of the skin")
+    file = find(table, "file")
+    with table.blamed("file"):
+        surface = read_surface(file, unit or "")
+        if found := faults(surface):
+            raise Refusal(f"{file}: {found[0].message}")
+    with table.blamed("held"):
+        edges = None if held is None else held_edges(surface, UNITS[unit] * np.array(held))
+        return MeshSkin(surface.nodes, surface.triangles, thickness, edges)
 
 
 def _patch(table: TomlTable, shape: str) -> Patch:
