@@ -164,7 +164,7 @@ def scene_of(top: TomlTable, file: Path, trust: Trust = False) -> Scene:
 
     `trust` as of `named_file`.
     """
-    name, find = file.stem.removesuffix(".scene"), partial(_named_file, file.parent, trust)
+    name, find = file.stem.removesuffix(".scene"), partial(find_file, file.parent, trust)
     if (version := SCENE.value(top, "format")) != FORMAT:
         raise top.refusal(
             f"expected a scene of format {FORMAT}, got {version}; update kappaskin"
@@ -465,8 +465,8 @@ def _object(table: TomlTable, kind: type[RigidObject], find: _Find) -> RigidObje
         return table.make(kind)
 
 
-def _named_file(folder: Path, trust: Trust, table: TomlTable, key: str) -> Path:
-    """The file that the table names at `key`."""
+def find_file(folder: Path, trust: Trust, table: TomlTable, key: str) -> Path:
+    """The file that the table names at `key`; `trust` as of `named_file`."""
     name = TOUCH.value(table, key)
     with table.blamed(key):
         file = named_file(name, folder, trust)

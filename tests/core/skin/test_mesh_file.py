@@ -437,16 +437,16 @@ def test_decimation_keeps_the_shape_and_the_rim():
     assert coarse.normals.sum(axis=0)[2] == pytest.approx(30e-3 * 20e-3, rel=1e-3)
 
 
-@pytest.mark.parametrize("most", [100, 1000])
+@pytest.mark.parametrize("most", [100, 500])
 def test_decimation_moves_the_rim_along_itself(most):
     """Waves that reach the rim do not draw it inward from the four planes that it lies in."""
     waves = sheet(
-        lambda x, y: (30e-3 * x, 20e-3 * y, 1.5e-3 * np.sin(20 * x + 40 * y)), nx=61, ny=61
+        lambda x, y: (30e-3 * x, 20e-3 * y, 1.5e-3 * np.sin(20 * x + 40 * y)), nx=41, ny=41
     )
     coarse = repaired(waves, "decimate", most=most)
     x, y, _ = coarse.nodes[coarse.rim[:, 0]].T
     assert np.abs(x * (x - 30e-3) * y * (y - 20e-3)).max() < 1e-20
-    assert placed(coarse, waves.nodes[[0, 60, -61, -1]])[2].max() < 1e-12
+    assert placed(coarse, waves.nodes[[0, 40, -41, -1]])[2].max() < 1e-12
     assert set(kinds(coarse)) <= {"too few"}
 
 
