@@ -222,13 +222,6 @@ class TomlTable:
             raise self.refusal(f"expected a table [{key}], got {value!r:.60}", key)
         return self._inside(value, key)
 
-    def overlaid(self, other: "TomlTable", without: str) -> "TomlTable":
-        """This table with the values of an `other` besides, and then `without` a key of its own."""
-        if not other._values:
-            return self
-        own = {key: value for key, value in self._values.items() if key != without}
-        return self._inside(own | other._values)
-
     def tables(self, key: str) -> "list[TomlTable]":
         """The tables of the array [[key]]."""
         self._asked.add(key)

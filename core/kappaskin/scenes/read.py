@@ -256,7 +256,12 @@ def _mesh(table: TomlTable, find: _Find) -> MeshSkin:
             raise Refusal(f"{file}: {found[0].message}")
     with table.blamed("held"):
         edges = None if held is None else held_edges(surface, UNITS[unit] * np.array(held))
-        return MeshSkin(surface.nodes, surface.triangles, thickness, edges)
+        order = np.lexsort(surface.nodes.T)  # the text of the mesh is half as long
+        number = np.argsort(order)
+        triangles = number[surface.triangles]
+        triangles = triangles[triangles.min(axis=1).argsort()]
+        held_nodes = None if edges is None else number[edges]
+        return MeshSkin(surface.nodes[order], triangles, thickness, held_nodes)
 
 
 def _patch(table: TomlTable, shape: str) -> Patch:

@@ -281,6 +281,7 @@ def _with_calibration(text: str, file: Path) -> str:
     return f"{text}{toml_table(_CALIBRATION.rstrip(), values)}"
 
 
+_WITH_FILES = ("skin",)
 _MESH = "\n[kept.skin]  # what the file of the mesh has"
 
 
@@ -290,6 +291,17 @@ def _with_mesh(text: str, file: Path) -> str:
         return text
     patch = read_skin(skin, partial(find_file, file.parent, False))[0].patch
     return f"{text}{toml_table(_MESH, {'mesh': cast('MeshSkin', patch).text})}"
+
+
+def _with_kept(values: dict[str, Any], top: TomlTable) -> None:
+    """Put what [kept] has of files in the place of their names in `values`, the table `top`."""
+    kept = top.table("kept")
+    for part in _WITH_FILES:
+        top.table(part), kept.table(part)  # or refused here
+        if part in kept:
+            own = {key: value for key, value in values.get(part, {}).items() if key != "file"}
+            values[part] = own | values["kept"][part]
+    kept.done()
 
 
 _VALUES = "\n[values]  # a record: sequence number, time in s, and the numbers of the columns\n"
@@ -316,12 +328,12 @@ def description_of(text: str, name: str, serial_number: str = "") -> Description
 
     `serial_number` is that of the sensor where the text has no `id`.
     """
-    top = TomlTable(parsed(text, Path(name)), text, name)
+    values = parsed(text, Path(name))
+    top = TomlTable(values, text, name)
     if (version := TOP.value(top, "format")) != FORMAT:
         raise top.refusal(f"expected format = {FORMAT}, got {version}", "format")
-    kept = top.table("kept")
-    skin = top.table("skin").overlaid(kept.table("skin"), "file")
-    kept.done()
+    _with_kept(values, top)
+    skin = top.table("skin")
     plate, edge = read_skin(skin, _no_file)
     # Without a given rigidity that of the default skin is no information.
     plate = replace(plate, unknown_material=plate.unknown_material or "rigidity" not in skin)
