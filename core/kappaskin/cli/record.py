@@ -321,8 +321,9 @@ def export(
 
     The suffix selects the format. A .parquet, .csv, .npz or .h5 has a row for each frame,
     recomputed from the recorded bytes with the recorded settings; the preset selects its columns.
-    A .vtp or .stl is the skin in space at one moment, a .pvd a series of .vtp files. Every file
-    states units, settings, calibration, tare and device.
+    A .vtp or .stl is the skin in space at one moment, a .pvd a series of .vtp files. A .glb (glTF)
+    is the skin at one moment, as it moves with the time between two shapes, or at its deepest.
+    Every file states units, settings, calibration, tare and device.
 
     Example: `kappaskin export press.mcap --to press.csv --from 2 --until 4`
 

@@ -297,7 +297,8 @@ def _with_kept(values: dict[str, Any], top: TomlTable) -> None:
     """Put what [kept] has of files in the place of their names in `values`, the table `top`."""
     kept = top.table("kept")
     for part in _WITH_FILES:
-        top.table(part), kept.table(part)  # or refused here
+        for table in (top, kept):
+            table.table(part)  # or refused here
         if part in kept:
             own = {key: value for key, value in values.get(part, {}).items() if key != "file"}
             values[part] = own | values["kept"][part]
