@@ -12,7 +12,7 @@ from kappaskin.skin import MeshSkin
 from meshes import ellipsoid, obj
 
 AXES = 9e-3, 7e-3, 6e-3
-NODES, TRIANGLES = ellipsoid(10, AXES, math.radians(70))
+NODES, TRIANGLES = ellipsoid(18, AXES, math.radians(70))
 SKIN = """format = 1
 [skin]
 shape = "mesh"

@@ -40,7 +40,7 @@ def sensor_on(mesh):
 
 
 def test_a_device_sends_its_mesh():
-    sensor = sensor_on(MeshSkin(*ellipsoid(10, AXES, ANGLE), 1e-3, np.arange(280, 320)))
+    sensor = sensor_on(MeshSkin(*ellipsoid(18, AXES, ANGLE), 1e-3, np.arange(930, 980)))
     text = sensor_to_json(sensor)
     back = sensor_from_json(text)
     assert back.plate == sensor.plate
@@ -62,7 +62,7 @@ def test_the_largest_mesh_fits_in_the_information(tmp_path):
 
 
 def test_a_text_of_no_mesh_is_refused_by_the_device_and_its_description():
-    text = sensor_to_json(sensor_on(MeshSkin(*ellipsoid(10, AXES, ANGLE), 1e-3)))
+    text = sensor_to_json(sensor_on(MeshSkin(*ellipsoid(18, AXES, ANGLE), 1e-3)))
     begin = text.index('"mesh":"') + 8
     with pytest.raises(SourceError, match="expected the text of a mesh"):
         sensor_from_json(text[:begin] + text[begin + 40 :])
@@ -70,12 +70,12 @@ def test_a_text_of_no_mesh_is_refused_by_the_device_and_its_description():
 
 @pytest.fixture
 def file(tmp_path):
-    (tmp_path / "pad.obj").write_text(obj(1e3 * ellipsoid(10, AXES, ANGLE)[0], TRIANGLES))
+    (tmp_path / "pad.obj").write_text(obj(1e3 * ellipsoid(18, AXES, ANGLE)[0], TRIANGLES))
     (tmp_path / "board.toml").write_text(SKIN)
     return tmp_path / "board.toml"
 
 
-TRIANGLES = ellipsoid(10, AXES, ANGLE)[1]
+TRIANGLES = ellipsoid(18, AXES, ANGLE)[1]
 
 
 def test_a_description_is_kept_with_its_mesh(file):
