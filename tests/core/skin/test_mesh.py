@@ -162,6 +162,11 @@ def test_elements_are_spread_evenly(sphere):
     assert sphere.depth(at[:, :2]).min() > 0
 
 
+def test_a_place_that_is_not_known_is_not_on_the_skin(sphere):
+    assert sphere.holds(sphere.a / 2, sphere.b / 2)
+    assert not sphere.holds(math.nan, math.nan)
+
+
 def test_only_what_is_held_is_near_the_rim():
     nodes, triangles = ellipsoid(12, (R, R, R), MORE)
     held = np.flatnonzero(
