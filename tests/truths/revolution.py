@@ -278,8 +278,9 @@ class RevolvedShell:
         first, last = segment.min(), segment.max() + 1
         spread = np.zeros((last - first, len(s)))
         spread[segment - first, np.arange(len(s))] = 1.0
-        by_stage = np.einsum("nq,mq,qk->nmk", weights, spread, shares)
-        return -np.einsum("nmk,nmkr->nr", by_stage, table[:, first:last])
+        by_stage = weights @ (spread.T[:, :, None] * shares[:, None]).reshape(len(s), -1)
+        influences = table[:, first:last].reshape(len(table), -1, table.shape[-1])
+        return -(by_stage[:, None] @ influences)[:, 0]
 
     def _pieces(self, load, s0, nodes):
         """Places (Q,) along the meridian and the force (N, Q) in N of each harmonic there."""
@@ -311,10 +312,11 @@ class RevolvedShell:
         middle = self.meridian.points(s0, 0.0)
         _, cos, sin, _ = self.meridian.at(s0)
         normal = np.array([sin, 0.0, cos])
+        r, _, z = self.meridian.points(s, 0.0).T
         low, high = np.zeros_like(s), np.full_like(s, np.pi)
         for _ in range(50):
             azimuth = (low + high) / 2
-            to = self.meridian.points(s, azimuth) - middle
+            to = np.stack([r * np.cos(azimuth), r * np.sin(azimuth), z], -1) - middle
             chord2 = np.maximum(np.sum(to**2, -1), 1e-30)
             bend = np.abs(to @ normal) / np.sqrt(chord2)  # sine of half of the arc's angle
             arc = np.sqrt(chord2) * np.where(bend > 1e-6, np.arcsin(bend) / (bend + 1e-300), 1.0)
