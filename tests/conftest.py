@@ -44,7 +44,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # With the resource tracker: they stay, and are nobody's leak.
 if "forkserver" in multiprocessing.get_all_start_methods():
-    multiprocessing.set_forkserver_preload(["kappaskin.live.loop"])
+    multiprocessing.set_forkserver_preload(["kappaskin.live.loop", "scipy.spatial"])
     forkserver.ensure_running()
 else:
     resource_tracker.ensure_running()

@@ -64,7 +64,7 @@ def test_every_number_spent_is_decoded_and_the_contact_follows(
 
     window.session.estimated.connect(note)
     until(lambda: window.display.badge.state == "SIM")  # the device says that it is a simulated one
-    end = time.monotonic() + 10
+    end = time.monotonic() + 1.1 * PERIOD
     until(lambda: time.monotonic() > end and window.display.badge.state == "SIM")
     assert colours_in(window, window.membrane) > 500
     for heatmap in window.heatmaps.values():
