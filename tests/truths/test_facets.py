@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial import Delaunay
 
 from kappaskin.bases.facets import Facets, Factored, held_freedoms
+from meshes import disk
 from navier import HingedPlate, Load
 from revolution import RevolvedShell, Spheroid, sphere
 
@@ -89,11 +90,11 @@ def test_the_roof_of_scordelis_and_lo_sags_as_published(n, off):
 
 
 def octant(n):
-    """Nodes, triangles and corners of an eighth of the unit sphere."""
+    """Nodes and triangles of an eighth of the unit sphere."""
     u, v = np.array([(i, j) for i in range(n + 1) for j in range(n + 1 - i)]).T
     number = np.full((n + 2, n + 2), -1)
     number[u, v] = np.arange(len(u))
-    a, b, c, d = number[u, v], number[u + 1, v], number[u, v + 1], number[u + 1, v + 1][: len(u)]
+    a, b, c, d = number[u, v], number[u + 1, v], number[u, v + 1], number[u + 1, v + 1]
     up, down = np.stack([a, b, c], -1), np.stack([b, d, c], -1)
     nodes = np.sin(np.pi / 2 * np.stack([u, v, n - u - v], -1) / n)
     nodes /= np.linalg.norm(nodes, axis=1)[:, None]
@@ -131,14 +132,6 @@ def test_a_hemisphere_pinched_at_its_free_rim_moves_as_published(mesh, n, moved,
     quarter.forces[pinched, X], quarter.forces[other, Y] = 1, -1
 
     assert quarter.moved()[pinched, X] == pytest.approx(moved, rel=off)
-
-
-def rings(n):
-    """Delaunay's triangulation of the unit disc, of n rings of 6, 12, 18 points and so on."""
-    turns = [2 * np.pi * np.arange(max(6 * k, 1)) / max(6 * k, 1) for k in range(n + 1)]
-    radii = np.repeat(np.arange(n + 1) / n, [len(turn) for turn in turns])
-    angles = np.concatenate(turns)
-    return Delaunay(radii[:, None] * np.stack([np.cos(angles), np.sin(angles)], -1))
 
 
 def disc(load):
@@ -227,7 +220,7 @@ CAPS = {
 @pytest.mark.parametrize("name", CAPS)
 def test_a_cap_moves_as_a_shell_of_revolution(name, edge, n, off):
     (meridian, turn), length = CAPS[name], 1.2 * R
-    load, mesh = Load(turn * R, 0.0, 0.5, radius=1.5e-3), rings(n)
+    load, mesh = Load(turn * R, 0.0, 0.5, radius=1.5e-3), Delaunay(disk(n)[0])
     model = Model(meridian.points(*polar(length * mesh.points)), mesh.simplices, H, E, NU)
     count = len(mesh.points)
     model.held[:] = held_freedoms(np.arange(count)[-6 * n :], edge, count).reshape(-1, 6)

@@ -1,7 +1,7 @@
 """A thin shell of flat triangles: its stiffness, and displacements under forces."""
 
 from collections.abc import Callable
-from typing import Any, Literal, cast
+from typing import Any, cast
 
 import numpy as np
 from scipy.sparse import bsr_array, csc_array
@@ -52,14 +52,14 @@ class Facets:
         flat = np.flatnonzero(~(doubled > _FLATTEST * lengths.max(axis=1) ** 2))
         if flat.size:
             raise Refusal(
-                f"Expected triangles with an area, got {flat.size} with none; "
-                f"remove them or move their corners. The first is number {flat[0]}."
+                f"expected triangles with an area, got {flat.size} with none, the first of them "
+                f"number {flat[0]}; remove them or move their corners"
             )
         loose = np.setdiff1d(np.arange(len(nodes)), triangles)
         if loose.size:
             raise Refusal(
-                f"Expected nodes at corners of triangles, got {loose.size} that are at none; "
-                f"remove them. The first is number {loose[0]}."
+                f"expected nodes at corners of triangles, got {loose.size} that are at none, the "
+                f"first of them number {loose[0]}; remove them"
             )
         normals = across / doubled[:, None]
         along = sides[:, 0] / lengths[:, :1]
@@ -110,10 +110,10 @@ class Facets:
         return opposite[..., ::-1] * (-1, 1) / (2 * self._areas)[:, None, None]
 
     def _strains(self, nu: float) -> Array:
-        """Mean strain (F, 4, 3, 9) and three that count on top, by u, v, rotation at each corner.
+        """Strains (F, 4, 3, 9) xx, yy, 2 xy by u, v and the rotation at each corner.
 
-        Strains are xx, yy and 2 xy. The mean is as if a corner's rotation moved it about the
-        centre; the others follow rotations beyond the mean and take their work at the sides.
+        First the mean, as if a corner moved with its rotation about the centre; then what rotations
+        beyond the mean add at the middles of the sides, by the root of its share of the energy.
         """
         slopes = self._slopes()
         F = len(slopes)
@@ -133,10 +133,10 @@ class Facets:
     def _curvatures(self) -> Array:
         """Curvatures (F, 3, 3, 9) xx, yy, 2 xy at the sides' middles, by w and two rotations.
 
-        The normal turns by (b_x, b_y), linear from corner to corner where it leans across a side;
-        along a side it stays normal to it in the middle. So 4 L_i L_j times
-        t (3/2 (w_i - w_j) / l - 3/4 t . (b_i + b_j)) is added to the linear field, L barycentric
-        coordinates, t the direction of the side and l its length.
+        The normal turns by b = (b_x, b_y), linear in the barycentric coordinates L, plus on each
+        side ij of direction t and length l
+            4 L_i L_j t (3/2 (w_i - w_j) / l - 3/4 t . (b_i + b_j)),
+        with which it stays normal to the cubic w in the middle of the side.
         """
         slopes, corners = self._slopes(), self._corners
         F = len(slopes)
@@ -147,7 +147,7 @@ class Facets:
             linear += _symmetric(slopes, unit)[..., None] * turns[axis]
         sides = corners[:, _NEXT] - corners
         squares = np.sum(sides**2, axis=-1)[..., None]
-        row = np.zeros((F, 3, 3, 3))  # of side, of corner: times l
+        row = np.zeros((F, 3, 3, 3))  # times l, by side and corner
         each = np.arange(3)
         row[:, each, each] = row[:, each, _NEXT] = -3 / 4 * sides @ turns
         row[:, each, each, 0], row[:, each, _NEXT, 0] = 3 / 2, -3 / 2
@@ -180,7 +180,7 @@ def _joined(blocks: Array, at: Indices, starts: Indices) -> csc_array:
     return csc_array((by_rows.data, by_rows.indices, by_rows.indptr), shape=by_rows.shape)
 
 
-def held_freedoms(edge_nodes: Indices, edge: Literal["hinged", "clamped"], count: int) -> Mask:
+def held_freedoms(edge_nodes: Indices, edge: str, count: int) -> Mask:
     """What (6 count,) an edge holds of `count` nodes: displacements; clamped, rotations too."""
     held = np.zeros((count, 6), bool)
     held[edge_nodes, : 6 if edge == "clamped" else 3] = True
@@ -208,8 +208,8 @@ class Factored:
             lost = np.abs(found - known).max()
         if not lost < _LOST:
             raise Refusal(
-                "Expected a skin that is held, got one that is free to move as a whole or in part; "
-                "hold an edge of each part of it."
+                "the skin, or a part of it, moves as a whole without bending: expected edges that "
+                "hold it; hold more of the edge, or clamp it"
             )
 
     def __call__(self, forces: Array) -> Array:

@@ -16,10 +16,11 @@ from kappaskin.bases.basis import ORDERS, FunctionBasis, Order, PointMap
 from kappaskin.bases.product import gauss
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.skin import Cap, Disk, Polygon
+from kappaskin.skin import Cap, Disk, MeshSkin, Polygon
 
 if TYPE_CHECKING:
     from kappaskin.bases.argyris import PlateModes
+    from kappaskin.bases.mesh import MeshFunctions
 
 
 @dataclass(frozen=True)
@@ -443,3 +444,60 @@ class PolygonBasis(ModeBasis):
     def quadrature(self) -> tuple[Array, Array]:
         """Points (Q, 2) in m and weights (Q,) in m^2: exact for two quintics on each triangle."""
         return self._modes.points, self._modes.weights
+
+
+@dataclass(frozen=True)
+class MeshBasis(ModeBasis):
+    """The softest shapes of a mesh, hinged or `clamped` where it is held, by finite elements.
+
+    Combinations of what loads all over it make; the tangential displacements of a bent skin are in
+    them. For a skin of the mesh's thickness and Poisson's ratio 0.3, they do not mix.
+    """
+
+    clamped: bool = False
+
+    @property
+    def mesh(self) -> MeshSkin:
+        if not isinstance(self.patch, MeshSkin):
+            raise Refusal(f"expected a mesh, got a {self.patch.name}")
+        return self.patch
+
+    @property
+    def edge(self) -> str:
+        return "clamped" if self.clamped else "hinged"
+
+    @cached_property
+    def functions(self) -> "MeshFunctions":
+        # scipy.sparse is slow to import, and seldom needed.
+        from kappaskin.bases.mesh import mesh_functions
+
+        return mesh_functions(self.mesh, self.edge, self.size)
+
+    def _derivative(self, positions: Array, order: Order) -> Array:
+        values = np.full((len(positions), self.size), np.nan)
+        on = self.patch.contains(positions)
+        design = self.mesh.splines.design(positions[on], *order)
+        values[on] = design @ self.functions.values
+        return values
+
+    def _place(self, x: float, y: float) -> Array:
+        if not self.mesh.holds(x, y):
+            return np.full((len(ORDERS), self.size), np.nan)
+        return self.mesh.splines.jet(self.functions.values, x, y)
+
+    def curvature_at(self, positions: Array) -> Array:
+        """Curvature xx, yy, xy (3, P, N) in 1/m per m of each function; NaN off the skin."""
+        found = np.full((3, len(positions), self.size), np.nan)
+        on = self.patch.contains(positions)
+        found[:, on] = self.functions.curvature_at(positions[on])
+        return found
+
+    def quadrature(self) -> tuple[Array, Array]:
+        """Points (Q, 2) in m and weights (Q,) in m^2: the middles of all sides of triangles."""
+        mesh = self.mesh
+        corners = mesh.points[mesh.triangles]
+        middles = (corners + np.roll(corners, 1, axis=1)) / 2
+        u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        return middles[..., :2].reshape(-1, 2), np.repeat(
+            np.linalg.norm(np.cross(u, v), axis=1) / 6, 3
+        )
