@@ -205,7 +205,7 @@ class Factored:
             found = np.zeros(len(known))
             for _ in range(3):  # rounding is mended by repetition, what is free to move is not
                 found += self._solved(matrix @ (known - found))
-            lost = np.abs(found - known).max()
+            lost = np.abs(found - known).max(initial=0.0)
         if not lost < _LOST:
             raise Refusal(
                 "the skin, or a part of it, moves as a whole without bending: expected edges that "

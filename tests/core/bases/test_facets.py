@@ -135,6 +135,15 @@ def test_many_forces_are_solved_for_at_once_and_held_freedoms_stay():
     np.testing.assert_allclose((K @ moved)[~held], forces[~held], atol=1e-9)
 
 
+def test_a_skin_that_is_held_everywhere_does_not_move():
+    nodes, triangles, rim = grid(1, 1)
+    held = held_freedoms(rim, "clamped", len(nodes))
+
+    moved = Factored(Facets(nodes, triangles).stiffness(D, C, NU), held)(np.ones((24, 2)))
+
+    assert moved.tolist() == np.zeros((24, 2)).tolist()
+
+
 def test_edges_hold_displacements_and_clamped_rotations_too():
     hinged, clamped = (held_freedoms(np.array([1]), e, 2) for e in ("hinged", "clamped"))
 
