@@ -53,7 +53,7 @@ def stiffness(mesh: MeshSkin, D: float, C: float, nu: float, k_f: float) -> Any:
 
 def inward(mesh: MeshSkin) -> Array:
     """Unit vectors (n, 3) along which loads press at the nodes."""
-    return -np.stack(np.broadcast_arrays(*mesh.base(*mesh.points[:, :2].T).normal), axis=-1)
+    return -np.stack(np.broadcast_arrays(*mesh.base(*mesh.places.T).normal), axis=-1)
 
 
 def pressed(mesh: MeshSkin, forces: Array) -> Array:

@@ -495,9 +495,8 @@ class MeshBasis(ModeBasis):
     def quadrature(self) -> tuple[Array, Array]:
         """Points (Q, 2) in m and weights (Q,) in m^2: the middles of all sides of triangles."""
         mesh = self.mesh
-        corners = mesh.points[mesh.triangles]
-        middles = (corners + np.roll(corners, 1, axis=1)) / 2
+        corners, flat = mesh.points[mesh.triangles], mesh.places[mesh.triangles]
+        middles = (flat + np.roll(flat, 1, axis=1)) / 2
         u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        return middles[..., :2].reshape(-1, 2), np.repeat(
-            np.linalg.norm(np.cross(u, v), axis=1) / 6, 3
-        )
+        area: Array = np.linalg.norm(np.cross(u, v), axis=1) / 2
+        return middles.reshape(-1, 2), np.repeat(area / 3, 3)

@@ -550,7 +550,7 @@ class _OfMesh:
         found = mesh.spread(min(_SPREAD, len(mesh.points) // 2))
         side = min(mesh.a, mesh.b)
         places = np.array(
-            [(*mesh.points[k, :2], (share * side) ** 2) for k in found for share in _RADII]
+            [(*mesh.places[k], (share * side) ** 2) for k in found for share in _RADII]
         )
         read = np.empty((len(places), self._out.shape[1]), np.float32)
         for row, place in zip(read, places.tolist(), strict=True):
@@ -860,7 +860,7 @@ def _decay(plate: Plate) -> float:
     Hx, Hy = patch.curvatures if patch.is_shallow or isinstance(patch, Cap) else (0.0, 0.0)
     square = (3 * Hx**2 + 3 * Hy**2 + 2 * Hx * Hy) / 8
     if isinstance(patch, MeshSkin):
-        xx, yy, xy = patch.read_at_rest(patch.points[:, :2])
+        xx, yy, xy = patch.read_at_rest(patch.places)
         square = (3 * xx**2 + 3 * yy**2 + 2 * xx * yy + 4 * xy**2) / 8
         square = float(np.percentile(square, _BENT_MORE))
     stretch = (1 - plate.poisson**2) * plate.membrane_stiffness * square

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kappaskin.errors import Refusal
-from kappaskin.skin import MeshSkin
+from kappaskin.skin import MeshSkin, doubled_area
 from meshes import disk, ellipsoid
 
 R = 8e-3
@@ -155,6 +155,16 @@ def test_a_mesh_with_a_hole_is_refused():
         MeshSkin(np.column_stack([places, 0 * places[:, 0]]) * 0.01, whole, 1e-3)
 
 
-def test_a_mesh_that_leans_too_far_is_refused():
-    with pytest.raises(Refusal, match="lean by at most 80 degrees"):
-        MeshSkin(*ellipsoid(20, (R, R, R), math.radians(95)), 1e-3)
+def test_a_skin_that_folds_over_its_plane_is_flattened():
+    more = math.radians(110)
+    mesh = MeshSkin(*ellipsoid(24, (R, R, R), more), 1e-3)
+
+    assert mesh.is_flattened
+    assert mesh.a == pytest.approx(2 * R * more, rel=0.25)  # nearly as long as its arc
+    flat = mesh.places[mesh.triangles]
+    assert (doubled_area(flat[:, 0], flat[:, 1], flat[:, 2]) > 0).all()
+    at = np.random.default_rng(0).uniform(0, 1, (2000, 2)) * [mesh.a, mesh.b]
+    base = mesh.base(*at[mesh.depth(at) > 0.1 * mesh.a].T)
+    assert np.allclose(base.form, np.array([[1], [1], [0]]) / R, atol=0.02 / R)
+    centre = -mesh.origin @ mesh.frame.T
+    assert np.allclose(np.linalg.norm(np.stack(base.point, -1) - centre, axis=-1), R, rtol=1e-3)
