@@ -84,6 +84,12 @@ class RoundBasis(ModeBasis):
         values[on] = self._functions.derivative(x[on] + 1j * y[on], order) / R ** sum(order)
         return values
 
+    def weighed(self, positions: Array, weights: Array) -> Array:
+        """The sum (N,) of each function at `positions` (P, 2) in m, by `weights` (P,)."""
+        R = self.patch.a / 2
+        x, y = (positions.T - R) / R
+        return self._functions.weighed(x + 1j * y, weights)
+
     def _place(self, x: float, y: float) -> Array:
         R = self.patch.a / 2
         z = complex(x - R, y - R) / R
@@ -302,16 +308,26 @@ class _PolarFunctions:
         self._series = to_series @ parts((1 + np.cos(nodes)) / 2)
         self._flat = np.hstack(list(self._series))
 
+    def _factors(self, z: Complex) -> tuple[Array, Complex]:
+        """Chebyshev's polynomials (P, D) of the radius, and e^(i m angle) (P, M), at z (P,)."""
+        t = np.arccos(np.clip(2 * np.abs(z) - 1, -1, 1))
+        turns = np.exp(1j * np.multiply.outer(np.angle(z), self._turns))
+        return np.cos(np.multiply.outer(t, self._degrees)), turns
+
+    def weighed(self, z: Complex, weights: Array) -> Array:
+        """The sums (N,) of the modes at the points z = x + i y (P,) of the disk, by `weights`."""
+        polynomials, turns = self._factors(z)
+        by_turn = polynomials.T @ (weights[:, None] * turns)  # before there are so many functions
+        return self._parts((self._series[0] * by_turn[:, self._which]).sum(axis=0))
+
     def derivative(self, z: Complex, order: Order) -> Array:
         """The derivatives (P, N) of one order at the points z = x + i y (P,) of the disk."""
-        t = np.arccos(np.clip(2 * np.abs(z) - 1, -1, 1))
-        polynomials = np.cos(np.multiply.outer(t, self._degrees))
+        polynomials, turns = self._factors(z)
         turn = np.exp(1j * np.angle(z))[:, None]
         values = np.zeros((len(z), len(self.m)), complex)
         for step, factor in enumerate(_BY_STEPS[ORDERS.index(order)]):
             if factor:
                 values += factor * turn ** _TURNS[step] * (polynomials @ self._series[step])
-        turns = np.exp(1j * np.multiply.outer(np.angle(z), self._turns))
         return self._parts(values * turns[:, self._which])
 
     def jet(self, z: complex, R: float) -> Array:

@@ -266,6 +266,7 @@ class _DiscOnGages:
 
 
 _NEAREST = 1e-6  # of a standard deviation: nearer, a Gaussian load bends the plate no more
+_FAR = 40.0  # exp1 of it is less than the rounding of what it is added to
 
 
 def _gaussian(d: Array, sd: float) -> tuple[Array, Array]:
@@ -273,7 +274,8 @@ def _gaussian(d: Array, sd: float) -> tuple[Array, Array]:
     t = np.maximum(d[0] ** 2 + d[1] ** 2, (_NEAREST * sd) ** 2)
     u = t / (2 * sd**2)
     mean: Array = -np.expm1(-u) / u
-    integral = cast("Array", scipy.special.exp1(u))
+    integral, near = np.zeros_like(u), u < _FAR
+    integral[near] = scipy.special.exp1(u[near])
     return np.log(t) + 0.5 + integral + mean, 2 * (1 - mean) / t
 
 

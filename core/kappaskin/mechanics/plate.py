@@ -396,7 +396,9 @@ class Plate:
             return cap_shell(self, basis).by_function(self.compliance_by_wave(basis))
         K, bare = self._stiffness(basis)
         inextensible = self.patch.arc_curvature and not self._is_shell
-        W = np.eye(basis.size) if basis.free is None or not inextensible else basis.free
+        if basis.free is None or not inextensible:
+            return self._inverse(K, bare)
+        W = basis.free
         return W @ self._inverse(W.T @ K @ W, W.T @ bare @ W) @ W.T
 
     def _inverse(self, K: Array, bare: Array) -> Array:
