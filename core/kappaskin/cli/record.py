@@ -426,6 +426,7 @@ def reconstruct(
     curvature or twist, its `direction` (R,) in rad from x, its `sigma` (R,) or (T, R), and in
     `datum` the quantities of an unknown zero. A `size` (1,) with `positions` (P, 1) is a strip, for
     which only curvature xx is used. An `outline` in m is a polygon (V, 2) or the radius of a disk.
+    Instead of `size`, `mesh` is the text of a mesh, `MeshSkin(...).text`.
     With a `rigidity` in N m, forces are computed too; without it contacts are found by the shape
     alone. A `gage_length` in m is that of gages, `cell` (2,) in m the sides that heights and slopes
     are the mean over. A `thickness` in m, `poisson` and `inplane`
