@@ -1,6 +1,7 @@
-"""Files: written whole or not at all, read within limits, in use or left behind."""
+"""Files: written whole or not at all, read within limits, in use, left behind, or a cache."""
 
 import hashlib
+import io
 import os
 import platform
 import secrets
@@ -13,7 +14,10 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal
 
@@ -314,3 +318,52 @@ def remove_folders_left_behind(beside: Path | None = None) -> None:
             with left_behind(folder / _MARK, _MARKED) as left:
                 if left and not folder.is_symlink():
                     shutil.rmtree(folder, ignore_errors=True)
+
+
+_MEANING = 1  # to be changed by whatever makes other arrays of the same key
+_MOST = 16  # files
+_DIGEST = hashlib.sha256().digest_size  # bytes: what a file begins with
+_LARGEST = 64_000_000  # bytes of one: more is read no faster than it is computed
+
+
+def cached(key: str, compute: Callable[[], dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
+    """The arrays of `compute()`, by name: read from the cache where `key` is there.
+
+    The same bits whether cached or computed. A damaged file and those of other versions of numpy
+    or scipy are not used; where none can be written, the arrays are computed every time.
+    """
+    import scipy  # needed by few
+
+    versioned = f"{_MEANING} {np.__version__} {scipy.__version__} {key}"
+    file = _cache_folder() / f"{hashlib.sha256(versioned.encode()).hexdigest()[:24]}.npz"
+    with suppress(OSError):
+        data = file.read_bytes()
+        if data.startswith(_digest(data[_DIGEST:])):
+            file.touch()  # the oldest go first
+            return dict(np.load(io.BytesIO(data[_DIGEST:])))
+    arrays = compute()
+    if sum(values.nbytes for values in arrays.values()) <= _LARGEST:
+        with suppress(OSError, Refusal):
+            _write_arrays(file, arrays)
+    return arrays
+
+
+def _digest(data: bytes) -> bytes:
+    return hashlib.sha256(data).digest()
+
+
+def _cache_folder() -> Path:
+    import platformdirs  # needed by few
+
+    return user_folder(platformdirs.user_cache_path) / "modes"
+
+
+def _write_arrays(file: Path, arrays: dict[str, NDArray[Any]]) -> None:
+    made = io.BytesIO()
+    np.savez(made, **arrays)  # pyright: ignore[reportArgumentType]
+    data = made.getvalue()
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(file, _digest(data) + data)
+    there = sorted(file.parent.iterdir(), key=lambda one: one.stat().st_mtime, reverse=True)
+    for old in there[_MOST:]:
+        old.unlink(missing_ok=True)

@@ -13,6 +13,7 @@ from kappaskin.bases.basis import curvature_at as curvature_at
 from kappaskin.bases.basis import hoop_at as hoop_at
 from kappaskin.bases.modes import CapBasis as CapBasis
 from kappaskin.bases.modes import DiskBasis, PolygonBasis
+from kappaskin.bases.modes import MeshBasis as MeshBasis
 from kappaskin.bases.modes import ModeBasis as ModeBasis
 from kappaskin.bases.modes import radial as radial
 from kappaskin.bases.product import ClampedBasis
@@ -22,7 +23,7 @@ from kappaskin.bases.product import SineBasis as SineBasis
 from kappaskin.bases.product import gauss as gauss
 from kappaskin.bases.product import overlaps as overlaps
 from kappaskin.errors import Refusal
-from kappaskin.skin import Cap, Disk, Patch, Polygon
+from kappaskin.skin import Cap, Disk, MeshSkin, Patch, Polygon
 
 _Maker = Callable[[Patch, int, int], Basis]
 _MAKERS: dict[type[Patch], dict[str, _Maker]] = {
@@ -35,6 +36,7 @@ _MAKERS: dict[type[Patch], dict[str, _Maker]] = {
     },
     Disk: {"hinged": DiskBasis, "clamped": partial(DiskBasis, clamped=True)},
     Cap: {"hinged": CapBasis, "clamped": partial(CapBasis, clamped=True)},
+    MeshSkin: {"hinged": MeshBasis, "clamped": partial(MeshBasis, clamped=True)},
     Polygon: {"hinged": PolygonBasis, "clamped": partial(PolygonBasis, clamped=True)},
 }
 

@@ -1,24 +1,17 @@
 """Finite elements: a triangle mesh, Argyris' quintic elements, and modes of polygonal plates."""
 
-import hashlib
-import io
 import math
-from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-import platformdirs
-import scipy
 from scipy.sparse import block_diag, coo_array, csc_array, diags_array, eye_array
 from scipy.sparse.linalg import eigsh
 from scipy.spatial import Delaunay, KDTree
 from scipy.special import perm
 
-from kappaskin._files import user_folder, write_whole
+from kappaskin._files import cached
 from kappaskin.bases.basis import ORDERS, Order
 from kappaskin.bases.product import gauss
 from kappaskin.errors import Refusal
@@ -399,48 +392,3 @@ def _lowest(K: Any, M: Any, allowed: csc_array, count: int) -> Array:
         eigsh(scaled.T @ K @ scaled, count, scaled.T @ M @ scaled, sigma=0, v0=start),
     )
     return np.asarray(scaled @ vectors[:, np.argsort(squares)])
-
-
-_MEANING = 1  # to be changed by whatever makes other arrays of the same key
-_MOST = 16  # files
-_MARK = hashlib.sha256().digest_size  # bytes: what a file begins with
-_LARGEST = 64_000_000  # bytes of one: more is read no faster than it is computed
-
-
-def cached(key: str, compute: Callable[[], dict[str, Array]]) -> dict[str, Array]:
-    """The arrays of `compute()`, by name: read from the cache where `key` is there.
-
-    The same bits whether cached or computed. A damaged file and those of other versions of numpy
-    or scipy are not used; where none can be written, the arrays are computed every time.
-    """
-    versioned = f"{_MEANING} {np.__version__} {scipy.__version__} {key}"
-    file = _folder() / f"{hashlib.sha256(versioned.encode()).hexdigest()[:24]}.npz"
-    with suppress(OSError):
-        data = file.read_bytes()
-        if data.startswith(_mark(data[_MARK:])):
-            file.touch()  # the oldest go first
-            return dict(np.load(io.BytesIO(data[_MARK:])))
-    arrays = compute()
-    if sum(values.nbytes for values in arrays.values()) <= _LARGEST:
-        with suppress(OSError, Refusal):
-            _write(file, arrays)
-    return arrays
-
-
-def _mark(data: bytes) -> bytes:
-    return hashlib.sha256(data).digest()
-
-
-def _folder() -> Path:
-    return user_folder(platformdirs.user_cache_path) / "modes"
-
-
-def _write(file: Path, arrays: dict[str, Array]) -> None:
-    made = io.BytesIO()
-    np.savez(made, **arrays)  # pyright: ignore[reportArgumentType]
-    data = made.getvalue()
-    file.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(file, _mark(data) + data)
-    there = sorted(file.parent.iterdir(), key=lambda one: one.stat().st_mtime, reverse=True)
-    for old in there[_MOST:]:
-        old.unlink(missing_ok=True)

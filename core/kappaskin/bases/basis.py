@@ -4,14 +4,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Array
-from kappaskin.skin import Cap, Patch
+from kappaskin.skin import Cap, MeshSkin, Patch
 
 Order = tuple[int, int]
 ORDERS: tuple[Order, ...] = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
@@ -139,6 +139,8 @@ def curvature_at(basis: Basis, positions: Array) -> Array:
     """
     if isinstance(basis.patch, Cap):
         return _on_cap(basis, basis.patch, positions)
+    if isinstance(basis.patch, MeshSkin):
+        return cast("Any", basis).curvature_at(positions)  # a `MeshBasis` has its own
     return np.stack(
         [
             sum(
@@ -198,7 +200,7 @@ class CurvatureMap:
 
     def __init__(self, basis: Basis, component: str, x: Array, y: Array) -> None:
         self._terms: list[tuple[float, ValueMap]]
-        if isinstance(basis.patch, Cap):
+        if isinstance(basis.patch, Cap | MeshSkin):
             k = COMPONENTS.index(component)
             self._terms = [(1.0, PointMap.of(lambda at: curvature_at(basis, at)[k], x, y))]
         else:

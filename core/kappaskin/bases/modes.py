@@ -16,10 +16,11 @@ from kappaskin.bases.basis import ORDERS, FunctionBasis, Order, PointMap
 from kappaskin.bases.product import gauss
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
-from kappaskin.skin import Cap, Disk, Polygon
+from kappaskin.skin import Cap, Disk, MeshSkin, Polygon
 
 if TYPE_CHECKING:
     from kappaskin.bases.argyris import PlateModes
+    from kappaskin.bases.mesh import MeshFunctions
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,12 @@ class RoundBasis(ModeBasis):
         values = np.full((len(positions), self.size), np.nan)
         values[on] = self._functions.derivative(x[on] + 1j * y[on], order) / R ** sum(order)
         return values
+
+    def weighed(self, positions: Array, weights: Array) -> Array:
+        """The sum (N,) of each function at `positions` (P, 2) in m, by `weights` (P,)."""
+        R = self.patch.a / 2
+        x, y = (positions.T - R) / R
+        return self._functions.weighed(x + 1j * y, weights)
 
     def _place(self, x: float, y: float, count: int) -> Array:
         R = self.patch.a / 2
@@ -301,16 +308,26 @@ class _PolarFunctions:
         self._series = to_series @ parts((1 + np.cos(nodes)) / 2)
         self._flat = np.hstack(list(self._series))
 
+    def _factors(self, z: Complex) -> tuple[Array, Complex]:
+        """Chebyshev's polynomials (P, D) of the radius, and e^(i m angle) (P, M), at z (P,)."""
+        t = np.arccos(np.clip(2 * np.abs(z) - 1, -1, 1))
+        turns = np.exp(1j * np.multiply.outer(np.angle(z), self._turns))
+        return np.cos(np.multiply.outer(t, self._degrees)), turns
+
+    def weighed(self, z: Complex, weights: Array) -> Array:
+        """The sums (N,) of the modes at the points z = x + i y (P,) of the disk, by `weights`."""
+        polynomials, turns = self._factors(z)
+        by_turn = polynomials.T @ (weights[:, None] * turns)  # before there are so many functions
+        return self._parts((self._series[0] * by_turn[:, self._which]).sum(axis=0))
+
     def derivative(self, z: Complex, order: Order) -> Array:
         """The derivatives (P, N) of one order at the points z = x + i y (P,) of the disk."""
-        t = np.arccos(np.clip(2 * np.abs(z) - 1, -1, 1))
-        polynomials = np.cos(np.multiply.outer(t, self._degrees))
+        polynomials, turns = self._factors(z)
         turn = np.exp(1j * np.angle(z))[:, None]
         values = np.zeros((len(z), len(self.m)), complex)
         for step, factor in enumerate(_BY_STEPS[ORDERS.index(order)]):
             if factor:
                 values += factor * turn ** _TURNS[step] * (polynomials @ self._series[step])
-        turns = np.exp(1j * np.multiply.outer(np.angle(z), self._turns))
         return self._parts(values * turns[:, self._which])
 
     def jet(self, z: complex, R: float, count: int) -> Array:
@@ -448,3 +465,59 @@ class PolygonBasis(ModeBasis):
     def quadrature(self) -> tuple[Array, Array]:
         """Points (Q, 2) in m and weights (Q,) in m^2: exact for two quintics on each triangle."""
         return self._modes.points, self._modes.weights
+
+
+@dataclass(frozen=True)
+class MeshBasis(ModeBasis):
+    """The softest shapes of a mesh, hinged or `clamped` where it is held, by finite elements.
+
+    Combinations of what loads all over it make; the tangential displacements of a bent skin are in
+    them. For a skin of the mesh's thickness and Poisson's ratio 0.3, they do not mix.
+    """
+
+    clamped: bool = False
+
+    @property
+    def mesh(self) -> MeshSkin:
+        if not isinstance(self.patch, MeshSkin):
+            raise Refusal(f"expected a mesh, got a {self.patch.name}")
+        return self.patch
+
+    @property
+    def edge(self) -> str:
+        return "clamped" if self.clamped else "hinged"
+
+    @cached_property
+    def functions(self) -> "MeshFunctions":
+        # scipy.sparse is slow to import, and seldom needed.
+        from kappaskin.bases.mesh import mesh_functions
+
+        return mesh_functions(self.mesh, self.edge, self.size)
+
+    def _derivative(self, positions: Array, order: Order) -> Array:
+        values = np.full((len(positions), self.size), np.nan)
+        on = self.patch.contains(positions)
+        design = self.mesh.splines.design(positions[on], *order)
+        values[on] = design @ self.functions.values
+        return values
+
+    def _place(self, x: float, y: float, count: int) -> Array:
+        if not self.mesh.holds(x, y):
+            return np.full((count, self.size), np.nan)
+        return self.mesh.splines.jet(self.functions.values, x, y, count)
+
+    def curvature_at(self, positions: Array) -> Array:
+        """Curvature xx, yy, xy (3, P, N) in 1/m per m of each function; NaN off the skin."""
+        found = np.full((3, len(positions), self.size), np.nan)
+        on = self.patch.contains(positions)
+        found[:, on] = self.functions.curvature_at(positions[on])
+        return found
+
+    def quadrature(self) -> tuple[Array, Array]:
+        """Points (Q, 2) in m and weights (Q,) in m^2: the middles of all sides of triangles."""
+        mesh = self.mesh
+        corners, flat = mesh.points[mesh.triangles], mesh.places[mesh.triangles]
+        middles = (flat + np.roll(flat, 1, axis=1)) / 2
+        u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        area: Array = np.linalg.norm(np.cross(u, v), axis=1) / 2
+        return middles.reshape(-1, 2), np.repeat(area / 3, 3)

@@ -1,21 +1,24 @@
 """Influence of a load: what the elements read of a load at any place on the skin, of any size."""
 
+import hashlib
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from itertools import product
-from typing import Protocol, cast
+from typing import Any, Protocol, cast
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from kappaskin.bases import Basis, CapBasis, ProductBasis, SineBasis, basis_for
+from kappaskin._files import cached
+from kappaskin.bases import Basis, CapBasis, MeshBasis, ProductBasis, SineBasis, basis_for
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics import CapWaves, Compliance, Plate, Shell, cap_shell
 from kappaskin.sensing import SensorLayout
-from kappaskin.skin import Cap, Patch
+from kappaskin.skin import Cap, MeshSkin, Patch
 
 Single = NDArray[np.float32]
 
@@ -66,16 +69,22 @@ def influence_of(
     On strips, disks, polygons and drum heads it is that of a basis of so many `functions` each way;
     that of heights and slopes, which are bounded under a load, is one of more.
     """
-    is_cap = isinstance(plate.patch, Cap)
     is_rectangle = type(plate.patch) is Patch and not plate.patch.strip
     _check_decay(plate, functions)
-    if not is_cap and not (is_rectangle and _is_stiff(plate)):
+    if not isinstance(plate.patch, Cap | MeshSkin) and not (is_rectangle and _is_stiff(plate)):
         return _OfFunctions(plate, layout, edge, functions, out)
     if not layout.senses_curvature_only or (layout.reads and layout.gage_length):
         return _OfFunctions(plate, layout, edge, _FINE, out)
     if layout.reads or layout.scale is not None:
         return _OfDirections(plate, layout, edge, out)
-    return (_OfCap if is_cap else _OfPlate)(plate, layout, edge, out)
+    return _of_curvature(plate)(plate, layout, edge, out)
+
+
+def _of_curvature(plate: Plate) -> Callable[[Plate, SensorLayout, str, Array], Influence]:
+    """What makes the influence on gages along x and y of a plate, a shell, a cap or a mesh."""
+    if isinstance(plate.patch, Cap):
+        return _OfCap
+    return _OfMesh if isinstance(plate.patch, MeshSkin) else _OfPlate
 
 
 @lru_cache(1)  # the same array for all, which is read in half the time
@@ -158,17 +167,21 @@ class _Disc:
     def __init__(self, positions: Array, out: Array) -> None:
         P = len(positions)
         self._positions, self._out = positions.T.copy(), list(out.reshape(12, P))
-        self._d, self.t = np.empty((2, P)), np.empty(P)
+        self.d, self.t = np.empty((2, P)), np.empty(P)
         self._numbers = list(np.repeat([[0.5], [1.0], [2.0], [4.0]], P, axis=1))
         self._work = list(np.empty((12, P)))
 
     def __call__(self, x: float, y: float, s: float) -> None:
+        np.subtract(((x,), (y,)), self._positions, self.d)
+        self.under(s)
+
+    def under(self, s: float) -> None:
+        """As a call, with the load at `d` (2, P) in m from the gages."""
         add, subtract, multiply, t = np.add, np.subtract, np.multiply, self.t
         half, one, two, four = self._numbers
         size, m, q, qq, v, w, B, b, x2, y2, e, f = self._work
         xx, yy, xy, xx_x, yy_x, xy_x, xx_y, yy_y, xy_y, xx_s, yy_s, xy_s = self._out
-        subtract(((x,), (y,)), self._positions, self._d)
-        dx, dy = self._d
+        dx, dy = self.d
         multiply(dx, dx, x2)
         multiply(dy, dy, y2)
         add(x2, y2, t)
@@ -229,9 +242,15 @@ class _DiscOnGages:
     def __init__(self, positions: Array, length: float, out: Array) -> None:
         self._positions, self._length = positions.T, length
         self._out, self.t = out.reshape(4, 3, -1), np.empty(len(positions))
+        self.d = np.empty((2, len(positions)))
 
     def __call__(self, x: float, y: float, s: float) -> None:
-        d, out = np.array([[x], [y]]) - self._positions, self._out
+        np.subtract(((x,), (y,)), self._positions, self.d)
+        self.under(s)
+
+    def under(self, s: float) -> None:
+        """As a call, with the load at `d` (2, P) in m from the middles of the gages."""
+        d, out = self.d, self._out
         np.sum(d * d, axis=0, out=self.t)
         D = d[:, None] + self._length / 2 * _ENDS.T[..., None]
         t: Array = np.sum(D * D, axis=0)
@@ -247,6 +266,7 @@ class _DiscOnGages:
 
 
 _NEAREST = 1e-6  # of a standard deviation: nearer, a Gaussian load bends the plate no more
+_FAR = 40.0  # exp1 of it is less than the rounding of what it is added to
 
 
 def _gaussian(d: Array, sd: float) -> tuple[Array, Array]:
@@ -254,7 +274,8 @@ def _gaussian(d: Array, sd: float) -> tuple[Array, Array]:
     t = np.maximum(d[0] ** 2 + d[1] ** 2, (_NEAREST * sd) ** 2)
     u = t / (2 * sd**2)
     mean: Array = -np.expm1(-u) / u
-    integral = cast("Array", scipy.special.exp1(u))
+    integral, near = np.zeros_like(u), u < _FAR
+    integral[near] = scipy.special.exp1(u[near])
     return np.log(t) + 0.5 + integral + mean, 2 * (1 - mean) / t
 
 
@@ -382,8 +403,7 @@ class _OfDirections:
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str, out: Array) -> None:
         self._rows, self._out = np.zeros((4, 3 * len(layout))), out
-        of_skin = _OfCap if isinstance(plate.patch, Cap) else _OfPlate
-        self._of = of_skin(plate, layout.of_curvature, edge, self._rows)
+        self._of = _of_curvature(plate)(plate, layout.of_curvature, edge, self._rows)
         self.unit = self._of.unit
         self.nodes: tuple[Array, Single] | None = None
         reads, P = layout.reads, len(layout)
@@ -503,6 +523,141 @@ class _OfCap:
         d = math.hypot(x - self._cap.rim_radius, y - self._cap.rim_radius)
         at = np.linspace(0, self._cap.rim_radius, len(self._gives))
         return float(np.interp(d, at, self._gives))
+
+
+class _OfMesh:
+    """A mesh's: in closed form what grows without bound, and splines of the rest."""
+
+    sized = True
+
+    def __init__(self, plate: Plate, layout: SensorLayout, edge: str, out: Array) -> None:
+        self._mesh, self._out = cast("MeshSkin", plate.patch), out
+        self.unit = 8 * math.pi * plate.rigidity
+        length = layout.gage_length
+        places = layout.positions.tobytes()
+        self._table, variances = _rest_on_mesh(plate, edge, places, length)
+        # Lagrange's parabolas through the variances of the table, by powers of the variance.
+        self._shares = np.linalg.inv(np.vander(variances, increasing=True).T)
+        self._basis, self._compliance, _ = read_of_modes(plate, layout.of_curvature, edge, _ON_MESH)
+        base = self._mesh.base(*layout.positions.T)
+        tangents: Array = np.swapaxes(base.frame, 0, 1)
+        self._origin = np.vecdot(tangents, np.stack(base.point, axis=-1))
+        self._frame: Array = np.ascontiguousarray(tangents).reshape(-1, 3)
+        at = layout.positions
+        self._disc = _DiscOnGages(at, length, out) if length else _Disc(at, out)
+        self.nodes: tuple[Array, Single] | None = self._searched()
+
+    def _searched(self) -> tuple[Array, Single]:
+        mesh = self._mesh
+        found = mesh.spread(min(_SPREAD, len(mesh.points) // 2))
+        side = min(mesh.a, mesh.b)
+        places = np.array(
+            [(*mesh.places[k], (share * side) ** 2) for k in found for share in _RADII]
+        )
+        read = np.empty((len(places), self._out.shape[1]), np.float32)
+        for row, place in zip(read, places.tolist(), strict=True):
+            self.at(*place)
+            row[:] = self._out[0]
+        return places, read
+
+    def at(self, x: float, y: float, s: float) -> None:
+        mesh, disc, out = self._mesh, self._disc, self._out
+        r = mesh.jet(x, y)
+        # The load from each element along its tangents, and how that moves with x and y.
+        along = (self._frame @ r[:3].T).reshape(2, -1, 3)
+        np.subtract(along[..., 0], self._origin, disc.d)
+        disc.under(s)
+        by_d = out[1:3].reshape(2, 3, -1)
+        by_x, by_y = along[..., 1], along[..., 2]
+        of_x, of_y = by_d[0] * by_x[0], by_d[0] * by_y[0]
+        of_x += by_d[1] * by_x[1]
+        of_y += by_d[1] * by_y[1]
+        by_d[0], by_d[1] = of_x, of_y
+        rest = mesh.splines.jet(self._table, x, y, 3).reshape(3, len(self._shares), -1)
+        v = s / 4  # what is smooth depends on the variance of a load alone
+        share, by_s = np.dot(((1.0, v, v * v), (0.0, 0.25, v / 2)), self._shares.T)
+        out[:3] += share @ rest
+        out[3] += by_s @ rest[0]
+
+    def trust(self, s: float, share: float) -> Array | None:
+        return _trust(self._disc.t, s, share)
+
+    def profile(self, s: float) -> Array | None:
+        return None
+
+    def gives(self, x: float, y: float) -> float:
+        f = self._basis.jet(x, y)[:1]
+        return float(np.vdot(self._compliance.after(f), f))
+
+
+_ON_MESH = 15  # functions each way, of the displacement under a load
+_SPREAD = 700  # places searched
+_RADII = 0.02, 0.07  # of the shorter side, of the loads there
+_MESH_SD = 1.2  # steps of the splines: of a Gaussian load
+_CUT = 3.0  # of it: farther away such a load presses no more
+_SPREADS = 1, 4, 12  # times that a load of the table is spread as one such
+_BLOCK = 16  # elements together: 100 MB
+
+
+@lru_cache(2)
+def _rest_on_mesh(
+    plate: Plate, edge: str, places: bytes, gage_length: float
+) -> tuple[Array, Array]:
+    """Splines (G, 3 C) of what is read of Gaussian loads less that on a plate without edges.
+
+    In the units of `_Disc`; and the variances (3,) of the loads in m^2.
+    """
+    mesh, C = cast("MeshSkin", plate.patch), plate.membrane_stiffness
+    of_sheet = plate.rigidity / C, plate.poisson, plate.foundation / C
+    sizes = " ".join(f"{each:.12g}" for each in (*of_sheet, gage_length))
+    made = cached(
+        f"loads {mesh.content} {edge} {sizes} {hashlib.sha256(places).hexdigest()}",
+        lambda: _made_on_mesh(mesh, edge, of_sheet, places, gage_length),
+    )
+    return made["splines"].astype(float), made["variances"]
+
+
+def _made_on_mesh(
+    mesh: MeshSkin,
+    edge: str,
+    of_sheet: tuple[float, float, float],
+    places: bytes,
+    gage_length: float,
+) -> dict[str, NDArray[Any]]:
+    basis = cast("MeshBasis", basis_for(mesh, edge, 1, 1))
+    n, unit, functions = len(mesh.points), 8 * math.pi * of_sheet[0], basis.functions
+    layout = SensorLayout.scattered(mesh, np.frombuffer(places).reshape(-1, 2))
+    read = np.empty((n, 3, len(layout)))
+    for i in range(0, len(layout), _BLOCK):
+        part = SensorLayout.scattered(mesh, layout.positions[i : i + _BLOCK])
+        part = replace(part, gage_length=gage_length)
+        rows = part.mean_curvature(basis, functions.nodal_curvature)
+        of_forces = functions.read_of_forces(rows, *of_sheet)
+        read[:, :, i : i + _BLOCK] = unit * of_forces.reshape(n, 3, -1)
+    sd = _MESH_SD * float(mesh.splines.step.max())
+    spread, base = _spread_by(mesh, sd), mesh.base(*layout.positions.T)
+    away = mesh.points.T[:, :, None] - np.stack(base.point)[:, None]
+    d = np.einsum("pak,knp->anp", base.frame, away)
+    cut, found = _CUT**2 / 2, list[Array]()
+    variances = sd**2 * (1 - cut / math.expm1(cut)) * np.array(_SPREADS, float)
+    for k in range(1, max(_SPREADS) + 1):
+        read = (spread @ read.reshape(n, -1)).reshape(read.shape)
+        if k in _SPREADS:
+            plain = _under_gaussian(d, math.sqrt(variances[len(found)]), gage_length)
+            found.append(mesh.splines.fit((read - np.moveaxis(plain, 0, 1)).reshape(n, -1)))
+    return {"splines": np.hstack(found).astype(np.float32), "variances": variances}
+
+
+def _spread_by(mesh: MeshSkin, sd: float) -> Any:
+    """The sparse mean (n, n) of values at nodes under a Gaussian about each, as far as `_CUT`."""
+    from scipy.sparse import csr_array, diags_array  # slow to import, and seldom needed
+    from scipy.spatial import KDTree
+
+    near = KDTree(mesh.points)
+    far = csr_array(near.sparse_distance_matrix(near, _CUT * sd, output_type="coo_matrix"))
+    far.data = np.exp(-(far.data**2) / (2 * sd**2))
+    shares: Any = far * mesh.areas
+    return diags_array(1 / shares.sum(axis=1)) @ shares
 
 
 def _coefficients(nodes: int) -> Array:
@@ -706,10 +861,16 @@ def _decay(plate: Plate) -> float:
     patch = plate.patch
     Hx, Hy = patch.curvatures if patch.is_shallow or isinstance(patch, Cap) else (0.0, 0.0)
     square = (3 * Hx**2 + 3 * Hy**2 + 2 * Hx * Hy) / 8
+    if isinstance(patch, MeshSkin):
+        xx, yy, xy = patch.read_at_rest(patch.places)
+        square = (3 * xx**2 + 3 * yy**2 + 2 * xx * yy + 4 * xy**2) / 8
+        square = float(np.percentile(square, _BENT_MORE))
     stretch = (1 - plate.poisson**2) * plate.membrane_stiffness * square
     return (plate.rigidity / stretch) ** 0.25 if stretch else math.inf
 
 
+_BENT_MORE = 90  # percent of the nodes of a mesh are bent less than it is taken to be
+_STEPS_OF_DECAY = 2  # steps of a mesh's splines: over less a load is not felt as these have it
 _FOLLOWED = 0.8  # half waves on a cap: over less a load is not felt as the table has it
 
 
@@ -721,7 +882,9 @@ def _check_decay(plate: Plate, functions: int) -> None:
     """
     patch = plate.patch
     least = max(patch.a, patch.b) / functions / math.pi
-    if isinstance(patch, Cap):
+    if isinstance(patch, MeshSkin):
+        least = _STEPS_OF_DECAY * float(patch.splines.step.max())
+    elif isinstance(patch, Cap):
         least = _FOLLOWED * cap_half_wave(patch)
     if (decay := _decay(plate)) < least:
         raise Refusal(

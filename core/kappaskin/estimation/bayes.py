@@ -13,7 +13,7 @@ from kappaskin.estimation.estimator import Estimator, PatternCache
 from kappaskin.estimation.fit import Fit, Uncertainty, power_of_two
 from kappaskin.frames import Array, Mask
 from kappaskin.mechanics import Plate
-from kappaskin.skin import Cap
+from kappaskin.skin import Cap, MeshSkin
 
 _THICKNESSES = 0.25e-3, 1e-3, 4e-3  # m
 _WIDTH = 0.15  # of the shorter side, over which wide loads are smoothed twice
@@ -42,7 +42,7 @@ def prior_root(basis: Basis) -> Array:
     # With f = Q R, G = R'R and C R' is a root of C G C; R C R' is one of the displacement's.
     R = _triangle(f)
     plates, loads = [Plate(basis.patch)], [R]
-    if isinstance(basis.patch, Cap) or basis.patch.is_shallow:
+    if isinstance(basis.patch, Cap | MeshSkin) or basis.patch.is_shallow:
         plates = [
             replace(plates[0], axial_stiffness=plates[0].modulus(h) * h) for h in _THICKNESSES
         ]
@@ -54,7 +54,11 @@ def prior_root(basis: Basis) -> Array:
     roots = [plate.compliance(basis).after(load).T for plate in plates for load in loads]
     joined = np.hstack([root / np.linalg.norm(R @ root) for root in roots])
     # How far a cap moves along its axis is a matter of its stiffness, not of its edge.
-    root = _triangle(joined.T).T if isinstance(basis.patch, Cap) else _on_free(basis, joined)
+    root = (
+        _triangle(joined.T).T
+        if isinstance(basis.patch, Cap | MeshSkin)
+        else _on_free(basis, joined)
+    )
     return root / np.linalg.norm(R @ root)
 
 

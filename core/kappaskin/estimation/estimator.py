@@ -15,7 +15,7 @@ from kappaskin.errors import RankDeficient, Refusal
 from kappaskin.estimation.fit import Fit, Uncertainty
 from kappaskin.frames import Array, Mask
 from kappaskin.sensing import SensorLayout
-from kappaskin.skin import Cap
+from kappaskin.skin import Cap, MeshSkin
 
 _SETS = 8  # that are cached: those used last
 _Made = TypeVar("_Made")
@@ -212,7 +212,7 @@ class Estimator(ABC):
         """The slopes along x and along y as sums of terms, on a grid that shows the finest."""
         patch, (Ni, Nj) = self.basis.patch, self.basis.shape
         at = patch.grid(*(min(4 * count + 1, _FINEST) for count in (Ni, Nj)))
-        if isinstance(patch, Cap):
+        if isinstance(patch, Cap | MeshSkin):
             return [[(1.0, values)] for values in covariant_maps(self.basis, *at)[1:3]]
         terms = [[(1.0, (1, 0))], [(1.0, (0, 1))]]
         if H := patch.arc_curvature:

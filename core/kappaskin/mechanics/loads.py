@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from kappaskin.bases import Basis, CapBasis, SineBasis
+from kappaskin.bases import Basis, CapBasis, MeshBasis, SineBasis
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.skin import Patch, Polygon
@@ -183,8 +183,10 @@ class DistributedLoad(CentredLoad, ABC):
             if felt is not None:
                 return self.force * felt
         points, weights = self.quadrature(max(basis.shape))
-        on_cap = isinstance(basis, CapBasis)
-        at = basis.cap.around(self.x, self.y, points) if on_cap else self.centre() + points
+        along_skin = isinstance(basis, CapBasis | MeshBasis)
+        at = self.centre() + points
+        if along_skin:
+            at = basis.patch.around(self.x, self.y, points)
         felt = weights @ basis.at(at)
         if np.isnan(felt).any():  # a notch in the outline that passes between the rim's points
             raise Refusal(f"expected a load completely on the skin, got {self}; make it smaller")
@@ -328,7 +330,8 @@ class _RoundOnCap:
         )
         nodes = np.pi * (self._degrees + 0.5) / len(self._degrees)
         far = self._rim + self._reach * (1 - 1e-12) * (1 + np.cos(nodes)) / 2
-        felt = [weights @ basis.at(basis.cap.around(at, self._rim, points)) for at in far.tolist()]
+        around = [basis.cap.around(at, self._rim, points) for at in far.tolist()]
+        felt = [basis.weighed(at, weights) for at in around]
         to_series = 2 / len(nodes) * np.cos(np.multiply.outer(self._degrees, nodes))
         to_series[0] /= 2
         self._series = to_series @ np.array(felt)

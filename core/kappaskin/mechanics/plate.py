@@ -11,6 +11,7 @@ from kappaskin.bases import (
     Basis,
     CapBasis,
     ElasticBasis,
+    MeshBasis,
     ModeBasis,
     ProductBasis,
     SineBasis,
@@ -23,7 +24,7 @@ from kappaskin.frames import Array
 from kappaskin.mechanics.cap import CapShell
 from kappaskin.mechanics.loads import Load, is_point
 from kappaskin.mechanics.shell import Sheet, Tangential, shallow_stiffness
-from kappaskin.skin import Cap, Patch
+from kappaskin.skin import Cap, MeshSkin, Patch
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,6 +191,8 @@ class Plate:
     @property
     def sheet_thickness(self) -> float | None:
         """Thickness h in m by which it stretches; None for a flat skin that was given none."""
+        if isinstance(self.patch, MeshSkin):
+            return self.thickness or self.patch.thickness
         if self.thickness is not None or not any(self.patch.curvatures):
             return self.thickness
         D, C = self.rigidity, self.axial_stiffness
@@ -267,7 +270,9 @@ class Plate:
             values: Array = 1 / (area * stiffness)
         else:
             values = self._by_ritz(basis)
-            if isinstance(basis, ModeBasis) and not any(self.patch.curvatures):
+            if isinstance(basis, MeshBasis) or (
+                isinstance(basis, ModeBasis) and not any(self.patch.curvatures)
+            ):
                 values = _unmixed(values)
         if self.fluid and not isinstance(basis, CapBasis):
             return self._over_fluid(values, basis)
@@ -327,6 +332,10 @@ class Plate:
 
     def _stiffness(self, basis: Basis) -> tuple[Array, Array]:
         """Stiffness matrix (N, N) in N/m, and the same without its negative terms, for scaling."""
+        if isinstance(basis, MeshBasis):
+            of_sheet = self.rigidity, self.membrane_stiffness, self.poisson, self.foundation
+            whole = basis.functions.stiffness(*of_sheet)
+            return whole, whole
         nu, (Hx, Hy), overlap = self.poisson, self.patch.curvatures, overlaps(basis)
         H = math.hypot(Hx, Hy)
         xx, yy, xy = (2, 0), (0, 2), (1, 1)
@@ -363,7 +372,9 @@ class Plate:
             return cap_shell(self, basis).by_function(self.compliance_by_wave(basis))
         K, bare = self._stiffness(basis)
         inextensible = self.patch.arc_curvature and not self._is_shell
-        W = np.eye(basis.size) if basis.free is None or not inextensible else basis.free
+        if basis.free is None or not inextensible:
+            return self._inverse(K, bare)
+        W = basis.free
         return W @ self._inverse(W.T @ K @ W, W.T @ bare @ W) @ W.T
 
     def _inverse(self, K: Array, bare: Array) -> Array:
@@ -391,6 +402,8 @@ class Plate:
         """
         if isinstance(basis, CapBasis):
             return cap_shell(self, basis).curvature_at
+        if isinstance(basis, MeshBasis):
+            return basis.curvature_at
         if self._is_shell:
             return self._tangential(basis).curvature_at
         return partial(curvature_at, basis)

@@ -61,7 +61,7 @@ from kappaskin.sensing import (
     SensorLayout,
     Transduction,
 )
-from kappaskin.skin import Cap, Disk, Patch, Polygon
+from kappaskin.skin import UNITS, Cap, Disk, MeshSkin, Patch, Polygon, read_surface
 
 TABLE_1_NOISE = 0.40 / math.sqrt(3)
 """RMS of the noise of Table 1 in 1/m: uniform between -0.40 and 0.40."""
@@ -81,6 +81,7 @@ LOOPS = {"second": SECOND_GENERATION_LOOPS, "first": FIRST_GENERATION_LOOPS}
 Trust = bool | Collection[Path]
 """Whether a scene may name any file, or which ones outside its folder."""
 
+_Find = Callable[[TomlTable, str], Path]  # the file that a table names at a key
 _LARGEST_SCENE = 2**21  # bytes: more takes longer than a few seconds to read
 _LARGEST_RECORD = 2**22  # bytes of a recorded motion
 
@@ -161,7 +162,7 @@ def scene_of(top: TomlTable, file: Path, trust: Trust = False) -> Scene:
             else f"expected format = {FORMAT}, got {version}",
             "format",
         )
-    plate, edge = read_skin(top.table("skin"))
+    plate, edge = read_skin(top.table("skin"), find)
     layout = read_elements(top.table("elements"), plate.patch)
     reference = SCENE.value(top, "reference", default=usual_reference(plate.patch))
     basis = partial(basis_for, plate.patch, edge, *reference)
@@ -212,16 +213,31 @@ def scene_of(top: TomlTable, file: Path, trust: Trust = False) -> Scene:
     return scene
 
 
-def read_skin(table: TomlTable) -> tuple[Plate, str]:
-    """The skin in the table [skin] of a file, and its boundary condition."""
+def read_skin(table: TomlTable, find: _Find) -> tuple[Plate, str]:
+    """The skin in the table [skin] of a file, and its boundary condition.
+
+    `find` gives the file that a key of the table names.
+    """
     shape = SKIN.value(table, "shape")
     with table.blamed():
-        patch = _patch(table, shape)
+        patch = _mesh(table, find) if shape == "mesh" else _patch(table, shape)
         check_sides(patch)
     plate = SKIN.make(table, Plate, patch=patch)
     edge = SKIN.value(table, "edge")
     table.done()
     return plate, edge
+
+
+def _mesh(table: TomlTable, find: _Find) -> MeshSkin:
+    if (text := SKIN.value(table, "mesh")) is not None:
+        return MeshSkin.of_text(text)
+    unit, thickness = SKIN.value(table, "unit"), SKIN.value(table, "thickness")
+    if thickness is None:
+        raise table.refusal("expected the thickness of the mesh in m, got none", "shape")
+    surface, held = read_surface(find(table, "file"), unit), SKIN.value(table, "held")
+    if held is not None:
+        held = surface.rim_between(*(UNITS[unit] * np.array(held)))
+    return MeshSkin(surface.nodes, surface.triangles, thickness, held)
 
 
 def _patch(table: TomlTable, shape: str) -> Patch:
@@ -239,7 +255,7 @@ def _patch(table: TomlTable, shape: str) -> Patch:
 def read_elements(table: TomlTable, patch: Patch) -> SensorLayout:
     """The elements in the table [elements] of a file."""
     with table.blamed():
-        given = [key for key in ("positions", "rings", "spiral") if key in table]
+        given = [key for key in ("positions", "rings", "spiral", "spread") if key in table]
         if len(given) > 1:
             raise table.refusal(f"expected one pattern, got {' and '.join(given)}", given[1])
         if "positions" in table:
@@ -250,6 +266,9 @@ def read_elements(table: TomlTable, patch: Patch) -> SensorLayout:
         elif "spiral" in table:
             check_elements(count := ELEMENTS.value(table, "spiral"))
             layout = SensorLayout.in_spiral(patch, count)
+        elif "spread" in table:
+            check_elements(count := ELEMENTS.value(table, "spread"))
+            layout = SensorLayout.spread(patch, count)
         else:
             grid = ELEMENTS.value(table, "grid")
             check_elements(*grid)
@@ -388,9 +407,6 @@ def _wanted(table: TomlTable) -> set[str]:
     """The effects that a file names."""
     named = EFFECT.value(table, "choose")
     return {*EFFECT.value(table, "on"), *(() if isinstance(named, str) else named)}
-
-
-_Find = Callable[[TomlTable, str], Path]  # the file that a table names at a key
 
 
 def _stimulus(

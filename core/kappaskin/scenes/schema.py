@@ -48,7 +48,7 @@ from kappaskin.sensing import (
     Multiplexer,
     SensorLayout,
 )
-from kappaskin.skin import Cap, Disk, Patch, Polygon
+from kappaskin.skin import UNITS, Cap, Disk, MeshSkin, Patch, Polygon
 
 _SECOND = Unit.same("s")
 _MM, _UM = Unit("m", "mm", 1e-3), Unit("m", "\N{MICRO SIGN}m", 1e-6)
@@ -124,6 +124,33 @@ SKIN = Part(
             "shallow skin: a dome, a saddle where their signs differ, a trough where one is inf.",
             _MM,
             example=0.05,
+        ),
+        "file": Key(
+            "File",
+            "STL, OBJ or PLY file of a skin of any shape, as triangles, in the folder of the file.",
+            kind=str,
+        ),
+        "unit": Key(
+            "Unit",
+            "Unit of length of the mesh's file.",
+            kind=str,
+            choices=tuple((unit, unit) for unit in UNITS),
+        ),
+        "held": Key(
+            "Held",
+            "Of a mesh: which part of its rim is held: from the node nearest to the first point, "
+            "in the unit of its file, along the rim to that nearest to the second, counter-"
+            "clockwise seen from outside. All of it if omitted.",
+            kind=tuple[tuple[float, float, float], tuple[float, float, float]],
+            default=None,
+            example=[[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]],
+        ),
+        "mesh": Key(
+            "Mesh",
+            "A mesh itself, as kappaskin writes it into a scene or a recording.",
+            kind=str,
+            default=None,
+            offered=False,
         ),
         "angle": Key(
             "Angle",
@@ -229,6 +256,7 @@ SKIN = Part(
             ("angle", "stretch"),
             {"radius": Key("Radius", "Radius of the cap, of its equator.", _MM, 0.0, kind=float)},
         ),
+        "mesh": PartKind("Mesh", MeshSkin, {"file": "skin.stl", "unit": "mm"}, ("held", "mesh")),
         "polygon": PartKind(
             "Polygon",
             Polygon,
@@ -236,6 +264,7 @@ SKIN = Part(
         ),
     },
     "shape",
+    (("file", "mesh"),),
 )
 
 ELEMENTS = Part(
@@ -273,6 +302,14 @@ ELEMENTS = Part(
             example=60,
             offered=False,
         ),
+        "spread": Key(
+            "Spread",
+            "Of a mesh: number of elements that are spread evenly over it.",
+            least=1,
+            kind=int,
+            example=120,
+            offered=False,
+        ),
         "dead": Key(
             "Dead",
             "Numbers of the elements without readings, from 0.",
@@ -305,7 +342,7 @@ ELEMENTS = Part(
         ),
     },
     (SensorLayout,),
-    either=(("grid", "positions", "rings", "spiral"),),
+    either=(("grid", "positions", "rings", "spiral", "spread"),),
 )
 
 READINGS = Part(

@@ -35,7 +35,7 @@ from kappaskin.scenes.schema import (
 )
 from kappaskin.scenes.stimulus import Indenter, Motion, MotionPath, MotionStep, Orbit, Stimulus
 from kappaskin.sensing import DigitalReadings, SensorLayout, Transduction
-from kappaskin.skin import Cap, Disk, Patch, Polygon
+from kappaskin.skin import Cap, Disk, MeshSkin, Patch, Polygon
 
 _MOST_CELLS = 2**20  # of a grid that is looked for
 
@@ -93,6 +93,8 @@ def _patch(patch: Patch) -> dict[str, Any]:
             return {"shape": "cap", "radius": float(patch.equator), **more}
         case Disk():
             return {"shape": "disk", "rim_radius": float(patch.rim_radius)}
+        case MeshSkin():
+            return {"shape": "mesh", "mesh": patch.text}
         case Polygon():
             return {"shape": "polygon", "outline": [list(corner) for corner in patch.vertices]}
         case _:

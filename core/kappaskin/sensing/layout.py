@@ -13,7 +13,7 @@ from kappaskin.bases import Basis, SineBasis, covariant_at, curvature_at, gauss,
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Array, Indices, Mask
 from kappaskin.mechanics import Plate
-from kappaskin.skin import Cap, Disk, Patch
+from kappaskin.skin import Cap, Disk, MeshSkin, Patch
 
 _POINTS = 12  # exact to rounding for waves as short as the gage
 
@@ -284,7 +284,7 @@ class SensorLayout:
                 f"at ({x:g}, {y:g}) m; positions are in metres from the corner x = y = 0, the "
                 f"middle of the skin is at ({patch.a / 2:g}, {patch.b / 2:g})"
             )
-        if isinstance(self.patch, Cap):
+        if isinstance(self.patch, Cap | MeshSkin):
             self._check_on_cap()
         self._check_gages()
         self._check_cells()
@@ -380,6 +380,15 @@ class SensorLayout:
         within = float(np.interp(rim - math.sqrt(area[-1] / N) / 2, far, area))
         places: Array = np.interp((np.arange(N, dtype=float) + 0.5) / N * within, area, far)
         return cls._about_middle(patch, places, np.arange(N) * (3 - math.sqrt(5)) / 2)
+
+    @classmethod
+    def spread(cls, patch: Patch, count: int) -> "SensorLayout":
+        """`count` elements spread evenly over a mesh."""
+        if not isinstance(patch, MeshSkin):
+            raise Refusal(f"expected a mesh to spread elements over, got a {patch.name}")
+        if not 1 <= count <= len(patch.points):
+            raise Refusal(f"expected 1 to {len(patch.points)} elements, one at a node, got {count}")
+        return cls.scattered(patch, patch.places[patch.spread(count)])
 
     @classmethod
     def _about_middle(cls, patch: Patch, far: Array, turns: Array) -> "SensorLayout":
@@ -839,7 +848,7 @@ class NormalCurvature:
         plate: Plate | None = None,
     ) -> None:
         places, patch = layout.positions, basis.patch
-        if isinstance(patch, Cap):
+        if isinstance(patch, Cap | MeshSkin):
             at = list(covariant_at(basis, places)[1:3])
         else:  # by shallow shell theory x and y meet at a right angle
             at = [basis.at(places, 1, 0), basis.at(places, 0, 1)]

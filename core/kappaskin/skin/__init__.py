@@ -1,5 +1,9 @@
 """The skin: its own coordinates, its outline, and surfaces on it."""
 
+from kappaskin.skin.mesh import MeshSkin as MeshSkin
+from kappaskin.skin.mesh_file import UNITS as UNITS
+from kappaskin.skin.mesh_file import read_surface as read_surface
+from kappaskin.skin.mesh_file import repaired as repaired
 from kappaskin.skin.patch import Base as Base
 from kappaskin.skin.patch import Cap as Cap
 from kappaskin.skin.patch import Disk as Disk

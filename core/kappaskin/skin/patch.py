@@ -682,6 +682,10 @@ class Polygon(Patch):
         on = 0 <= row < _CELLS and 0 <= column < _CELLS
         return on and self._raster[row][column] > depth
 
+    def holds(self, x: float, y: float) -> bool:
+        """Whether (x, y) in m lies on the skin."""
+        return self._is_deep(x, y, 0.0) or bool(self.contains(np.array([[x, y]]))[0])
+
     def inward(self, x: float, y: float) -> tuple[float, float]:
         margin = _MARGIN * min(self.a, self.b)
         if self._is_deep(x, y, margin) or self.depth(np.array([[x, y]]))[0] >= margin:

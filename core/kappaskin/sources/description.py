@@ -295,6 +295,10 @@ def of_values(description: Description) -> Description:
     return description_of(f"{sensor.description}{_VALUES}", sensor.name, sensor.serial_number)
 
 
+def _no_file(table: TomlTable, key: str) -> Path:
+    raise table.refusal("expected the mesh itself, as a description is kept without its files", key)
+
+
 @lru_cache(8)
 def description_of(text: str, name: str, serial_number: str = "") -> Description:
     """The description with this `text`, of the file `name`.
@@ -305,7 +309,7 @@ def description_of(text: str, name: str, serial_number: str = "") -> Description
     if (version := TOP.value(top, "format")) != FORMAT:
         raise top.refusal(f"expected format = {FORMAT}, got {version}", "format")
     skin = top.table("skin")
-    plate, edge = read_skin(skin)
+    plate, edge = read_skin(skin, _no_file)
     # Without a given rigidity that of the default skin is no information.
     plate = replace(plate, unknown_material=plate.unknown_material or "rigidity" not in skin)
     elements = top.table("elements")

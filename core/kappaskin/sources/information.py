@@ -14,7 +14,7 @@ from kappaskin.errors import Refusal, SourceError
 from kappaskin.mechanics import Plate
 from kappaskin.scenes import PARTS, check_elements, check_sides
 from kappaskin.sensing import QUANTITIES, DigitalReadings, Sensor, SensorLayout, Transduction
-from kappaskin.skin import Cap, Disk, Patch, Polygon
+from kappaskin.skin import Cap, Disk, MeshSkin, Patch, Polygon
 from kappaskin.sources.description import described_sensor, described_text
 
 _SKIN, _ELEMENTS = PARTS["skin"], PARTS["elements"]
@@ -69,6 +69,7 @@ SENSOR = Part(
             kind=tuple[float, float, float],
             default=None,
         ),
+        "mesh": _SKIN.key("mesh"),
         **{
             name: _SKIN.key(name)
             for name in (
@@ -128,6 +129,7 @@ def sensor_to_json(sensor: Sensor) -> str:
         "base_curvature": both if isinstance(patch.radius, tuple) else patch.arc_curvature,
         "outline": _outline(patch),
         "cap": (patch.equator, patch.angle, patch.stretch) if isinstance(patch, Cap) else None,
+        "mesh": patch.text if isinstance(patch, MeshSkin) else None,
         "grid": layout.shape,
         "positions": None if layout.shape else layout.positions.tolist(),
         "dead_channels": np.flatnonzero(~layout.live.ravel()).tolist(),
@@ -150,10 +152,10 @@ def sensor_to_json(sensor: Sensor) -> str:
 
 
 def _outline(patch: Patch) -> Any:
-    """The corners of a polygon, or "disk"; None for a rectangle and a cap."""
+    """The corners of a polygon, or "disk"; None for a rectangle, a cap and a mesh."""
     if type(patch) is Disk:
         return "disk"
-    return patch.vertices if isinstance(patch, Polygon) else None
+    return patch.vertices if type(patch) is Polygon else None
 
 
 def sensor_from_json(text: str) -> Sensor:
@@ -197,6 +199,8 @@ def _sensor(table: TomlTable) -> Sensor:
 
 def _patch(values: dict[str, Any]) -> Patch:
     size, H, outline = values["size"], values["base_curvature"], values["outline"]
+    if values["mesh"] is not None:
+        return MeshSkin.of_text(values["mesh"])
     if values["cap"] is not None:
         cap = Cap(*values["cap"])
         if H or values["strip"] or outline is not None or not np.allclose(size, (cap.a, cap.b)):

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kappaskin.bases.argyris import cached
+from kappaskin._files import cached
 
 
 @pytest.fixture(autouse=True)
