@@ -20,14 +20,8 @@ ModalProjection = Callable[[Array], Array]
 def modal_projection(
     layout: SensorLayout, basis: Basis, compliance: Compliance, M: Array
 ) -> ModalProjection:
-    """The map from readings K to M'K, where M (3 P, N) are the readings of unit modal forces.
-
-    By one matrix it is in single precision, which is read in half the time.
-    """
-    single = M.astype(np.float32)
-    return element_grid(layout, basis, compliance) or (
-        lambda K: np.dot(K.astype(np.float32), single)
-    )
+    """The map from readings K to M'K, where M (3 P, N) are the readings of unit modal forces."""
+    return element_grid(layout, basis, compliance) or (lambda K: K @ M)
 
 
 def element_grid(

@@ -586,7 +586,7 @@ class _OfMesh:
         return None
 
     def gives(self, x: float, y: float) -> float:
-        f = self._basis.jet(x, y)[:1]
+        f = self._basis.jet(x, y, 0)
         return float(np.vdot(self._compliance.after(f), f))
 
 
