@@ -42,7 +42,7 @@ def test_importing_the_library_loads_no_gui(code):
     [
         ("import kappaskin", {"_lazy"}),
         ("from kappaskin import Refusal", {"_lazy", "errors"}),
-        ("from kappaskin import Patch", {"_lazy", "_text", "errors", "frames", "skin"}),
+        ("from kappaskin import Patch", {"_files", "_lazy", "_text", "errors", "frames", "skin"}),
     ],
 )
 def test_a_name_of_the_library_loads_its_room_and_those_below_alone(code, rooms):

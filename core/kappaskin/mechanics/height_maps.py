@@ -1,7 +1,6 @@
 """Rigid objects from files: height maps, grey pictures and triangle meshes."""
 
 import io
-import os
 import struct
 import warnings
 from collections.abc import Callable, Iterator
@@ -15,11 +14,11 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from kappaskin._files import check_memory, open_file, read_file, why_unread
+from kappaskin._files import open_file, read_file, why_unread
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.mechanics.rigid_objects import check_sizes
-from kappaskin.skin import doubled_area
+from kappaskin.skin import doubled_area, read_surface, repaired
 
 _MOST_PIXELS = 2**24  # pixels
 _LARGEST = 2**26  # bytes of a picture
@@ -173,28 +172,13 @@ def _read_picture(path: Path) -> Array:
 _READERS: dict[str, Callable[[Path], Array]] = {".npy": _read_array, ".png": _read_picture}
 
 
-_FILES = (".stl", ".ply", ".obj")
 _MOST_TRIANGLES = 2_000_000  # triangles
 _PIXELS = 256  # along the longer side of the map
 _AT_ONCE = 2**18  # pixels tried against triangles at a time
-_MEMORY = 20  # times the size of a file of triangles, that it takes in memory
 _TRIED = 2**25  # pixels tried in all: many large triangles above each other take minutes
 _SIZES = (1e-4, 1.0)  # m
 _EDGE_ON = 1e-9  # pixels: a face seen with less area is seen from the side
 _ON_EDGE = 1e-9  # of a face: a pixel as far beside it is on it
-# What trimesh raises on files of other contents, a local variable that was never set among it, and
-# that it lacks the package which guesses an encoding.
-_UNREADABLE = (
-    ImportError,
-    OSError,
-    ValueError,
-    LookupError,
-    TypeError,
-    AttributeError,
-    ArithmeticError,
-    NameError,
-    struct.error,
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,27 +225,12 @@ class Mesh:
     @classmethod
     def read(cls, path: str | Path, unit: float = 1.0) -> "Mesh":
         """The mesh in an STL, PLY or OBJ file whose unit of length is `unit` in m: 1e-3 for mm."""
-        import trimesh  # slow to import, and seldom needed
-
-        if Path(path).suffix.lower() not in _FILES:
-            raise Refusal(f"expected a file named {', '.join(_FILES)}, got {path}")
         if not 0 < unit < np.inf:
             raise Refusal(f"expected a unit above zero in m, got {unit}")
-        try:
-            # From an open file no other is looked for, as an OBJ names them. Not typed throughout.
-            load = cast("Any", trimesh).load_mesh
-            with open_file(Path(path)) as file, np.errstate(all="ignore"):  # NaN is refused below
-                check_memory(_MEMORY * os.fstat(file.fileno()).st_size, f"the mesh {path}")
-                mesh = load(file, file_type=Path(path).suffix.lower()[1:])
-        except Refusal:
-            raise
-        except _UNREADABLE as error:
-            raise Refusal(
-                f"cannot read a mesh from {path}{why_unread(error)}; export the object again"
-            ) from error
-        if not len(mesh.faces):
-            raise Refusal(f"expected triangles in {path}, found none; export the object again")
-        return cls(unit * np.array(mesh.vertices, float), np.array(mesh.faces, np.intp))
+        surface = read_surface(path, "m")
+        if np.isfinite(surface.nodes).all():
+            surface = repaired(surface, "merge")  # as most files have nodes of their own per face
+        return cls(unit * surface.nodes, surface.triangles)
 
     @property
     def extent(self) -> tuple[float, float]:

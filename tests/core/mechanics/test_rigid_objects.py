@@ -391,12 +391,12 @@ TRIANGLE = (
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("thing.step", b"", r"named \.stl, \.ply, \.obj"),
-        ("thing.stl", b"", "found none"),
-        ("thing.stl", b"hello", "found none"),
+        ("thing.step", b"", r"named \.stl, \.obj, \.ply"),
+        ("thing.stl", b"", "begins with `solid`"),
+        ("thing.stl", b"hello", "begins with `solid`"),
         ("thing.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n", "cannot read"),
         ("thing.ply", b"hello", "cannot read"),
-        ("thing.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "cannot read"),
+        ("thing.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "triangles of its 3 nodes"),
         ("thing.obj", b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "found none|4 to"),
         ("thing.ply", TRIANGLE % (b"vertex_indices", b"1e400"), "cannot read"),
         ("thing.ply", TRIANGLE % (b"others", b"3"), "cannot read"),
