@@ -14,7 +14,7 @@ from kappaskin.estimation import FAULTS, Estimator, estimator_for
 from kappaskin.frames import COMPONENTS, Array, Estimate
 from kappaskin.live import Status
 from kappaskin.pipeline import ErrorBars, Quantities, SkinColour, colours_of, skin_colours
-from kappaskin.sensing import SHOWN_UNITS, Sensor
+from kappaskin.sensing import SHOWN_UNITS
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.settings import Settings, locked_at
 from kappaskin_app.widgets.text import round_up

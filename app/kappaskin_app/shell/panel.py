@@ -35,7 +35,7 @@ _LONGEST, _BEGINNING = 800, 500  # characters of a message, and how many from it
 class CornerButton(QToolButton):
     """A button without a frame until it has the mouse or the focus, or is checked.
 
-    Painted: a style sheet takes 0.2 ms to follow a theme, for each panel.
+    It is painted, as a style sheet takes 0.2 ms in each panel to follow a theme.
     """
 
     def sizeHint(self) -> QSize:
