@@ -321,8 +321,9 @@ def export(
 
     The suffix selects the format. A .parquet, .csv, .npz or .h5 has a row for each frame,
     recomputed from the recorded bytes with the recorded settings; the preset selects its columns.
-    A .vtp or .stl is the skin in space at one moment, a .pvd a series of .vtp files. Every file
-    states units, settings, calibration, tare and device.
+    A .vtp or .stl is the skin in space at one moment, a .pvd a series of .vtp files. A .glb (glTF)
+    is the skin at one moment, as it moves with the time between two shapes, or at its deepest.
+    Every file states units, settings, calibration, tare and device.
 
     Example: `kappaskin export press.mcap --to press.csv --from 2 --until 4`
 
@@ -425,6 +426,7 @@ def reconstruct(
     curvature or twist, its `direction` (R,) in rad from x, its `sigma` (R,) or (T, R), and in
     `datum` the quantities of an unknown zero. A `size` (1,) with `positions` (P, 1) is a strip, for
     which only curvature xx is used. An `outline` in m is a polygon (V, 2) or the radius of a disk.
+    Instead of `size`, `mesh` is the text of a mesh, `MeshSkin(...).text`.
     With a `rigidity` in N m, forces are computed too; without it contacts are found by the shape
     alone. A `gage_length` in m is that of gages, `cell` (2,) in m the sides that heights and slopes
     are the mean over. A `thickness` in m, `poisson` and `inplane`

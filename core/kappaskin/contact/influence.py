@@ -120,7 +120,7 @@ class _OfFunctions:
         self.sized = layout.reads is not None and not plate.patch.strip
 
     def at(self, x: float, y: float, s: float) -> None:
-        felt = self._over_disc(x, y, s) if self.sized else self._basis.jet(x, y)[:3]
+        felt = self._over_disc(x, y, s) if self.sized else self._basis.jet(x, y, 1)
         np.dot(felt, self._readings, self._out[: len(felt)])
 
     def _over_disc(self, x: float, y: float, s: float) -> Array:
@@ -139,7 +139,7 @@ class _OfFunctions:
         return None
 
     def gives(self, x: float, y: float) -> float:
-        f = self._basis.jet(x, y)[:1]
+        f = self._basis.jet(x, y, 0)
         return float(np.vdot(self._compliance.after(f), f))
 
 
@@ -266,6 +266,7 @@ class _DiscOnGages:
 
 
 _NEAREST = 1e-6  # of a standard deviation: nearer, a Gaussian load bends the plate no more
+_FAR = 40.0  # exp1 of it is less than the rounding of what it is added to
 
 
 def _gaussian(d: Array, sd: float) -> tuple[Array, Array]:
@@ -273,7 +274,8 @@ def _gaussian(d: Array, sd: float) -> tuple[Array, Array]:
     t = np.maximum(d[0] ** 2 + d[1] ** 2, (_NEAREST * sd) ** 2)
     u = t / (2 * sd**2)
     mean: Array = -np.expm1(-u) / u
-    integral = cast("Array", scipy.special.exp1(u))
+    integral, near = np.zeros_like(u), u < _FAR
+    integral[near] = scipy.special.exp1(u[near])
     return np.log(t) + 0.5 + integral + mean, 2 * (1 - mean) / t
 
 
@@ -550,7 +552,7 @@ class _OfMesh:
         found = mesh.spread(min(_SPREAD, len(mesh.points) // 2))
         side = min(mesh.a, mesh.b)
         places = np.array(
-            [(*mesh.points[k, :2], (share * side) ** 2) for k in found for share in _RADII]
+            [(*mesh.places[k], (share * side) ** 2) for k in found for share in _RADII]
         )
         read = np.empty((len(places), self._out.shape[1]), np.float32)
         for row, place in zip(read, places.tolist(), strict=True):
@@ -584,7 +586,7 @@ class _OfMesh:
         return None
 
     def gives(self, x: float, y: float) -> float:
-        f = self._basis.jet(x, y)[:1]
+        f = self._basis.jet(x, y, 0)
         return float(np.vdot(self._compliance.after(f), f))
 
 
@@ -860,7 +862,7 @@ def _decay(plate: Plate) -> float:
     Hx, Hy = patch.curvatures if patch.is_shallow or isinstance(patch, Cap) else (0.0, 0.0)
     square = (3 * Hx**2 + 3 * Hy**2 + 2 * Hx * Hy) / 8
     if isinstance(patch, MeshSkin):
-        xx, yy, xy = patch.read_at_rest(patch.points[:, :2])
+        xx, yy, xy = patch.read_at_rest(patch.places)
         square = (3 * xx**2 + 3 * yy**2 + 2 * xx * yy + 4 * xy**2) / 8
         square = float(np.percentile(square, _BENT_MORE))
     stretch = (1 - plate.poisson**2) * plate.membrane_stiffness * square

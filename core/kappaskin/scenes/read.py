@@ -61,7 +61,17 @@ from kappaskin.sensing import (
     SensorLayout,
     Transduction,
 )
-from kappaskin.skin import UNITS, Cap, Disk, MeshSkin, Patch, Polygon, held_edges, read_surface
+from kappaskin.skin import (
+    UNITS,
+    Cap,
+    Disk,
+    MeshSkin,
+    Patch,
+    Polygon,
+    faults,
+    held_edges,
+    read_surface,
+)
 
 TABLE_1_NOISE = 0.40 / math.sqrt(3)
 """RMS of the noise of Table 1 in 1/m: uniform between -0.40 and 0.40."""
@@ -154,7 +164,7 @@ def scene_of(top: TomlTable, file: Path, trust: Trust = False) -> Scene:
 
     `trust` as of `named_file`.
     """
-    name, find = file.stem.removesuffix(".scene"), partial(_named_file, file.parent, trust)
+    name, find = file.stem.removesuffix(".scene"), partial(find_file, file.parent, trust)
     if (version := SCENE.value(top, "format")) != FORMAT:
         raise top.refusal(
             f"expected a scene of format {FORMAT}, got {version}; update kappaskin"
@@ -229,15 +239,29 @@ def read_skin(table: TomlTable, find: _Find) -> tuple[Plate, str]:
 
 
 def _mesh(table: TomlTable, find: _Find) -> MeshSkin:
-    if (text := SKIN.value(table, "mesh")) is not None:
-        return MeshSkin.of_text(text)
-    unit, thickness = SKIN.value(table, "unit"), SKIN.value(table, "thickness")
+    unit, thickness, held, text = (
+        SKIN.value(table, key, default=None) for key in ("unit", "thickness", "held", "mesh")
+    )
+    if text is not None:
+        if "file" in table:
+            raise table.refusal("expected a file or the mesh itself, got both", "file")
+        with table.blamed("mesh"):
+            return MeshSkin.of_text(text)
     if thickness is None:
-        raise table.refusal("expected the thickness of the mesh in m, got none", "shape")
-    surface, held = read_surface(find(table, "file"), unit), SKIN.value(table, "held")
-    if held is not None:
-        held = np.unique(held_edges(surface, UNITS[unit] * np.array(held)))
-    return MeshSkin(surface.nodes, surface.triangles, thickness, held)
+        raise table.refusal("expected a thickness in m, got none; give that of the skin")
+    file = find(table, "file")
+    with table.blamed("file"):
+        surface = read_surface(file, unit or "")
+        if found := faults(surface):
+            raise Refusal(f"{file}: {found[0].message}")
+    with table.blamed("held"):
+        edges = None if held is None else held_edges(surface, UNITS[unit] * np.array(held))
+        order = np.lexsort(surface.nodes.T)  # the text of the mesh is half as long
+        number = np.argsort(order)
+        triangles = number[surface.triangles]
+        triangles = triangles[triangles.min(axis=1).argsort()]
+        held_nodes = None if edges is None else number[edges]
+        return MeshSkin(surface.nodes[order], triangles, thickness, held_nodes)
 
 
 def _patch(table: TomlTable, shape: str) -> Patch:
@@ -446,8 +470,8 @@ def _object(table: TomlTable, kind: type[RigidObject], find: _Find) -> RigidObje
         return table.make(kind)
 
 
-def _named_file(folder: Path, trust: Trust, table: TomlTable, key: str) -> Path:
-    """The file that the table names at `key`."""
+def find_file(folder: Path, trust: Trust, table: TomlTable, key: str) -> Path:
+    """The file that the table names at `key`; `trust` as of `named_file`."""
     name = TOUCH.value(table, key)
     with table.blamed(key):
         file = named_file(name, folder, trust)

@@ -246,25 +246,31 @@ SKIN = Part(
     },
     (Plate, Scene, Patch),
     {
-        "rectangle": PartKind("Rectangle", Patch, {"size": [0.1, 0.1]}, ("radius",)),
-        "strip": PartKind("Strip", Patch, {"size": [0.1, 0.02]}, ("radius",)),
-        "disk": PartKind("Disk", Disk, {"rim_radius": 0.05}),
+        "rectangle": PartKind("Rectangle", Patch, {"size": [0.1, 0.1]}, ("radius", "thickness")),
+        "strip": PartKind("Strip", Patch, {"size": [0.1, 0.02]}, ("radius", "thickness")),
+        "disk": PartKind("Disk", Disk, {"rim_radius": 0.05}, ("thickness",)),
         "cap": PartKind(
             "Cap",
             Cap,
             {"radius": 0.008},
-            ("angle", "stretch"),
+            ("angle", "stretch", "thickness"),
             {"radius": Key("Radius", "Radius of the cap, of its equator.", _MM, 0.0, kind=float)},
         ),
-        "mesh": PartKind("Mesh", MeshSkin, {"file": "skin.stl", "unit": "mm"}, ("held", "mesh")),
+        "mesh": PartKind(
+            "Mesh",
+            MeshSkin,
+            {"file": "skin.stl", "unit": "mm", "thickness": 1e-3},
+            ("held", "mesh"),
+        ),
         "polygon": PartKind(
             "Polygon",
             Polygon,
             {"outline": [[0.0, 0.0], [0.1, 0.0], [0.1, 0.06], [0.05, 0.1], [0.0, 0.06]]},
+            ("thickness",),
         ),
     },
     "shape",
-    (("file", "mesh"),),
+    (("file", "mesh"), ("unit", "mesh"), ("held", "mesh")),
 )
 
 ELEMENTS = Part(

@@ -388,7 +388,7 @@ class SensorLayout:
             raise Refusal(f"expected a mesh to spread elements over, got a {patch.name}")
         if not 1 <= count <= len(patch.points):
             raise Refusal(f"expected 1 to {len(patch.points)} elements, one at a node, got {count}")
-        return cls.scattered(patch, patch.points[patch.spread(count), :2])
+        return cls.scattered(patch, patch.places[patch.spread(count)])
 
     @classmethod
     def _about_middle(cls, patch: Patch, far: Array, turns: Array) -> "SensorLayout":

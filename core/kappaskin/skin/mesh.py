@@ -4,6 +4,7 @@ import base64
 import hashlib
 import io
 import math
+import zipfile
 from dataclasses import dataclass, field, fields
 from functools import cached_property, lru_cache
 from typing import Any, cast
@@ -14,15 +15,20 @@ from numpy.typing import ArrayLike
 from kappaskin._files import ARCHIVE_DAMAGES
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Indices, Mask
-from kappaskin.skin.mesh_file import Surface
-from kappaskin.skin.patch import Base, Number, Polygon
+from kappaskin.skin.mesh_file import Surface, faults
+from kappaskin.skin.patch import SIDES, Base, Number, Polygon, doubled_area
 
 _MOST_STEPS = 64  # of the splines, along the longer side
 _PER_STEP = 1.4  # nodes at least along a step
 _SMOOTHED = 0.08  # of a step: shorter waves of what is fitted are smoothed
 _AT_RIM = 10.0  # times the weight of a node that lies on the rim
+_MOST_TRIANGLES = 2**15  # which take some minutes
+_MOST_BYTES = 2**23  # of the arrays in a text, many times what so many triangles need
+# Faults that a skin may have: numbers become less exact, or nothing is wrong but the unit.
+_LESSER = ("size", "too many", "too few", "sliver")
 _STEEPEST = 80.0  # degrees between a triangle and the plane that it is projected on
 _ALONG = 0.9  # of a normal: with so much of x it has no x in its plane, and y is used
+_ROUNDS = 40  # of flattening
 _LINE = 0.1  # of its length: a held edge that is no wider has no plane
 
 # The cubic spline between the second and third of four even nodes, by powers of the place, and
@@ -139,8 +145,11 @@ class MeshSkin(Polygon):
     `thickness` in m.
 
     Positions are the projection on the plane of the held edge, with x along the nodes' x, as far as
-    it lies in that. In space x and y are these, and z points outward; the highest point has z = 0.
-    Two nodes p (3,) as given and q in these coordinates are alike where p = `origin` + q `frame`.
+    it lies in that. Where the skin leans by more than 80 degrees from that plane, they are those of
+    the skin flattened, with lengths along it as nearly kept as can be (`is_flattened`). In space z
+    points outward from that plane, the highest point has z = 0, and x and y are the positions, or
+    on the whole as near to them as can be. Two points p (3,) in the coordinates of the nodes and q
+    in these are alike where p = `origin` + q `frame`.
     """
 
     content: str
@@ -148,6 +157,8 @@ class MeshSkin(Polygon):
     nodes: Array = field(compare=False, repr=False)
     points: Array = field(compare=False, repr=False)
     """The nodes (n, 3) in m, in the coordinates of the skin in space."""
+    places: Array = field(compare=False, repr=False)
+    """The positions (n, 2) in m of the nodes."""
     triangles: Indices = field(compare=False, repr=False)
     rim: Indices = field(compare=False, repr=False)
     """The nodes (V,) of the rim in order, counter-clockwise seen from outside."""
@@ -166,23 +177,28 @@ class MeshSkin(Polygon):
         given = np.array(nodes, np.float32).astype(float)
         faces = np.array(triangles, np.intp)
         _check_mesh(given, faces, thickness)
-        rim = _rim(Surface(given, faces))
+        (rim,) = Surface(given, faces).loops
         fixed = np.intersect1d(rim if held is None else np.array(held, np.intp), rim)
         if len(fixed) < 2:
             raise Refusal(f"expected at least two nodes of the rim that are held, got {len(fixed)}")
         frame = _frame(given, faces, given[fixed], given[rim])
-        turned = given @ frame.T
-        corner = np.array([*turned[rim, :2].min(axis=0), turned[:, 2].max()])
-        points = turned - corner
-        _check_projection(points, faces)
+        points = given @ frame.T
+        places = points[:, :2]
+        if _leans(points, faces):
+            places = _flattened(points, faces, rim)
+        low = places[rim].min(axis=0)
+        beside = np.mean(points[:, :2] - places, axis=0)
+        corner = np.array([*(low + beside), points[:, 2].max()])
+        points, places = points - corner, places - low
         content = hashlib.sha256()
         for part in (given, faces, fixed, np.array(float(thickness))):
             content.update(np.ascontiguousarray(part).tobytes())
-        a, b = np.ptp(points[rim, :2], axis=0).tolist()
+        a, b = np.ptp(places[rim], axis=0).tolist()
         of_mesh: dict[str, Any] = {"a": a, "b": b, "radius": math.inf, "strip": False}
         of_mesh |= {
             "nodes": given,
             "points": points,
+            "places": places,
             "triangles": faces,
             "rim": rim,
             "held": fixed,
@@ -190,7 +206,7 @@ class MeshSkin(Polygon):
         }
         of_mesh |= {"origin": corner @ frame, "thickness": thickness}
         of_mesh |= {"content": content.hexdigest()}
-        of_mesh |= {"vertices": tuple((x, y) for x, y in points[rim, :2].tolist())}
+        of_mesh |= {"vertices": tuple((x, y) for x, y in places[rim].tolist())}
         for name, value in of_mesh.items():
             object.__setattr__(self, name, value)
 
@@ -207,8 +223,13 @@ class MeshSkin(Polygon):
     def of_text(cls, text: str) -> "MeshSkin":
         """The mesh of a `text`; raises a `Refusal` for another text."""
         try:
-            with np.load(io.BytesIO(base64.b85decode(text))) as file:
-                nodes, held = file["nodes"], file["held"]
+            content = base64.b85decode(text)
+            with zipfile.ZipFile(io.BytesIO(content)) as archive:
+                if sum(member.file_size for member in archive.infolist()) > _MOST_BYTES:
+                    raise ValueError
+            with np.load(io.BytesIO(content)) as file:
+                nodes = file["nodes"].astype(np.float32, casting="same_kind")
+                held = file["held"].astype(np.intp, casting="same_kind")
                 triangles = np.cumsum(file["steps"], dtype=np.intp).reshape(-1, 3)
                 thickness = float(file["thickness"])
         except (*ARCHIVE_DAMAGES, LookupError, TypeError) as error:
@@ -228,6 +249,11 @@ class MeshSkin(Polygon):
     @property
     def is_shallow(self) -> bool:
         return False
+
+    @property
+    def is_flattened(self) -> bool:
+        """Whether positions are those of the skin flattened, and no projection."""
+        return not np.array_equal(self.places, self.points[:, :2])
 
     @property
     def arc_curvature(self) -> float:
@@ -265,7 +291,7 @@ class MeshSkin(Polygon):
         spacing = math.sqrt(self.outline.area / len(self.points))
         step = max(max(self.a, self.b) / _MOST_STEPS, _PER_STEP * spacing)
         steps = math.ceil(self.a / step), math.ceil(self.b / step)
-        return Splines(self.points[:, :2], weights, (self.a, self.b), steps)
+        return Splines(self.places, weights, (self.a, self.b), steps)
 
     @cached_property
     def _surface(self) -> Array:
@@ -280,7 +306,7 @@ class MeshSkin(Polygon):
     @cached_property
     def _radii(self) -> tuple[float, float]:
         middle = (self.a / 2, self.b / 2)
-        away = np.linalg.norm(self.points[:, :2] - middle, axis=1)
+        away = np.linalg.norm(self.places - middle, axis=1)
         xx, yy, _ = self.base(*self.points[int(away.argmin()), :2].tolist()).curvature
         return 1 / xx if xx else math.inf, 1 / yy if yy else math.inf
 
@@ -336,10 +362,6 @@ class MeshSkin(Polygon):
             ways = np.einsum("pi,pia->pa", onward, np.linalg.inv(there))
             ways = ways / np.linalg.norm(ways, axis=1)[:, None]
         return places, ways
-
-    def places(self, points: Array) -> Array:
-        """Positions (..., 2) in m of `points` (..., 3) in space, on the skin or just off it."""
-        return points[..., :2]
 
     def near_rim(self, x: float, y: float, within: float) -> list[tuple[float, float, float]]:
         return [at for at in super().near_rim(x, y, within) if self._is_held(*at[:2])]
@@ -398,23 +420,23 @@ def _sums(places: Indices, values: Array, count: int) -> Array:
 def _check_mesh(nodes: Array, triangles: Indices, thickness: float) -> None:
     if nodes.ndim != 2 or nodes.shape[1] != 3 or not np.isfinite(nodes).all():
         raise Refusal(f"expected finite nodes of shape (n, 3) in m, got shape {nodes.shape}")
+    if not (SIDES[0] <= np.ptp(nodes, axis=0).max() <= SIDES[1]):
+        raise Refusal(f"expected nodes of a skin in m, got {np.ptp(nodes, axis=0)} m of them")
     of_three = triangles.ndim == 2 and triangles.shape[1] == 3 and len(triangles)
     if not (of_three and 0 <= triangles.min() <= triangles.max() < len(nodes)):
         raise Refusal(
             f"expected triangles of shape (F, 3), numbers of the {len(nodes)} nodes from 0, got "
             f"shape {triangles.shape}"
         )
+    if len(triangles) > _MOST_TRIANGLES:
+        raise Refusal(
+            f"expected at most {_MOST_TRIANGLES:,} triangles, got {len(triangles):,}; decimate them"
+        )
     if not 0 < thickness < math.inf:
         raise Refusal(f"expected a thickness above zero in m of the mesh, got {thickness}")
-
-
-def _rim(surface: Surface) -> Indices:
-    if len(surface.loops) != 1:
-        raise Refusal(
-            f"expected a mesh with one rim, got {len(surface.loops)}; close its holes, and keep "
-            "one piece"
-        )
-    return surface.loops[0]
+    for fault in faults(Surface(nodes, triangles)):
+        if fault.kind not in _LESSER:
+            raise Refusal(fault.message)
 
 
 def _frame(nodes: Array, triangles: Indices, held: Array, rim: Array) -> Array:
@@ -432,14 +454,68 @@ def _frame(nodes: Array, triangles: Indices, held: Array, rim: Array) -> Array:
     return np.stack([x, np.cross(z, x), z], dtype=float)
 
 
-def _check_projection(points: Array, triangles: Indices) -> None:
+def _leans(points: Array, triangles: Indices) -> bool:
+    """Whether a triangle leans by more than `_STEEPEST` from the plane of x and y."""
     corners = points[triangles]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     level = area[:, 2] / np.linalg.norm(area, axis=1)
-    steep = level < math.cos(math.radians(_STEEPEST))
-    if steep.any():
+    return bool((level < math.cos(math.radians(_STEEPEST))).any())
+
+
+def _flattened(points: Array, triangles: Indices, rim: Indices) -> Array:
+    """Positions (n, 2) in m in a plane, of lengths as near to those in space as can be.
+
+    From a map with the rim on a circle (Tutte), triangles are turned and joined again, as rigid as
+    possible (Liu et al., 10.1111/j.1467-8659.2008.01290.x).
+    """
+    from scipy.sparse import csc_array
+    from scipy.sparse.linalg import splu
+
+    n, corners = len(points), points[triangles]
+    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    long: Array = np.linalg.norm(u, axis=1)
+    along = np.vecdot(u, v) / long
+    flat = np.zeros((len(triangles), 3, 2))
+    flat[:, 1, 0], flat[:, 2, 0] = long, along
+    flat[:, 2, 1] = np.sqrt(np.maximum(np.vecdot(v, v) - along**2, 0))
+    # The side opposite to each corner, and half the cotangent of the angle there.
+    sides = np.roll(flat, -2, axis=1) - np.roll(flat, -1, axis=1)
+    one, other = np.roll(sides, -1, axis=1), np.roll(sides, -2, axis=1)
+    half = -np.vecdot(one, other) / (2 * (long * flat[:, 2, 1])[:, None])
+    begin, end = np.roll(triangles, -1, axis=1), np.roll(triangles, -2, axis=1)
+
+    def laplacian(weights: Array) -> Any:
+        pairs = np.stack([begin, end, begin, end]), np.stack([end, begin, begin, end])
+        values = np.stack([-weights, -weights, weights, weights])
+        places = tuple(each.ravel() for each in pairs)
+        return cast("Any", csc_array)((values.ravel(), places), shape=(n, n))
+
+    found, inner = np.zeros((n, 2)), np.setdiff1d(np.arange(n), rim)
+    steps = np.linalg.norm(points[rim] - np.roll(points[rim], -1, axis=0), axis=1)
+    turn = 2 * np.pi * np.concatenate([[0.0], np.cumsum(steps)[:-1]]) / steps.sum()
+    found[rim] = steps.sum() / (2 * np.pi) * np.column_stack([np.cos(turn), np.sin(turn)])
+    even = laplacian(np.ones_like(half))
+    found[inner] = splu(csc_array(even[inner][:, inner])).solve(-(even[inner][:, rim] @ found[rim]))
+    rigid = laplacian(half)
+    factors = splu(csc_array(rigid[1:][:, 1:]))
+    for _ in range(_ROUNDS):
+        now = found[triangles]
+        moved = np.roll(now, -2, axis=1) - np.roll(now, -1, axis=1)
+        U, _, Vt = np.linalg.svd(np.einsum("fk,fki,fkj->fij", half, moved, sides))
+        U[:, :, 1] *= np.linalg.det(U @ Vt)[:, None]
+        pull = half[:, :, None] * np.einsum("fij,fkj->fki", U @ Vt, sides)
+        force = np.zeros((n, 2))
+        np.add.at(force, end, pull)
+        np.add.at(force, begin, -pull)
+        found[1:] = factors.solve(force[1:])
+        found[0] = 0.0
+    area = doubled_area(*np.moveaxis(found[triangles], 1, 0))
+    if (area <= 0).any():
         raise Refusal(
-            f"expected triangles that lean by at most {_STEEPEST:g} degrees from the plane of the "
-            f"held edge, got {steep.sum()} that lean by more, up to "
-            f"{math.degrees(math.acos(max(level.min(), -1.0))):.0f}"
+            f"expected a skin that can be flattened without folds, got {(area <= 0).sum()} "
+            "triangles that fold; take away deep creases, or a part of the skin"
         )
+    # Turned so that it lies as the skin does, seen from outside.
+    across = (found - found.mean(axis=0)).T @ (points[:, :2] - points[:, :2].mean(axis=0))
+    one, _, other = np.linalg.svd(across)
+    return found @ (one * [1.0, np.linalg.det(one @ other)]) @ other

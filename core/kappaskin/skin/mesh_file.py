@@ -533,7 +533,7 @@ def repaired(
     duplicates, and triangles without area by collapsing their shortest side; `orient` makes the
     triangles of each part face as most of it, and the whole `outward` (3,) if that is given; `keep
     largest part` is by area; `decimate` collapses edges, those first that are short and on flat
-    places, to `most` triangles, and keeps the shape of the rim.
+    places, to `most` triangles or the few more that cannot go, and keeps the shape of the rim.
     """
     match repair:
         case "merge":
@@ -585,6 +585,7 @@ def _decimate(surface: Surface, most: int) -> Surface:
 
 
 _EVEN = 1e-3  # of an edge's length to the 4th: above an error of shape that is smaller, even edges
+_AT_RIM = 100.0  # times the error of a surface, that of the rim
 _TURN = 0.2  # least cosine of the angle by which a triangle may turn
 _SQUEEZED = np.radians(12)  # an angle that may not become smaller
 _CHEAPER = 0.15  # of the edges, that may be collapsed before all costs are found anew
@@ -606,7 +607,7 @@ def _errors(surface: Surface) -> Array:
     normal = _unit(np.concatenate([surface.normals, across]))
     point = np.concatenate([surface.centres, surface.nodes[surface.rim[:, 0]]])
     plane = np.column_stack([normal, -np.sum(normal * point, axis=1)])
-    weighted = plane * np.append(area, length**2)[:, None]
+    weighted = plane * np.append(area, _AT_RIM * length**2)[:, None]
     own = (weighted[:, :, None] * plane[:, None, :]).reshape(-1, 16)
     # Of a plane, its nodes; with a rim's side twice, so that all have three.
     nodes = np.concatenate([surface.triangles, surface.rim[:, [0, 1, 1]]])
@@ -628,11 +629,8 @@ def _collapsed(surface: Surface, errors: Array, of: Mask, most: int) -> tuple[Su
     (i, j), n = surface.edges.T, len(surface.nodes)
     nodes, into = surface.nodes.copy(), np.arange(n)
     rim = np.isin(into, surface.rim)
-    # To the middle, or an end: from inside to the rim, never the other way.
     places = np.stack([(nodes[i] + nodes[j]) / 2, nodes[i], nodes[j]])
     error = _error(errors[i] + errors[j], places)
-    error[:2, rim[j] & ~rim[i]] = np.inf
-    error[::2, rim[i] & ~rim[j]] = np.inf
     place = places[error.argmin(axis=0), np.arange(len(i))]
     cost = error.min(axis=0) + _EVEN * np.linalg.norm(nodes[i] - nodes[j], axis=1) ** 4
     of = of & (surface.counts < 3) & ~(rim[i] & rim[j] & (surface.counts == 2))
@@ -845,8 +843,8 @@ def held_edges(surface: Surface, held: ArrayLike) -> Indices:
     """The sides (H, 2) of the rim that are held, as pairs of nodes with the skin on their left.
 
     `held` is "all", or arcs (A, 2, 3) of the rim, each from the node nearest to one point in m to
-    that nearest to another, with the skin on the left as seen from outside. Raises a `Refusal`
-    where nothing is held, and for points away from the rim or on two loops of it.
+    that nearest to another, counter-clockwise as seen from outside. Raises a `Refusal` where
+    nothing is held, and for points away from the rim or on two loops of it.
     """
     if isinstance(held, str) and held == "all":
         return surface.rim

@@ -7,7 +7,7 @@ import re
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import chain
 from pathlib import Path
 from typing import Any, cast
@@ -20,7 +20,7 @@ from kappaskin._toml import TomlTable, parsed
 from kappaskin._toml import table as toml_table
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Indices
-from kappaskin.scenes import read_elements, read_skin
+from kappaskin.scenes import find_file, read_elements, read_skin
 from kappaskin.sensing import (
     QUANTITIES,
     DigitalReadings,
@@ -29,6 +29,7 @@ from kappaskin.sensing import (
     kind_of_reading,
     name_of_reading,
 )
+from kappaskin.skin import MeshSkin
 from kappaskin.sources.decoder import Decoder
 from kappaskin.sources.lines import (
     CHECKSUMS,
@@ -248,13 +249,12 @@ def load_description(file: Path, serial_number: str = "") -> Description:
         text = read_file(file, _LARGEST).decode("utf-8-sig")
     except (OSError, ValueError) as error:
         raise Refusal(f"{file}: cannot be read as a sensor's description ({error})") from error
-    return description_of(
-        _with_calibration(text.replace("\r\n", "\n"), file), str(file), serial_number
-    )
+    text = _with_mesh(_with_calibration(text.replace("\r\n", "\n"), file), file)
+    return description_of(text, str(file), serial_number)
 
 
 # Recordings keep the text of a description, and need no other file: so the gains and offsets of the
-# calibration that it names are put behind it.
+# calibration that it names are put behind it, and the mesh of the skin.
 _CALIBRATION = "\n[calibration]  # as it was in its file\n"
 
 
@@ -281,6 +281,30 @@ def _with_calibration(text: str, file: Path) -> str:
     return f"{text}{toml_table(_CALIBRATION.rstrip(), values)}"
 
 
+_WITH_FILES = ("skin",)
+_MESH = "\n[kept.skin]  # what the file of the mesh has"
+
+
+def _with_mesh(text: str, file: Path) -> str:
+    skin = TomlTable(parsed(text, file), text, str(file)).table("skin")
+    if "file" not in skin:
+        return text
+    patch = read_skin(skin, partial(find_file, file.parent, False))[0].patch
+    return f"{text}{toml_table(_MESH, {'mesh': cast('MeshSkin', patch).text})}"
+
+
+def _with_kept(values: dict[str, Any], top: TomlTable) -> None:
+    """Put what [kept] has of files in the place of their names in `values`, the table `top`."""
+    kept = top.table("kept")
+    for part in _WITH_FILES:
+        for table in (top, kept):
+            table.table(part)  # or refused here
+        if part in kept:
+            own = {key: value for key, value in values.get(part, {}).items() if key != "file"}
+            values[part] = own | values["kept"][part]
+    kept.done()
+
+
 _VALUES = "\n[values]  # a record: sequence number, time in s, and the numbers of the columns\n"
 _VALUES_SYNC, _VALUES_CHECKSUM = "b55e", "crc32"
 
@@ -296,7 +320,7 @@ def of_values(description: Description) -> Description:
 
 
 def _no_file(table: TomlTable, key: str) -> Path:
-    raise table.refusal("expected the mesh itself, as a description is kept without its files", key)
+    raise table.refusal("expected a description with its mesh; load it from its file", key)
 
 
 @lru_cache(8)
@@ -305,9 +329,11 @@ def description_of(text: str, name: str, serial_number: str = "") -> Description
 
     `serial_number` is that of the sensor where the text has no `id`.
     """
-    top = TomlTable(parsed(text, Path(name)), text, name)
+    values = parsed(text, Path(name))
+    top = TomlTable(values, text, name)
     if (version := TOP.value(top, "format")) != FORMAT:
         raise top.refusal(f"expected format = {FORMAT}, got {version}", "format")
+    _with_kept(values, top)
     skin = top.table("skin")
     plate, edge = read_skin(skin, _no_file)
     # Without a given rigidity that of the default skin is no information.
