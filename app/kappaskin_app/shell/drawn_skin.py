@@ -55,7 +55,10 @@ class DrawnSkin:
         if not self.on.all():
             grid, self._shown = snapped_to_rim(patch, grid, self.on)
         positions = grid.reshape(-1, 2)
-        self._moves = self._shown is not None and _is_free(patch, positions)
+        self._inside = np.flatnonzero(self.on)
+        off = np.setdiff1d(np.arange(self.on.size), self._inside)
+        self._free = off[_is_free(patch, positions[off])]
+        self._free_points = _extrapolated(positions[self._inside], positions[self._free])
         self._rest, self._out = self.at_rest(positions)
         self._areas, self._leans = self._normal_terms(positions)
         self.shares: Array = positions / (patch.a, patch.b)
@@ -70,10 +73,13 @@ class DrawnSkin:
     def height_of(self, surface: Array, times: float = 1.0) -> Array:
         """How far out in mm points are drawn for a displacement inward (ny, nx) in m.
 
-        At a rim that is not held, as far as beside it.
+        A rim that is not held is drawn as the skin beside it runs on.
         """
         height = -MM * times * surface
-        return np.where(self._moves, self.values(height), height.ravel()).reshape(self.on.shape)
+        near, weights = self._free_points
+        found = np.sum(weights * height.ravel()[self._inside[near]], axis=1)
+        height.ravel()[self._free] = found
+        return height
 
     @cached_property
     def rim(self) -> Array:
@@ -85,6 +91,18 @@ class DrawnSkin:
             turn = np.linspace(0, 2 * np.pi, _AROUND)
             return patch.rim_radius * (1 + np.stack([np.cos(turn), np.sin(turn)], axis=-1))
         return np.empty((0, 2))
+
+    def rim_height(self) -> Array:
+        """How far out (k,) in mm the `rim` is drawn: as the skin beside it, unless it is held."""
+        near, weights = self._rim_points
+        return np.sum(weights * self.height.ravel()[self._inside[near]], axis=1)
+
+    @cached_property
+    def _rim_points(self) -> tuple[Indices, Array]:
+        positions = self.patch.grid(*self.on.shape[::-1])
+        inside = np.stack(np.meshgrid(*positions), axis=-1).reshape(-1, 2)[self._inside]
+        near, weights = _extrapolated(inside, self.rim)
+        return near, weights * _is_free(self.patch, self.rim)[:, None]
 
     def at_rest(self, positions: Array) -> tuple[Array, Array]:
         """Points of the skin at rest at `positions`, and its outward normals there."""
@@ -260,10 +278,26 @@ class DrawnSkin:
         return np.einsum("kv,kvi->ki", weights, corners), np.vecdot(ac, q)[met] / area[met]
 
 
-def _is_free(patch: Patch, positions: Array) -> Mask | bool:
+_BESIDE = 8  # points that a plane through the skin beside its rim is fitted to
+
+
+def _extrapolated(inside: Array, positions: Array) -> tuple[Indices, Array]:
+    """Which of the points `inside` (k, 2), and their weights, that a plane has at `positions`.
+
+    Both (P, 8): those nearest to each position, and the plane of least squares through them.
+    """
+    count = min(_BESIDE, len(inside))
+    if not len(positions):
+        return np.empty((0, count), np.intp), np.empty((0, count))
+    far, near = scipy.spatial.KDTree(inside).query(positions, count)
+    away = (inside[near] - positions[:, None]) / np.max(far)
+    return np.asarray(near), np.linalg.pinv(np.insert(away, 0, 1.0, axis=2))[:, 0]
+
+
+def _is_free(patch: Patch, positions: Array) -> Mask:
     """Whether the rim next to each of `positions` (k, 2) is not held."""
     if not isinstance(patch, MeshSkin) or len(patch.held) == len(patch.rim):
-        return False
+        return np.zeros(len(positions), bool)
     near = scipy.spatial.KDTree(patch.points[patch.rim, :2]).query(positions)[1]
     return ~np.isin(patch.rim[near], patch.held)
 

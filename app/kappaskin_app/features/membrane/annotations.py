@@ -107,7 +107,7 @@ class Sides:
         self._held: Any = pv.PolyData(np.zeros((2, 3)), lines=[2, 0, 1])
         self.held = plotter.add_mesh(self._held, line_width=pixels(plotter, _HELD), **UNLIT)
         self.actor.visibility = self.held.visibility = False
-        self._rim, self._nearest = (np.empty((0, 3)), np.empty((0, 3))), np.empty(0, np.intp)
+        self._rim = np.empty((0, 3)), np.empty((0, 3))
         self.unit = 0.0
         self.labels: list[Any] = [pv.Label() for _ in range(3)]
         for label in self.labels:
@@ -125,7 +125,7 @@ class Sides:
             ends, texts = np.array([(0.0, 0.0), (a, 0.0), (0.0, b)]), ("0", x, y)
             shares = np.array([(-0.04, -0.04, 0), (0, -0.06, 0), (0, 0.05, 0)])
             line = ends[[1, 0, 2]]
-        self._rim, self._nearest = skin.at_rest(line), skin.nearest(line)
+        self._rim = skin.at_rest(line)
         self._lines.points = self._rim[0] + _OUT * skin.size * self._rim[1]
         self._lines.lines = np.r_[len(line), : len(line)]
         self.actor.visibility = not skin.on.all()
@@ -147,7 +147,7 @@ class Sides:
         """Follow the rim of a mesh that is held in part."""
         if self.held.visibility:
             points, out = self._rim
-            height = skin.height.ravel()[self._nearest] + _OUT * skin.size
+            height = skin.rim_height() + _OUT * skin.size
             for line in (self._lines, self._held):
                 line.points[:] = points + out * height[:, None]
 
