@@ -258,10 +258,11 @@ class MeshSkin(Polygon):
         third = np.linalg.norm(np.cross(u, v), axis=1) / 6
         return _sums(self.triangles.ravel(), np.repeat(third, 3), len(self.points))
 
-    def spread(self, count: int) -> Indices:
-        """So many nodes, spread evenly: each the farthest from those before.
+    def spread(self, count: int, apart: float = 0.0) -> Indices:
+        """So many nodes at most, spread evenly: each the farthest from those before.
 
-        From the rim they are half as far as from one another.
+        From the rim they are half as far as from one another; at least `apart` in m through the
+        air.
         """
         from scipy.spatial import KDTree
 
@@ -269,6 +270,8 @@ class MeshSkin(Polygon):
         found = np.empty(count, np.intp)
         for k in range(count):
             found[k] = away.argmax()
+            if away[found[k]] < apart:
+                return found[:k]
             far = np.linalg.norm(self.points - self.points[found[k]], axis=1)
             away = np.minimum(away, far)
         return found
