@@ -1,6 +1,7 @@
 """Contacts on meshes: against shells that share nothing with the library."""
 
 from dataclasses import dataclass, replace
+from functools import cache
 from math import pi, radians, sqrt
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from kappaskin import Plate, SensorLayout
 from kappaskin.contact.influence import influence_of
 from kappaskin.skin import MeshSkin
+from koiter import Panel
 from meshes import disk, ellipsoid
 from navier import Load
 from revolution import RevolvedShell, sphere
@@ -154,3 +156,45 @@ def test_readings_on_an_ellipsoid_are_those_of_a_solid_shell():
 
         assert np.linalg.norm(ours - true) < 0.02 * np.linalg.norm(true)
         assert ours @ true == pytest.approx(true @ true, rel=0.01)
+
+
+# A shallow dome, held all around
+
+SIDE, RADIUS, THIN = 40e-3, 0.1, 0.4e-3
+
+
+def _dome(count):
+    """A mesh of the dome, of `count` nodes each way, even along its arcs."""
+    line = np.linspace(-SIDE / 2, SIDE / 2, count)
+    u, v = (each.ravel() for each in np.meshgrid(line, line))
+    height = RADIUS * (np.cos(u / RADIUS) + np.cos(v / RADIUS))
+    nodes = np.column_stack([RADIUS * np.sin(u / RADIUS), RADIUS * np.sin(v / RADIUS), height])
+    corner = np.arange(count**2).reshape(count, count)
+    below, above = corner[:-1], corner[1:]
+    a, b, c, d = (
+        each.ravel() for each in (below[:, :-1], below[:, 1:], above[:, 1:], above[:, :-1])
+    )
+    return MeshSkin(nodes, np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]), THIN)
+
+
+@pytest.mark.full
+def test_a_shallow_dome_bends_as_in_closed_form():
+    mesh, panel = _dome(61), Panel(SIDE, SIDE, RADIUS, RADIUS, thickness=THIN, inplane="held")
+    wide, load = 3e-3, Load(0.42 * SIDE, 0.55 * SIDE, 1.0, radius=3e-3)
+    away = wide * np.array([(-2, 0), (-1, 1), (1, 0.5), (2, 0), (0, -1.5), (0, 2)])
+    places = np.array([load.x, load.y]) + away
+
+    def seen(along):
+        half = mesh.a / 2
+        return half + RADIUS * np.sin((along - SIDE / 2) / RADIUS)
+
+    layout, out = SensorLayout.scattered(mesh, seen(places)), np.zeros((4, 18))
+    influence = influence_of(Plate(mesh), layout, "hinged", 15, out)
+    influence.at(*seen(np.array([load.x, load.y])).tolist(), wide**2)
+    curvature = panel.reader(places)(load).ravel()
+    assert np.abs(out[0] / influence.unit - curvature).max() < 0.03 * np.abs(curvature).max()
+
+    at = seen(np.array([load.x, load.y])).tolist()
+    point = replace(load, radius=0.0)
+    w = panel.displacement(point, np.array([[load.x, load.y]]))[2, 0]
+    assert influence.gives(*at) == pytest.approx(w, rel=0.01)

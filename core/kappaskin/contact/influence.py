@@ -277,20 +277,17 @@ def _gaussian(d: Array, sd: float) -> tuple[Array, Array]:
     return np.log(t) + 0.5 + integral + mean, 2 * (1 - mean) / t
 
 
-def _evenly(d: Array, s: float) -> tuple[Array, Array]:
-    """The same of a load over a disc of radius sqrt(s)."""
+def _sharper(d: Array, s: float) -> tuple[Array, Array]:
+    """What A and B of a Gaussian load differ by from those of a disc as wide, of s = r^2."""
+    A, B = _gaussian(d, math.sqrt(s) / 2)
     t: Array = d[0] ** 2 + d[1] ** 2
     m = np.maximum(t, s)
-    return np.log(m) + (s + t) / (2 * m), (2 - s / m) / m
+    return A - np.log(m) - (s + t) / (2 * m), B - (2 - s / m) / m
 
 
 def _under_gaussian(d: Array, sd: float, gage_length: float) -> Array:
     """Curvature (3, ...) read at `d` (2, ...) from the centre of a Gaussian load."""
     return _read(lambda D: _gaussian(D, sd), d, gage_length)
-
-
-def _under_disc(d: Array, s: float, gage_length: float) -> Array:
-    return _read(lambda D: _evenly(D, s), d, gage_length)
 
 
 def _read(load: Callable[[Array], tuple[Array, Array]], d: Array, gage_length: float) -> Array:
@@ -550,7 +547,8 @@ class _OfMesh:
         self.unit = 8 * math.pi * plate.rigidity
         self._gage_length = length = layout.gage_length
         places = layout.positions.tobytes()
-        self._table, variances = _rest_on_mesh(plate, edge, places, length)
+        table, variances = _rest_on_mesh(plate, edge, places, length)
+        self._jet = self._mesh.splines.jets(table)
         # Lagrange's polynomials through the variances of the table, by powers of the variance,
         # and what a disc's even moments are of those of a Gaussian as wide.
         self._widest, n = float(variances[-1]), len(variances)
@@ -558,6 +556,8 @@ class _OfMesh:
         self._powers = np.arange(float(n))
         self._moments = 2.0**self._powers / scipy.special.factorial(self._powers + 1)
         self._basis, self._compliance, _ = read_of_modes(plate, layout.of_curvature, edge, _ON_MESH)
+        N, area = self._basis.size, float(self._mesh.areas.sum())
+        self._finer = area / (16 * math.pi**2 * plate.rigidity * N)
         base = self._mesh.base(*layout.positions.T)
         tangents: Array = np.swapaxes(base.frame, 0, 1)
         self._origin = np.vecdot(tangents, np.stack(base.point, axis=-1))
@@ -596,7 +596,7 @@ class _OfMesh:
         of_x += by_d[1] * by_x[1]
         of_y += by_d[1] * by_y[1]
         by_d[0], by_d[1] = of_x, of_y
-        self._rest = mesh.splines.jet(self._table, x, y, 3).reshape(self._rest.shape)
+        self._rest = self._jet(x, y, 3).reshape(self._rest.shape)
         out += self._smooth(s, self._moments)
 
     def _smooth(self, s: float, moments: Array) -> Array:
@@ -616,14 +616,15 @@ class _OfMesh:
         # And right under the load; its slopes there are taken to be those of a disc.
         near = np.flatnonzero(self._disc.t < _TAIL * s + length**2)
         if len(near):
-            d = self._disc.d[:, near]
-            more = _under_gaussian(d, math.sqrt(s) / 2, length) - _under_disc(d, s, length)
+            more = _read(lambda d: _sharper(d, s), self._disc.d[:, near], length)
             found[0].reshape(3, -1)[:, near] += more
         return found
 
     def gives(self, x: float, y: float) -> float:
-        f = self._basis.jet(x, y)[:1]
-        return float(np.vdot(self._compliance.after(f), f))
+        f, N = self._basis.jet(x, y)[:1], self._basis.size
+        # Finer waves, of which by Weyl's law there are k dk / 2 pi to an area, move 1 / (D k^4).
+        finer = self._finer * min(4 * float(np.vdot(f, f)) / N, 1.0)
+        return float(np.vdot(self._compliance.after(f), f)) + finer
 
 
 _ON_MESH = 15  # functions each way, of the displacement under a load
