@@ -21,7 +21,9 @@ Maps = dict[str, dict[str, Prospect]]
 
 _SHOWN = {"contact": (1e6, "um"), "force": (1e2, "%"), "displacement": (1e6, "um")}
 _ENDINGS = ".csv", ".npz", ".ply"
-_COLOURS = np.array([(68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37)])
+_COLOURS: Array = np.array(
+    [(68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37)]
+)
 """Of viridis (M. Nunez and others), evenly from the least to the largest."""
 
 
@@ -29,8 +31,8 @@ def design_maps(scene: Scene, functions: tuple[int, int], by: Sequence[str]) -> 
     """What is predicted of a scene with its elements placed `by` each of some `PLACEMENTS`."""
     if not noise_of(scene):
         raise Refusal(
-            f"expected a scene with noise, to predict errors from, got none in {scene.name}; add "
-            "one as in [noise] of a ready scene"
+            "expected noise that counts at the scene's accuracy, to predict errors from, got none "
+            f"in {scene.name}; add or raise [effects.gaussian-noise], or press less hard"
         )
     found = Maps()
     for name in by:
@@ -143,8 +145,8 @@ def _ply(mesh: MeshSkin, points: Array, columns: dict[str, Array]) -> str:
     low, high = np.nanmin(value), np.nanmax(value)
     share = (value - low) / (high - low or 1.0)
     steps = np.linspace(0, 1, len(_COLOURS))
-    colours = np.column_stack([np.interp(share, steps, each) for each in _COLOURS.T])
-    colours[np.isnan(value)] = 160
+    each = [np.asarray(np.interp(share, steps, one), float) for one in _COLOURS.T]
+    colours: Array = np.where(np.isnan(value)[:, None], 160.0, np.column_stack(each))
     names = [name.replace(" ", "_") for name in columns]
     head = [
         "ply",

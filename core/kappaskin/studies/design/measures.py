@@ -390,7 +390,7 @@ class _Map:
         if isinstance(patch, MeshSkin):
             places, shares = patch.places, patch.areas / patch.areas.sum()
             on = patch.depth(places) >= margin
-            return cls(*places.T, places, on, np.where(on, shares, 0.0))
+            return cls(places[:, 0], places[:, 1], places, on, np.where(on, shares, 0.0))
         x, y = patch.grid(side, 2 if patch.strip else side)
         places = np.stack(np.meshgrid(x, y), axis=-1)
         points = places.reshape(-1, 2)

@@ -104,5 +104,5 @@ def test_the_command_prints_a_row_for_each_placement_and_writes_a_map(
 def test_a_file_of_another_kind_or_no_noise_is_refused(scene, maps, tmp_path):
     with pytest.raises(Refusal, match="ends in"):
         write_maps(tmp_path / "felt.txt", scene.plate.patch, maps)
-    with pytest.raises(Refusal, match="with noise"):
+    with pytest.raises(Refusal, match="noise that counts"):
         design_maps(replace(scene, effects=()), (6, 6), ("scene",))
