@@ -45,7 +45,11 @@ x = 9e-3
 y = 7e-3
 radius = 1e-3
 force = 0.1
-path = [{ step = "press", seconds = 0.1 }, { step = "hold", seconds = 1.0 }, { step = "release", seconds = 0.1 }]
+path = [
+    { step = "press", seconds = 0.1 },
+    { step = "hold", seconds = 1.0 },
+    { step = "release", seconds = 0.1 },
+]
 """
 
 
@@ -122,6 +126,9 @@ def test_tables_have_a_row_for_each_frame(recorded, tmp_path, suffix):
         with h5py.File(to) as file:
             assert file["force"][:] == pytest.approx(force, nan_ok=True)
             device = json.loads(file.attrs["device"])
+    elif suffix == "csv":
+        (line,) = (line for line in to.read_text().splitlines() if line.startswith("# device: "))
+        device = json.loads(line.removeprefix("# device: "))
     else:
         assert scene.plate.patch.text.encode() in to.read_bytes()
         return
