@@ -4,7 +4,7 @@ import hashlib
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import product
 from typing import Any, Protocol, cast
 
@@ -535,7 +535,8 @@ class _OfMesh:
         self.unit = 8 * math.pi * plate.rigidity
         length = layout.gage_length
         places = layout.positions.tobytes()
-        self._table, variances = _rest_on_mesh(plate, edge, places, length)
+        table, variances = _rest_on_mesh(plate, edge, places, length)
+        self._block = lru_cache(32)(partial(self._mesh.splines.block, table))
         # Lagrange's parabolas through the variances of the table, by powers of the variance.
         self._shares = np.linalg.inv(np.vander(variances, increasing=True).T)
         self._basis, self._compliance, _ = read_of_modes(plate, layout.of_curvature, edge, _ON_MESH)
@@ -573,7 +574,8 @@ class _OfMesh:
         of_x += by_d[1] * by_x[1]
         of_y += by_d[1] * by_y[1]
         by_d[0], by_d[1] = of_x, of_y
-        rest = mesh.splines.jet(self._table, x, y, 3).reshape(3, len(self._shares), -1)
+        first, weights = mesh.splines.at(x, y)
+        rest = weights[:3].dot(self._block(*first)).reshape(3, len(self._shares), -1)
         v = s / 4  # what is smooth depends on the variance of a load alone
         share, by_s = np.dot(((1.0, v, v * v), (0.0, 0.25, v / 2)), self._shares.T)
         out[:3] += share @ rest
@@ -591,7 +593,7 @@ class _OfMesh:
 
 
 _ON_MESH = 15  # functions each way, of the displacement under a load
-_SPREAD = 700  # places searched
+_SPREAD = 300  # places searched
 _RADII = 0.02, 0.07  # of the shorter side, of the loads there
 _MESH_SD = 1.2  # steps of the splines: of a Gaussian load
 _CUT = 3.0  # of it: farther away such a load presses no more

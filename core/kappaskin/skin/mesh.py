@@ -69,7 +69,8 @@ class Splines:
         self._transposed = csc_array(B.T * weights)
         self._normal = splu(csc_array(self._transposed @ B + smooth * rough))
         self._count, self._sizes = (self._steps + 3).tolist(), self.step.tolist()
-        self._at = lru_cache(4)(self._weights_at)
+        self.at = lru_cache(4)(self._weights_at)
+        """The first coefficients each way around a place, and weights (6, 16) as of a jet."""
 
     def _cells(self, positions: Array) -> tuple[Indices, Array]:
         """The cell (P, 2) that each place lies in, and the place (P, 2) within it, in steps."""
@@ -102,9 +103,13 @@ class Splines:
 
         Or the first of these `orders` alone.
         """
-        (i, j), rows = self._at(x, y)
-        block = coefficients.reshape(self._count[1], self._count[0], -1)[j : j + 4, i : i + 4]
-        return rows[:orders].dot(block.reshape(16, -1))
+        first, rows = self.at(x, y)
+        return rows[:orders].dot(self.block(coefficients, *first))
+
+    def block(self, coefficients: Array, i: int, j: int) -> Array:
+        """Those (16, k) of coefficients (G, k) of which `at` gives the weights."""
+        found = coefficients.reshape(self._count[1], self._count[0], -1)[j : j + 4, i : i + 4]
+        return found.reshape(16, -1)
 
     def _weights_at(self, x: float, y: float) -> tuple[tuple[int, int], Array]:
         """The first coefficients each way around a place, and weights (6, 16) of those."""
