@@ -337,7 +337,7 @@ ELEMENTS = Part(
         ),
         "turns": Key(
             "Turns",
-            "By how much the axis of each element is turned from the skin's x.",
+            "Of a mesh: by how much the axis of each element is turned from the skin's x.",
             Unit.same("rad"),
             kind=tuple[float, ...],
             default=None,

@@ -453,10 +453,15 @@ class SensorLayout:
         return replace(self, reads=None, live=_channels(self.patch, len(self)))
 
     def turned(self, turns: ArrayLike) -> "SensorLayout":
-        """The same with the directions that each element reads turned by `turns` (P,) in rad.
+        """The same on a mesh, with what each element reads along turned by `turns` (P,) in rad.
 
         A curvature sensor then reads curvatures along 0, 90 and 45 degrees of its own axis.
         """
+        if not isinstance(self.patch, MeshSkin):
+            raise Refusal(
+                f"expected elements that are turned on a mesh, got a {self.patch.name}; let them "
+                "read slope@DEGREES or curvature@DEGREES instead"
+            )
         if self.reads is None:
             return self.reading_each(_ROSETTE).turned(turns)
         reads, turns = self.reads, np.asarray(turns, float)

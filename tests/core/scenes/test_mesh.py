@@ -240,3 +240,5 @@ def test_places_in_space_are_of_a_mesh_from_a_file(folder):
         read(text, folder)
     with pytest.raises(Refusal, match=r"elements.along: expected a mesh, got a patch"):
         read(text.replace('file = "elements.csv"', 'along = "principal"'), folder)
+    with pytest.raises(Refusal, match="expected elements that are turned on a mesh, got a patch"):
+        read(text.replace('file = "elements.csv"', "grid = [1, 1]\nturns = [0.1]"), folder)
