@@ -90,12 +90,12 @@ class RoundBasis(ModeBasis):
         x, y = (positions.T - R) / R
         return self._functions.weighed(x + 1j * y, weights)
 
-    def _place(self, x: float, y: float) -> Array:
+    def _place(self, x: float, y: float, count: int) -> Array:
         R = self.patch.a / 2
         z = complex(x - R, y - R) / R
         if not abs(z) <= 1 + _ROUNDING:
-            return np.full((len(ORDERS), self.size), np.nan)
-        return self._functions.jet(z, R)
+            return np.full((count, self.size), np.nan)
+        return self._functions.jet(z, R, count)
 
     def quadrature(self) -> tuple[Array, Array]:
         """Points (Q, 2) in m and weights (Q,) in m^2: Gauss along the radius, even in angle."""
@@ -330,14 +330,19 @@ class _PolarFunctions:
                 values += factor * turn ** _TURNS[step] * (polynomials @ self._series[step])
         return self._parts(values * turns[:, self._which])
 
-    def jet(self, z: complex, R: float) -> Array:
-        """All derivatives (6, N) at one point, z = x + i y on the disk of radius 1, of radius R."""
+    def jet(self, z: complex, R: float, count: int) -> Array:
+        """The first `count` derivatives (count, N) at one point.
+
+        It is z = x + i y on the disk of radius 1, of radius R.
+        """
         r, angle = cmath.polar(z)
         t = math.acos(min(max(2 * r - 1, -1.0), 1.0))
-        steps = np.cos(t * self._degrees).dot(self._flat).reshape(6, -1)
-        turn = cmath.rect(1.0, angle)
-        turned: Complex = _BY_STEPS * turn**_TURNS / R**_SUMS
-        values: Complex = (turned @ steps) * turn**self.m
+        series = self._flat[:, : count * len(self.m)]
+        steps = np.cos(t * self._degrees).dot(series).reshape(count, -1)
+        turned: Complex = _BY_STEPS[:count, :count] * cmath.rect(1.0, angle) ** _TURNS[:count]
+        turns: Complex = np.exp(1j * angle * self._turns)  # far quicker than powers
+        values: Complex = (turned / R ** _SUMS[:count]).dot(steps)
+        values *= turns.take(self._which)
         return self._parts(values)
 
     def _parts(self, values: Complex) -> Array:
@@ -454,8 +459,8 @@ class PolygonBasis(ModeBasis):
     def _derivative(self, positions: Array, order: Order) -> Array:
         return self._modes.functions.derivative(positions, order)
 
-    def _place(self, x: float, y: float) -> Array:
-        return self._modes.functions.jet(x, y)
+    def _place(self, x: float, y: float, count: int) -> Array:
+        return self._modes.functions.jet(x, y, count)
 
     def quadrature(self) -> tuple[Array, Array]:
         """Points (Q, 2) in m and weights (Q,) in m^2: exact for two quintics on each triangle."""
@@ -496,10 +501,10 @@ class MeshBasis(ModeBasis):
         values[on] = design @ self.functions.values
         return values
 
-    def _place(self, x: float, y: float) -> Array:
+    def _place(self, x: float, y: float, count: int) -> Array:
         if not self.mesh.holds(x, y):
-            return np.full((len(ORDERS), self.size), np.nan)
-        return self.mesh.splines.jet(self.functions.values, x, y)
+            return np.full((count, self.size), np.nan)
+        return self.mesh.splines.jet(self.functions.values, x, y, count)
 
     def curvature_at(self, positions: Array) -> Array:
         """Curvature xx, yy, xy (3, P, N) in 1/m per m of each function; NaN off the skin."""

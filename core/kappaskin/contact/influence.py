@@ -120,7 +120,7 @@ class _OfFunctions:
         self.sized = layout.reads is not None and not plate.patch.strip
 
     def at(self, x: float, y: float, s: float) -> None:
-        felt = self._over_disc(x, y, s) if self.sized else self._basis.jet(x, y)[:3]
+        felt = self._over_disc(x, y, s) if self.sized else self._basis.jet(x, y, 1)
         np.dot(felt, self._readings, self._out[: len(felt)])
 
     def _over_disc(self, x: float, y: float, s: float) -> Array:
@@ -139,7 +139,7 @@ class _OfFunctions:
         return None
 
     def gives(self, x: float, y: float) -> float:
-        f = self._basis.jet(x, y)[:1]
+        f = self._basis.jet(x, y, 0)
         return float(np.vdot(self._compliance.after(f), f))
 
 
@@ -586,7 +586,7 @@ class _OfMesh:
         return None
 
     def gives(self, x: float, y: float) -> float:
-        f = self._basis.jet(x, y)[:1]
+        f = self._basis.jet(x, y, 0)
         return float(np.vdot(self._compliance.after(f), f))
 
 
