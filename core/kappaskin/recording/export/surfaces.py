@@ -7,6 +7,7 @@ import math
 import struct
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +50,14 @@ class SkinMesh:
     def __init__(self, basis: Basis, nx: int, ny: int) -> None:
         self._basis = basis
         self._rest = RestMesh(basis.patch, nx, ny)
+
+    def depth(self, coefficients: Array) -> float:
+        """The largest displacement in m, either way."""
+        return float(np.abs(self._values @ coefficients.ravel()).max())
+
+    @cached_property
+    def _values(self) -> Array:
+        return self._basis.at(self._rest.positions)
 
     def __call__(self, coefficients: Array) -> SkinSurface:
         """The surface with `coefficients` (Ni, Nj) in m."""
@@ -231,13 +240,20 @@ class GlbSurfaces(SurfaceWriter):
         self._parts: list[bytes] = []
         self._accessors: list[dict[str, Any]] = []
 
+    def take(self, frame: ExportedFrame) -> bool:
+        coefficients = frame.estimate.coefficients
+        if self._shapes and not self.request.every and np.isfinite(coefficients).all():
+            if self._skin(frame.pipeline).depth(coefficients) <= self._deepest:
+                return True
+        return super().take(frame)
+
     def write(self, path: Path, frame: ExportedFrame, surface: SkinSurface) -> None:
-        if (deep := float(np.abs(surface.displacement).max())) > self._deepest:
+        deep = float(np.abs(surface.displacement).max())
+        if not self.request.every:
+            self._shapes = []
+        if deep > self._deepest or not self._shapes:
             self._about, self._deepest = self.description(frame), deep
-            if not self.request.every:
-                self._shapes = []
-        if self.request.every or not self._shapes:
-            self._shapes.append((frame.at, surface))
+        self._shapes.append((frame.at, surface))
         if len(self._shapes) > _MOST_SHAPES:
             raise Refusal(
                 f"expected at most {_MOST_SHAPES} shapes in a .glb, got more; choose a longer time "
