@@ -241,10 +241,10 @@ class GlbSurfaces(SurfaceWriter):
         self._accessors: list[dict[str, Any]] = []
 
     def take(self, frame: ExportedFrame) -> bool:
-        coefficients = frame.estimate.coefficients
-        if self._shapes and not self.request.every and np.isfinite(coefficients).all():
-            if self._skin(frame.pipeline).depth(coefficients) <= self._deepest:
-                return True
+        c, skin = frame.estimate.coefficients, self._skin(frame.pipeline)
+        known = self._shapes and not self.request.every and np.isfinite(c).all()
+        if known and skin.depth(c) <= self._deepest:
+            return True
         return super().take(frame)
 
     def write(self, path: Path, frame: ExportedFrame, surface: SkinSurface) -> None:
