@@ -176,8 +176,7 @@ def scene_of(top: TomlTable, file: Path, trust: Trust = False) -> Scene:
             "format",
         )
     plate, edge = read_skin(top.table("skin"), find)
-    unit = SKIN.value(top.table("skin"), "unit", default="")
-    layout, moved = read_elements(top.table("elements"), plate.patch, find, unit)
+    layout, moved = read_elements(top.table("elements"), plate.patch, find, top.table("skin"))
     reference = SCENE.value(top, "reference", default=usual_reference(plate.patch))
     basis = partial(basis_for, plate.patch, edge, *reference)
     with top.blamed("reference"):
@@ -264,8 +263,8 @@ def _mesh(table: TomlTable, find: _Find) -> MeshSkin:
         number = np.argsort(order)
         triangles = number[surface.triangles]
         triangles = triangles[triangles.min(axis=1).argsort()]
-        held_nodes = None if edges is None else number[edges]
-        return MeshSkin(surface.nodes[order], triangles, thickness, held_nodes)
+        nodes, held = surface.nodes[order], None if edges is None else number[edges]
+        return MeshSkin(nodes, triangles, thickness, held)
 
 
 def _patch(table: TomlTable, shape: str) -> Patch:
@@ -281,12 +280,12 @@ def _patch(table: TomlTable, shape: str) -> Patch:
 
 
 def read_elements(
-    table: TomlTable, patch: Patch, find: _Find, unit: str
+    table: TomlTable, patch: Patch, find: _Find, skin: TomlTable
 ) -> tuple[SensorLayout, str]:
     """The elements in the table [elements] of a file, and by how much they had to be moved.
 
     In words, empty where that is little. `find` gives the file that a key of the table names,
-    `unit` is that of the mesh's file.
+    `skin` is the table [skin], which has the unit of the mesh's file.
     """
     moved, turns = "", None
     with table.blamed():
@@ -307,6 +306,7 @@ def read_elements(
         elif "file" in table:
             file = find(table, "file")
             with table.blamed("file"):
+                unit = SKIN.value(skin, "unit", default="")
                 layout, turns, moved = _in_space(file, patch, unit)
         else:
             grid = ELEMENTS.value(table, "grid")
@@ -334,8 +334,6 @@ def _turned(layout: SensorLayout, table: TomlTable, turns: Array | None) -> Sens
     if (given is not None) + (along != "x") + (turns is not None) > 1:
         raise table.refusal("expected one of turns, along and directions in the file, got more")
     if along == "principal":
-        if not isinstance(layout.patch, MeshSkin):
-            raise table.refusal(f"expected a mesh, got a {layout.patch.name}", "along")
         xx, yy, xy = layout.patch.read_at_rest(layout.positions)
         turns = np.arctan2(2 * xy, xx - yy) / 2
     turns = turns if given is None else np.array(given)
@@ -358,13 +356,12 @@ def _in_space(file: Path, patch: Patch, unit: str) -> tuple[SensorLayout, Array 
         ) from error
     names = heading.replace(" ", "").split(",")
     directed = names == [*"xyz", "dx", "dy", "dz"]
-    if not (directed or names == [*"xyz"]) or rows.shape[1:] != (len(names),):
+    known = (directed or names == [*"xyz"]) and rows.shape[1:] == (len(names),)
+    if not (known and np.isfinite(rows).all()):
         raise Refusal(
-            f"{file}: expected a first line x,y,z or x,y,z,dx,dy,dz and lines of so many numbers, "
-            "got others"
+            f"{file}: expected a first line x,y,z or x,y,z,dx,dy,dz and lines of so many finite "
+            "numbers, got others"
         )
-    if not np.isfinite(rows).all():
-        raise Refusal(f"{file}: expected finite numbers, got NaN or infinity")
     positions, away = patch.projected(UNITS[unit] * rows[:, :3])
     layout = SensorLayout.scattered(patch, positions)
     far, k = float(away.max()), int(away.argmax())
@@ -373,9 +370,9 @@ def _in_space(file: Path, patch: Patch, unit: str) -> tuple[SensorLayout, Array 
             f"{file}: expected elements on the mesh, in its coordinates in {unit}, got element "
             f"{k} {1e3 * far:.3g} mm away"
         )
-    moved = ""
-    if far > _MOVED * math.sqrt(patch.areas.sum() / len(rows)):
-        moved = f"Elements were moved onto the mesh, element {k} by {1e3 * far:.2g} mm."
+    is_far = far > _MOVED * math.sqrt(patch.areas.sum() / len(rows))
+    words = f"Elements were moved onto the mesh, element {k} by {1e3 * far:.2g} mm."
+    moved = words if is_far else ""
     if not directed:
         return layout, None, moved
     ways = np.einsum("pix,px->pi", patch.base(*positions.T).frame, rows[:, 3:] @ patch.frame.T)

@@ -20,7 +20,7 @@ from kappaskin._toml import TomlTable, parsed
 from kappaskin._toml import table as toml_table
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Indices
-from kappaskin.scenes import PARTS, find_file, read_elements, read_skin
+from kappaskin.scenes import find_file, read_elements, read_skin
 from kappaskin.sensing import (
     QUANTITIES,
     DigitalReadings,
@@ -295,15 +295,11 @@ def _with_files(text: str, file: Path) -> str:
     if "file" in skin:
         text += toml_table(_KEPT.format("skin"), {"mesh": cast("MeshSkin", patch).text})
     if "file" in elements:
-        layout, _ = read_elements(elements, patch, find, _unit(skin))
+        layout, _ = read_elements(elements, patch, find, skin)
         kept: dict[str, Any] = {"positions": layout.positions.tolist()}
         kept |= {} if layout.turns is None else {"turns": layout.turns.tolist()}
         text += toml_table(_KEPT.format("elements"), kept)
     return text
-
-
-def _unit(skin: TomlTable) -> str:
-    return PARTS["skin"].value(skin, "unit", default="")
 
 
 def _with_kept(values: dict[str, Any], top: TomlTable) -> None:
@@ -356,7 +352,7 @@ def description_of(text: str, name: str, serial_number: str = "") -> Description
     elements = top.table("elements")
     if "reads" in elements:
         raise elements.refusal("expected none: the columns determine what is read", "reads")
-    layout, _ = read_elements(elements, plate.patch, _no_file, _unit(skin))
+    layout, _ = read_elements(elements, plate.patch, _no_file, skin)
     line = top.table("line")
     kind = LINE.value(line, "kind")
     names, paths = _names(line, kind)
