@@ -178,9 +178,10 @@ class Plate:
             )
 
     def _check_mesh(self, mesh: MeshSkin) -> None:
-        h = mesh.thickness
-        if self.thickness not in (None, h):
-            raise Refusal(f"expected the thickness of the mesh, {h} m, got {self.thickness}")
+        if self.thickness not in (None, mesh.thickness):
+            raise Refusal(
+                f"expected the thickness of the mesh, {mesh.thickness} m, got {self.thickness}"
+            )
         for name, value in (
             ("rigidity", not self.rigidity),
             ("tension", self.tension),
@@ -188,10 +189,10 @@ class Plate:
             ("axial_stiffness", self.axial_stiffness is not None),
         ):
             if value:
-                has = "above zero" if name == "rigidity" else "left out"
                 raise Refusal(
-                    f"expected {name} {has} of a {mesh.name}, got {getattr(self, name)}: it bends "
-                    "and stretches as a sheet of its thickness and rigidity does"
+                    f"expected {'a' if name == 'rigidity' else 'no'} {name} of a {mesh.name}, got "
+                    f"{getattr(self, name)}: it bends and stretches as a sheet of its thickness "
+                    "and rigidity does"
                 )
         if self.inplane not in ("", "held"):
             raise Refusal(

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from kappaskin._files import ARCHIVE_DAMAGES
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Indices, Mask
-from kappaskin.skin.mesh_file import Surface, faults
+from kappaskin.skin.mesh_file import Surface, faults, placed
 from kappaskin.skin.patch import SIDES, Base, Number, Polygon, doubled_area
 
 _MOST_STEPS = 64  # of the splines, along the longer side
@@ -287,6 +287,14 @@ class MeshSkin(Polygon):
             far = np.linalg.norm(self.points - self.points[found[k]], axis=1)
             away = np.minimum(away, far)
         return found
+
+    def projected(self, points: Array) -> tuple[Array, Array]:
+        """Positions (P, 2) in m nearest to `points` (P, 3) in m in the coordinates of `nodes`.
+
+        And how far (P,) in m these are from there.
+        """
+        triangle, shares, away = placed(Surface(self.nodes, self.triangles), points)
+        return np.einsum("pk,pki->pi", shares, self.places[self.triangles[triangle]]), away
 
     @cached_property
     def splines(self) -> Splines:
