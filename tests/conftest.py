@@ -44,7 +44,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # With the resource tracker: they stay, and are nobody's leak.
 if "forkserver" in multiprocessing.get_all_start_methods():
-    multiprocessing.set_forkserver_preload(["kappaskin.live.loop"])
+    multiprocessing.set_forkserver_preload(["kappaskin.live.loop", "scipy.spatial"])
     forkserver.ensure_running()
 else:
     resource_tracker.ensure_running()
@@ -156,8 +156,9 @@ def _children() -> set[int]:
 def _children_of(pid: int) -> set[int]:
     found = ""
     with suppress(OSError):  # it ended meanwhile
-        for thread in Path(f"/proc/{pid}/task").iterdir():
-            found += (thread / "children").read_text()
+        for thread in os.listdir(f"/proc/{pid}/task"):
+            with open(f"/proc/{pid}/task/{thread}/children") as file:
+                found += file.read()
     return {int(child) for child in found.split()}
 
 

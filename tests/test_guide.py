@@ -209,7 +209,8 @@ def _alike(said: str, printed: str) -> bool:
 
 def _without_numbers(text: str) -> str:
     """A text with one sign for each number, as it is written: 1,024, -3e-05."""
-    return re.sub(r"[-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?", "#", text)
+    text = re.sub(r"[-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?", "#", text)
+    return re.sub(r"\s+(?=\])", "", text)  # where NumPy pads a shorter number of an array
 
 
 def _keep(block: Block) -> None:

@@ -8,7 +8,7 @@ with other colours use `follow_look`.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from itertools import cycle
 from typing import Any, NamedTuple
 
@@ -86,6 +86,7 @@ DARK = Theme(
     disabled="#8a939e",
 )
 _LATER, _APART, _TURNS = 20, 6, 10  # ms after which hidden widgets follow, in so many turns
+_PAINTED = 1  # ms: a timer of none is no turn of its own
 _turns = cycle(range(_TURNS))
 THEMES = {"light": LIGHT, "dark": DARK}
 FAINT, ALERT = QPalette.ColorRole.PlaceholderText, QPalette.ColorRole.BrightText
@@ -137,8 +138,12 @@ def current() -> Theme:
 def apply_look(theme: Theme, percent: float = 100.0, colours: str = "standard") -> None:
     """Show every window in `theme`, with letters of so many percent of the system's size.
 
-    `colours` is the name of a colour map of `COLOUR_MAPS`.
+    `colours` is the name of a colour map of `COLOUR_MAPS`. Windows are painted in a turn of the
+    event loop after that in which their widgets get the palette.
     """
+    for window in filter(QWidget.isVisible, QApplication.topLevelWidgets()):
+        window.setUpdatesEnabled(False)
+        QTimer.singleShot(_PAINTED, window, partial(window.setUpdatesEnabled, True))
     application = QApplication.instance()
     if application is not None and application.property(_PROPERTY) != colours:
         application.setProperty(_PROPERTY, colours)

@@ -52,7 +52,7 @@ def _context() -> Context:
     """The fork server's where there is one: its socket needs a folder for temporary files."""
     if "forkserver" in multiprocessing.get_all_start_methods():
         context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload(["kappaskin.live.loop"])
+        context.set_forkserver_preload(["kappaskin.live.loop", "scipy.spatial"])
         with suppress(OSError):
             _start_forkserver()
             return context

@@ -44,6 +44,16 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     return True if left_out and collection_path.is_relative_to(folder) else None
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """End each file with its shared window: it draws and computes as long as it is there."""
+    files = {item.path: number for number, item in enumerate(items)}
+    items.sort(key=lambda item: (files[item.path], "shared_window" in _fixtures(item)))
+
+
+def _fixtures(item: pytest.Item) -> Sequence[str]:
+    return item.fixturenames if isinstance(item, pytest.Function) else ()
+
+
 @pytest.fixture(autouse=True)
 def no_window_and_no_failure_left(
     qapp: QApplication, request: pytest.FixtureRequest

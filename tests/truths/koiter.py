@@ -15,7 +15,7 @@ which is smooth, is left to the Legendre polynomials.
 """
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 
 import numpy as np
 from numpy.polynomial.legendre import legder, leggauss, legvander
@@ -289,6 +289,12 @@ _gauss = cache(leggauss)
 
 def _wave(k, x, order):
     """sin(k x) or a derivative of it, (G, n)."""
+    return _waves(k.tobytes(), x.tobytes(), order)
+
+
+@lru_cache(100)  # each load has them at the same places
+def _waves(k, x, order):
+    k, x = np.frombuffer(k), np.frombuffer(x)
     return k**order * np.sin(np.multiply.outer(x, k) + order * np.pi / 2)
 
 

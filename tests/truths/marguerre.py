@@ -77,34 +77,42 @@ class ShallowShell:
 
     def energy(self, q):
         """Energy in J, its gradient (N,) and Hessian (N, N) at the unknowns `q` (N,)."""
-        (Hx, Hy), B = self.curvatures, self._rows
-        wx, wy = B["wx"] @ q, B["wy"] @ q
-        e = np.stack(
-            [
-                (B["ux"] - Hx * B["w"]) @ q + wx**2 / 2,
-                (B["vy"] - Hy * B["w"]) @ q + wy**2 / 2,
-                (B["uy"] + B["vx"]) @ q + wx * wy,
-            ]
-        )
-        S = np.stack(
-            [
-                B["ux"] - Hx * B["w"] + wx[:, None] * B["wx"],
-                B["vy"] - Hy * B["w"] + wy[:, None] * B["wy"],
-                B["uy"] + B["vx"] + wx[:, None] * B["wy"] + wy[:, None] * B["wx"],
-            ]
-        )
-        nu, g = self.poisson, self._weights
+        (Hx, Hy), (M, of_plane), (w, x, y) = self.curvatures, self._plane, self._inward
+        plane, inward = np.split(q, [len(of_plane)])
+        depth, wx, wy = w @ inward, x @ inward, y @ inward
+        bent = np.concatenate([wx**2 / 2 - Hx * depth, wy**2 / 2 - Hy * depth, wx * wy])
+        of_x, of_y = wx[:, None], wy[:, None]
+        A = np.concatenate([of_x * x - Hx * w, of_y * y - Hy * w, of_x * y + of_y * x])
+        e = M @ plane + bent
+        N, stress, flexural = self._stress(e), self._stress(A), self._bending @ q
+        energy = (N @ e + flexural @ q) / 2
+        gradient = flexural + np.concatenate([N @ M, N @ A])
+        xx, yy, xy = N.reshape(3, -1, 1)
+        of_inward = A.T @ stress + x.T @ (xx * x + xy * y) + y.T @ (xy * x + yy * y)
+        mixed = M.T @ stress
+        return energy, gradient, self._bending + np.block([[of_plane, mixed], [mixed.T, of_inward]])
+
+    def _stress(self, strain):
+        """Forces xx, yy, xy in N/m, times weights (3 G, ...), of a `strain` (3 G, ...)."""
+        nu = self.poisson
         law = np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]])
         law = law * self.modulus * self.thickness / (1 - nu**2)
-        N = g * (law @ e)
-        flexural = self._bending @ q
-        energy = (np.sum(N * e) + flexural @ q) / 2
-        gradient = flexural + np.einsum("cg,cgn->n", N, S)
-        hessian = self._bending + np.einsum("cgm,cd,dgn->mn", S, law, S * g[:, None], optimize=True)
-        for n, one, other in ((N[0], "wx", "wx"), (N[1], "wy", "wy"), (N[2], "wx", "wy")):
-            part = (B[one].T * n) @ B[other]
-            hessian += part if one == other else part + part.T
-        return energy, gradient, hessian
+        by_point = (law @ strain.reshape(3, -1)).reshape(3, len(self._weights), -1)
+        return (by_point * self._weights[:, None]).reshape(strain.shape)
+
+    @cached_property
+    def _plane(self):
+        """Strains (3 G, U) of the unknowns of u and v, and their part (U, U) of the Hessian."""
+        B, held = self._rows, 2 * self.polynomials**2
+        M = np.concatenate([B["ux"], B["vy"], B["uy"] + B["vx"]])[:, :held]
+        return M, M.T @ self._stress(M)
+
+    @cached_property
+    def _inward(self):
+        """Rows (3, G, W) of w and its slopes, of the unknowns of w."""
+        return np.stack([self._rows[name] for name in ("w", "wx", "wy")])[
+            ..., 2 * self.polynomials**2 :
+        ]
 
     @cached_property
     def _bending(self):

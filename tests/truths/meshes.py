@@ -25,3 +25,9 @@ def ellipsoid(rings, axes, angle):
     t = angle * far
     unit = [np.sin(t) * np.cos(turn), np.sin(t) * np.sin(turn), np.cos(t)]
     return np.column_stack(unit) * axes, triangles
+
+
+def obj(nodes, triangles):
+    """The text of an OBJ file."""
+    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in np.asarray(nodes).tolist()]
+    return "\n".join(lines + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in triangles.tolist()])

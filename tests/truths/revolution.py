@@ -125,8 +125,12 @@ class RevolvedShell:
 
         def read(load):
             s0, azimuth = np.hypot(load.x, load.y), np.arctan2(load.y, load.x)
-            parts = (self._work(part, s0, nodes, table) for part in _discs(load))
-            by_ring = sum(parts).reshape(len(n), len(s), -1)
+            shares = np.sum([self._shares(part, s0, nodes) for part in _discs(load)], axis=0)
+            used = np.flatnonzero(shares.any(axis=(0, 2)))
+            used = slice(used[0], used[-1] + 1)
+            influences = table[:, used].reshape(len(n), -1, table.shape[-1])
+            by_ring = -shares[:, used].reshape(len(n), 1, -1) @ influences
+            by_ring = by_ring.reshape(len(n), len(s), -1)
             turn = n * (places[:, 1] - azimuth)
             waves = np.stack([np.cos(turn)] * 3 + [np.sin(turn)])[which]
             return np.einsum("nec,cne->ce", by_ring[:, ring.ravel()], waves)
@@ -270,16 +274,17 @@ class RevolvedShell:
         right[:4] = begin @ jumps[0]
         return solve_banded((band, band), matrix, right).reshape(M + 1, 8, -1)
 
-    def _work(self, load, s0, nodes, table):
-        """The work (N, readings) of the harmonics of an inward load at `s0` on the influences."""
+    def _shares(self, load, s0, nodes):
+        """What the harmonics of an inward load at `s0` weigh the influences with.
+
+        (N, M, stages + 1); their product is the work, but for its sign, of the load.
+        """
         s, weights = self._pieces(load, s0, nodes)
         segment = np.clip(np.searchsorted(nodes, s, side="right") - 1, 0, len(nodes) - 2)
         shares = _lagrange((s - nodes[segment]) / np.diff(nodes)[segment])
-        first, last = segment.min(), segment.max() + 1
-        spread = np.zeros((last - first, len(s)))
-        spread[segment - first, np.arange(len(s))] = 1.0
-        by_stage = np.einsum("nq,mq,qk->nmk", weights, spread, shares)
-        return -np.einsum("nmk,nmkr->nr", by_stage, table[:, first:last])
+        spread = np.zeros((len(s), len(nodes) - 1, _STAGES + 1))
+        spread[np.arange(len(s)), segment] = shares
+        return (weights @ spread.reshape(len(s), -1)).reshape(-1, *spread.shape[1:])
 
     def _pieces(self, load, s0, nodes):
         """Places (Q,) along the meridian and the force (N, Q) in N of each harmonic there."""
@@ -311,10 +316,11 @@ class RevolvedShell:
         middle = self.meridian.points(s0, 0.0)
         _, cos, sin, _ = self.meridian.at(s0)
         normal = np.array([sin, 0.0, cos])
+        r, _, z = self.meridian.points(s, 0.0).T
         low, high = np.zeros_like(s), np.full_like(s, np.pi)
         for _ in range(50):
             azimuth = (low + high) / 2
-            to = self.meridian.points(s, azimuth) - middle
+            to = np.stack([r * np.cos(azimuth), r * np.sin(azimuth), z], -1) - middle
             chord2 = np.maximum(np.sum(to**2, -1), 1e-30)
             bend = np.abs(to @ normal) / np.sqrt(chord2)  # sine of half of the arc's angle
             arc = np.sqrt(chord2) * np.where(bend > 1e-6, np.arcsin(bend) / (bend + 1e-300), 1.0)

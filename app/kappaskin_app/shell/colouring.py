@@ -14,7 +14,7 @@ from kappaskin.estimation import FAULTS, Estimator, estimator_for
 from kappaskin.frames import COMPONENTS, Array, Estimate
 from kappaskin.live import Status
 from kappaskin.pipeline import ErrorBars, Quantities, SkinColour, colours_of, skin_colours
-from kappaskin.sensing import SHOWN_UNITS, Sensor
+from kappaskin.sensing import SHOWN_UNITS
 from kappaskin_app.shell.background import BackgroundTask, Tasks
 from kappaskin_app.shell.settings import Settings, locked_at
 from kappaskin_app.widgets.text import round_up
@@ -194,7 +194,7 @@ class Colouring:
 
     def __init__(self, tasks: Tasks) -> None:
         self._status = Status()
-        self._sensor: Sensor | None = None
+        self._read: tuple[object, ...] = ()
         self.shades = SHADES
         """What may be shown of the sensor, by name."""
         self._key: tuple[object, ...] = ()
@@ -205,9 +205,11 @@ class Colouring:
 
     def follow(self, status: Status) -> None:
         """Take the sensor and setup of the next estimates."""
-        if status.sensor is not None and status.sensor is not self._sensor:
-            self._sensor = status.sensor
-            self.shades = shades_of(colours_of(status.sensor.layout))
+        if status.sensor is not None:
+            layout = status.sensor.layout  # another object in each status
+            read = layout.patch.strip, layout.reads is None, *layout.kinds
+            if read != self._read:
+                self._read, self.shades = read, shades_of(colours_of(layout))
         self._status = status
 
     @property

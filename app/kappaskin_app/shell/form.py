@@ -33,7 +33,7 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin.live import Status
-from kappaskin_app.shell.panel import Panel
+from kappaskin_app.shell.panel import CornerButton, Panel
 from kappaskin_app.shell.settings import Look, Settings, form_field
 from kappaskin_app.shell.settings.form_fields import Choice, FormField, Range, Several, Switch, Text
 from kappaskin_app.widgets.parts import Label
@@ -342,7 +342,7 @@ class Form(Panel):
         self._fields: dict[str, QWidget] = {}
         for name in names:
             self._add(name)
-        self.reset = QToolButton(text="Reset")  # pyright: ignore[reportCallIssue]
+        self.reset = CornerButton(text="Reset")  # pyright: ignore[reportCallIssue]
         self.reset.setAccessibleName(f"Reset {title}")
         self.reset.setToolTip("Reset the settings of this panel; Ctrl+Z undoes it.")
         self._undoable = tuple(name for name in names if not hasattr(Look, name))

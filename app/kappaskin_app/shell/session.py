@@ -123,6 +123,7 @@ RECORDED = "replay:"
 """The prefix of a source that is a recording."""
 _READY = frozenset({"sim:", *(f"sim:{case}" for case in READY_CASES)})  # never refused
 _TICK = 4  # ms between two polls for a new estimate
+_DRAWN = 10  # ms that an estimate has to be drawn, until the next is polled for
 _ARRIVES = 0.3  # s after which a request to the engine shows in its status
 _LATE = 1.2  # margin over the time of the scan lists
 _NOTICE = 60.0  # s for which a replaced device is reported
@@ -455,6 +456,11 @@ class Session(QObject):
         except Refusal:  # elements chosen on another skin: the status says so
             return None
 
+    def hurry(self) -> None:
+        """Poll in the next turn of the event loop: the last estimate is drawn."""
+        if self.timer.isActive():
+            self.timer.start(0)
+
     @guarded
     def tick(self) -> None:
         """Poll the engine, and emit new estimates and the status."""
@@ -483,8 +489,10 @@ class Session(QObject):
             self.estimate = estimate
         if reports:  # with the estimate that is drawn now, not the one before
             self.reported.emit(self.status)
-        if estimate is not None and estimate is self.estimate:
+        if shown := estimate is not None and estimate is self.estimate:
             self.estimated.emit(estimate)
+        if self.timer.isActive():
+            self.timer.start(_DRAWN if shown else _TICK)
 
     @property
     def _lost(self) -> bool:

@@ -207,7 +207,7 @@ class Quintics:
     def _searched(self, x: float, y: float) -> tuple[int, Array, float]:
         """The triangle that (x, y) lies deepest inside, xi (2,) there, and the depth."""
         depths = (self._depths @ np.array([x, y, 1.0])).reshape(3, -1)
-        deepest = depths.min(axis=0)
+        deepest = np.minimum.reduce(depths)
         t = int(deepest.argmax())
         return t, depths[:2, t], float(deepest[t])
 
@@ -224,13 +224,13 @@ class Quintics:
             triangle[p], local[p], depth[p] = self._searched(*positions[p])
         return triangle, local, depth
 
-    def jet(self, x: float, y: float) -> Array:
-        """All derivatives (6, N) at one point; NaN off the mesh."""
+    def jet(self, x: float, y: float, count: int) -> Array:
+        """The first `count` derivatives (count, N) at one point; NaN off the mesh."""
         finite = math.isfinite(x) and math.isfinite(y)
         t, xi, depth = self._searched(x, y) if finite else self._searched(_FAR, _FAR)
         if not depth > -_ROUNDING:
-            return np.full((len(ORDERS), self.coefficients.shape[-1]), np.nan)
-        return self._chained[t].dot(monomials(xi)).dot(self.coefficients[t])
+            return np.full((count, self.coefficients.shape[-1]), np.nan)
+        return self._chained[t, :count].dot(monomials(xi)).dot(self.coefficients[t])
 
     def derivative(self, positions: Array, order: Order) -> Array:
         """The derivative (P, N) of one order at `positions` (P, 2); NaN off the mesh."""

@@ -16,6 +16,7 @@ from kappaskin.skin import Cap, MeshSkin, Patch
 Order = tuple[int, int]
 ORDERS: tuple[Order, ...] = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
 """Orders of the derivatives along x and y that `Basis.jet` gives."""
+_COUNTS = 1, 3, 6  # of them, up to each order
 
 
 class ValueMap(Protocol):
@@ -63,8 +64,11 @@ class Basis(Protocol):
         """
         ...
 
-    def jet(self, x: float, y: float) -> Array:
-        """Derivatives (6, N) of every function at one point, in the order of `ORDERS`."""
+    def jet(self, x: float, y: float, order: int = 2) -> Array:
+        """Derivatives (6, N) of every function at one point, in the order of `ORDERS`.
+
+        Those up to an `order` of 1 (3, N) or 0 (1, N) take less.
+        """
         ...
 
     def value(self, x: float, y: float, coefficients: Array) -> float:
@@ -235,20 +239,20 @@ class FunctionBasis(ABC):
         return None
 
     @abstractmethod
-    def _place(self, x: float, y: float) -> Array:
-        """Every function's derivatives at one point, (6, N), in the order of `ORDERS`."""
+    def _place(self, x: float, y: float, count: int) -> Array:
+        """The first `count` derivatives of every function at one point, (count, N), of `ORDERS`."""
 
     @cached_property
-    def _last(self) -> dict[tuple[float, float], Array]:
+    def _last(self) -> dict[tuple[float, float, int], Array]:
         return {}
 
-    def jet(self, x: float, y: float) -> Array:
+    def jet(self, x: float, y: float, order: int = 2) -> Array:
         """Derivatives (6, N) of every function at one point; the last point's are cached."""
-        if (x, y) not in self._last:
+        if (x, y, order) not in self._last:
             self._last.clear()
-            self._last[x, y] = self._place(x, y)
-        return self._last[x, y]
+            self._last[x, y, order] = self._place(x, y, _COUNTS[order])
+        return self._last[x, y, order]
 
     def value(self, x: float, y: float, coefficients: Array) -> float:
         """The value at one point of the shape with `coefficients` (Ni, Nj)."""
-        return float(self.jet(x, y)[0].dot(coefficients.ravel()))
+        return float(self.jet(x, y, 0)[0].dot(coefficients.ravel()))

@@ -6,10 +6,9 @@ from typing import Any, cast
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-from scipy.sparse import block_diag, csc_array
 
 from kappaskin._files import cached
-from kappaskin.bases.facets import Facets, Factored
+from kappaskin.bases.facets import Facets, Factored, held_freedoms
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.skin import MeshSkin
@@ -33,22 +32,15 @@ def factored(
 def _factored(
     mesh: MeshSkin, edge: str, rigidity: float, poisson: float, foundation: float
 ) -> Factored:
-    held = np.zeros((len(mesh.points), 6), bool)
-    held[mesh.held, : 6 if edge == "clamped" else 3] = True
-    return Factored(stiffness(mesh, rigidity, 1.0, poisson, foundation), held.ravel())
+    held = held_freedoms(mesh.held, edge, len(mesh.points))
+    return Factored(stiffness(mesh, rigidity, 1.0, poisson, foundation), held)
 
 
 def stiffness(mesh: MeshSkin, D: float, C: float, nu: float, k_f: float) -> Any:
     """Stiffness (6 n, 6 n) of a shell of D in N m, C in N/m, nu and a foam of k_f in N/m^3."""
-    K = Facets(mesh.points, mesh.triangles).stiffness(D, C, nu)
-    if not k_f:
-        return K
-    n = inward(mesh)
-    on_node = block_diag((k_f * mesh.areas)[:, None, None] * n[:, :, None] * n[:, None])
-    freedoms = (6 * np.arange(len(n))[:, None] + np.arange(3)).ravel()
-    of_foam = csc_array(on_node).tocoo()
-    places = freedoms[of_foam.row], freedoms[of_foam.col]
-    return K + csc_array((of_foam.data, places), shape=K.shape)
+    facets = Facets(mesh.points, mesh.triangles)
+    K = facets.stiffness(D, C, nu)
+    return K + facets.foundation(k_f) if k_f else K
 
 
 def inward(mesh: MeshSkin) -> Array:

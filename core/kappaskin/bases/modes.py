@@ -84,12 +84,18 @@ class RoundBasis(ModeBasis):
         values[on] = self._functions.derivative(x[on] + 1j * y[on], order) / R ** sum(order)
         return values
 
-    def _place(self, x: float, y: float) -> Array:
+    def weighed(self, positions: Array, weights: Array) -> Array:
+        """The sum (N,) of each function at `positions` (P, 2) in m, by `weights` (P,)."""
+        R = self.patch.a / 2
+        x, y = (positions.T - R) / R
+        return self._functions.weighed(x + 1j * y, weights)
+
+    def _place(self, x: float, y: float, count: int) -> Array:
         R = self.patch.a / 2
         z = complex(x - R, y - R) / R
         if not abs(z) <= 1 + _ROUNDING:
-            return np.full((len(ORDERS), self.size), np.nan)
-        return self._functions.jet(z, R)
+            return np.full((count, self.size), np.nan)
+        return self._functions.jet(z, R, count)
 
     def quadrature(self) -> tuple[Array, Array]:
         """Points (Q, 2) in m and weights (Q,) in m^2: Gauss along the radius, even in angle."""
@@ -302,26 +308,41 @@ class _PolarFunctions:
         self._series = to_series @ parts((1 + np.cos(nodes)) / 2)
         self._flat = np.hstack(list(self._series))
 
+    def _factors(self, z: Complex) -> tuple[Array, Complex]:
+        """Chebyshev's polynomials (P, D) of the radius, and e^(i m angle) (P, M), at z (P,)."""
+        t = np.arccos(np.clip(2 * np.abs(z) - 1, -1, 1))
+        turns = np.exp(1j * np.multiply.outer(np.angle(z), self._turns))
+        return np.cos(np.multiply.outer(t, self._degrees)), turns
+
+    def weighed(self, z: Complex, weights: Array) -> Array:
+        """The sums (N,) of the modes at the points z = x + i y (P,) of the disk, by `weights`."""
+        polynomials, turns = self._factors(z)
+        by_turn = polynomials.T @ (weights[:, None] * turns)  # before there are so many functions
+        return self._parts((self._series[0] * by_turn[:, self._which]).sum(axis=0))
+
     def derivative(self, z: Complex, order: Order) -> Array:
         """The derivatives (P, N) of one order at the points z = x + i y (P,) of the disk."""
-        t = np.arccos(np.clip(2 * np.abs(z) - 1, -1, 1))
-        polynomials = np.cos(np.multiply.outer(t, self._degrees))
+        polynomials, turns = self._factors(z)
         turn = np.exp(1j * np.angle(z))[:, None]
         values = np.zeros((len(z), len(self.m)), complex)
         for step, factor in enumerate(_BY_STEPS[ORDERS.index(order)]):
             if factor:
                 values += factor * turn ** _TURNS[step] * (polynomials @ self._series[step])
-        turns = np.exp(1j * np.multiply.outer(np.angle(z), self._turns))
         return self._parts(values * turns[:, self._which])
 
-    def jet(self, z: complex, R: float) -> Array:
-        """All derivatives (6, N) at one point, z = x + i y on the disk of radius 1, of radius R."""
+    def jet(self, z: complex, R: float, count: int) -> Array:
+        """The first `count` derivatives (count, N) at one point.
+
+        It is z = x + i y on the disk of radius 1, of radius R.
+        """
         r, angle = cmath.polar(z)
         t = math.acos(min(max(2 * r - 1, -1.0), 1.0))
-        steps = np.cos(t * self._degrees).dot(self._flat).reshape(6, -1)
-        turn = cmath.rect(1.0, angle)
-        turned: Complex = _BY_STEPS * turn**_TURNS / R**_SUMS
-        values: Complex = (turned @ steps) * turn**self.m
+        series = self._flat[:, : count * len(self.m)]
+        steps = np.cos(t * self._degrees).dot(series).reshape(count, -1)
+        turned: Complex = _BY_STEPS[:count, :count] * cmath.rect(1.0, angle) ** _TURNS[:count]
+        turns: Complex = np.exp(1j * angle * self._turns)  # far quicker than powers
+        values: Complex = (turned / R ** _SUMS[:count]).dot(steps)
+        values *= turns.take(self._which)
         return self._parts(values)
 
     def _parts(self, values: Complex) -> Array:
@@ -438,8 +459,8 @@ class PolygonBasis(ModeBasis):
     def _derivative(self, positions: Array, order: Order) -> Array:
         return self._modes.functions.derivative(positions, order)
 
-    def _place(self, x: float, y: float) -> Array:
-        return self._modes.functions.jet(x, y)
+    def _place(self, x: float, y: float, count: int) -> Array:
+        return self._modes.functions.jet(x, y, count)
 
     def quadrature(self) -> tuple[Array, Array]:
         """Points (Q, 2) in m and weights (Q,) in m^2: exact for two quintics on each triangle."""
@@ -480,10 +501,10 @@ class MeshBasis(ModeBasis):
         values[on] = design @ self.functions.values
         return values
 
-    def _place(self, x: float, y: float) -> Array:
+    def _place(self, x: float, y: float, count: int) -> Array:
         if not self.mesh.holds(x, y):
-            return np.full((len(ORDERS), self.size), np.nan)
-        return self.mesh.splines.jet(self.functions.values, x, y)
+            return np.full((count, self.size), np.nan)
+        return self.mesh.splines.jet(self.functions.values, x, y, count)
 
     def curvature_at(self, positions: Array) -> Array:
         """Curvature xx, yy, xy (3, P, N) in 1/m per m of each function; NaN off the skin."""

@@ -69,9 +69,9 @@ class ProductBasis(FunctionBasis):
             return np.full((len(y), 1), float(derivative == 0))
         return self._along(y, self.patch.b, self.Nj, derivative)
 
-    def _place(self, x: float, y: float) -> Array:
+    def _place(self, x: float, y: float, count: int) -> Array:
         in_x, in_y = self._factors(x, y)
-        return (in_x[:, :, None] * in_y[:, None, :]).reshape(6, self.size)
+        return (in_x[:count, :, None] * in_y[:count, None, :]).reshape(count, self.size)
 
     def value(self, x: float, y: float, coefficients: Array) -> float:
         in_x, in_y = self._factors(x, y)

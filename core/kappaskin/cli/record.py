@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 _POLL = 0.05  # s
 _BEGIN = 10.0  # s within which something must come
+_OPENED = 120.0  # s within which a source is open: a large mesh is prepared for the first time
 
 
 def record(
@@ -141,8 +142,9 @@ def _recorded(
             return slope
         if status.state == LOST and not tared.connections:
             raise Refusal(status.message)
-        if status.state != STREAMING and not tared.connections and now - began > _BEGIN:
-            raise Refusal(f"{status.source}: no readings within {_BEGIN:g} s")
+        most = _BEGIN if status.source else _OPENED
+        if status.state != STREAMING and not tared.connections and now - began > most:
+            raise Refusal(f"{status.source or 'source'}: no readings within {most:g} s")
         show_progress(_line(status))
         time.sleep(_POLL)
 
@@ -321,8 +323,9 @@ def export(
 
     The suffix selects the format. A .parquet, .csv, .npz or .h5 has a row for each frame,
     recomputed from the recorded bytes with the recorded settings; the preset selects its columns.
-    A .vtp or .stl is the skin in space at one moment, a .pvd a series of .vtp files. Every file
-    states units, settings, calibration, tare and device.
+    A .vtp or .stl is the skin in space at one moment, a .pvd a series of .vtp files. A .glb (glTF)
+    is the skin at one moment, as it moves with the time between two shapes, or at its deepest.
+    Every file states units, settings, calibration, tare and device.
 
     Example: `kappaskin export press.mcap --to press.csv --from 2 --until 4`
 
@@ -425,6 +428,7 @@ def reconstruct(
     curvature or twist, its `direction` (R,) in rad from x, its `sigma` (R,) or (T, R), and in
     `datum` the quantities of an unknown zero. A `size` (1,) with `positions` (P, 1) is a strip, for
     which only curvature xx is used. An `outline` in m is a polygon (V, 2) or the radius of a disk.
+    Instead of `size`, `mesh` is the text of a mesh, `MeshSkin(...).text`.
     With a `rigidity` in N m, forces are computed too; without it contacts are found by the shape
     alone. A `gage_length` in m is that of gages, `cell` (2,) in m the sides that heights and slopes
     are the mean over. A `thickness` in m, `poisson` and `inplane`

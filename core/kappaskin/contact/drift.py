@@ -68,7 +68,7 @@ class SmoothDrift:
         self._columns, self._live = level_and_slopes(layout), layout.live.ravel()
         self._frame_shape = layout.frame_shape
         self._beside = PointContact(plate, layout, edge, free=self._columns)
-        self._directions = PatternCache[Array]()
+        self._directions = PatternCache[tuple[Array, int]]()
         self._reference: tuple[Estimator, Estimator] | None = None
         self._of_fit = PatternCache[Array]()
 
@@ -86,8 +86,8 @@ class SmoothDrift:
         one load leaves of it, 0 where missing, and the squares `left` by the `contacts` found.
         """
         used = self._live & np.isfinite(curvature.ravel())
-        Q = self._directions(used, self._orthonormal)
-        spare, along = max(int(np.count_nonzero(used)) - len(Q), 1), Q.dot(rest)
+        Q, spare = self._directions(used, self._orthonormal)
+        along = Q.dot(rest)
         score = float(along.dot(along))
         if not score > _HINT * max(float(rest.dot(rest)) - score, 0.0) / spare:
             return None
@@ -119,8 +119,10 @@ class SmoothDrift:
         contacts = self._beside(curvature, beside), NO_CONTACT
         return FittedDrift(size, readings, contacts, beside)
 
-    def _orthonormal(self, used: Mask) -> Array:
-        return orthonormal(np.where(used, self._columns, 0.0))
+    def _orthonormal(self, used: Mask) -> tuple[Array, int]:
+        """Directions (r, C) of a drift of the readings `used`, and how many readings are spare."""
+        Q = orthonormal(np.where(used, self._columns, 0.0))
+        return Q, max(int(np.count_nonzero(used)) - len(Q), 1)
 
     def _noise(self, curvature: Array, fit: Fit, used: Mask) -> tuple[float, int] | None:
         """Noise in 1/m that a shape and a drift leave together, and from how many spare readings.

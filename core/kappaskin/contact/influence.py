@@ -4,7 +4,7 @@ import hashlib
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import product
 from typing import Any, Protocol, cast
 
@@ -120,7 +120,7 @@ class _OfFunctions:
         self.sized = layout.reads is not None and not plate.patch.strip
 
     def at(self, x: float, y: float, s: float) -> None:
-        felt = self._over_disc(x, y, s) if self.sized else self._basis.jet(x, y)[:3]
+        felt = self._over_disc(x, y, s) if self.sized else self._basis.jet(x, y, 1)
         np.dot(felt, self._readings, self._out[: len(felt)])
 
     def _over_disc(self, x: float, y: float, s: float) -> Array:
@@ -139,7 +139,7 @@ class _OfFunctions:
         return None
 
     def gives(self, x: float, y: float) -> float:
-        f = self._basis.jet(x, y)[:1]
+        f = self._basis.jet(x, y, 0)
         return float(np.vdot(self._compliance.after(f), f))
 
 
@@ -266,6 +266,7 @@ class _DiscOnGages:
 
 
 _NEAREST = 1e-6  # of a standard deviation: nearer, a Gaussian load bends the plate no more
+_FAR = 40.0  # exp1 of it is less than the rounding of what it is added to
 
 
 def _gaussian(d: Array, sd: float) -> tuple[Array, Array]:
@@ -273,7 +274,8 @@ def _gaussian(d: Array, sd: float) -> tuple[Array, Array]:
     t = np.maximum(d[0] ** 2 + d[1] ** 2, (_NEAREST * sd) ** 2)
     u = t / (2 * sd**2)
     mean: Array = -np.expm1(-u) / u
-    integral = cast("Array", scipy.special.exp1(u))
+    integral, near = np.zeros_like(u), u < _FAR
+    integral[near] = scipy.special.exp1(u[near])
     return np.log(t) + 0.5 + integral + mean, 2 * (1 - mean) / t
 
 
@@ -548,7 +550,7 @@ class _OfMesh:
         self._gage_length = length = layout.gage_length
         places = layout.positions.tobytes()
         table, variances = _rest_on_mesh(plate, edge, places, length)
-        self._jet = self._mesh.splines.jets(table)
+        self._block = lru_cache(32)(partial(self._mesh.splines.block, table))
         # Lagrange's polynomials through the variances of the table, by powers of the variance,
         # and what a disc's even moments are of those of a Gaussian as wide.
         self._widest, n = float(variances[-1]), len(variances)
@@ -596,7 +598,8 @@ class _OfMesh:
         of_x += by_d[1] * by_x[1]
         of_y += by_d[1] * by_y[1]
         by_d[0], by_d[1] = of_x, of_y
-        self._rest = self._jet(x, y, 3).reshape(self._rest.shape)
+        first, weights = mesh.splines.at(x, y)
+        self._rest = weights[:3].dot(self._block(*first)).reshape(self._rest.shape)
         out += self._smooth(s, self._moments)
 
     def _smooth(self, s: float, moments: Array) -> Array:
@@ -621,7 +624,7 @@ class _OfMesh:
         return found
 
     def gives(self, x: float, y: float) -> float:
-        f, N = self._basis.jet(x, y)[:1], self._basis.size
+        f, N = self._basis.jet(x, y, 0), self._basis.size
         # Finer waves, of which by Weyl's law there are k dk / 2 pi to an area, move 1 / (D k^4).
         finer = self._finer * min(4 * float(np.vdot(f, f)) / N, 1.0)
         return float(np.vdot(self._compliance.after(f), f)) + finer
@@ -629,7 +632,7 @@ class _OfMesh:
 
 _ON_MESH = 15  # functions each way, of the displacement under a load
 _INEXACT = 0.01  # of a reading: by elements and theory of shells (`tests/truths/test_meshes.py`)
-_SPREAD = 700  # places searched
+_SPREAD = 300  # places searched
 _SEARCHED = {0.02: 1, 0.07: 1, 0.16: 2}  # radii of the shorter side, and at every how many places
 _MESH_SD = 1.2  # steps of the splines: of a Gaussian load
 _CUT = 3.0  # of it: farther away such a load presses no more

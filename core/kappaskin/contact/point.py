@@ -316,8 +316,7 @@ class PointContact:
         for _ in range(_STEPS):
             if hopeless := here.left - _HOPE * here.gain > most:
                 break
-            worth = self._worth(x, y) * variance
-            if self._fits_profile and here.left + here.gain > cost + worth:
+            if self._fits_profile and here.left + here.gain > cost + self._worth(x, y) * variance:
                 x, y, s = (x + there[0]) / 2, (y + there[1]) / 2, (s + there[2]) / 2
             else:
                 there, cost = (x, y, s), here.left + here.gain
@@ -330,7 +329,8 @@ class PointContact:
                 if self._stretched is not None:  # the readings are not linear in the force
                     self._stretched.move(force, dx, dy)
                     gain += (force - before) ** 2 / here.inverse.item(0, 0)
-                if gain <= self._worth(x, y) * variance + _NO_GAIN * here.power:
+                left = gain - _NO_GAIN * here.power
+                if left <= _WORTH * variance and left <= self._worth(x, y) * variance:
                     break
             here = self._linearised(x, y, s, here, tables, variance)
         self.rest = self._rows[4] - np.dot(here.steps[: self._unknowns], self.linear)
@@ -425,24 +425,25 @@ class PointContact:
         # What the load leaves of the readings: the noise, or more where it is no single load.
         spread, unit = math.sqrt(here.left / tables.spare), self._influence.unit
         strength, force = abs(here.steps[0]), here.steps[0] * unit
-        sd = spread * np.sqrt(here.inverse.diagonal())
+        sd: list[float] = (spread * np.sqrt(here.inverse.diagonal())).tolist()
+        theory = self._theory_error
         self.misfit = (spread / float(fit.noise)) ** 2 if fit.noise else math.inf
         under = force * self._influence.gives(x, y)
         if self._stretched is not None:
             under += self._stretched.more(x, y, force)
-        place = np.array([x, y])
-        from_middle = place - (self.patch.a / 2, self.patch.b / 2)
-        by_theory = self._theory_error * from_middle if self.patch.is_shallow else 0.0
+        theory_of_place = theory if self.patch.is_shallow else 0.0
+        sd_x = math.hypot(sd[1] / strength, theory_of_place * (x - self.patch.a / 2))
+        sd_y = math.hypot(sd[2] / strength, theory_of_place * (y - self.patch.b / 2))
         return Contact(
-            place,
-            np.hypot(sd[1:3] / strength, by_theory),
+            np.array([x, y]),
+            np.array([sd_x, sd_y]),
             force,
-            math.hypot(float(sd[0]) * unit, self._theory_error * force),
+            math.hypot(sd[0] * unit, theory * force),
             *self._displacement(fit, x, y, under),
             tables.spare,
             spread < _AS_WELL * float(fit.noise),
             self._near_rim(x, y, s, here, tables),
-            *((s, float(sd[3]) / strength) if self._influence.sized else (math.nan, math.nan)),
+            *((s, sd[3] / strength) if self._influence.sized else (math.nan, math.nan)),
         )
 
     def _near_rim(self, x: float, y: float, s: float, here: _Linearised, tables: _Tables) -> bool:
@@ -484,8 +485,13 @@ def left_by_chance(share: float, spare: int, of_fit: ArrayLike) -> float:
     """
     fewer = max(float(cast("float", of_fit)), 1.0)
     more = max(spare - fewer, 1.0)
-    F = float(scipy.special.fdtri(more, fewer, 1 - share))
-    return (fewer + more * F) / (fewer + more)
+    return (fewer + more * _quantile(more, fewer, 1 - share)) / (fewer + more)
+
+
+@lru_cache(64)
+def _quantile(more: float, fewer: float, share: float) -> float:
+    """Quantile of F for these degrees of freedom."""
+    return float(scipy.special.fdtri(more, fewer, share))
 
 
 def orthonormal(rows: Array) -> Array:

@@ -33,7 +33,7 @@ class StretchedSkin:
 
     def begin(self, x: float, y: float, displacement: float) -> None:
         """Begin with the shape under a load at (x, y) in m, of this `displacement` there in m."""
-        t = self._basis.jet(x, y)[0]
+        t = self._basis.jet(x, y, 0)[0]
         shape = self._C @ t
         self._q = shape * (displacement / float(t @ shape))
 
@@ -61,5 +61,5 @@ class StretchedSkin:
 
     def more(self, x: float, y: float, force: float) -> float:
         """Displacement in m under `force` N at (x, y), less that of a skin that only bends."""
-        t = self._basis.jet(x, y)[0]
+        t = self._basis.jet(x, y, 0)[0]
         return float(t @ (self._q - force * (self._C @ t)))

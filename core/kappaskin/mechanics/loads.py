@@ -330,7 +330,8 @@ class _RoundOnCap:
         )
         nodes = np.pi * (self._degrees + 0.5) / len(self._degrees)
         far = self._rim + self._reach * (1 - 1e-12) * (1 + np.cos(nodes)) / 2
-        felt = [weights @ basis.at(basis.cap.around(at, self._rim, points)) for at in far.tolist()]
+        around = [basis.cap.around(at, self._rim, points) for at in far.tolist()]
+        felt = [basis.weighed(at, weights) for at in around]
         to_series = 2 / len(nodes) * np.cos(np.multiply.outer(self._degrees, nodes))
         to_series[0] /= 2
         self._series = to_series @ np.array(felt)

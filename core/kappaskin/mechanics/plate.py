@@ -152,6 +152,8 @@ class Plate:
         possible = INPLANE if self.patch.arc_curvature else INPLANE[:-1]
         if isinstance(self.patch, Cap):
             self._check_cap(self.patch)
+        if isinstance(self.patch, MeshSkin):
+            self._check_mesh(self.patch)
         if self.inplane and self.inplane not in possible:
             raise Refusal(
                 f"expected inplane among {', '.join(possible)} for a "
@@ -173,6 +175,29 @@ class Plate:
                 f"expected inplane held of a {cap.name}, or diaphragm of less than a hemisphere, "
                 f"got {self.inplane}: such a rim lets the cap turn or bend without stretching, and "
                 "its force is not determined"
+            )
+
+    def _check_mesh(self, mesh: MeshSkin) -> None:
+        if self.thickness not in (None, mesh.thickness):
+            raise Refusal(
+                f"expected the thickness of the mesh, {mesh.thickness} m, got {self.thickness}"
+            )
+        for name, value in (
+            ("rigidity", not self.rigidity),
+            ("tension", self.tension),
+            ("fluid", self.fluid),
+            ("axial_stiffness", self.axial_stiffness is not None),
+        ):
+            if value:
+                raise Refusal(
+                    f"expected {'a' if name == 'rigidity' else 'no'} {name} of a {mesh.name}, got "
+                    f"{getattr(self, name)}: it bends and stretches as a sheet of its thickness "
+                    "and rigidity does"
+                )
+        if self.inplane not in ("", "held"):
+            raise Refusal(
+                f"expected inplane held of a {mesh.name}, got {self.inplane}; of a mesh a part of "
+                "the rim can be held instead"
             )
 
     @classmethod
@@ -224,7 +249,8 @@ class Plate:
         """
         if isinstance(self.patch, MeshSkin):
             xx, yy, xy = self.patch.read_at_rest(self.patch.places)
-            H = math.sqrt(float(np.mean(xx**2 + yy**2 + 2 * xy**2)) / 2)
+            square: Array = xx**2 + yy**2 + 2 * xy**2
+            H = math.sqrt(float(square.mean()) / 2)
             return (self.sheet_thickness or 0.0) * H / 24
         times = {"diaphragm": 2.0, "free": 4.0}.get(self.inplane_edge, 0.0)
         if not self.patch.is_shallow or not times:
@@ -378,7 +404,9 @@ class Plate:
             return cap_shell(self, basis).by_function(self.compliance_by_wave(basis))
         K, bare = self._stiffness(basis)
         inextensible = self.patch.arc_curvature and not self._is_shell
-        W = np.eye(basis.size) if basis.free is None or not inextensible else basis.free
+        if basis.free is None or not inextensible:
+            return self._inverse(K, bare)
+        W = basis.free
         return W @ self._inverse(W.T @ K @ W, W.T @ bare @ W) @ W.T
 
     def _inverse(self, K: Array, bare: Array) -> Array:

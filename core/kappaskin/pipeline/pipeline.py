@@ -69,7 +69,7 @@ class FrameAssembly(Stateful):
         """The readings `curvature` of `frame` with earlier ones, and which of them are new."""
         flat = curvature.ravel()
         if self.is_whole(frame):
-            np.copyto(self._values, flat)
+            self._values[:] = flat
             self._times.fill(frame.device_time)
             return curvature, np.isfinite(curvature)
         self._times[self._times > frame.device_time + OVERTAKEN] = -np.inf

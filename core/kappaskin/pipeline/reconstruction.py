@@ -37,7 +37,7 @@ from kappaskin.estimation import (
 from kappaskin.frames import Array, Contact, LocalGeometry
 from kappaskin.mechanics import Plate
 from kappaskin.sensing import SensorLayout
-from kappaskin.skin import Cap, Disk, Patch, Polygon
+from kappaskin.skin import Cap, Disk, MeshSkin, Patch, Polygon
 
 _NEEDED = (
     "size (2,) in m, positions (P, 2) in m and curvature (T, 3, P) or (3, P) in 1/m, or values "
@@ -58,11 +58,13 @@ _NAMES = (
     "angle",
     "stretch",
     "outline",
+    "mesh",
     *_AVERAGED,
     *_SKIN,
     "inplane",
 )
-_TEXTS = ("quantity", "datum", "inplane")
+_TEXTS = ("quantity", "datum", "inplane", "mesh")
+_SIZES = ("size", "radius", "angle", "stretch", "outline")  # which a mesh has itself
 _HEADER = 2**16  # bytes of a member that say what it holds
 _READ_AS = 8  # bytes of each number in memory
 
@@ -117,7 +119,11 @@ def _read(path: Path) -> tuple[dict[str, Array], dict[str, NDArray[np.str_]]]:
     except ARCHIVE_DAMAGES as error:
         raise Refusal(f"{path}: cannot be read as NPZ ({error}); expected {_NEEDED}") from error
     needed = ("values", "element", "quantity") if "values" in found else ("curvature",)
-    for name in ("size", "positions", *needed):
+    if "mesh" not in found:
+        needed = "size", *needed
+    elif sizes := [name for name in _SIZES if name in found]:
+        raise Refusal(f"{path}: expected the mesh alone, got {', '.join(sizes)} too; leave it out")
+    for name in ("positions", *needed):
         if name not in found:
             raise Refusal(f"{path}: has no {name!r} (it has {sorted(found)}); expected {_NEEDED}")
     if other := [name for name in ("values", *_READ) if "curvature" in found and name in found]:
@@ -127,8 +133,9 @@ def _read(path: Path) -> tuple[dict[str, Array], dict[str, NDArray[np.str_]]]:
         )
     texts = {name: found.pop(name) for name in _TEXTS if name in found}
     for name, values in texts.items():
-        if values.dtype.kind != "U" or (name == "inplane" and values.size != 1):
-            one = "one text" if name == "inplane" else "text"
+        single = name in ("inplane", "mesh")
+        if values.dtype.kind != "U" or (single and values.size != 1):
+            one = "one text" if single else "text"
             raise Refusal(f"{path}: expected {name} to be {one}, got {values.dtype}")
     for name, values in found.items():
         if values.dtype.kind not in "fiu":
@@ -308,7 +315,9 @@ def reconstruct(
     found, texts = _read(readings)
     name, sigma = "values" if "values" in found else "curvature", found.get("sigma")
     radius = found.get("radius", np.array(np.inf))
-    if "angle" in found:
+    if "mesh" in texts:
+        patch = MeshSkin.of_text(str(texts["mesh"].item()))
+    elif "angle" in found:
         patch = _cap(readings, found)
     else:
         patch = _patch(readings, found["size"], radius, found.get("outline"))

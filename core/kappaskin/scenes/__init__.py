@@ -9,6 +9,7 @@ from kappaskin.scenes.read import TABLE_1_NOISE as TABLE_1_NOISE
 from kappaskin.scenes.read import Trust as Trust
 from kappaskin.scenes.read import check_elements as check_elements
 from kappaskin.scenes.read import check_sides as check_sides
+from kappaskin.scenes.read import find_file as find_file
 from kappaskin.scenes.read import load_scene as load_scene
 from kappaskin.scenes.read import named_file as named_file
 from kappaskin.scenes.read import read_elements as read_elements

@@ -246,25 +246,31 @@ SKIN = Part(
     },
     (Plate, Scene, Patch),
     {
-        "rectangle": PartKind("Rectangle", Patch, {"size": [0.1, 0.1]}, ("radius",)),
-        "strip": PartKind("Strip", Patch, {"size": [0.1, 0.02]}, ("radius",)),
-        "disk": PartKind("Disk", Disk, {"rim_radius": 0.05}),
+        "rectangle": PartKind("Rectangle", Patch, {"size": [0.1, 0.1]}, ("radius", "thickness")),
+        "strip": PartKind("Strip", Patch, {"size": [0.1, 0.02]}, ("radius", "thickness")),
+        "disk": PartKind("Disk", Disk, {"rim_radius": 0.05}, ("thickness",)),
         "cap": PartKind(
             "Cap",
             Cap,
             {"radius": 0.008},
-            ("angle", "stretch"),
+            ("angle", "stretch", "thickness"),
             {"radius": Key("Radius", "Radius of the cap, of its equator.", _MM, 0.0, kind=float)},
         ),
-        "mesh": PartKind("Mesh", MeshSkin, {"file": "skin.stl", "unit": "mm"}, ("held", "mesh")),
+        "mesh": PartKind(
+            "Mesh",
+            MeshSkin,
+            {"file": "skin.stl", "unit": "mm", "thickness": 1e-3},
+            ("held", "mesh"),
+        ),
         "polygon": PartKind(
             "Polygon",
             Polygon,
             {"outline": [[0.0, 0.0], [0.1, 0.0], [0.1, 0.06], [0.05, 0.1], [0.0, 0.06]]},
+            ("thickness",),
         ),
     },
     "shape",
-    (("file", "mesh"),),
+    (("file", "mesh"), ("unit", "mesh"), ("held", "mesh")),
 )
 
 ELEMENTS = Part(
@@ -310,6 +316,34 @@ ELEMENTS = Part(
             example=120,
             offered=False,
         ),
+        "file": Key(
+            "File",
+            "Of a mesh: CSV file with the columns x, y and z of each element, in the coordinates "
+            "and the unit of the mesh's file; elements are moved onto the mesh. Further columns "
+            "dx, dy and dz: the direction of each element's axis.",
+            kind=str,
+            example="elements.csv",
+            offered=False,
+        ),
+        "along": Key(
+            "Along",
+            "Of a mesh: the axis of each element is along the skin's x, or along its largest "
+            "principal curvature: then an element reads curvature@0, curvature@90 and "
+            "curvature@45 from there.",
+            kind=str,
+            default="x",
+            choices=_choices(x="x", principal="Principal curvature"),
+            offered=False,
+        ),
+        "turns": Key(
+            "Turns",
+            "Of a mesh: by how much the axis of each element is turned from the skin's x.",
+            Unit.same("rad"),
+            kind=tuple[float, ...],
+            default=None,
+            example=[0.1],
+            offered=False,
+        ),
         "dead": Key(
             "Dead",
             "Numbers of the elements without readings, from 0.",
@@ -342,7 +376,7 @@ ELEMENTS = Part(
         ),
     },
     (SensorLayout,),
-    either=(("grid", "positions", "rings", "spiral", "spread"),),
+    either=(("grid", "positions", "rings", "spiral", "spread", "file"), ("along", "turns")),
 )
 
 READINGS = Part(

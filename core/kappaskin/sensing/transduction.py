@@ -283,9 +283,12 @@ class Transduction:
     def curvature(self, counts: Counts) -> Array:
         """Curvature in 1/m for `counts` (Eq. 8); NaN on the rails, where it is unknown."""
         low, high = self.limits
-        curvature = cast("Array", counts * self.resolution - self._offset)
-        if counts.size and (counts.min() <= low or counts.max() >= high):
-            curvature[self.saturated(counts)] = np.nan
+        curvature = cast("Array", counts * self.resolution)
+        curvature -= self._offset
+        if counts.size:
+            ends = counts.argmin(), counts.argmax()  # min() and max() go through Python
+            if not low < counts.item(ends[0]) <= counts.item(ends[1]) < high:
+                curvature[self.saturated(counts)] = np.nan
         return curvature
 
     def saturated(self, counts: Counts) -> Mask:

@@ -4,7 +4,7 @@ import base64
 import hashlib
 import io
 import math
-from collections.abc import Callable
+import zipfile
 from dataclasses import dataclass, field, fields
 from functools import cached_property, lru_cache
 from typing import Any, cast
@@ -15,13 +15,17 @@ from numpy.typing import ArrayLike
 from kappaskin._files import ARCHIVE_DAMAGES
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Indices, Mask
-from kappaskin.skin.mesh_file import Surface
-from kappaskin.skin.patch import Base, Number, Polygon, doubled_area
+from kappaskin.skin.mesh_file import Surface, faults, placed
+from kappaskin.skin.patch import SIDES, Base, Number, Polygon, doubled_area
 
 _MOST_STEPS = 64  # of the splines, along the longer side
 _PER_STEP = 1.4  # nodes at least along a step
 _SMOOTHED = 0.08  # of a step: shorter waves of what is fitted are smoothed
 _AT_RIM = 10.0  # times the weight of a node that lies on the rim
+_MOST_TRIANGLES = 2**15  # which take some minutes
+_MOST_BYTES = 2**23  # of the arrays in a text, many times what so many triangles need
+# Faults that a skin may have: numbers become less exact, or nothing is wrong but the unit.
+_LESSER = ("size", "too many", "too few", "sliver")
 _STEEPEST = 80.0  # degrees between a triangle and the plane that it is projected on
 _ALONG = 0.9  # of a normal: with so much of x it has no x in its plane, and y is used
 _ROUNDS = 40  # of flattening
@@ -65,7 +69,8 @@ class Splines:
         self._transposed = csc_array(B.T * weights)
         self._normal = splu(csc_array(self._transposed @ B + smooth * rough))
         self._count, self._sizes = (self._steps + 3).tolist(), self.step.tolist()
-        self._at = lru_cache(4)(self._weights_at)
+        self.at = lru_cache(4)(self._weights_at)
+        """The first coefficients each way around a place, and weights (6, 16) as of a jet."""
 
     def _cells(self, positions: Array) -> tuple[Indices, Array]:
         """The cell (P, 2) that each place lies in, and the place (P, 2) within it, in steps."""
@@ -98,20 +103,13 @@ class Splines:
 
         Or the first of these `orders` alone.
         """
-        (i, j), rows = self._at(x, y)
-        block = coefficients.reshape(self._count[1], self._count[0], -1)[j : j + 4, i : i + 4]
-        return rows[:orders].dot(block.reshape(16, -1))
+        first, rows = self.at(x, y)
+        return rows[:orders].dot(self.block(coefficients, *first))
 
-    def jets(self, coefficients: Array) -> Callable[[float, float, int], Array]:
-        """The same at many places, one after the other: quicker where they are near."""
-        grid = coefficients.reshape(self._count[1], self._count[0], -1)
-        block = lru_cache(16)(lambda i, j: grid[j : j + 4, i : i + 4].reshape(16, -1))
-
-        def jet(x: float, y: float, orders: int) -> Array:
-            (i, j), rows = self._at(x, y)
-            return rows[:orders].dot(block(i, j))
-
-        return jet
+    def block(self, coefficients: Array, i: int, j: int) -> Array:
+        """Those (16, k) of coefficients (G, k) of which `at` gives the weights."""
+        found = coefficients.reshape(self._count[1], self._count[0], -1)[j : j + 4, i : i + 4]
+        return found.reshape(16, -1)
 
     def _weights_at(self, x: float, y: float) -> tuple[tuple[int, int], Array]:
         """The first coefficients each way around a place, and weights (6, 16) of those."""
@@ -184,7 +182,7 @@ class MeshSkin(Polygon):
         given = np.array(nodes, np.float32).astype(float)
         faces = np.array(triangles, np.intp)
         _check_mesh(given, faces, thickness)
-        rim = _rim(Surface(given, faces))
+        (rim,) = Surface(given, faces).loops
         fixed = np.intersect1d(rim if held is None else np.array(held, np.intp), rim)
         if len(fixed) < 2:
             raise Refusal(f"expected at least two nodes of the rim that are held, got {len(fixed)}")
@@ -230,8 +228,13 @@ class MeshSkin(Polygon):
     def of_text(cls, text: str) -> "MeshSkin":
         """The mesh of a `text`; raises a `Refusal` for another text."""
         try:
-            with np.load(io.BytesIO(base64.b85decode(text))) as file:
-                nodes, held = file["nodes"], file["held"]
+            content = base64.b85decode(text)
+            with zipfile.ZipFile(io.BytesIO(content)) as archive:
+                if sum(member.file_size for member in archive.infolist()) > _MOST_BYTES:
+                    raise ValueError
+            with np.load(io.BytesIO(content)) as file:
+                nodes = file["nodes"].astype(np.float32, casting="same_kind")
+                held = file["held"].astype(np.intp, casting="same_kind")
                 triangles = np.cumsum(file["steps"], dtype=np.intp).reshape(-1, 3)
                 thickness = float(file["thickness"])
         except (*ARCHIVE_DAMAGES, LookupError, TypeError) as error:
@@ -287,6 +290,14 @@ class MeshSkin(Polygon):
             far = np.linalg.norm(self.points - self.points[found[k]], axis=1)
             away = np.minimum(away, far)
         return found
+
+    def projected(self, points: Array) -> tuple[Array, Array]:
+        """Positions (P, 2) in m nearest to `points` (P, 3) in m in the coordinates of `nodes`.
+
+        And how far (P,) in m these are from there.
+        """
+        triangle, shares, away = placed(Surface(self.nodes, self.triangles), points)
+        return np.einsum("pk,pki->pi", shares, self.places[self.triangles[triangle]]), away
 
     @cached_property
     def splines(self) -> Splines:
@@ -425,23 +436,23 @@ def _sums(places: Indices, values: Array, count: int) -> Array:
 def _check_mesh(nodes: Array, triangles: Indices, thickness: float) -> None:
     if nodes.ndim != 2 or nodes.shape[1] != 3 or not np.isfinite(nodes).all():
         raise Refusal(f"expected finite nodes of shape (n, 3) in m, got shape {nodes.shape}")
+    if not (SIDES[0] <= np.ptp(nodes, axis=0).max() <= SIDES[1]):
+        raise Refusal(f"expected nodes of a skin in m, got {np.ptp(nodes, axis=0)} m of them")
     of_three = triangles.ndim == 2 and triangles.shape[1] == 3 and len(triangles)
     if not (of_three and 0 <= triangles.min() <= triangles.max() < len(nodes)):
         raise Refusal(
             f"expected triangles of shape (F, 3), numbers of the {len(nodes)} nodes from 0, got "
             f"shape {triangles.shape}"
         )
+    if len(triangles) > _MOST_TRIANGLES:
+        raise Refusal(
+            f"expected at most {_MOST_TRIANGLES:,} triangles, got {len(triangles):,}; decimate them"
+        )
     if not 0 < thickness < math.inf:
         raise Refusal(f"expected a thickness above zero in m of the mesh, got {thickness}")
-
-
-def _rim(surface: Surface) -> Indices:
-    if len(surface.loops) != 1:
-        raise Refusal(
-            f"expected a mesh with one rim, got {len(surface.loops)}; close its holes, and keep "
-            "one piece"
-        )
-    return surface.loops[0]
+    for fault in faults(Surface(nodes, triangles)):
+        if fault.kind not in _LESSER:
+            raise Refusal(fault.message)
 
 
 def _frame(nodes: Array, triangles: Indices, held: Array, rim: Array) -> Array:

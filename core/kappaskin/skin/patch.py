@@ -678,9 +678,9 @@ class Polygon(Patch):
 
     def _is_deep(self, x: float, y: float, depth: float) -> bool:
         """Whether the raster alone shows that (x, y) lies deeper than `depth` in m."""
-        column, row = int(_CELLS * x / self.a), int(_CELLS * y / self.b)
-        on = 0 <= row < _CELLS and 0 <= column < _CELLS
-        return on and self._raster[row][column] > depth
+        column, row = _CELLS * x / self.a, _CELLS * y / self.b
+        on = 0 <= row < _CELLS and 0 <= column < _CELLS  # not where they are NaN
+        return on and self._raster[int(row)][int(column)] > depth
 
     def holds(self, x: float, y: float) -> bool:
         """Whether (x, y) in m lies on the skin."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kappaskin.frames import Array, Indices, Mask
+from kappaskin.skin.mesh import MeshSkin
 from kappaskin.skin.patch import Patch
 
 _HALVINGS = 24  # of a cell, until the rim is found
@@ -41,18 +42,22 @@ def snapped_to_rim(patch: Patch, grid: Array, on: Mask) -> tuple[Array, Indices]
 class RestMesh:
     """The skin of `patch` at rest at nx x ny points; those outside its rim are moved onto it.
 
-    At `positions` (k, 2) in m on the skin are the `points` (k, 3) in m in space with outward
-    `normals`; the `triangles` (n, 3) of them turn left as seen from outside.
+    Of a mesh at its nodes. At `positions` (k, 2) in m on the skin are the `points` (k, 3) in m in
+    space with outward `normals`; the `triangles` (n, 3) of them turn left as seen from outside.
     """
 
     def __init__(self, patch: Patch, nx: int, ny: int) -> None:
-        grid = np.stack(np.meshgrid(*patch.grid(nx, ny)), axis=-1)
-        on = patch.contains(grid.reshape(-1, 2)).reshape(ny, nx)
-        if not on.all():
-            grid, _ = snapped_to_rim(patch, grid, on)
+        self.positions: Array
         self.triangles: Indices
-        used, self.triangles = np.unique(_triangles(on), return_inverse=True)
-        self.positions: Array = grid.reshape(-1, 2)[used]
+        if isinstance(patch, MeshSkin):
+            self.positions, self.triangles = patch.places, patch.triangles
+        else:
+            grid = np.stack(np.meshgrid(*patch.grid(nx, ny)), axis=-1)
+            on = patch.contains(grid.reshape(-1, 2)).reshape(ny, nx)
+            if not on.all():
+                grid, _ = snapped_to_rim(patch, grid, on)
+            used, self.triangles = np.unique(_triangles(on), return_inverse=True)
+            self.positions = grid.reshape(-1, 2)[used]
         self.points, self.normals = patch.at_rest(self.positions)
 
 

@@ -7,7 +7,7 @@ import re
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import chain
 from pathlib import Path
 from typing import Any, cast
@@ -20,7 +20,7 @@ from kappaskin._toml import TomlTable, parsed
 from kappaskin._toml import table as toml_table
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Indices
-from kappaskin.scenes import read_elements, read_skin
+from kappaskin.scenes import find_file, read_elements, read_skin
 from kappaskin.sensing import (
     QUANTITIES,
     DigitalReadings,
@@ -29,6 +29,7 @@ from kappaskin.sensing import (
     kind_of_reading,
     name_of_reading,
 )
+from kappaskin.skin import MeshSkin
 from kappaskin.sources.decoder import Decoder
 from kappaskin.sources.lines import (
     CHECKSUMS,
@@ -248,13 +249,12 @@ def load_description(file: Path, serial_number: str = "") -> Description:
         text = read_file(file, _LARGEST).decode("utf-8-sig")
     except (OSError, ValueError) as error:
         raise Refusal(f"{file}: cannot be read as a sensor's description ({error})") from error
-    return description_of(
-        _with_calibration(text.replace("\r\n", "\n"), file), str(file), serial_number
-    )
+    text = _with_files(_with_calibration(text.replace("\r\n", "\n"), file), file)
+    return description_of(text, str(file), serial_number)
 
 
 # Recordings keep the text of a description, and need no other file: so the gains and offsets of the
-# calibration that it names are put behind it.
+# calibration that it names are put behind it, and what files of the skin and the elements have.
 _CALIBRATION = "\n[calibration]  # as it was in its file\n"
 
 
@@ -281,6 +281,41 @@ def _with_calibration(text: str, file: Path) -> str:
     return f"{text}{toml_table(_CALIBRATION.rstrip(), values)}"
 
 
+_REPLACED = ("file", "along")
+_KEPT = "\n[kept.{}]  # what its file has"
+
+
+def _with_files(text: str, file: Path) -> str:
+    top = TomlTable(parsed(text, file), text, str(file))
+    skin, elements = top.table("skin"), top.table("elements")
+    if "file" not in skin and "file" not in elements:
+        return text
+    find = partial(find_file, file.parent, False)
+    patch = read_skin(skin, find)[0].patch
+    if "file" in skin:
+        text += toml_table(_KEPT.format("skin"), {"mesh": cast("MeshSkin", patch).text})
+    if "file" in elements:
+        layout, _ = read_elements(elements, patch, find, skin)
+        kept: dict[str, Any] = {"positions": layout.positions.tolist()}
+        kept |= {} if layout.turns is None else {"turns": layout.turns.tolist()}
+        text += toml_table(_KEPT.format("elements"), kept)
+    return text
+
+
+def _with_kept(values: dict[str, Any], top: TomlTable) -> None:
+    """Put what [kept] has of files in the place of their names in `values`, the table `top`."""
+    kept = top.table("kept")
+    for part in ("skin", "elements"):
+        for table in (top, kept):
+            table.table(part)  # or refused here
+        if part in kept:
+            own = {
+                key: value for key, value in values.get(part, {}).items() if key not in _REPLACED
+            }
+            values[part] = own | values["kept"][part]
+    kept.done()
+
+
 _VALUES = "\n[values]  # a record: sequence number, time in s, and the numbers of the columns\n"
 _VALUES_SYNC, _VALUES_CHECKSUM = "b55e", "crc32"
 
@@ -296,7 +331,7 @@ def of_values(description: Description) -> Description:
 
 
 def _no_file(table: TomlTable, key: str) -> Path:
-    raise table.refusal("expected the mesh itself, as a description is kept without its files", key)
+    raise table.refusal("expected a description with its mesh; load it from its file", key)
 
 
 @lru_cache(8)
@@ -305,9 +340,11 @@ def description_of(text: str, name: str, serial_number: str = "") -> Description
 
     `serial_number` is that of the sensor where the text has no `id`.
     """
-    top = TomlTable(parsed(text, Path(name)), text, name)
+    values = parsed(text, Path(name))
+    top = TomlTable(values, text, name)
     if (version := TOP.value(top, "format")) != FORMAT:
         raise top.refusal(f"expected format = {FORMAT}, got {version}", "format")
+    _with_kept(values, top)
     skin = top.table("skin")
     plate, edge = read_skin(skin, _no_file)
     # Without a given rigidity that of the default skin is no information.
@@ -315,7 +352,7 @@ def description_of(text: str, name: str, serial_number: str = "") -> Description
     elements = top.table("elements")
     if "reads" in elements:
         raise elements.refusal("expected none: the columns determine what is read", "reads")
-    layout = read_elements(elements, plate.patch)
+    layout, _ = read_elements(elements, plate.patch, _no_file, skin)
     line = top.table("line")
     kind = LINE.value(line, "kind")
     names, paths = _names(line, kind)
@@ -495,7 +532,8 @@ def _reading(
         if datums.setdefault(quantity, datum) != datum:
             raise Refusal(f"expected one datum of all readings of {quantity}, got fixed and free")
     free = [quantity for quantity, datum in datums.items() if datum == "free"]
-    components = {COMPONENTS[k] for k in np.flatnonzero(layout.live.any(axis=1))}
+    turns, all_of = layout.turns, layout.live.any(axis=-1)
+    components = {COMPONENTS[k] for k in np.flatnonzero(all_of)} if turns is None else set[str]()
     alike = len({readings.of(what, "noise") for what in each}) == 1
     if alike and not free and set(each) == components:
         numbers = np.array([COMPONENTS.index(what) for what in each])
@@ -503,8 +541,9 @@ def _reading(
         live = layout.live & np.isin(np.arange(layout.channels), channels).reshape(3, -1)
         return replace(layout, live=live), channels
     quantities, directions = zip(*kinds, strict=True)
-    read = layout.reading(elements, quantities, directions, free).without(layout.dead)
-    return read, np.arange(len(each))
+    read = layout.reading(elements, quantities, directions, free)
+    read = read if turns is None else read.turned(turns)
+    return read.without(layout.dead), np.arange(len(each))
 
 
 def _columns(

@@ -18,7 +18,7 @@ from kappaskin.frames import Array
 from kappaskin.mechanics import Plate
 from kappaskin.scenes import EffectSelection, Plan, Scene, Simulator, plan
 from kappaskin.scenes.effects import EFFECTS, ReadingEffect
-from kappaskin.skin import Cap, Disk, Polygon
+from kappaskin.skin import Cap, Disk, MeshSkin, Polygon
 
 _MOST = 10_000_000  # readings: 80 MB for each array of them
 
@@ -90,6 +90,8 @@ def _skin(plate: Plate) -> dict[str, NDArray[Any]]:
             values |= {"angle": skin.angle, "stretch": skin.stretch}
         case Disk():
             values["outline"] = skin.rim_radius
+        case MeshSkin():
+            values |= {"size": None, "radius": None, "mesh": skin.text}
         case Polygon():
             values["outline"] = skin.vertices
         case _:

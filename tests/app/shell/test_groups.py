@@ -42,11 +42,12 @@ def test_what_the_finder_goes_to_is_expanded(shared_window, qtbot) -> None:
     assert shared_window.noise.editor("noise_rms").isVisible()
 
 
-def test_collapsed_groups_are_so_in_the_next_window(window, opened, qtbot, tmp_path: Path) -> None:
-    file = tmp_path / "window.toml"
+def test_collapsed_groups_are_so_in_the_next_window(opened, qtbot, tmp_path: Path) -> None:
+    file, window = tmp_path / "window.toml", opened("sim:")
     window.saver.begin(file)
     qtbot.mouseClick(window.noise.fold, LEFT)
     window.saver.finish()
+    window.close()
 
     other = opened("sim:")
     other.saver.begin(file)

@@ -158,6 +158,8 @@ def test_every_button_and_editor_explains_itself(window: MainWindow) -> None:
 def test_every_control_obeys_the_keyboard_and_can_be_undone_and_redone(
     window: MainWindow, qtbot, shape: str
 ) -> None:
+    window.session.timer.stop()
+    window.session.engine.disconnect()  # it would build a pipeline for each
     window.requests.set("shape", shape)
     window.history.change("All", -1, load_case="two-points", side_x=0.03, x=0.02, region="skin")
     obeyed = set()

@@ -32,6 +32,8 @@ from kappaskin import (
 from kappaskin.contact import KINDS
 from kappaskin.estimation import METHODS
 from kappaskin.pipeline import reconstruct
+from kappaskin.skin import MeshSkin
+from meshes import ellipsoid
 from navier import HingedPlate, Load
 
 RNG = np.random.default_rng(7)
@@ -496,6 +498,36 @@ def test_a_cap_comes_from_the_file(saved) -> None:
     found = reconstruct(saved(**of, curvature=read.reshape(3, -1)), (NI, NJ), edge="clamped")
 
     np.testing.assert_allclose(found["coefficients"].ravel(), TRUTH[0], rtol=0, atol=1e-14)
+
+
+@pytest.fixture(scope="module")
+def pad() -> MeshSkin:
+    return MeshSkin(*ellipsoid(18, (9e-3, 7e-3, 6e-3), 1.2), 1e-3)
+
+
+def test_a_mesh_comes_from_the_file(pad, saved) -> None:
+    layout = SensorLayout.spread(pad, 40)
+    read = layout.operator(basis_for(pad, "clamped", NI, NJ)) @ TRUTH[0]
+    of = {"mesh": pad.text, "positions": layout.positions, "size": None}
+
+    found = reconstruct(saved(**of, curvature=read.reshape(3, -1)), (NI, NJ), edge="clamped")
+
+    np.testing.assert_allclose(found["coefficients"].ravel(), TRUTH[0], rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"mesh": "a mesh", "size": None}, "expected the text of a mesh"),
+        ({"mesh": 1.0, "size": None}, "expected mesh to be one text, got float64"),
+        ({"mesh": ["a", "b"], "size": None}, "expected mesh to be one text"),
+        ({"mesh": "a mesh"}, "expected the mesh alone, got size too"),
+        ({"size": None}, "has no 'size'"),
+    ],
+)
+def test_a_file_of_no_mesh_is_refused(saved, changes: dict[str, Any], reason: str) -> None:
+    with pytest.raises(Refusal, match=reason):
+        reconstruct(saved(**changes), (NI, NJ))
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,8 @@ from kappaskin.publish.foxglove import (
 from kappaskin.publish.foxglove_channels import CHANNELS, MESH, NAMES, POINTS, SkinMessages
 from kappaskin.publish.message import EstimateMessage
 from kappaskin.publish.publishing import opened, target_of
-from kappaskin.skin import Cap, Disk, Patch, Polygon
+from kappaskin.skin import Cap, Disk, MeshSkin, Patch, Polygon
+from meshes import ellipsoid
 
 pytestmark = pytest.mark.slow
 
@@ -277,6 +278,7 @@ def area_of_dome(patch: Patch) -> float:
 
 
 DOME, DISK, CAP = Patch(0.03, 0.03, (0.07, -0.1)), Disk(0.02), Cap(0.008)
+PAD = MeshSkin(*ellipsoid(18, (0.008, 0.008, 0.008), 1.2), 1e-3)
 L_SHAPE = Polygon([[0, 0], [0.04, 0], [0.04, 0.02], [0.02, 0.02], [0.02, 0.04], [0, 0.04]])
 AREAS = {
     "flat": (Patch(0.1, 0.06), 6e-3),
@@ -286,6 +288,7 @@ AREAS = {
     "polygon": (L_SHAPE, 1.2e-3),
     "cap": (CAP, 2 * np.pi * 0.008**2),
     "egg": (Cap(0.008, 1.2, 1.0), 2 * np.pi * 0.008**2 * (1 - np.cos(1.2))),
+    "mesh": (PAD, 2 * np.pi * 0.008**2 * (1 - np.cos(1.2))),
 }
 
 
@@ -315,13 +318,18 @@ def test_the_mesh_is_one_piece_of_the_skin_seen_from_outside(kind: str) -> None:
     sizes = np.linalg.norm(turned, axis=1)
     assert sizes.sum() == pytest.approx(area, rel=0.01)
     outward = np.array([0.0, 0.0, 1.0])
-    if isinstance(patch, Cap):
+    if isinstance(patch, Cap | MeshSkin):
         outward = (a + b + c) / 3 - (patch.a / 2, patch.b / 2, -0.008)
     elif kind == "bent":
         outward = ((a + b + c) / 3 - (patch.a / 2, 0, -0.01)) * (1, 0, 1)
     assert (np.sum(turned * outward, axis=1)[sizes > 1e-6 * sizes.max()] > 0).all()
     assert (colours[:, 3] == 1).all()
     assert np.ptp(colours[:, 1]) > 0.3
+    if kind == "mesh":
+        assert np.array_equal(triangles, patch.triangles)
+        moved = basis.at(patch.places) @ coefficients.ravel()
+        out = np.linalg.norm(points - (patch.a / 2, patch.b / 2, -0.008), axis=1)
+        assert out == pytest.approx(0.008 - moved, abs=5e-6)
 
 
 def test_the_mesh_is_the_deflected_surface_with_the_contact_s_error_bars_on_it(

@@ -5,6 +5,7 @@ import json
 import math
 import os
 import re
+import struct
 import subprocess
 import sys
 from collections import deque
@@ -438,6 +439,73 @@ def test_a_series_is_one_surface_each_so_many_seconds(taps, tmp_path) -> None:
     assert list(said["times"].values()) == times
     assert all((tmp_path / "s" / name).exists() for name in said["times"])
     assert not (tmp_path / "s" / "skin.stl").exists()
+
+
+def glb(path: Path) -> tuple[dict, Callable[[int], np.ndarray]]:
+    """What a .glb says of itself, and its accessors' values by number."""
+    data = path.read_bytes()
+    assert struct.unpack("<4sII", data[:12]) == (b"glTF", 2, len(data))
+    size, kind = struct.unpack("<I4s", data[12:20])
+    said, rest = json.loads(data[20 : 20 + size]), data[28 + size :]
+    assert (kind, data[24 + size : 28 + size]) == (b"JSON", b"BIN\0")
+    assert len(rest) == said["buffers"][0]["byteLength"]
+
+    def values(number: int) -> np.ndarray:
+        one = said["accessors"][number]
+        view = said["bufferViews"][one["bufferView"]]
+        found = np.frombuffer(rest, {5125: "<u4", 5126: "<f4"}[one["componentType"]])
+        found = found[view["byteOffset"] // 4 :][: view["byteLength"] // 4]
+        assert found.size == one["count"] * {"SCALAR": 1, "VEC3": 3}[one["type"]]
+        return found.reshape(one["count"], -1)
+
+    return said, values
+
+
+def test_a_glb_is_the_same_surface_as_the_vtp(taps, tmp_path) -> None:
+    pv = pytest.importorskip("pyvista")
+    export(taps[0], tmp_path / "skin.vtp", at=0.2)
+    export(taps[0], tmp_path / "skin.glb", at=0.2)
+    one, other = pv.read(tmp_path / "skin.vtp"), trimesh.load(tmp_path / "skin.glb", force="mesh")
+    assert np.array_equal(other.faces, one.regular_faces)
+    turned = other.vertices[:, [0, 2, 1]] * (1, -1, 1)  # y is up in glTF
+    np.testing.assert_allclose(turned, one.points, rtol=1e-6, atol=1e-9)
+    said, values = glb(tmp_path / "skin.glb")
+    deep = np.abs(one["displacement [m]"])
+    assert said["asset"]["extras"]["brightest [m]"] == pytest.approx(deep.max())
+    assert said["asset"]["extras"]["device"]["name"] == "Simulated skin"
+    colours = values(said["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"])
+    assert np.ptp(colours, axis=0).min() > 0.1
+    assert colours.sum(axis=1).argmax() == deep.argmax()
+
+
+def test_a_glb_moves_as_the_skin_did(taps, tmp_path) -> None:
+    export(taps[0], tmp_path / "skin.glb", every=0.1)
+    export(taps[0], tmp_path / "skin.pvd", every=0.1)
+    pv = pytest.importorskip("pyvista")
+    said, values = glb(tmp_path / "skin.glb")
+    (animation,), mesh = said["animations"], said["meshes"][0]
+    (sampler,), skin = animation["samplers"], mesh["primitives"][0]
+    reader = pv.get_reader(tmp_path / "skin.pvd")
+    times = values(sampler["input"])[:, 0]
+    np.testing.assert_allclose(times, np.array(reader.time_values) - reader.time_values[0])
+    weights = values(sampler["output"]).reshape(len(times), len(mesh["weights"]))
+    first = values(skin["attributes"]["POSITION"])
+    moves = [values(target["POSITION"]) for target in skin["targets"]]
+    for at, weight in zip(reader.time_values, weights, strict=True):
+        reader.set_active_time_value(at)
+        points = first + np.tensordot(weight, moves, 1)
+        np.testing.assert_allclose(points, reader.read()[0].points, atol=1e-8)
+    assert np.abs(moves).max() > 1e-5
+
+
+def test_a_glb_without_times_is_the_skin_at_its_deepest(taps, tmp_path) -> None:
+    recording, told = taps
+    export(recording, tmp_path / "skin.glb")
+    said, values = glb(tmp_path / "skin.glb")
+    deepest = max(told, key=lambda one: np.abs(one.estimate.surface).max())
+    assert said["asset"]["extras"]["sequence"] == deepest.frame.sequence
+    z = values(said["meshes"][0]["primitives"][0]["attributes"]["POSITION"])[:, 2]
+    assert z.min() == pytest.approx(-deepest.estimate.surface.max(), rel=1e-6)
 
 
 # What is refused, and what is left of it.

@@ -15,7 +15,8 @@ from kappaskin.scenes.effects import EFFECTS
 
 GUIDE = runpy.run_path(str(Path(__file__).parents[2] / "guide_keys.py"))
 FROM_ELSEWHERE = {"patch", "transduction", "rigid", "a", "b", "strip", "vertices", "heights"}
-FROM_ELSEWHERE |= {"faces"}
+FROM_ELSEWHERE |= {"faces", "content", "nodes", "points", "places", "triangles", "rim", "frame"}
+FROM_ELSEWHERE |= {"origin"}
 """Fields that a scene tells by other keys, or by a file."""
 
 KINDS = [(part, kind) for part in PARTS for kind in (PARTS[part].kinds or ("",))]

@@ -1,7 +1,10 @@
 """Meshes: their coordinates, geometry and text, against spheres and ellipsoids in closed form."""
 
+import base64
+import io
 import math
 import pickle
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -112,11 +115,56 @@ def test_another_text_is_refused(text, sphere):
         MeshSkin.of_text(text)
 
 
+def packed(**changed):
+    """The text of arrays such as those of a mesh."""
+    nodes, triangles = ellipsoid(9, (R, R, R), MORE)
+    arrays = {"nodes": nodes.astype("f4"), "steps": np.diff(triangles.ravel(), prepend=0)}
+    arrays |= {"held": np.arange(217, 271), "thickness": np.array(1e-3)}
+    file = io.BytesIO()
+    np.savez_compressed(file, **arrays | changed)
+    return base64.b85encode(file.getvalue()).decode()
+
+
+HOSTILE = {
+    "a bomb": ({"nodes": np.zeros((2**20, 3), "f4")}, "the text of a mesh"),
+    "another bomb": ({"more": np.zeros(2**21)}, "the text of a mesh"),
+    "objects": ({"nodes": np.array([[{}]], object)}, "the text of a mesh"),
+    "texts": ({"nodes": np.array([["a"] * 3])}, "the text of a mesh"),
+    "sides that are no numbers": ({"held": np.array(["a"])}, "the text of a mesh"),
+    "broken nodes": ({"nodes": np.full((300, 3), np.nan, "f4")}, "finite nodes"),
+    "far nodes": ({"nodes": np.full((300, 3), [[0], [3e38], [0]] * 100, "f4")}, "nodes of a skin"),
+    "one node": ({"nodes": np.ones((300, 3), "f4")}, "nodes of a skin"),
+    "no such nodes": ({"steps": np.array([0, 1, 2**40])}, "numbers of the"),
+    "many triangles": ({"steps": np.zeros(3 * 2**16, "i4")}, "at most 32,768 triangles"),
+    "no area": ({"steps": np.zeros(300, "i4")}, "expected each triangle once"),
+    "held nowhere": ({"held": np.array([-1, 10**9])}, "nodes of the rim that are held"),
+    "no thickness": ({"thickness": np.array(np.nan)}, "thickness above zero"),
+    "many thicknesses": ({"thickness": np.ones(3)}, "the text of a mesh"),
+}
+
+
+@pytest.mark.parametrize(("changed", "match"), HOSTILE.values(), ids=HOSTILE)
+def test_a_hostile_text_is_refused_before_it_takes_memory(changed, match):
+    assert MeshSkin.of_text(packed()).thickness == 1e-3
+    text = packed(**changed)
+    tracemalloc.start()
+    with pytest.raises(Refusal, match=match):
+        MeshSkin.of_text(text)
+    taken = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert taken < 2**23
+
+
 def test_elements_are_spread_evenly(sphere):
     at = sphere.points[sphere.spread(60)]
     apart = np.linalg.norm(at[:, None] - at, axis=2) + np.eye(60)
     assert apart.min() > 0.6 * math.sqrt(sphere.areas.sum() / 60)
     assert sphere.depth(at[:, :2]).min() > 0
+
+
+def test_a_place_that_is_not_known_is_not_on_the_skin(sphere):
+    assert sphere.holds(sphere.a / 2, sphere.b / 2)
+    assert not sphere.holds(math.nan, math.nan)
 
 
 def test_only_what_is_held_is_near_the_rim():
@@ -151,7 +199,7 @@ def test_what_is_no_mesh_is_refused(change, match):
 def test_a_mesh_with_a_hole_is_refused():
     places, triangles = disk(8)
     whole = triangles[~(np.linalg.norm(places[triangles].mean(axis=1), axis=1) < 0.2)]
-    with pytest.raises(Refusal, match="one rim, got 2"):
+    with pytest.raises(Refusal, match="one rim, got 1 more"):
         MeshSkin(np.column_stack([places, 0 * places[:, 0]]) * 0.01, whole, 1e-3)
 
 

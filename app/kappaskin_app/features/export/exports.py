@@ -16,6 +16,7 @@ from kappaskin.errors import Refusal
 from kappaskin.pipeline import Setup
 from kappaskin.recording import (
     PRESETS,
+    SURFACES,
     Exported,
     ExportRequest,
     ExportTask,
@@ -52,6 +53,7 @@ _FORMATS = {
     ".vtp": "Surface for ParaView, PyVista",
     ".pvd": "Series of surfaces for ParaView",
     ".stl": "Surface for CAD",
+    ".glb": "Surface or its motion in glTF",
 }
 _EXTRAS = {_PARQUET: ("pyarrow", "parquet"), ".h5": ("h5py", "hdf5")}
 """What some formats need: a module, and the extra that installs it."""
@@ -181,7 +183,7 @@ class ExportDialog(WorkDialog):
     def _at_once(self) -> bool:
         """Whether one time is exported, not a span."""
         suffix = Path(self.to.text()).suffix.lower()
-        return suffix == ".vtp" or (suffix == ".stl" and not self.every.value())
+        return suffix == ".vtp" or (suffix in (".stl", ".glb") and not self.every.value())
 
     def _allow(self) -> None:
         super()._allow()
@@ -189,7 +191,7 @@ class ExportDialog(WorkDialog):
         one, suffix = self._at_once, Path(self.to.text()).suffix.lower()
         if (at := self.format.findData(suffix)) >= 0:
             self.format.setCurrentIndex(at)
-        self.preset.setEnabled(not busy and suffix not in (".vtp", ".pvd", ".stl"))
+        self.preset.setEnabled(not busy and suffix not in SURFACES)
         self._changed.stop()
         if self._forecast.running:
             self._forecast.stop()

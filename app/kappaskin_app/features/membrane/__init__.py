@@ -1,7 +1,5 @@
 """Membrane: 3-D view of the skin with colours, loads, contact, overlays and legend."""
 
-from PySide6.QtCore import Qt
-
 from kappaskin_app.features.membrane.skin_view import SkinView
 from kappaskin_app.features.membrane.view_actions import ViewActions, ViewPanel
 from kappaskin_app.guard import guarded
@@ -34,8 +32,7 @@ class MembraneFeature:
         for part in (self.scale, self.legend, self.membrane):
             shell.display.unit_changed.connect(guarded(part.show_unit))
         shell.display.unit_changed.connect(guarded(self._enable_alarm))
-        # Queued: the next update follows the drawing, without waiting for the timer.
-        self.membrane.drawn.connect(shell.session.tick, Qt.ConnectionType.QueuedConnection)
+        self.membrane.drawn.connect(shell.session.hurry)
         self.membrane.drawn.connect(shell.display.drawn)
         self.membrane.pointer.moved.connect(selection.over)
         self.scale.lock_wanted.connect(guarded(self.view_actions.lock))

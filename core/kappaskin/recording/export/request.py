@@ -22,7 +22,7 @@ from kappaskin.sources import sensor_from_json
 TABLES = (".parquet", ".csv", ".npz", ".h5")
 """Suffixes of files with a row for each frame."""
 
-SURFACES = (".vtp", ".stl", ".pvd")
+SURFACES = (".vtp", ".stl", ".pvd", ".glb")
 """Suffixes of files of the skin's surface."""
 
 

@@ -1,10 +1,13 @@
-"""Exported meshes of the skin's surface: STL, VTP and PVD."""
+"""Exported meshes of the skin's surface: STL, VTP, PVD and GLB."""
 
 import base64
 import html
+import json
 import math
+import struct
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +19,7 @@ from kappaskin.bases import Basis
 from kappaskin.contact import surface_geometry
 from kappaskin.errors import Refusal
 from kappaskin.frames import COMPONENTS, Array, Indices
-from kappaskin.pipeline import Pipeline
+from kappaskin.pipeline import SEQUENTIAL, Pipeline
 from kappaskin.recording.export.request import ExportedFrame, ExportRequest, RecordingInfo
 from kappaskin.skin import RestMesh
 
@@ -39,11 +42,22 @@ class SkinSurface:
 
 
 class SkinMesh:
-    """The skin of a `basis` at nx x ny points; those outside its rim are moved onto it."""
+    """The skin of a `basis` at nx x ny points; those outside its rim are moved onto it.
+
+    That of a mesh at its nodes.
+    """
 
     def __init__(self, basis: Basis, nx: int, ny: int) -> None:
         self._basis = basis
         self._rest = RestMesh(basis.patch, nx, ny)
+
+    def depth(self, coefficients: Array) -> float:
+        """The largest displacement in m, either way."""
+        return float(np.abs(self._values @ coefficients.ravel()).max())
+
+    @cached_property
+    def _values(self) -> Array:
+        return self._basis.at(self._rest.positions)
 
     def __call__(self, coefficients: Array) -> SkinSurface:
         """The surface with `coefficients` (Ni, Nj) in m."""
@@ -203,3 +217,112 @@ def _array(name: str, values: "NDArray[Any]", more: str = "") -> str:
         f'<DataArray type="{kind}" Name="{name}" NumberOfComponents="{width}" {more} '
         f'format="binary">{text}</DataArray>\n'
     )
+
+
+_FLOAT, _INTEGER = 5126, 5125  # as glTF numbers them: 32 bits each
+_UPWARD = (-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))  # turns z up to y up, as glTF has it
+_MOST_SHAPES = 500
+_ANCHORS = np.array([[*bytes.fromhex(anchor[1:])] for anchor in SEQUENTIAL]) / 255
+
+
+class GlbSurfaces(SurfaceWriter):
+    """Binary glTF in m: the skin at a moment, at its deepest, or as it moves (morph targets).
+
+    Coloured by the largest displacement that each point has.
+    """
+
+    suffix = ".glb"
+
+    def __init__(self, scratch: Path, request: ExportRequest, info: RecordingInfo) -> None:
+        super().__init__(scratch, request, info)
+        self._shapes: list[tuple[float, SkinSurface]] = []
+        self._about, self._deepest = "", -1.0
+        self._parts: list[bytes] = []
+        self._accessors: list[dict[str, Any]] = []
+
+    def take(self, frame: ExportedFrame) -> bool:
+        c, skin = frame.estimate.coefficients, self._skin(frame.pipeline)
+        known = self._shapes and not self.request.every and np.isfinite(c).all()
+        if known and skin.depth(c) <= self._deepest:
+            return True
+        return super().take(frame)
+
+    def write(self, path: Path, frame: ExportedFrame, surface: SkinSurface) -> None:
+        deep = float(np.abs(surface.displacement).max())
+        if not self.request.every:
+            self._shapes = []
+        if deep > self._deepest or not self._shapes:
+            self._about, self._deepest = self.description(frame), deep
+        self._shapes.append((frame.at, surface))
+        if len(self._shapes) > _MOST_SHAPES:
+            raise Refusal(
+                f"expected at most {_MOST_SHAPES} shapes in a .glb, got more; choose a longer time "
+                "between two, or a shorter span"
+            )
+        if len(surface.points) != len(self._shapes[0][1].points):
+            raise Refusal(
+                f"expected one grid of the skin in a .glb, got another at {frame.at:.6g} s, when "
+                "the settings changed; export the time before or after that"
+            )
+
+    def finish(self) -> None:
+        times, shapes = zip(*self._shapes, strict=True)
+        first = shapes[0]
+        deep = np.max([np.abs(each.displacement) for each in shapes], axis=0)
+        share, places = deep / (self._deepest or 1.0), np.linspace(0, 1, len(_ANCHORS))
+        # Of colours glTF has the light, not the values on a screen.
+        light: list[Array] = [np.interp(share, places, of) ** 2.2 for of in _ANCHORS.T]
+        attributes = {
+            "POSITION": self._add(first.points),
+            "NORMAL": self._add(first.normals),
+            "COLOR_0": self._add(np.column_stack(light)),
+        }
+        skin = {"attributes": attributes, "indices": self._add(first.triangles), "material": 0}
+        targets = [
+            {
+                "POSITION": self._add(each.points - first.points),
+                "NORMAL": self._add(each.normals - first.normals),
+            }
+            for each in shapes[1:]
+        ]
+        moving: dict[str, Any] = {}
+        if targets:
+            at, weights = np.array(times) - times[0], np.eye(len(times))[:, 1:]
+            moved = {"input": self._add(at), "output": self._add(weights.ravel())}
+            channel = {"sampler": 0, "target": {"node": 0, "path": "weights"}}
+            moving["animations"] = [{"samplers": [moved], "channels": [channel]}]
+        many = {"primitives": [skin | {"targets": targets}], "weights": [0.0] * len(targets)}
+        look = {"metallicFactor": 0.0, "roughnessFactor": 0.6}
+        about = json.loads(self._about) | {"brightest [m]": self._deepest}
+        sizes = [len(part) for part in self._parts]
+        made = moving | {
+            "asset": {"version": "2.0", "generator": self.info.program, "extras": about},
+            "scene": 0,
+            "scenes": [{"nodes": [0]}],
+            "nodes": [{"mesh": 0, "name": "skin", "rotation": _UPWARD}],
+            "meshes": [many if targets else {"primitives": [skin]}],
+            "materials": [{"doubleSided": True, "pbrMetallicRoughness": look}],
+            "accessors": self._accessors,
+            "bufferViews": [
+                {"buffer": 0, "byteOffset": sum(sizes[:k]), "byteLength": size}
+                for k, size in enumerate(sizes)
+            ],
+            "buffers": [{"byteLength": sum(sizes)}],
+        }
+        text = json.dumps(made).encode()
+        chunks = (text + b" " * (-len(text) % 4), b"JSON"), (b"".join(self._parts), b"BIN\0")
+        content = b"".join(struct.pack("<I4s", len(data), kind) + data for data, kind in chunks)
+        head = struct.pack("<4sII", b"glTF", 2, 12 + len(content))
+        (self.scratch / self.request.to.name).write_bytes(head + content)
+
+    def _add(self, values: NDArray[Any]) -> int:
+        """The number of the accessor of some values: points (n, 3), triangles or numbers."""
+        whole = values.dtype.kind == "i"
+        width, kind = (3, "VEC3") if values.ndim == 2 and not whole else (1, "SCALAR")
+        data = values.astype("<u4" if whole else "<f4")
+        rows = data.reshape(-1, width)
+        bounds = {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
+        number = {"componentType": _INTEGER if whole else _FLOAT, "count": len(rows), "type": kind}
+        self._accessors.append(number | bounds | {"bufferView": len(self._parts)})
+        self._parts.append(data.tobytes())
+        return len(self._parts) - 1

@@ -20,7 +20,7 @@ from kappaskin.recording.export.request import (
     another,
     recording_info,
 )
-from kappaskin.recording.export.surfaces import StlSurfaces, VtpSurfaces
+from kappaskin.recording.export.surfaces import GlbSurfaces, StlSurfaces, VtpSurfaces
 from kappaskin.recording.export.tables import CsvTable, Hdf5Table, NpzTable, ParquetTable
 from kappaskin.recording.reading import RecordedMessage, Recording
 from kappaskin.recording.recompute import Recomputation
@@ -35,6 +35,7 @@ FORMATS: dict[str, type[ExportWriter]] = {
     ".vtp": VtpSurfaces,
     ".pvd": VtpSurfaces,
     ".stl": StlSurfaces,
+    ".glb": GlbSurfaces,
 }
 """Writers by suffix: a new format is one more class."""
 

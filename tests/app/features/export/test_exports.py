@@ -343,14 +343,20 @@ def test_an_export_is_cancelled_with_nothing_left(window, recording) -> None:
 
 @pytest.mark.cases("a.pvd")
 @pytest.mark.parametrize(
-    ("name", "span", "at"), [("a.vtp", False, True), ("a.stl", False, True), ("a.pvd", True, False)]
+    ("name", "span", "at"),
+    [
+        ("a.vtp", False, True),
+        ("a.stl", False, True),
+        ("a.glb", False, True),
+        ("a.pvd", True, False),
+    ],
 )
 def test_only_what_makes_sense_is_asked(name: str, span: bool, at: bool, window) -> None:
     dialog = window.exports.dialog
     dialog.to.setText(name)
     assert dialog.begin.isEnabled() == dialog.until.isEnabled() == span
     assert dialog.at.isEnabled() == at
-    if name.endswith(".stl"):
+    if name.endswith((".stl", ".glb")):
         dialog.every.setValue(0.1)
         assert dialog.begin.isEnabled()
         assert not dialog.at.isEnabled()
@@ -367,7 +373,7 @@ def test_a_name_without_an_ending_gets_that_of_the_format_chosen(
         named(tmp_path / "force 0.5 N", kind)
         dialog.choose_file.click()
         names.append(Path(dialog.to.text()).name)
-    endings = [".csv", ".parquet", ".npz", ".h5", ".vtp", ".pvd", ".stl"]
+    endings = [".csv", ".parquet", ".npz", ".h5", ".vtp", ".pvd", ".stl", ".glb"]
     assert names == [f"force 0.5 N{ending}" for ending in endings]
     named(tmp_path / "out.npz", "CSV (*.csv)")
     dialog.choose_file.click()
