@@ -427,13 +427,13 @@ class PointContact:
         strength, force = abs(here.steps[0]), here.steps[0] * unit
         sd: list[float] = (spread * np.sqrt(here.inverse.diagonal())).tolist()
         theory = self._theory_error
+        of_place = theory if self.patch.is_shallow else 0.0
         self.misfit = (spread / float(fit.noise)) ** 2 if fit.noise else math.inf
         under = force * self._influence.gives(x, y)
         if self._stretched is not None:
             under += self._stretched.more(x, y, force)
-        theory_of_place = theory if self.patch.is_shallow else 0.0
-        sd_x = math.hypot(sd[1] / strength, theory_of_place * (x - self.patch.a / 2))
-        sd_y = math.hypot(sd[2] / strength, theory_of_place * (y - self.patch.b / 2))
+        sd_x = math.hypot(sd[1] / strength, of_place * (x - self.patch.a / 2))
+        sd_y = math.hypot(sd[2] / strength, of_place * (y - self.patch.b / 2))
         return Contact(
             np.array([x, y]),
             np.array([sd_x, sd_y]),
