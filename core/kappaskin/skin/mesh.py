@@ -5,6 +5,7 @@ import hashlib
 import io
 import math
 import zipfile
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from functools import cached_property, lru_cache
 from typing import Any, cast
@@ -105,6 +106,17 @@ class Splines:
         (i, j), rows = self._at(x, y)
         block = coefficients.reshape(self._count[1], self._count[0], -1)[j : j + 4, i : i + 4]
         return rows[:orders].dot(block.reshape(16, -1))
+
+    def jets(self, coefficients: Array) -> Callable[[float, float, int], Array]:
+        """The same at many places, one after the other: quicker where they are near."""
+        grid = coefficients.reshape(self._count[1], self._count[0], -1)
+        block = lru_cache(16)(lambda i, j: grid[j : j + 4, i : i + 4].reshape(16, -1))
+
+        def jet(x: float, y: float, orders: int) -> Array:
+            (i, j), rows = self._at(x, y)
+            return rows[:orders].dot(block(i, j))
+
+        return jet
 
     def _weights_at(self, x: float, y: float) -> tuple[tuple[int, int], Array]:
         """The first coefficients each way around a place, and weights (6, 16) of those."""
@@ -268,10 +280,11 @@ class MeshSkin(Polygon):
         third = np.linalg.norm(np.cross(u, v), axis=1) / 6
         return _sums(self.triangles.ravel(), np.repeat(third, 3), len(self.points))
 
-    def spread(self, count: int) -> Indices:
-        """So many nodes, spread evenly: each the farthest from those before.
+    def spread(self, count: int, apart: float = 0.0) -> Indices:
+        """So many nodes at most, spread evenly: each the farthest from those before.
 
-        From the rim they are half as far as from one another.
+        From the rim they are half as far as from one another; at least `apart` in m through the
+        air.
         """
         from scipy.spatial import KDTree
 
@@ -279,6 +292,8 @@ class MeshSkin(Polygon):
         found = np.empty(count, np.intp)
         for k in range(count):
             found[k] = away.argmax()
+            if away[found[k]] < apart:
+                return found[:k]
             far = np.linalg.norm(self.points - self.points[found[k]], axis=1)
             away = np.minimum(away, far)
         return found
