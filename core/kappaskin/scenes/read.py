@@ -261,10 +261,9 @@ def _mesh(table: TomlTable, find: _Find) -> MeshSkin:
         edges = None if held is None else held_edges(surface, UNITS[unit] * np.array(held))
         order = np.lexsort(surface.nodes.T)  # the text of the mesh is half as long
         number = np.argsort(order)
-        triangles = number[surface.triangles]
-        triangles = triangles[triangles.min(axis=1).argsort()]
-        nodes, held = surface.nodes[order], None if edges is None else number[edges]
-        return MeshSkin(nodes, triangles, thickness, held)
+        triangles, held = number[surface.triangles], None if edges is None else number[edges]
+        first = triangles.min(axis=1).argsort()
+        return MeshSkin(surface.nodes[order], triangles[first], thickness, held)
 
 
 def _patch(table: TomlTable, shape: str) -> Patch:
@@ -306,8 +305,7 @@ def read_elements(
         elif "file" in table:
             file = find(table, "file")
             with table.blamed("file"):
-                unit = SKIN.value(skin, "unit", default="")
-                layout, turns, moved = _in_space(file, patch, unit)
+                layout, turns, moved = _in_space(file, patch, SKIN.value(skin, "unit", default=""))
         else:
             grid = ELEMENTS.value(table, "grid")
             check_elements(*grid)
@@ -370,9 +368,8 @@ def _in_space(file: Path, patch: Patch, unit: str) -> tuple[SensorLayout, Array 
             f"{file}: expected elements on the mesh, in its coordinates in {unit}, got element "
             f"{k} {1e3 * far:.3g} mm away"
         )
-    is_far = far > _MOVED * math.sqrt(patch.areas.sum() / len(rows))
     words = f"Elements were moved onto the mesh, element {k} by {1e3 * far:.2g} mm."
-    moved = words if is_far else ""
+    moved = words if far > _MOVED * math.sqrt(patch.areas.sum() / len(rows)) else ""
     if not directed:
         return layout, None, moved
     ways = np.einsum("pix,px->pi", patch.base(*positions.T).frame, rows[:, 3:] @ patch.frame.T)

@@ -116,8 +116,8 @@ def _elements(layout: SensorLayout) -> dict[str, Any]:
     placed = {"positions": layout.positions.tolist()} if grid is None else {"grid": list(grid[0])}
     gages = _fields(layout, without=("patch", "positions", "live", "shape", "reads"))
     reads = {"reads": layout.each_reads} if layout.reads else {}
-    reads |= {} if turns is None else {"turns": turns.tolist()}
-    return {**placed, **({"dead": dead} if dead else {}), **gages, **reads}
+    ways = {} if turns is None else {"turns": turns.tolist()}
+    return {**placed, **({"dead": dead} if dead else {}), **gages, **reads, **ways}
 
 
 def _grid(layout: SensorLayout) -> tuple[tuple[int, int], SensorLayout] | None:

@@ -226,10 +226,13 @@ class Readings:
         return _unit(self.direction)
 
     @cached_property
-    def _kinds(self) -> tuple[list[tuple[str, float]], Indices]:
-        if self.turn is None:
-            return self.directed
-        return replace(self, direction=self.direction - self.turn, turn=None).directed
+    def kinds(self) -> tuple[list[tuple[str, float]], Indices]:
+        """The different quantities with their directions from the axes of their elements.
+
+        And which of them each reading (R,) is.
+        """
+        own = 0.0 if self.turn is None else self.turn
+        return replace(self, direction=self.direction - own, turn=None).directed
 
     @cached_property
     def directed(self) -> tuple[list[tuple[str, float]], Indices]:
@@ -239,19 +242,6 @@ class Readings:
         each = np.rec.fromarrays([self.quantity, np.round(angle, _ALIKE)])
         _, first, kind = np.unique(each, return_index=True, return_inverse=True)
         return [(str(self.quantity[r]), float(angle[r])) for r in first], kind.reshape(-1)
-
-    @property
-    def kinds(self) -> list[tuple[str, float]]:
-        """The different quantities that are read, each with its direction in rad.
-
-        From x, or from the axis of the element where it is turned.
-        """
-        return self._kinds[0]
-
-    @property
-    def kind(self) -> Indices:
-        """Which of `kinds` each reading (R,) is."""
-        return self._kinds[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -577,7 +567,7 @@ class SensorLayout:
     @property
     def kinds(self) -> list[tuple[str, float]]:
         """The different quantities that are read, each with its direction in rad."""
-        return self.reads.kinds if self.reads else list(_CURVATURES)
+        return self.reads.kinds[0] if self.reads else list(_CURVATURES)
 
     @property
     def directed(self) -> tuple[list[tuple[str, float]], Indices]:
@@ -587,7 +577,7 @@ class SensorLayout:
     @property
     def kind(self) -> Indices:
         """Which of `kinds` each reading (R,) is."""
-        return self.reads.kind if self.reads else np.repeat(np.arange(3), len(self))
+        return self.reads.kinds[1] if self.reads else np.repeat(np.arange(3), len(self))
 
     @property
     def kind_names(self) -> list[str]:

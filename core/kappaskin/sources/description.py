@@ -296,8 +296,8 @@ def _with_files(text: str, file: Path) -> str:
         text += toml_table(_KEPT.format("skin"), {"mesh": cast("MeshSkin", patch).text})
     if "file" in elements:
         layout, _ = read_elements(elements, patch, find, skin)
-        kept: dict[str, Any] = {"positions": layout.positions.tolist()}
-        kept |= {} if layout.turns is None else {"turns": layout.turns.tolist()}
+        turns = {} if layout.turns is None else {"turns": layout.turns.tolist()}
+        kept = {"positions": layout.positions.tolist(), **turns}
         text += toml_table(_KEPT.format("elements"), kept)
     return text
 

@@ -237,8 +237,7 @@ def _layout(patch: Patch, values: dict[str, Any]) -> SensorLayout:
     layout = replace(layout, **averaged)
     if values["reads"]:
         layout = layout.reading_each(values["reads"])
-    if values["turns"]:
-        layout = layout.turned(values["turns"])
+    layout = layout.turned(values["turns"]) if values["turns"] else layout
     dead, channels = values["dead_channels"], range(layout.channels)
     if unknown := [channel for channel in dead if channel not in channels]:
         raise Refusal(

@@ -242,10 +242,8 @@ class GlbSurfaces(SurfaceWriter):
 
     def take(self, frame: ExportedFrame) -> bool:
         c, skin = frame.estimate.coefficients, self._skin(frame.pipeline)
-        known = self._shapes and not self.request.every and np.isfinite(c).all()
-        if known and skin.depth(c) <= self._deepest:
-            return True
-        return super().take(frame)
+        known = self._shapes and not self.request.every
+        return bool(known and skin.depth(c) <= self._deepest) or super().take(frame)
 
     def write(self, path: Path, frame: ExportedFrame, surface: SkinSurface) -> None:
         deep = float(np.abs(surface.displacement).max())
@@ -309,11 +307,11 @@ class GlbSurfaces(SurfaceWriter):
             ],
             "buffers": [{"byteLength": sum(sizes)}],
         }
-        text = json.dumps(made).encode()
-        chunks = (text + b" " * (-len(text) % 4), b"JSON"), (b"".join(self._parts), b"BIN\0")
-        content = b"".join(struct.pack("<I4s", len(data), kind) + data for data, kind in chunks)
-        head = struct.pack("<4sII", b"glTF", 2, 12 + len(content))
-        (self.scratch / self.request.to.name).write_bytes(head + content)
+        text, data = json.dumps(made).encode(), b"".join(self._parts)
+        text += b" " * (-len(text) % 4)
+        head = struct.pack("<4sIII4s", b"glTF", 2, 28 + len(text + data), len(text), b"JSON")
+        content = head + text + struct.pack("<I4s", len(data), b"BIN\0") + data
+        (self.scratch / self.request.to.name).write_bytes(content)
 
     def _add(self, values: NDArray[Any]) -> int:
         """The number of the accessor of some values: points (n, 3), triangles or numbers."""
