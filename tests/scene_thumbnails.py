@@ -116,7 +116,7 @@ def _drawn(skin: DrawnSkin, surface: Array) -> tuple[Array, Array]:
         return surface, surface
     share = surface / most
     depth = min(_DEPTH * np.sqrt(1e3 * most / skin.size), _DEEPEST) * skin.size
-    return share, -min(depth, skin.deepest) * share
+    return share, skin.height_of(1e-3 * min(depth, skin.deepest) * share)
 
 
 def _marks(skin: DrawnSkin, positions: Array) -> ReliefMarks:
@@ -208,7 +208,8 @@ class _Camera:
         right = np.cross(up, self.towards)
         right /= np.linalg.norm(right)
         self._axes = np.array([right, -np.cross(self.towards, right)])
-        whole = np.concatenate([relief.points, relief.arrows.reshape(-1, 3)])
+        drawn = relief.points[np.unique(relief.faces)]
+        whole = np.concatenate([drawn, relief.arrows.reshape(-1, 3)])
         low, high = whole.min(axis=0), whole.max(axis=0)
         self._middle = (low + high) / 2
         self._far = _FAR * float(np.linalg.norm(high - low))

@@ -5,15 +5,17 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 
-from kappaskin.frames import Array, Indices
-from kappaskin.skin import Patch, interpolated, snapped_to_rim
+from kappaskin.frames import Array, Indices, Mask
+from kappaskin.skin import Cap, MeshSkin, Patch, interpolated, snapped_to_rim
 
 MM = 1e3
 _DEEPEST = 0.45  # of the shorter side that a skin is drawn deep at most, to stay in the picture
 _NEAREST = 0.7  # of the base radius, so that no skin is drawn through its own axis
 
 
+_AROUND = 129  # points around the rim of a cap
 _SEAM = 1e-9  # of a side: or a line passes between two triangles
 _ITERATIONS = 12  # until a place on a bent skin is found to rounding
 _STEP = 1e-5  # of the shorter side, of differences along the skin at rest
@@ -53,12 +55,54 @@ class DrawnSkin:
         if not self.on.all():
             grid, self._shown = snapped_to_rim(patch, grid, self.on)
         positions = grid.reshape(-1, 2)
+        self._inside = np.flatnonzero(self.on)
+        off = np.setdiff1d(np.arange(self.on.size), self._inside)
+        self._free = off[_is_free(patch, positions[off])]
+        self._free_points = _extrapolated(positions[self._inside], positions[self._free])
         self._rest, self._out = self.at_rest(positions)
         self._areas, self._leans = self._normal_terms(positions)
         self.shares: Array = positions / (patch.a, patch.b)
         """Where each point (points, 2) is, as shares of the sides."""
         self.height: Array = np.zeros((ny, nx))
         """How far out each point is drawn, in mm."""
+
+    def show_displacement(self, surface: Array, times: float = 1.0) -> None:
+        """Draw a displacement inward (ny, nx) in m, NaN off the skin, `times` as large."""
+        self.height = self.height_of(np.nan_to_num(surface), times)
+
+    def height_of(self, surface: Array, times: float = 1.0) -> Array:
+        """How far out in mm points are drawn for a displacement inward (ny, nx) in m.
+
+        A rim that is not held is drawn as the skin beside it runs on.
+        """
+        height = -MM * times * surface
+        near, weights = self._free_points
+        found = np.sum(weights * height.ravel()[self._inside[near]], axis=1)
+        height.ravel()[self._free] = found
+        return height
+
+    @cached_property
+    def rim(self) -> Array:
+        """Positions (k, 2) in m around the rim of a cap or a mesh; none of other skins."""
+        patch = self.patch
+        if isinstance(patch, MeshSkin):
+            return patch.points[np.append(patch.rim, patch.rim[0]), :2]
+        if isinstance(patch, Cap):
+            turn = np.linspace(0, 2 * np.pi, _AROUND)
+            return patch.rim_radius * (1 + np.stack([np.cos(turn), np.sin(turn)], axis=-1))
+        return np.empty((0, 2))
+
+    def rim_height(self) -> Array:
+        """How far out (k,) in mm the `rim` is drawn: as the skin beside it, unless it is held."""
+        near, weights = self._rim_points
+        return np.sum(weights * self.height.ravel()[self._inside[near]], axis=1)
+
+    @cached_property
+    def _rim_points(self) -> tuple[Indices, Array]:
+        positions = self.patch.grid(*self.on.shape[::-1])
+        inside = np.stack(np.meshgrid(*positions), axis=-1).reshape(-1, 2)[self._inside]
+        near, weights = _extrapolated(inside, self.rim)
+        return near, weights * _is_free(self.patch, self.rim)[:, None]
 
     def at_rest(self, positions: Array) -> tuple[Array, Array]:
         """Points of the skin at rest at `positions`, and its outward normals there."""
@@ -232,6 +276,30 @@ class DrawnSkin:
         weights = np.stack([1 - u[met] - v[met], u[met], v[met]], axis=1)
         corners = self.shares[self._triangles[met]] * (self.patch.a, self.patch.b)
         return np.einsum("kv,kvi->ki", weights, corners), np.vecdot(ac, q)[met] / area[met]
+
+
+_BESIDE = 8  # points that a plane through the skin beside its rim is fitted to
+
+
+def _extrapolated(inside: Array, positions: Array) -> tuple[Indices, Array]:
+    """Which of the points `inside` (k, 2), and their weights, that a plane has at `positions`.
+
+    Both (P, 8): those nearest to each position, and the plane of least squares through them.
+    """
+    count = min(_BESIDE, len(inside))
+    if not len(positions):
+        return np.empty((0, count), np.intp), np.empty((0, count))
+    far, near = scipy.spatial.KDTree(inside).query(positions, count)
+    away = (inside[near] - positions[:, None]) / np.max(far)
+    return np.asarray(near), np.linalg.pinv(np.insert(away, 0, 1.0, axis=2))[:, 0]
+
+
+def _is_free(patch: Patch, positions: Array) -> Mask:
+    """Whether the rim next to each of `positions` (k, 2) is not held."""
+    if not isinstance(patch, MeshSkin) or len(patch.held) == len(patch.rim):
+        return np.zeros(len(positions), bool)
+    near = scipy.spatial.KDTree(patch.points[patch.rim, :2]).query(positions)[1]
+    return ~np.isin(patch.rim[near], patch.held)
 
 
 NO_SKIN = DrawnSkin(Patch(0.1, 0.1), 2, 2)

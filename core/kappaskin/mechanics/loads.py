@@ -182,15 +182,22 @@ class DistributedLoad(CentredLoad, ABC):
             felt = _on_cap(replace(self, x=0.0, y=0.0, force=1.0), basis)(self.x, self.y)
             if felt is not None:
                 return self.force * felt
-        points, weights = self.quadrature(max(basis.shape))
-        along_skin = isinstance(basis, CapBasis | MeshBasis)
-        at = self.centre() + points
-        if along_skin:
-            at = basis.patch.around(self.x, self.y, points)
-        felt = weights @ basis.at(at)
+        felt = _felt(replace(self, force=1.0), basis)
         if np.isnan(felt).any():  # a notch in the outline that passes between the rim's points
             raise Refusal(f"expected a load completely on the skin, got {self}; make it smaller")
         return self.force * felt.reshape(basis.shape)
+
+
+@lru_cache(16)
+def _felt(load: DistributedLoad, basis: Basis) -> Array:
+    """The mean (N,) of each function under the load; NaN where that is not all on the skin."""
+    # On a mesh to 1e-5: its functions are splines, which no number of points integrates exactly.
+    points, weights = load.quadrature(1 if isinstance(basis, MeshBasis) else max(basis.shape))
+    if isinstance(basis, CapBasis | MeshBasis):
+        at = basis.patch.around(load.x, load.y, points)
+    else:
+        at = load.centre() + points
+    return weights @ basis.at(at)
 
 
 def _check_size(load: DistributedLoad, *sizes: float) -> None:

@@ -6,7 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kappaskin import Cap, Patch
+from kappaskin.skin import MeshSkin
 from kappaskin_app.shell.drawn_skin import DrawnSkin
+from meshes import ellipsoid
 
 FLAT = Patch(0.1, 0.06)
 ARC = Patch(0.04, 0.03, 0.0129)
@@ -223,3 +225,27 @@ def test_of_two_sides_of_an_arc_the_near_one_is_hit() -> None:
     assert x < ARC.a / 2
     x, _ = skin.hit(far, near)
     assert x > ARC.a / 2
+
+
+def test_a_mesh_moves_at_its_rim_where_that_is_free_and_rests_where_it_is_held() -> None:
+    nodes, triangles = ellipsoid(14, (9e-3, 7e-3, 6e-3), 1.2)
+    rim = np.flatnonzero(np.hypot(nodes[:, 0] / 9, nodes[:, 1] / 7) > 0.99e-3 * np.sin(1.2))
+    mesh = MeshSkin(nodes, triangles, 1e-3, rim[nodes[rim, 0] > 0])
+    skin = DrawnSkin(mesh, 33, 33)
+    x, _ = np.meshgrid(*mesh.grid(33, 33))
+    surface = np.where(skin.on, 2e-4 - 1e-2 * x, np.nan)
+
+    skin.show_displacement(surface, 3.0)
+
+    on_rim = np.setdiff1d(np.unique(skin.faces()[:, 1:]), np.flatnonzero(skin.on))
+    x = skin.shares[on_rim, 0]
+    moved = skin.height.ravel()[on_rim]
+    free = x < 0.45
+    np.testing.assert_allclose(moved[free], 30 * x[free] * mesh.a - 0.6, atol=1e-6)
+    np.testing.assert_array_equal(moved[x > 0.55], 0.0)
+    x = skin.rim[:, 0] / mesh.a
+    free = x < 0.45
+    np.testing.assert_allclose(skin.rim_height()[free], 30 * x[free] * mesh.a - 0.6, atol=1e-6)
+    np.testing.assert_array_equal(skin.rim_height()[x > 0.55], 0.0)
+    for axis, side in enumerate((mesh.a, mesh.b)):
+        assert np.ptp(skin.rim[:, axis]) == pytest.approx(side)

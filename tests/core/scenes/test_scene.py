@@ -36,7 +36,7 @@ def test_every_ready_scene_is_a_sensor_that_says_it_is_simulated(name):
 
     assert sensor.simulated
     others = {"fingertip": 30, "camera": 400, "tilts": 200, "dome": 192, "saddle": 192}
-    assert sensor.channels == (others | {"fingertip-cap": 180}).get(name, 300)
+    assert sensor.channels == (others | {"fingertip-cap": 180, "thumb-pad": 360}).get(name, 300)
 
 
 @pytest.mark.parametrize(

@@ -179,6 +179,14 @@ def test_only_what_is_held_is_near_the_rim():
     assert not mesh.near_rim(mesh.a - edge, middle, 0.1)
 
 
+def test_a_mesh_holds_its_places_and_no_unknown_one(sphere):
+    middle = sphere.a / 2
+    assert sphere.holds(middle, middle)
+    assert not sphere.holds(0.01 * middle, 0.01 * middle)
+    assert not sphere.holds(math.nan, middle)
+    assert not sphere.holds(middle, math.inf)
+
+
 @pytest.mark.parametrize(
     ("change", "match"),
     [

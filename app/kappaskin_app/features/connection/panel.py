@@ -30,7 +30,7 @@ from kappaskin._text import printable
 from kappaskin.calibration import Calibration
 from kappaskin.live import Status
 from kappaskin.sensing import Sensor
-from kappaskin.skin import Cap
+from kappaskin.skin import Cap, MeshSkin
 from kappaskin.sources import Port, feeds_found, parts_of
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.background import BackgroundTask, Tasks
@@ -442,6 +442,7 @@ def _sensor_text(sensor: Sensor, calibration: Calibration | None) -> str:
     sensing = live[:1] if bends else live
     dead = int((~sensing).sum())
     a, b, along_x, along_y = (round(1e3 * one, 1) for one in (patch.a, patch.b, *patch.radii))
+    size = f"{a:g} x {b:g} mm"
     bent = f", radius {along_x:g} mm" if patch.arc_curvature else ""
     if patch.is_shallow:
         bent = (
@@ -452,10 +453,14 @@ def _sensor_text(sensor: Sensor, calibration: Calibration | None) -> str:
         angle = f"{math.degrees(patch.angle):.3g}\N{DEGREE SIGN}"
         bent = f" along the skin\ncap of radius {1e3 * patch.equator:g} mm, {angle} to the rim"
         bent += f", stretched {patch.stretch:g} times" if patch.stretch != 1 else ""
+    if isinstance(patch, MeshSkin):
+        held, rim = len(patch.held), len(patch.rim)
+        on = "its whole rim" if held == rim else f"{held} of {rim} nodes of its rim"
+        size = f"{a:g} x {b:g} x {round(1e3 * patch.rise, 1):g} mm"
+        bent = f"\nmesh of {len(patch.triangles):,} triangles, {len(patch.points):,} nodes"
+        bent += f"\nheld at {on}"
     health = f"\n{dead} of {sensing.size} channels dead" if dead else ""
     name = printable(f"{sensor.name} ({sensor.serial_number})")
     calibrated = f"\n{calibration_text(calibration)}" if calibration else ""
     rate = f", up to {sensor.rate:g} frames/s" if math.isfinite(sensor.rate) else ""
-    return (
-        f"{name}\n{sensor.layout}, {sensor.edge}{rate}{health}\n{a:g} x {b:g} mm{bent}{calibrated}"
-    )
+    return f"{name}\n{sensor.layout}, {sensor.edge}{rate}{health}\n{size}{bent}{calibrated}"

@@ -1,11 +1,20 @@
 """Panel of the estimator and its basis."""
 
+from typing import cast
+
+from PySide6.QtWidgets import QLabel
+
 from kappaskin.bases import edges_of
 from kappaskin.live import Status
+from kappaskin.skin import MeshSkin
 from kappaskin_app.shell.badge import in_use
 from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.pages import LIVE
+from kappaskin_app.shell.settings import Settings
 from kappaskin_app.shell.window import MainWindow
+
+_ON_MESH = "Functions, N =", "\N{MULTIPLICATION SIGN}"
+_SOFTEST = "N = {} functions: the softest shapes of the mesh."
 
 
 class EstimatorFeature:
@@ -26,9 +35,23 @@ class BasisPanel(Form):
 
     def __init__(self) -> None:
         super().__init__("Basis", ("functions_x", "functions_y", "method", "fit_edge"))
+        self._labels = [
+            cast("QLabel", self.form.labelForField(self.editor(name))) for name in self.names[:2]
+        ]
+        self._words = [label.text() for label in self._labels]
+        self._count = 0
+
+    def show_settings(self, settings: Settings) -> None:
+        super().show_settings(settings)
+        self._count = settings.functions_x * settings.functions_y
 
     def show_status(self, status: Status, simulating: bool) -> None:
         if status.sensor is not None:
             self.offer("fit_edge", ("", *edges_of(status.sensor.layout.patch)))
-        computing = "Computing\N{HORIZONTAL ELLIPSIS}"
-        self.show_message(computing if status.computing else in_use(status))
+        on_mesh = status.sensor is not None and isinstance(status.sensor.layout.patch, MeshSkin)
+        for label, words in zip(self._labels, _ON_MESH if on_mesh else self._words, strict=True):
+            label.setText(words)
+        if words := "Computing\N{HORIZONTAL ELLIPSIS}" if status.computing else in_use(status):
+            self.show_message(words)
+        else:
+            self.show_message(_SOFTEST.format(self._count) if on_mesh else "", hint=True)

@@ -30,7 +30,7 @@ from PySide6.QtWidgets import (
 from kappaskin.estimation import FAULTS
 from kappaskin.frames import Array, Indices, Mask
 from kappaskin.sensing import SensorLayout
-from kappaskin.skin import Cap
+from kappaskin.skin import Cap, MeshSkin
 from kappaskin_app.shell.colouring import SHADES, Shade
 from kappaskin_app.theme import DARK_INK, WANTED, Colours, current, follow_look
 from kappaskin_app.widgets.colour_bar import ColourBar, LockButton
@@ -50,24 +50,30 @@ _LEGIBLE = 9  # px, height of the smallest letter
 _ROOM = 18.0  # px, side of the smallest cell with a ring around its letter
 
 
-_BEYOND = 3.0  # of a rim's radius: where points around a cap bound the cells at its rim
+_BEYOND = 1.5  # of the longer side: how far out points bound the cells at the rim
 
 
 @lru_cache(1)  # for all heatmaps
 def cells_of(layout: SensorLayout) -> list[Array]:
-    """For each element of a cap the corners (k, 2) in m of what is nearest to it on its map.
+    """For each element of a cap or mesh the corners (k, 2) in m of what is nearest on its map.
 
     The cells at the rim end on it, or just outside. Other skins have none.
     """
-    if not isinstance(layout.patch, Cap):
+    patch, positions, turns = layout.patch, layout.positions, np.arange(0, 2 * np.pi, 0.5)
+    if isinstance(patch, Cap):
+        offset = positions - patch.rim_radius
+        far = np.linalg.norm(offset, axis=1, keepdims=True)
+        feet = patch.rim_radius * (1 + offset / np.maximum(far, 1e-6 * patch.rim_radius))
+    elif isinstance(patch, MeshSkin):
+        feet = patch.outline.feet(positions)
+        nearest = np.linalg.norm(feet - positions[:, None], axis=-1).argmin(axis=1)
+        feet = feet[np.arange(len(feet)), nearest]
+    else:
         return []
-    rim, turns = layout.patch.rim_radius, np.arange(0, 2 * np.pi, 0.5)
-    offset = layout.positions - rim
-    far = np.linalg.norm(offset, axis=1, keepdims=True)
-    mirrored = offset * (2 * rim / np.maximum(far, 1e-6 * rim) - 1)
-    around = _BEYOND * rim * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
-    found = scipy.spatial.Voronoi(rim + np.concatenate([offset, mirrored, around]))
-    regions = found.point_region[: len(offset)]
+    ways, sides = np.stack([np.cos(turns), np.sin(turns)], axis=-1), np.array([patch.a, patch.b])
+    around = sides / 2 + _BEYOND * sides.max() * ways
+    found = scipy.spatial.Voronoi(np.concatenate([positions, 2 * feet - positions, around]))
+    regions = found.point_region[: len(positions)]
     return [found.vertices[found.regions[region]] for region in regions]
 
 
@@ -83,7 +89,7 @@ def _square_side(layout: SensorLayout) -> float:
 
 
 class CellGrid(QWidget):
-    """Elements as the cells of a regular grid or of a cap, else as squares at their positions."""
+    """Elements as the cells of a regular grid, cap or mesh, else as squares at their positions."""
 
     pointed = Signal(int)
     chosen = Signal(int)
@@ -182,9 +188,12 @@ class CellGrid(QWidget):
                     self._draw_cell(painter, area, self._hovered)
 
     def _rim(self, area: QRectF) -> QPainterPath:
-        """The outline of the skin: a circle for a cap, else its rectangle."""
-        path = QPainterPath()
-        if self._regions:
+        """The outline of the skin: of a cap or mesh its rim, else its rectangle."""
+        path, patch = QPainterPath(), self._layout.patch if self._layout else None
+        if isinstance(patch, MeshSkin):
+            path.addPolygon(QPolygonF([self.pixel_of(area, *at) for at in patch.vertices]))
+            path.closeSubpath()
+        elif self._regions:
             path.addEllipse(area)
         else:
             path.addRect(area)

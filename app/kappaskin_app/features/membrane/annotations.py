@@ -8,7 +8,7 @@ import pyvista as pv
 
 from kappaskin._text import with_error
 from kappaskin.frames import Array, Indices
-from kappaskin.skin import Cap, Distances
+from kappaskin.skin import Distances, MeshSkin
 from kappaskin_app.shell.drawn_skin import MM, Direction, DrawnSkin
 from kappaskin_app.theme import WANTED, current, follow_look, grown
 from kappaskin_app.widgets.lettering import CAPTION
@@ -88,8 +88,8 @@ class Caption:
 
 
 _SIDE_LETTERS = 15  # px
-_AROUND = 129  # points of the line around a cap
 _OUT = 0.004  # of the skin's size: how far out lines are drawn, which the surface would hide
+_HELD = 4  # px: the line along the rim where it is held
 _LABEL_WIDTH = 5.2  # width of a label with its margin, of the letters' height
 _MOST_WIDTH = 0.2  # of the view's width, of one label
 
@@ -97,14 +97,17 @@ _MOST_WIDTH = 0.2  # of the view's width, of one label
 class Sides:
     """Labels of the corner 0 and of the sides along x and y.
 
-    For a flat skin smaller than its rectangle, lines show these sides. A cap has labels at the ends
-    of its axes, and a line around its rim.
+    For a flat skin smaller than its rectangle, lines show these sides. A cap or mesh has labels at
+    the ends along x and y, and a line around its rim, which is thick where a mesh is held.
     """
 
     def __init__(self, plotter: Any) -> None:
         self._lines: Any = pv.PolyData(np.zeros((3, 3)), lines=[3, 1, 0, 2])
         self.actor = plotter.add_mesh(self._lines, line_width=pixels(plotter, 1), **UNLIT)
-        self.actor.visibility = False
+        self._held: Any = pv.PolyData(np.zeros((2, 3)), lines=[2, 0, 1])
+        self.held = plotter.add_mesh(self._held, line_width=pixels(plotter, _HELD), **UNLIT)
+        self.actor.visibility = self.held.visibility = False
+        self._rim = np.empty((0, 3)), np.empty((0, 3))
         self.unit = 0.0
         self.labels: list[Any] = [pv.Label() for _ in range(3)]
         for label in self.labels:
@@ -114,19 +117,24 @@ class Sides:
     def show_skin(self, skin: DrawnSkin) -> None:
         a, b = skin.patch.a, skin.patch.b
         x, y = f"x {round(a * MM, 1):g} mm", f"y {round(b * MM, 1):g} mm"
-        if isinstance(skin.patch, Cap):
-            ends, texts = np.array([(0, b / 2), (a, b / 2), (a / 2, 0)]), ("x 0", x, "y 0")
+        if len(line := skin.rim):
+            left, low = line.argmin(axis=0)
+            ends, texts = line[[left, line[:, 0].argmax(), low]], ("x 0", x, "y 0")
             shares = np.array([(-0.1, 0, 0), (0.06, 0, 0), (-0.02, -0.12, 0)])
-            turn = np.linspace(0, 2 * np.pi, _AROUND)
-            line = skin.patch.rim_radius * (1 + np.stack([np.cos(turn), np.sin(turn)], axis=-1))
         else:
             ends, texts = np.array([(0.0, 0.0), (a, 0.0), (0.0, b)]), ("0", x, y)
             shares = np.array([(-0.04, -0.04, 0), (0, -0.06, 0), (0, 0.05, 0)])
             line = ends[[1, 0, 2]]
-        points, out = skin.at_rest(line)
-        self._lines.points = points + _OUT * skin.size * out
+        self._rim = skin.at_rest(line)
+        self._lines.points = self._rim[0] + _OUT * skin.size * self._rim[1]
         self._lines.lines = np.r_[len(line), : len(line)]
         self.actor.visibility = not skin.on.all()
+        self.held.visibility = isinstance(skin.patch, MeshSkin)
+        if isinstance(skin.patch, MeshSkin):
+            on = np.isin(skin.patch.rim, skin.patch.held)
+            first = np.flatnonzero(on & np.roll(on, -1))
+            self._held.points = self._lines.points
+            self._held.lines = np.column_stack([np.full_like(first, 2), first, first + 1]).ravel()
         places = skin.at_rest(ends)[0] + shares * (MM * np.array([a, b, 0]))
         for label, text, at in zip(self.labels, texts, places, strict=True):
             label.input = text
@@ -134,6 +142,14 @@ class Sides:
         # A centred text would lie below a skin that rises steeply.
         y_at = "right" if any(skin.patch.curvatures) else "center"
         self.labels[2].prop.justification_horizontal = y_at
+
+    def follow(self, skin: DrawnSkin) -> None:
+        """Follow the rim of a mesh that is held in part."""
+        if self.held.visibility:
+            points, out = self._rim
+            height = skin.rim_height() + _OUT * skin.size
+            for line in (self._lines, self._held):
+                line.points[:] = points + out * height[:, None]
 
     def show_from(self, direction: Direction | None) -> None:
         """Hide the label of a side seen end-on, which would cover the rim."""
@@ -149,7 +165,7 @@ class Sides:
         return _LABEL_WIDTH * size / wide
 
     def _apply_theme(self) -> None:
-        for part in (self.actor, *self.labels):
+        for part in (self.actor, self.held, *self.labels):
             part.prop.color = current().text
 
 

@@ -8,7 +8,6 @@ from PySide6.QtCore import QObject, QPointF, Signal
 from pyvistaqt import QtInteractor
 
 from kappaskin.frames import Array
-from kappaskin.skin import Cap
 from kappaskin_app.features.membrane.annotations import Sides
 from kappaskin_app.shell.drawn_skin import FROM_THE_LEFT, MM, NO_SKIN, Direction, DrawnSkin
 
@@ -97,8 +96,8 @@ def _around(skin: DrawnSkin, share: float) -> Array:
     curved = zip((a, b), skin.patch.curvatures, strict=True)
     x, y = (np.linspace(0, length, 9 if H else 2) for length, H in curved)
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    if isinstance(skin.patch, Cap):
-        places = places[skin.patch.contains(places)]
+    if len(skin.rim):
+        places = np.concatenate([places[skin.patch.contains(places)], skin.rim])
     points, out = skin.at_rest(places)
     low, high = -_LOW * MM * min(a, b), 2 * margin
     corners = [(dx, dy, 0.0) for dx in (-margin, 2.5 * margin) for dy in (-margin, margin)]

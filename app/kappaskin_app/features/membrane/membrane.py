@@ -31,7 +31,7 @@ from kappaskin_app.features.membrane.loads import LOAD, DrawnLoads, put_upright
 from kappaskin_app.features.membrane.mouse import LoadDrag, SurfacePointer
 from kappaskin_app.features.membrane.surface import WHOLE, Box, GridLines, Shares, Surface
 from kappaskin_app.guard import guarded
-from kappaskin_app.shell.drawn_skin import MM, DrawnSkin
+from kappaskin_app.shell.drawn_skin import DrawnSkin
 from kappaskin_app.theme import DARK_INK, LIGHT_INK, OUT, WANTED, Colours, current, follow_look
 
 _LETTERS = 14  # px, of the caption
@@ -245,7 +245,8 @@ class MembraneView(QWidget):
         skin = self.skin
         if estimate.surface.shape != skin.height.shape or self.surface.lost:
             return  # of another skin, or received after the loss
-        skin.height = -MM * times * np.nan_to_num(estimate.surface)
+        skin.show_displacement(estimate.surface, times)
+        self.sides.follow(skin)
         self._show_corner(times)
         self.surface.show_shape(skin)
         self.surface.show_values(skin, values, limits)
@@ -284,7 +285,7 @@ class MembraneView(QWidget):
     def _show_grids(self, skin: DrawnSkin, true: Array, times: float) -> None:
         """Draw the lines of the fitted and of the `true` (ny, nx) surface."""
         self._grid.show(skin, skin.height + self.lift / 2)
-        self._truth.show(skin, self.lift - MM * times * true)
+        self._truth.show(skin, self.lift + skin.height_of(true, times))
         self._grid.actor.visibility &= self._shown["fit"]
         self._truth.actor.visibility &= self._shown["truth"]
 

@@ -11,7 +11,6 @@ from kappaskin.contact import ContactObject, placed_object
 from kappaskin.frames import Array, Estimate, Indices
 from kappaskin.mechanics import PlacedObject
 from kappaskin.scenes import Indenter
-from kappaskin.skin import Cap
 from kappaskin_app.features.membrane.annotations import UNLIT, pixels
 from kappaskin_app.features.membrane.loads import LOAD
 from kappaskin_app.features.membrane.membrane import CONTACT, MembraneView
@@ -218,7 +217,7 @@ _ABOVE = 0.35  # of the skin's size: the highest part drawn
 
 
 class ObjectMesh:
-    """Translucent lit mesh of an object, exaggerated in height as the skin is unless on a cap."""
+    """Translucent lit mesh of an object, exaggerated as the skin is unless on a cap or mesh."""
 
     def __init__(self, plotter: Any, colour: str) -> None:
         self._mesh: Any = pv.PolyData(np.zeros((_OUT * _AROUND, 3)), faces=_faces())
@@ -256,10 +255,10 @@ def _normals(points: Array) -> Array:
 def underside(stands: PlacedObject, skin: DrawnSkin, times: float) -> Array | None:
     """Points (k, 3) in mm of the underside in contact with the drawn skin.
 
-    None where the object is nowhere above the skin. On a cap it has its true shape.
+    None where the object is nowhere above the skin. On a cap or mesh it has its true shape.
     """
-    if isinstance(skin.patch, Cap):
-        times = 1.0  # else the cap's own fall would be exaggerated with it, to a funnel
+    if len(skin.rim):
+        times = 1.0  # else the skin's own fall would be exaggerated with it, to a funnel
     reach, (x, y) = (
         min(float(np.hypot(*stands.object_.extent)), skin.side / MM),
         stands.place.tolist(),

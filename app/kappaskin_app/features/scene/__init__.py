@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
-from kappaskin.errors import Refusal
 from kappaskin.scenes import scene_file
 from kappaskin_app.features.scene.control import SceneControl
 from kappaskin_app.features.scene.editing import SceneEditing
@@ -12,6 +11,7 @@ from kappaskin_app.features.scene.gallery import MEASURED
 from kappaskin_app.features.scene.load_panel import AddedNoisePanel, LoadPanel, NoisePanel
 from kappaskin_app.features.scene.panel import ScenePanel
 from kappaskin_app.features.scene.plan import EffectPlanner
+from kappaskin_app.features.scene.skin_dialog import MESHES, SkinDialog
 from kappaskin_app.features.scene.timeline import Timeline
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.actions import plain
@@ -20,11 +20,13 @@ from kappaskin_app.shell.loads import loads_at, object_replaceable
 from kappaskin_app.shell.opening import Kind
 from kappaskin_app.shell.pages import LIVE
 from kappaskin_app.shell.parts import FILE
+from kappaskin_app.shell.settings.scene import Written
 from kappaskin_app.shell.window import MainWindow
 from kappaskin_app.widgets.parts import ELLIPSIS
 
 _MILLIMETRE = 1e-3  # m, the unit of mesh files
 _OPEN = "Simulate a scene file (.toml); it can also be dropped on the window"
+_OPEN_SKIN = "Simulate a skin of any shape, from a mesh file (STL, OBJ, PLY)"
 _SAVE = "Write the present scene to a text file, which can be edited and opened again"
 
 _ABOUT = "Gallery of scenes, editor of the present scene, and plan of its effects"
@@ -40,6 +42,7 @@ class SceneFeature:
         self.added_noise = shell.panels.add(LIVE, AddedNoisePanel())
         self.scene, self.timeline = ScenePanel(), Timeline()
         self.planner = EffectPlanner(session, shell.tasks, shell)
+        self.skin = SkinDialog(shell.tasks, shell)
         self.editing = SceneEditing(shell.history, session, shell.selection.load)
         self.scene_control = SceneControl(
             *(shell.history, session, self.editing, self.planner),
@@ -58,12 +61,19 @@ class SceneFeature:
         shell.settings_shown.connect(guarded(self.scene_control.show_settings))
         shell.display.unit_changed.connect(guarded(self.timeline.clock.show_unit))
         shell.opening.add(Kind("scene", (".toml",), self.scene_control.play))
-        shell.opening.add(Kind("mesh", (".stl", ".ply", ".obj"), self._replace_object))
+        for kind in (
+            Kind("mesh of an object", MESHES, self._replace_object, self._replaces_object),
+            Kind("mesh of a skin", MESHES, self.skin.begin),
+        ):
+            shell.opening.add(kind)
+        self.skin.made.connect(guarded(self._simulate))
+        shell.closing.connect(guarded(self.skin.reject))
         shell.menus.entry_sources.append(self._things)
 
     def _add_actions(self, shell: MainWindow) -> None:
         add, control = shell.actions_by_name.add, self.scene_control
         add("open-scene", FILE, f"&Open scene{ELLIPSIS}", control.open, "Ctrl+O", _OPEN)
+        add("open-skin", FILE, f"Open s&kin{ELLIPSIS}", self.skin.open, "", _OPEN_SKIN)
         add("save-scene", FILE, f"Save scene &as{ELLIPSIS}", control.save, "Ctrl+Shift+S", _SAVE)
         shell.menus.welcome.add(
             1,
@@ -76,16 +86,20 @@ class SceneFeature:
         if not self._shell.session.replaying:
             self.scene_control.pause()
 
+    def _simulate(self, scene: Written) -> None:
+        self.editing.play(scene)
+        self._shell.opening.note(self.skin.file)
+
+    def _replaces_object(self, _: Path) -> bool:
+        """Whether a mesh can be the object that presses: one is at rest on the simulated skin."""
+        session = self._shell.session
+        touches = loads_at(session.scene, session.time) if session.inside else ()
+        return bool(touches) and object_replaceable(session.scene)
+
     def _replace_object(self, file: Path) -> None:
         """Replace the load by the object of a mesh file, whose unit is the millimetre."""
         session = self._shell.session
-        touches = loads_at(session.scene, session.time) if session.inside else []
-        if not touches or not object_replaceable(session.scene):
-            raise Refusal(
-                f"{file}: expected a simulated skin with one object at rest, which the mesh can "
-                "replace; select such a scene (F2), or run `kappaskin demo`"
-            )
-        load = touches[0].load
+        load = loads_at(session.scene, session.time)[0].load
         x, y = (float(value) for value in load.centre())
         found = file.resolve()
         mesh = {"what": "mesh", "file": str(found), "unit": _MILLIMETRE}

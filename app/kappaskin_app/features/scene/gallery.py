@@ -152,8 +152,8 @@ class CardPainter(QStyledItemDelegate):
 
 # Demonstrations, then the paper's scenes, those of one effect, and those of other readings.
 _DEMONSTRATIONS = (
-    "sphere pencil coin bolt tapping two-contacts fingertip-cap fingertip dome saddle circle "
-    "exploring cylinder edge slipping demo"
+    "sphere pencil coin bolt tapping two-contacts fingertip-cap thumb-pad fingertip dome saddle "
+    "circle exploring cylinder edge slipping demo"
 )
 _PAPER = "centre off-centre line calibration"
 _EFFECTS = "failing-elements creep-hold steep saturation long-gages on-foam stretching hot-room hum"

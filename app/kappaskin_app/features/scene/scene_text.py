@@ -328,9 +328,11 @@ def replaced(text: str, touch: int, values: Mapping[str, Any]) -> str:
 
 def named(text: str) -> list[tuple[Place, str]]:
     """The files that a scene names, each with its place; raises `Refusal` for invalid TOML."""
-    many = parsed(text).get("touch", ())
+    document = parsed(text)
+    many = document.get("touch", ())
     each = {("touch",): many} if isinstance(many, Mapping) else {}
     each |= {("touch", n): one for n, one in enumerate(many)} if not each else {}
+    each[("skin",)] = document.get("skin")
     return [
         ((*place, key), str(one[key]))
         for place, one in each.items()

@@ -5,10 +5,11 @@ from PySide6.QtGui import QImage, QMouseEvent
 from PySide6.QtWidgets import QApplication
 
 from kappaskin import Cap, Patch, SensorLayout
-from kappaskin.skin import Outline
+from kappaskin.skin import MeshSkin, Outline
 from kappaskin_app.features.heatmaps.heatmap import CellGrid, Heatmap, cells_of
 from kappaskin_app.shell.colouring import SHADES
 from kappaskin_app.theme import DARK, DIVERGING, apply_look
+from meshes import ellipsoid
 
 TINT = SHADES["xx"].tint(1.0)
 
@@ -112,16 +113,28 @@ def _cap_layout(count: int) -> SensorLayout:
 
 @pytest.mark.parametrize("count", [1, 2, 60])
 def test_every_place_of_a_cap_lies_in_the_cell_of_the_nearest_element(count: int) -> None:
-    layout = _cap_layout(count)
+    _check_cells(_cap_layout(count))
+
+
+@pytest.mark.parametrize("count", [1, 40])
+def test_every_place_of_a_mesh_lies_in_the_cell_of_the_nearest_element(count: int) -> None:
+    _check_cells(_mesh_layout(count))
+
+
+def _check_cells(layout: SensorLayout) -> None:
     cells = [Outline(_in_order(cell)) for cell in cells_of(layout)]
     rng = np.random.default_rng(1)
-    rim = layout.patch.rim_radius
-    places = rim * (1 + rng.uniform(-1, 1, (400, 2)))
+    places = rng.uniform(0, 1, (400, 2)) * (layout.patch.a, layout.patch.b)
     places = places[layout.patch.contains(places)]
     nearest = np.argmin(np.linalg.norm(layout.positions[:, None] - places, axis=-1), axis=0)
     inside = np.stack([cell.inside(places) for cell in cells])
     assert (inside.sum(axis=0) == 1).all()
     np.testing.assert_array_equal(inside.argmax(axis=0), nearest)
+
+
+def _mesh_layout(count: int) -> SensorLayout:
+    mesh = MeshSkin(*ellipsoid(12, (9e-3, 6e-3, 5e-3), 1.2), 1e-3)
+    return SensorLayout.spread(mesh, count)
 
 
 def _in_order(cell: np.ndarray) -> np.ndarray:
@@ -130,8 +143,10 @@ def _in_order(cell: np.ndarray) -> np.ndarray:
     return cell[np.argsort(np.arctan2(y, x))]
 
 
-def test_a_cap_is_a_disc_of_cells_that_are_pointed_at_up_to_its_rim(qapp: QApplication) -> None:
-    layout = _cap_layout(60)
+@pytest.mark.parametrize("layout", [_cap_layout(60), _mesh_layout(60)], ids=["cap", "mesh"])
+def test_a_domed_skin_has_cells_that_are_pointed_at_up_to_its_rim(
+    qapp: QApplication, layout: SensorLayout
+) -> None:
     heatmap = _heatmap(layout)
     heatmap.show_values(np.linspace(-1, 1, 60), TINT)
     picture, cells = _picture(heatmap), heatmap.cells

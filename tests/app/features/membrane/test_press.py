@@ -167,6 +167,29 @@ def test_a_press_on_the_fingertip_puts_a_load_there_that_stays(
     assert pinched.history.settings == before
 
 
+@pytest.mark.full
+def test_a_press_on_a_mesh_puts_its_load_under_the_mouse(
+    window: MainWindow, qtbot, until, pixel_of
+) -> None:
+    window.session.begin(written(scene_file("thumb-pad")))
+    until(lambda: window.session.scene.name == "thumb-pad" and not window.session.making, 200.0)
+    window.session.run(False)
+    window.session.seek(1.0)
+    until(lambda: held_at(window, 0.009, 0.007))
+    plotter, flank = window.membrane.plotter, np.array([0.0065, 0.0036])
+    at = pixel_of(window, flank)
+    move(window, at, held=Qt.MouseButton.NoButton)
+    positions = window.session.scene.layout.positions
+    nearest = int(np.argmin(np.linalg.norm(positions - flank, axis=1)))
+    until(lambda: window.selection.element == nearest)
+    qtbot.mousePress(plotter, LEFT, pos=at)
+    until(lambda: np.allclose(window.membrane.drag.handles, [flank], atol=3e-4))
+    qtbot.mouseRelease(plotter, LEFT, pos=at)
+    (handle,) = window.membrane.drag.handles
+    until(lambda: np.allclose(window.session.estimate.true_contact, handle, atol=1e-5))
+    assert np.linalg.norm(window.session.estimate.contact.position - handle) < 1e-4
+
+
 def test_a_load_of_a_timetable_rests_while_it_is_held_and_goes_on_after_escape(
     pinched, qtbot, until, pixel_of
 ) -> None:
