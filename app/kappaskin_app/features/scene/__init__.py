@@ -73,7 +73,7 @@ class SceneFeature:
     def _add_actions(self, shell: MainWindow) -> None:
         add, control = shell.actions_by_name.add, self.scene_control
         add("open-scene", FILE, f"&Open scene{ELLIPSIS}", control.open, "Ctrl+O", _OPEN)
-        add("open-skin", FILE, f"Open s&kin{ELLIPSIS}", self.skin.open, "", _OPEN_SKIN)
+        add("open-skin", FILE, f"Open s&kin{ELLIPSIS}", self.skin.choose, "", _OPEN_SKIN)
         add("save-scene", FILE, f"Save scene &as{ELLIPSIS}", control.save, "Ctrl+Shift+S", _SAVE)
         shell.menus.welcome.add(
             1,

@@ -116,6 +116,8 @@ class SurfacePreview(QWidget):
 
     def show_surface(self, surface: Surface | None, places: Array, held: Indices) -> None:
         """Draw a surface, faults at `places` (k, 3) in m, and `held` sides (H, 2) of its rim."""
+        if surface is not None:
+            surface = surface.part(np.isfinite(np.ptp(surface.corners, axis=(1, 2))))
         another = surface is not self.surface
         self.surface, self.places, self.held = surface, places, held
         self._redraw() if another else self.update()
@@ -126,16 +128,12 @@ class SurfacePreview(QWidget):
 
     def seen(self, points: Array) -> Array:
         """Where `points` (k, 3) in m are on the widget: x and y in px, and towards the viewer."""
-        nodes = self._nodes()
+        nodes = _finite(self.surface)
         low, high = nodes.min(axis=0), nodes.max(axis=0)
         size = float(np.linalg.norm(high - low)) or 1.0
         scale = _MARGIN * min(self.width(), self.height()) / size
         found = scale * (points - (low + high) / 2) @ self._axes.T
         return found * (1, -1, 1) + (self.width() / 2, self.height() / 2, 0)
-
-    def _nodes(self) -> Array:
-        nodes = self.surface.nodes if self.surface else np.zeros((1, 3))
-        return nodes[np.isfinite(nodes).all(axis=1)]
 
     def paintEvent(self, event: QPaintEvent) -> None:
         with QPainter(self) as painter:
@@ -172,12 +170,11 @@ class SurfacePreview(QWidget):
     def _picture(self, surface: Surface) -> QImage:
         """Its triangles as dots, those nearer over those farther."""
         width, height = self.width(), self.height()
-        triangles = surface.part(np.isfinite(np.ptp(surface.corners, axis=(1, 2))))
-        corners = self.seen(triangles.corners.reshape(-1, 3)).reshape(-1, 3, 3)
+        corners = self.seen(surface.corners.reshape(-1, 3)).reshape(-1, 3, 3)
         flat = corners[..., :2]
         longest = np.linalg.norm(flat - np.roll(flat, 1, axis=1), axis=2).max(axis=1)
         rows = np.clip(np.ceil(1.3 * longest), 1, 2000)
-        rows = np.ceil(rows * min(1.0, np.sqrt(_SAMPLES / (rows**2).sum()))).astype(int)
+        rows = np.ceil(rows * min(1.0, np.sqrt(_SAMPLES / max((rows**2).sum(), 1.0)))).astype(int)
         of = np.repeat(np.arange(len(rows)), rows**2)
         number = np.arange(len(of)) - np.repeat(np.cumsum(rows**2) - rows**2, rows**2)
         s, t = (np.array(np.divmod(number, rows[of])) + 0.5) / rows[of]
@@ -186,8 +183,8 @@ class SurfacePreview(QWidget):
         x, y, near = (a[of] + s[:, None] * u[of] + t[:, None] * v[of]).T
         order = np.argsort(near, kind="stable")
         at = np.clip(y, 0, height - 1).astype(int) * width + np.clip(x, 0, width - 1).astype(int)
-        facing = triangles.normals @ self._axes[2]
-        facing /= np.maximum(np.linalg.norm(triangles.normals, axis=1), 1e-300)
+        facing = surface.normals @ self._axes[2]
+        facing /= np.maximum(np.linalg.norm(surface.normals, axis=1), 1e-300)
         colours = np.where((facing > 0)[:, None], (120, 160, 205), (214, 138, 60))
         rgb = (colours * (0.3 + 0.7 * np.abs(facing))[:, None]).astype(np.uint32)
         packed = 0xFF000000 | rgb[:, 0] << 16 | rgb[:, 1] << 8 | rgb[:, 2]
@@ -232,6 +229,13 @@ class SurfacePreview(QWidget):
             super().keyPressEvent(event)
         else:
             self._turn(_PER_KEY * way[0], _PER_KEY * way[1])
+
+
+def _finite(surface: Surface | None) -> Array:
+    """The finite nodes (n, 3), or zero where there are none."""
+    nodes = surface.nodes if surface else np.zeros((1, 3))
+    found = nodes[np.isfinite(nodes).all(axis=1)]
+    return found if len(found) else np.zeros((1, 3))
 
 
 class SkinDialog(QDialog):
@@ -293,6 +297,8 @@ class SkinDialog(QDialog):
         self.bar = QProgressBar(maximum=0)  # pyright: ignore[reportCallIssue]
         self.begin_button = button("&Simulate", "simulate-skin", "Simulate this skin.")
         self.cancel_button = button("C&lose", "close-skin", "Close (Esc).")
+        self.begin_button.setDefault(True)
+        self.cancel_button.setAutoDefault(False)
         self.begin_button.clicked.connect(guarded(lambda *_: self._begin()))
         self.cancel_button.clicked.connect(guarded(lambda *_: self.reject()))
         self._lay_out()
@@ -320,7 +326,7 @@ class SkinDialog(QDialog):
 
     # The mesh.
 
-    def open(self) -> None:
+    def choose(self) -> None:
         """Ask for a file."""
         window, folder = self.parentWidget(), str(recordings_folder())
         file, _ = QFileDialog.getOpenFileName(window, "Open a skin", folder, _FILES)
@@ -366,7 +372,7 @@ class SkinDialog(QDialog):
             self.unit.addItem(f"Select the unit{ELLIPSIS}", "")
             for unit in UNITS:
                 self.unit.addItem(unit, unit)
-        size = np.ptp(found.nodes[np.isfinite(found.nodes).all(axis=1)], axis=0)
+        size = np.ptp(_finite(found), axis=0)
         for row, (unit, scale) in enumerate(UNITS.items(), 1):
             sides = " x ".join(f"{1e3 * scale * side:.3g}" for side in size)
             self.unit.setItemText(row, f"{unit}: the skin is {sides} mm")
@@ -454,6 +460,7 @@ class SkinDialog(QDialog):
             layout.addWidget(text_label(sentence(fault.message)), 1)
             if fault.repair:
                 repair = button(_REPAIRS[fault.repair], f"repair-{fault.kind}", "The file stays.")
+                repair.setAutoDefault(False)  # or Enter in a line would press it
                 repair.clicked.connect(guarded(lambda *_, fault=fault: self._repair(fault)))
                 layout.addWidget(repair, 0, Qt.AlignmentFlag.AlignTop)
             self.found.addWidget(row)

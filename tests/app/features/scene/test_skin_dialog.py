@@ -156,6 +156,24 @@ def test_what_is_no_mesh_is_refused_in_the_dialog(dialog, until, tmp_path) -> No
     assert not dialog.begin_button.isEnabled()
 
 
+def test_a_mesh_without_finite_nodes_is_a_fault(dialog, until, qtbot, tmp_path) -> None:
+    dialog.begin(stl(tmp_path / "none.stl", np.nan * PAD[0], PAD[1]))
+    until(lambda: dialog.unit.count() > 1)
+    qtbot.keyClicks(dialog.unit, "mm")
+    until(lambda: "Repair" in dialog.message.text())
+    assert not dialog.begin_button.isEnabled()
+
+
+def test_enter_in_a_line_repairs_nothing(dialog, until, qtbot, broken) -> None:
+    opened(dialog, until, qtbot, broken)
+    dialog.held.setCurrentIndex(1)
+    qtbot.keyClicks(dialog.ends[0], "0, 0, 0")
+    qtbot.keyClick(dialog.ends[0], Qt.Key.Key_Return)
+    qtbot.wait(100)
+    assert len(repairs(dialog)) == 2
+    assert dialog.isVisible()
+
+
 def test_computing_can_be_cancelled(dialog, until, qtbot, pad) -> None:
     opened(dialog, until, qtbot, pad)
     made = []
