@@ -71,7 +71,7 @@ def fingerprint(layout: SensorLayout) -> str:
     found = hashlib.sha256(where.tobytes())
     if layout.reads:
         each = zip(layout.element.tolist(), layout.kind.tolist(), strict=True)
-        found.update(repr((layout.kinds, *each)).encode())
+        found.update(repr((layout.directed[0], *each)).encode())
     return found.hexdigest()
 
 

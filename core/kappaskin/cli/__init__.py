@@ -37,7 +37,7 @@ _PANELS = {
     "Live": ("live", "publish listen"),
     "Recordings": ("record", "record info verify repair export import reconstruct"),
     "Sensor": ("sensor", "calibrate tare press monitor device"),
-    "Studies": ("study", "plan simulate cost compare stability regions study report"),
+    "Studies": ("study", "plan simulate cost compare stability regions design study report"),
     "Paper": ("study", "tables figures"),
     "System": ("system", "doctor drill"),
 }

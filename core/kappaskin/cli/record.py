@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 _POLL = 0.05  # s
 _BEGIN = 10.0  # s within which something must come
+_OPENED = 120.0  # s within which a source is open: a large mesh is prepared for the first time
 
 
 def record(
@@ -141,8 +142,9 @@ def _recorded(
             return slope
         if status.state == LOST and not tared.connections:
             raise Refusal(status.message)
-        if status.state != STREAMING and not tared.connections and now - began > _BEGIN:
-            raise Refusal(f"{status.source}: no readings within {_BEGIN:g} s")
+        most = _BEGIN if status.source else _OPENED
+        if status.state != STREAMING and not tared.connections and now - began > most:
+            raise Refusal(f"{status.source or 'source'}: no readings within {most:g} s")
         show_progress(_line(status))
         time.sleep(_POLL)
 

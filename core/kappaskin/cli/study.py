@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from kappaskin.studies import Cost, Refused
 
 
+Some = Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")]
+"""One or more names after the option."""
+
+
 def plan(scene: str = "", *, trust: Switch = False, json: Switch = False) -> None:
     """Show which effects a scene needs at its requested accuracy, and why.
 
@@ -245,6 +249,53 @@ def regions(*, json: Switch = False) -> None:
     print_result(rows, json, lambda: regions_text(rows))
 
 
+def design(
+    scene: str = "",
+    *,
+    place: Some = ("scene", "D", "A"),
+    basis: Pair = "8x8",
+    out: Path | None = None,
+    trust: Switch = False,
+    json: Switch = False,
+) -> None:
+    """Predict how surely each place of a skin is felt, by where the elements are.
+
+    The errors of the place and force of the scene's load, pressed all over the skin, and of the
+    shape, due to noise alone and without a simulation. As many elements as the scene has are
+    placed as in the scene, D- or A-optimally for the shape, or clustered.
+
+    Example: `kappaskin design finger.scene.toml --place scene A --out felt.ply`
+
+    Parameters
+    ----------
+    scene
+        The name of a ready scene, or a file that ends in .toml; the default one when left out.
+    place
+        The placements to compare, of scene, clustered, D and A.
+    basis
+        Number of functions along x and y of the shape; on a mesh their product counts.
+    out
+        The file to write all errors at each place to: .csv, .npz, or of a mesh .ply, coloured by
+        the error of the place by the first placement.
+    trust
+        Let the scene name files outside its folder.
+    json
+        Print one JSON list of rows instead of a table.
+    """
+    from kappaskin.scenes import load_scene
+    from kappaskin.studies import check_maps_file, design_maps, maps_rows, maps_text, write_maps
+
+    on = load_scene(scene, trust)
+    patch = on.plate.patch
+    if out is not None:
+        check_output(out, scene)
+        check_maps_file(out, patch)
+    found = design_maps(on, pair(basis, "a basis"), place)
+    if out is not None:
+        write_maps(out, patch, found)
+    print_result(maps_rows(found), json, lambda: maps_text(on, found))
+
+
 _LOG_EVERY = 10.0  # s between two lines of progress in a log
 
 
@@ -311,9 +362,6 @@ def report(folder: Path) -> None:
 
 
 # Commands of the paper: tables, figures
-
-Some = Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")]
-"""One or more names after the option."""
 
 
 def tables(

@@ -4,7 +4,7 @@ import hashlib
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import product
 from typing import Any, Protocol, cast
 
@@ -44,7 +44,7 @@ class Influence(Protocol):
         """Weights (P,) of the elements around the last place; None where all are 1.
 
         The readings of one that lies under the load depend on how it is spread over it: its
-        variance is 1 + `share`.
+        variance is 1 + `share`. On a mesh they are inexact, in proportion to what is read.
         """
         ...
 
@@ -52,7 +52,7 @@ class Influence(Protocol):
         """What the readings of a Gaussian load at the last place differ by from those of `at`.
 
         Of one as wide, with the standard deviation sqrt(s) / 2 each way, and its derivatives,
-        (4, C), on a cap, where they differ all around; else None, and `trust` is to be used.
+        (4, C), on a cap or a mesh, where they differ all around; else None.
         """
         ...
 
@@ -279,15 +279,28 @@ def _gaussian(d: Array, sd: float) -> tuple[Array, Array]:
     return np.log(t) + 0.5 + integral + mean, 2 * (1 - mean) / t
 
 
+def _sharper(d: Array, s: float) -> tuple[Array, Array]:
+    """What A and B of a Gaussian load differ by from those of a disc as wide, of s = r^2."""
+    A, B = _gaussian(d, math.sqrt(s) / 2)
+    t: Array = d[0] ** 2 + d[1] ** 2
+    m = np.maximum(t, s)
+    return A - np.log(m) - (s + t) / (2 * m), B - (2 - s / m) / m
+
+
 def _under_gaussian(d: Array, sd: float, gage_length: float) -> Array:
     """Curvature (3, ...) read at `d` (2, ...) from the centre of a Gaussian load."""
+    return _read(lambda D: _gaussian(D, sd), d, gage_length)
+
+
+def _read(load: Callable[[Array], tuple[Array, Array]], d: Array, gage_length: float) -> Array:
+    """Curvature (3, ...) read at `d` (2, ...) of a load's A and B there."""
     if not gage_length:
-        A, B = _gaussian(d, sd)
+        A, B = load(d)
         return np.stack([A + B * d[0] ** 2, A + B * d[1] ** 2, B * d[0] * d[1]])
 
     def slope(x: float, y: float, along: float) -> Array:
         D = d + (along * np.array([x, y])).reshape(2, *[1] * (d.ndim - 1))
-        return _gaussian(D, sd)[0] * (x * D[0] + y * D[1])
+        return load(D)[0] * (x * D[0] + y * D[1])
 
     half = gage_length / 2
     ways: list[tuple[float, float]] = _WAYS.tolist()
@@ -318,6 +331,7 @@ CUBICS = np.asarray(np.linalg.inv(np.vander(np.arange(4.0), increasing=True).T).
 """Lagrange's cubics through four even nodes, by the powers of the place."""
 SPLINES: Array = np.array([[8, -5, 4, -1], [-12, 21, -12, 3], [6, -15, 12, -3], [-1, 3, -3, 1]]) / 6
 """The same of a cubic spline, between the second and third of four nodes."""
+BY_PROFILE = 0.27  # of P / (8 pi D): by so much a disc and a Gaussian differ in their middle
 _BESIDE = 2.5  # of a load's squared radius: an element as far off does not lie under it
 
 
@@ -533,26 +547,37 @@ class _OfMesh:
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str, out: Array) -> None:
         self._mesh, self._out = cast("MeshSkin", plate.patch), out
         self.unit = 8 * math.pi * plate.rigidity
-        length = layout.gage_length
+        self._gage_length = length = layout.gage_length
         places = layout.positions.tobytes()
-        self._table, variances = _rest_on_mesh(plate, edge, places, length)
-        # Lagrange's parabolas through the variances of the table, by powers of the variance.
-        self._shares = np.linalg.inv(np.vander(variances, increasing=True).T)
+        table, variances = _rest_on_mesh(plate, edge, places, length)
+        self._block = lru_cache(32)(partial(self._mesh.splines.block, table))
+        # Lagrange's polynomials through the variances of the table, by powers of the variance,
+        # and what a disc's even moments are of those of a Gaussian as wide.
+        self._widest, n = float(variances[-1]), len(variances)
+        self._shares = np.linalg.inv(np.vander(variances / self._widest, increasing=True))
+        self._powers = np.arange(float(n))
+        self._moments = 2.0**self._powers / scipy.special.factorial(self._powers + 1)
         self._basis, self._compliance, _ = read_of_modes(plate, layout.of_curvature, edge, _ON_MESH)
+        N, area = self._basis.size, float(self._mesh.areas.sum())
+        self._finer = area / (16 * math.pi**2 * plate.rigidity * N)
         base = self._mesh.base(*layout.positions.T)
         tangents: Array = np.swapaxes(base.frame, 0, 1)
         self._origin = np.vecdot(tangents, np.stack(base.point, axis=-1))
         self._frame: Array = np.ascontiguousarray(tangents).reshape(-1, 3)
         at = layout.positions
         self._disc = _DiscOnGages(at, length, out) if length else _Disc(at, out)
+        self._difference, self._rest = np.zeros(out.shape), np.zeros((3, n, out.shape[1]))
         self.nodes: tuple[Array, Single] | None = self._searched()
 
     def _searched(self) -> tuple[Array, Single]:
         mesh = self._mesh
         found = mesh.spread(min(_SPREAD, len(mesh.points) // 2))
         side = min(mesh.a, mesh.b)
-        places = np.array(
-            [(*mesh.places[k], (share * side) ** 2) for k in found for share in _RADII]
+        places = np.concatenate(
+            [
+                np.insert(mesh.places[found[: len(found) // each]], 2, (share * side) ** 2, axis=1)
+                for share, each in _SEARCHED.items()
+            ]
         )
         read = np.empty((len(places), self._out.shape[1]), np.float32)
         for row, place in zip(read, places.tolist(), strict=True):
@@ -573,29 +598,48 @@ class _OfMesh:
         of_x += by_d[1] * by_x[1]
         of_y += by_d[1] * by_y[1]
         by_d[0], by_d[1] = of_x, of_y
-        rest = mesh.splines.jet(self._table, x, y, 3).reshape(3, len(self._shares), -1)
-        v = s / 4  # what is smooth depends on the variance of a load alone
-        share, by_s = np.dot(((1.0, v, v * v), (0.0, 0.25, v / 2)), self._shares.T)
-        out[:3] += share @ rest
-        out[3] += by_s @ rest[0]
+        first, weights = mesh.splines.at(x, y)
+        self._rest = weights[:3].dot(self._block(*first)).reshape(self._rest.shape)
+        out += self._smooth(s, self._moments)
+
+    def _smooth(self, s: float, moments: Array) -> Array:
+        """What is smooth (4, C) of a load of these `moments`, each over that of a Gaussian."""
+        k, found = self._powers, self._difference
+        of_size = moments * (s / 4 / self._widest) ** k
+        np.dot(of_size @ self._shares, self._rest, found[:3])
+        np.dot((k / s * of_size) @ self._shares, self._rest[0], found[3])
+        return found
 
     def trust(self, s: float, share: float) -> Array | None:
-        return _trust(self._disc.t, s, share)
+        under = np.square(self._out[0]).reshape(3, -1).mean(axis=0)
+        return 1 / (1 + share * (_INEXACT / BY_PROFILE) ** 2 * under)
 
     def profile(self, s: float) -> Array | None:
-        return None
+        found, length = self._smooth(s, 1 - self._moments), self._gage_length
+        # And right under the load; its slopes there are taken to be those of a disc.
+        near = np.flatnonzero(self._disc.t < _TAIL * s + length**2)
+        if len(near):
+            more = _read(lambda d: _sharper(d, s), self._disc.d[:, near], length)
+            found[0].reshape(3, -1)[:, near] += more
+        return found
 
     def gives(self, x: float, y: float) -> float:
-        f = self._basis.jet(x, y, 0)
-        return float(np.vdot(self._compliance.after(f), f))
+        f, N = self._basis.jet(x, y, 0), self._basis.size
+        # Finer waves, of which by Weyl's law there are k dk / 2 pi to an area, move 1 / (D k^4).
+        finer = self._finer * min(4 * float(np.vdot(f, f)) / N, 1.0)
+        return float(np.vdot(self._compliance.after(f), f)) + finer
 
 
 _ON_MESH = 15  # functions each way, of the displacement under a load
-_SPREAD = 700  # places searched
-_RADII = 0.02, 0.07  # of the shorter side, of the loads there
+_INEXACT = 0.01  # of a reading: by elements and theory of shells (`tests/truths/test_meshes.py`)
+_SPREAD = 300  # places searched
+_SEARCHED = {0.02: 1, 0.07: 1, 0.16: 2}  # radii of the shorter side, and at every how many places
 _MESH_SD = 1.2  # steps of the splines: of a Gaussian load
 _CUT = 3.0  # of it: farther away such a load presses no more
-_SPREADS = 1, 4, 12  # times that a load of the table is spread as one such
+_WIDEST = 0.3  # of the shorter side: a disc as large as the Gaussian loads of the table
+_TAIL = 6.0  # times the squared radius: so far off, a Gaussian as wide has exp(-12) left
+_WIDE = 1.2  # times the decay squared: wider loads are followed by more variances
+_FEW, _MANY = (0.0, 0.4, 1.0), (0.0, 0.08, 0.3, 0.6, 0.85, 1.0)  # of the largest: the variances
 _BLOCK = 16  # elements together: 100 MB
 
 
@@ -605,14 +649,14 @@ def _rest_on_mesh(
 ) -> tuple[Array, Array]:
     """Splines (G, 3 C) of what is read of Gaussian loads less that on a plate without edges.
 
-    In the units of `_Disc`; and the variances (3,) of the loads in m^2.
+    In the units of `_Disc`; and the variances of the loads in m^2.
     """
     mesh, C = cast("MeshSkin", plate.patch), plate.membrane_stiffness
     of_sheet = plate.rigidity / C, plate.poisson, plate.foundation / C
     sizes = " ".join(f"{each:.12g}" for each in (*of_sheet, gage_length))
     made = cached(
-        f"loads {mesh.content} {edge} {sizes} {hashlib.sha256(places).hexdigest()}",
-        lambda: _made_on_mesh(mesh, edge, of_sheet, places, gage_length),
+        f"discs {mesh.content} {edge} {sizes} {hashlib.sha256(places).hexdigest()}",
+        lambda: _made_on_mesh(mesh, edge, of_sheet, places, gage_length, _decay(plate)),
     )
     return made["splines"].astype(float), made["variances"]
 
@@ -623,6 +667,7 @@ def _made_on_mesh(
     of_sheet: tuple[float, float, float],
     places: bytes,
     gage_length: float,
+    decay: float,
 ) -> dict[str, NDArray[Any]]:
     basis = cast("MeshBasis", basis_for(mesh, edge, 1, 1))
     n, unit, functions = len(mesh.points), 8 * math.pi * of_sheet[0], basis.functions
@@ -639,10 +684,14 @@ def _made_on_mesh(
     away = mesh.points.T[:, :, None] - np.stack(base.point)[:, None]
     d = np.einsum("pak,knp->anp", base.frame, away)
     cut, found = _CUT**2 / 2, list[Array]()
-    variances = sd**2 * (1 - cut / math.expm1(cut)) * np.array(_SPREADS, float)
-    for k in range(1, max(_SPREADS) + 1):
+    # Spread again and again, up to the largest load.
+    least, largest = sd**2 * (1 - cut / math.expm1(cut)), (_WIDEST * min(mesh.a, mesh.b)) ** 2 / 4
+    shares = np.array(_FEW if largest < _WIDE * decay**2 else _MANY)
+    times = np.unique(np.round(1 + shares * max(largest / least - 1, 2 * len(shares))))
+    variances = least * times
+    for k in range(1, int(times[-1]) + 1):
         read = (spread @ read.reshape(n, -1)).reshape(read.shape)
-        if k in _SPREADS:
+        if k in times:
             plain = _under_gaussian(d, math.sqrt(variances[len(found)]), gage_length)
             found.append(mesh.splines.fit((read - np.moveaxis(plain, 0, 1)).reshape(n, -1)))
     return {"splines": np.hstack(found).astype(np.float32), "variances": variances}

@@ -12,7 +12,7 @@ from scipy.linalg import lapack
 
 from kappaskin.bases import Basis, SineBasis, held_near
 from kappaskin.contact.element_grid import modal_projection
-from kappaskin.contact.influence import influence_of, read_of_modes
+from kappaskin.contact.influence import BY_PROFILE, influence_of, read_of_modes
 from kappaskin.contact.stretched import StretchedSkin
 from kappaskin.estimation import Fit, PatternCache
 from kappaskin.frames import Array, Contact, Mask
@@ -66,7 +66,6 @@ _HARDLY = 1e-9  # of the largest: a direction with no more left is none
 _DOUBTFUL = 0.15  # of a side: within it, a contact may be one on the rim
 _RIM = 1 / 15  # of a side: within it, a load moves the skin too little to be told
 _START, _LEAST, _LARGEST = 0.03, 1e-3, 0.2  # of the shorter side: radius of a load
-_PROFILE = 0.27  # of P / (8 pi D): by so much a disc and a Gaussian differ in their middle
 _TO_GAUSSIAN = 0.5  # of the way from a disc: the profile of a load, whose standard deviation is as
 _FURTHER = -1.0, 2.0  # much; and how far along that way slopes are followed
 
@@ -195,23 +194,21 @@ class PointContact:
         tables, s, n = self._used(self._none)[1], max(s, self._least), self._unknowns
         strength = force / self._influence.unit
         self._influence.at(x, y, s)
-        if (profile := self._influence.profile(s)) is not None:
-            self._rows[5] = profile[0]
+        profile = self._influence.profile(s)
+        self._rows[5] = 0.0 if profile is None else profile[0]
         weights = self._weights(s, strength, tables, noise**2)
         weights = np.ones(len(self._M)) if weights is None else weights
         rows = self._rows * weights
         free = rows[6:]
         if len(free):
             rows -= rows @ free.T @ np.linalg.pinv(free @ free.T) @ free
-        T = rows[:n]
-        if profile is None:
-            # Of readings with weights w other than over their noise, (T w)' K / (T w)' (T w).
-            of_noise = _inverse(T @ T.T) @ (T * weights)
-            covariance = of_noise @ of_noise.T
-        else:
-            beside, known = T @ rows[5], (noise / (_TO_GAUSSIAN * strength)) ** 2
-            share = beside / (rows[5] @ rows[5] + known)
-            covariance = _inverse(T @ T.T - np.multiply.outer(beside, share))
+        T, q, known = rows[:n], rows[5], (noise / (_TO_GAUSSIAN * strength)) ** 2 or math.inf
+        share = T @ q / (q @ q + known)
+        # What noise n, and a profile p off the usual one, do: H^-1 (T - share q)' (w n + p q).
+        T_left = T - np.multiply.outer(share, q)
+        by_reading = _inverse(T_left @ T.T) @ T_left
+        of_noise, of_profile = by_reading * weights, by_reading @ q
+        covariance = of_noise @ of_noise.T + np.multiply.outer(of_profile, of_profile) / known
         unit = np.array([self._influence.unit, 1 / strength, 1 / strength])
         return noise**2 * np.multiply.outer(unit, unit) * covariance[:3, :3]
 
@@ -362,15 +359,14 @@ class PointContact:
         """The best step from a load at (x, y) of size s, where the `last` one led."""
         self._influence.at(x, y, s)
         profile = self._influence.profile(s) if last and variance else None
-        force, weights = last.steps[0] if last else 0.0, tables.weights
+        force = last.steps[0] if last else 0.0
         if last and profile is not None:
             self._rows[5] = profile[0]
             self._rows[0] += _TO_GAUSSIAN * profile[0]
             least, most = _FURTHER
             along = _clamped(least, _TO_GAUSSIAN + last.profile / force, most)
             self._rows[1:4] += along * profile[1:]
-        else:
-            weights = self._weights(s, force, tables, variance)
+        weights = self._weights(s, force, tables, variance)
         if self._stretched is not None:
             self._rows[4] = self._readings
             self._stretched.stretch(x, y, s, self._influence.unit, self._rows)
@@ -416,7 +412,7 @@ class PointContact:
 
     def _weights(self, s: float, force: float, tables: _Tables, variance: float) -> Array | None:
         """Weights (3 P,) of the readings; None where all are 1."""
-        share = (_PROFILE * force) ** 2 / variance if variance else 0.0
+        share = (BY_PROFILE * force) ** 2 / variance if variance else 0.0
         trust = self._influence.trust(s, share) if share else None
         if trust is None:
             return tables.weights
@@ -431,12 +427,13 @@ class PointContact:
         strength, force = abs(here.steps[0]), here.steps[0] * unit
         sd: list[float] = (spread * np.sqrt(here.inverse.diagonal())).tolist()
         theory = self._theory_error
+        of_place = theory if self.patch.is_shallow else 0.0
         self.misfit = (spread / float(fit.noise)) ** 2 if fit.noise else math.inf
         under = force * self._influence.gives(x, y)
         if self._stretched is not None:
             under += self._stretched.more(x, y, force)
-        sd_x = math.hypot(sd[1] / strength, theory * (x - self.patch.a / 2))
-        sd_y = math.hypot(sd[2] / strength, theory * (y - self.patch.b / 2))
+        sd_x = math.hypot(sd[1] / strength, of_place * (x - self.patch.a / 2))
+        sd_y = math.hypot(sd[2] / strength, of_place * (y - self.patch.b / 2))
         return Contact(
             np.array([x, y]),
             np.array([sd_x, sd_y]),

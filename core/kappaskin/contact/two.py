@@ -10,7 +10,7 @@ import numpy as np
 from kappaskin.bases import held_near
 from kappaskin.contact.drift import FittedDrift, SmoothDrift
 from kappaskin.contact.geometry import contact_geometry
-from kappaskin.contact.influence import influence_of, read_of_modes
+from kappaskin.contact.influence import BY_PROFILE, influence_of, read_of_modes
 from kappaskin.contact.point import NO_CONTACT, PointContact, left_by_chance
 from kappaskin.estimation import Fit, PatternCache
 from kappaskin.frames import Array, Contact, LocalGeometry, Mask
@@ -36,7 +36,6 @@ _HOPE = 3.0  # times what a step promises: more is not to be gained by all that 
 _DAMPING, _EASED, _RAISED, _MOST = 1e-3, 0.2, 10.0, 1e6
 _FURTHEST = 0.05  # of a side, in one step
 _START, _LEAST, _LARGEST = 0.03, 1e-3, 0.2  # of the shorter side: radius of a load
-_PROFILE = 0.27  # of P / (8 pi D): by so much a disc and a Gaussian differ in their middle
 _RIM = 1 / 15  # of a side: within it, a load moves the skin too little to be told
 _LOUDEST = 1e12  # times the noise: beyond it, no load fits to rounding
 _RIDGE = 1e-9  # keeps what the readings do not determine solvable
@@ -201,11 +200,10 @@ class _Loads:
         return self._rows
 
     def _doubt(self, s: float, force: float) -> Array | float:
+        trust = self.influence.trust(s, (BY_PROFILE * force) ** 2)
         profile = self.influence.profile(s)
-        if profile is not None:
-            return np.square(force * profile[0])
-        trust = self.influence.trust(s, (_PROFILE * force) ** 2)
-        return 0.0 if trust is None else (1 / trust - 1)[self._element]
+        around = 0.0 if profile is None else np.square(force * profile[0])
+        return around if trust is None else around + (1 / trust - 1)[self._element]
 
     def several(self, p: Array) -> _Model:
         """Loads (L, 4): x, y and squared radius, and force in units."""

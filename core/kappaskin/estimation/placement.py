@@ -21,7 +21,7 @@ from kappaskin.errors import Refusal
 from kappaskin.estimation.estimator import Estimator, column_lengths, combinations
 from kappaskin.frames import Array, Indices, Mask
 from kappaskin.sensing import SensorLayout
-from kappaskin.skin import Cap
+from kappaskin.skin import Cap, MeshSkin
 
 
 def singular_values(basis: Basis, layout: SensorLayout) -> tuple[Array, Array]:
@@ -145,7 +145,9 @@ def _candidates(layout: SensorLayout, spacing: float) -> Array:
     count = patch.a * patch.b / spacing**2
     m, n = (math.floor(side / spacing + 1e-9) for side in (patch.a, patch.b))
     if m * n and count <= _MOST_CANDIDATES * (1 + 1e-9):
-        if isinstance(patch, Cap):
+        if isinstance(patch, MeshSkin):
+            places = patch.places[patch.spread(len(patch.places), spacing)]
+        elif isinstance(patch, Cap):
             places = SensorLayout.on_rings(patch, _rings(patch, spacing)).positions
         else:
             places = SensorLayout.regular(patch, m, n).positions

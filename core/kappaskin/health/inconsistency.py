@@ -204,10 +204,11 @@ class Neighbours:
         close = (np.reshape(distance, (E, k + 1))[:, 1:] < _CLOSE * pitch).sum(axis=1)
         self.alone: Array = _BESIDE / np.clip(close, 1, _BESIDE)
         """Ratio (E,) of the close neighbours inside a grid to those of each element."""
-        parts = _derivatives(layout.kinds)
+        kinds, kind = layout.directed
+        parts = _derivatives(kinds)
         used = np.flatnonzero(parts.any(axis=0))
         self._steps = _STEPS[used]
-        self._parts = parts[layout.kind[self.own]][:, :, used]
+        self._parts = parts[kind[self.own]][:, :, used]
         here = _covariance(np.zeros(2), self._steps)
         self._variance = np.einsum("eqi,ij,eqj->eq", self._parts, here, self._parts)
         self.scale = np.ones(layout.channels)

@@ -18,6 +18,7 @@ from kappaskin._schema import Within
 from kappaskin._toml import TomlTable, parsed
 from kappaskin.bases import basis_for
 from kappaskin.errors import Refusal
+from kappaskin.frames import Array
 from kappaskin.mechanics import HeightMap, Load, Mesh, Plate, RigidObject
 from kappaskin.scenes.cylinders import Presentation, schedule
 from kappaskin.scenes.effect_plan import effects_of
@@ -99,6 +100,8 @@ _SIDE = Within(1e-4, 10, "m")
 _MOST_READINGS = 2**16
 _MOST_ELEMENTS = _MOST_READINGS // 3  # with three readings, as many as the wire format can number
 _MOST_VALUES = 2**25  # of functions at channels, a quarter of a gigabyte
+_MOVED = 0.1  # of the distance of two elements: so far off the mesh is told
+_LEVEL = 0.1  # of a direction, that is at least along the skin
 _MOST_TOUCHES = 10_000  # some seconds to read
 _MOST_FUNCTIONS, _MOST_THAT_MIX, _MOST_ON_CAP = 64**2, 20**2, 32**2  # seconds to make the skin of
 
@@ -173,7 +176,7 @@ def scene_of(top: TomlTable, file: Path, trust: Trust = False) -> Scene:
             "format",
         )
     plate, edge = read_skin(top.table("skin"), find)
-    layout = read_elements(top.table("elements"), plate.patch)
+    layout, moved = read_elements(top.table("elements"), plate.patch, find, top.table("skin"))
     reference = SCENE.value(top, "reference", default=usual_reference(plate.patch))
     basis = partial(basis_for, plate.patch, edge, *reference)
     with top.blamed("reference"):
@@ -205,7 +208,7 @@ def scene_of(top: TomlTable, file: Path, trust: Trust = False) -> Scene:
             edge,
             choice=choice,
             title=SCENE.value(top, "title", default=name),
-            text=SCENE.value(top, "text"),
+            text="\n".join(filter(None, (SCENE.value(top, "text"), moved))),
         )
         with top.blamed("rate"):
             scene.sensor()
@@ -258,10 +261,9 @@ def _mesh(table: TomlTable, find: _Find) -> MeshSkin:
         edges = None if held is None else held_edges(surface, UNITS[unit] * np.array(held))
         order = np.lexsort(surface.nodes.T)  # the text of the mesh is half as long
         number = np.argsort(order)
-        triangles = number[surface.triangles]
-        triangles = triangles[triangles.min(axis=1).argsort()]
-        held_nodes = None if edges is None else number[edges]
-        return MeshSkin(surface.nodes[order], triangles, thickness, held_nodes)
+        triangles, held = number[surface.triangles], None if edges is None else number[edges]
+        first = triangles.min(axis=1).argsort()
+        return MeshSkin(surface.nodes[order], triangles[first], thickness, held)
 
 
 def _patch(table: TomlTable, shape: str) -> Patch:
@@ -276,10 +278,17 @@ def _patch(table: TomlTable, shape: str) -> Patch:
     return Patch(a, b, SKIN.value(table, "radius"), shape == "strip")
 
 
-def read_elements(table: TomlTable, patch: Patch) -> SensorLayout:
-    """The elements in the table [elements] of a file."""
+def read_elements(
+    table: TomlTable, patch: Patch, find: _Find, skin: TomlTable
+) -> tuple[SensorLayout, str]:
+    """The elements in the table [elements] of a file, and by how much they had to be moved.
+
+    In words, empty where that is little. `find` gives the file that a key of the table names,
+    `skin` is the table [skin], which has the unit of the mesh's file.
+    """
+    moved, turns = "", None
     with table.blamed():
-        given = [key for key in ("positions", "rings", "spiral", "spread") if key in table]
+        given = [key for key in ("positions", "rings", "spiral", "spread", "file") if key in table]
         if len(given) > 1:
             raise table.refusal(f"expected one pattern, got {' and '.join(given)}", given[1])
         if "positions" in table:
@@ -293,6 +302,10 @@ def read_elements(table: TomlTable, patch: Patch) -> SensorLayout:
         elif "spread" in table:
             check_elements(count := ELEMENTS.value(table, "spread"))
             layout = SensorLayout.spread(patch, count)
+        elif "file" in table:
+            file = find(table, "file")
+            with table.blamed("file"):
+                layout, turns, moved = _in_space(file, patch, SKIN.value(skin, "unit", default=""))
         else:
             grid = ELEMENTS.value(table, "grid")
             check_elements(*grid)
@@ -302,6 +315,7 @@ def read_elements(table: TomlTable, patch: Patch) -> SensorLayout:
         layout = replace(layout, **averaged)
         with table.blamed("reads"):
             layout = layout.reading_each(ELEMENTS.value(table, "reads"))
+            layout = _turned(layout, table, turns)
             if layout.channels > _MOST_READINGS:
                 raise Refusal(
                     f"expected at most {_MOST_READINGS} readings of all elements, got "
@@ -309,7 +323,59 @@ def read_elements(table: TomlTable, patch: Patch) -> SensorLayout:
                 )
         layout = layout.without(ELEMENTS.value(table, "dead"))
     table.done()
-    return layout
+    return layout, moved
+
+
+def _turned(layout: SensorLayout, table: TomlTable, turns: Array | None) -> SensorLayout:
+    """The elements with their axes turned as the table, or else `turns` (P,) has it."""
+    given, along = ELEMENTS.value(table, "turns"), ELEMENTS.value(table, "along")
+    if (given is not None) + (along != "x") + (turns is not None) > 1:
+        raise table.refusal("expected one of turns, along and directions in the file, got more")
+    if along == "principal":
+        xx, yy, xy = layout.patch.read_at_rest(layout.positions)
+        turns = np.arctan2(2 * xy, xx - yy) / 2
+    turns = turns if given is None else np.array(given)
+    return layout if turns is None else layout.turned(turns)
+
+
+def _in_space(file: Path, patch: Patch, unit: str) -> tuple[SensorLayout, Array | None, str]:
+    """Elements at the places in a CSV `file`, how their axes are turned, and how far they moved."""
+    if not isinstance(patch, MeshSkin) or not unit:
+        raise Refusal(
+            "expected places of elements on a mesh with the unit of its file in [skin], got "
+            f"a {patch.name}; give positions instead"
+        )
+    try:
+        heading, *lines = read_file(file, _LARGEST_RECORD).decode("utf-8-sig").splitlines() or [""]
+        rows = np.array([line.split(",") for line in lines if line.strip()], float)
+    except (OSError, ValueError) as error:
+        raise Refusal(
+            f"{file}: expected a CSV of numbers x,y,z, or x,y,z,dx,dy,dz{why_unread(error)}"
+        ) from error
+    names = heading.replace(" ", "").split(",")
+    directed = names == [*"xyz", "dx", "dy", "dz"]
+    known = (directed or names == [*"xyz"]) and rows.shape[1:] == (len(names),)
+    if not (known and np.isfinite(rows).all()):
+        raise Refusal(
+            f"{file}: expected a first line x,y,z or x,y,z,dx,dy,dz and lines of so many finite "
+            "numbers, got others"
+        )
+    positions, away = patch.projected(UNITS[unit] * rows[:, :3])
+    layout = SensorLayout.scattered(patch, positions)
+    far, k = float(away.max()), int(away.argmax())
+    if far > max(patch.a, patch.b) / 2:
+        raise Refusal(
+            f"{file}: expected elements on the mesh, in its coordinates in {unit}, got element "
+            f"{k} {1e3 * far:.3g} mm away"
+        )
+    words = f"Elements were moved onto the mesh, element {k} by {1e3 * far:.2g} mm."
+    moved = words if far > _MOVED * math.sqrt(patch.areas.sum() / len(rows)) else ""
+    if not directed:
+        return layout, None, moved
+    ways = np.einsum("pix,px->pi", patch.base(*positions.T).frame, rows[:, 3:] @ patch.frame.T)
+    if not (np.linalg.norm(ways, axis=1) > _LEVEL * np.linalg.norm(rows[:, 3:], axis=1)).all():
+        raise Refusal(f"{file}: expected directions along the skin, got one across it")
+    return layout, np.arctan2(*ways.T[::-1]), moved
 
 
 def _electronics(top: TomlTable, layout: SensorLayout) -> Transduction | DigitalReadings:

@@ -316,6 +316,34 @@ ELEMENTS = Part(
             example=120,
             offered=False,
         ),
+        "file": Key(
+            "File",
+            "Of a mesh: CSV file with the columns x, y and z of each element, in the coordinates "
+            "and the unit of the mesh's file; elements are moved onto the mesh. Further columns "
+            "dx, dy and dz: the direction of each element's axis.",
+            kind=str,
+            example="elements.csv",
+            offered=False,
+        ),
+        "along": Key(
+            "Along",
+            "Of a mesh: the axis of each element is along the skin's x, or along its largest "
+            "principal curvature: then an element reads curvature@0, curvature@90 and "
+            "curvature@45 from there.",
+            kind=str,
+            default="x",
+            choices=_choices(x="x", principal="Principal curvature"),
+            offered=False,
+        ),
+        "turns": Key(
+            "Turns",
+            "Of a mesh: by how much the axis of each element is turned from the skin's x.",
+            Unit.same("rad"),
+            kind=tuple[float, ...],
+            default=None,
+            example=[0.1],
+            offered=False,
+        ),
         "dead": Key(
             "Dead",
             "Numbers of the elements without readings, from 0.",
@@ -348,7 +376,7 @@ ELEMENTS = Part(
         ),
     },
     (SensorLayout,),
-    either=(("grid", "positions", "rings", "spiral", "spread"),),
+    either=(("grid", "positions", "rings", "spiral", "spread", "file"), ("along", "turns")),
 )
 
 READINGS = Part(

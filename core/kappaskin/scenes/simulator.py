@@ -210,10 +210,10 @@ class Simulator:
 
 def _same_elements(layout: SensorLayout, other: SensorLayout) -> bool:
     """Whether the same is read at the same places."""
-    if layout.kinds != other.kinds or not np.array_equal(layout.positions, other.positions):
+    (kinds, kind), (others, other_kind) = layout.directed, other.directed
+    if kinds != others or not np.array_equal(layout.positions, other.positions):
         return False
-    same_kind = np.array_equal(layout.kind, other.kind)
-    return same_kind and np.array_equal(layout.element, other.element)
+    return np.array_equal(kind, other_kind) and np.array_equal(layout.element, other.element)
 
 
 def _linear(layout: SensorLayout, basis: Basis, plate: Plate) -> Callable[[Array], Array]:

@@ -106,7 +106,8 @@ def _patch(patch: Patch) -> dict[str, Any]:
 def _elements(layout: SensorLayout) -> dict[str, Any]:
     grid = _grid(layout)
     made = SensorLayout.scattered(layout.patch, layout.positions) if grid is None else grid[1]
-    made, dead = made.reading_each(layout.each_reads), layout.dead
+    made, dead, turns = made.reading_each(layout.each_reads), layout.dead, layout.turns
+    made = made if turns is None else made.turned(turns)
     if made.shape != layout.shape or (made.without(dead).live != layout.live).any():
         raise Refusal(
             "expected elements that a scene file can describe, got a grid that is not regular, or "
@@ -115,7 +116,8 @@ def _elements(layout: SensorLayout) -> dict[str, Any]:
     placed = {"positions": layout.positions.tolist()} if grid is None else {"grid": list(grid[0])}
     gages = _fields(layout, without=("patch", "positions", "live", "shape", "reads"))
     reads = {"reads": layout.each_reads} if layout.reads else {}
-    return {**placed, **({"dead": dead} if dead else {}), **gages, **reads}
+    ways = {} if turns is None else {"turns": turns.tolist()}
+    return {**placed, **({"dead": dead} if dead else {}), **gages, **reads, **ways}
 
 
 def _grid(layout: SensorLayout) -> tuple[tuple[int, int], SensorLayout] | None:

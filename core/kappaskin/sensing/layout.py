@@ -143,6 +143,7 @@ _ALONG = ("slope", "curvature")  # have a direction
 _CURVED = ("curvature", "twist")  # depend on the slope
 _ALIKE = 9  # decimals of a direction in rad: those equal so far are one
 _CURVATURES = (("curvature", 0.0), ("curvature", np.pi / 2), ("twist", 0.0))  # xx, yy and xy
+_ROSETTE = ("curvature@0", "curvature@90", "curvature@45")
 _DEGREES = 6  # decimals of a direction in degrees in a name
 
 
@@ -180,12 +181,16 @@ class Readings:
 
     The zero of the quantities in `free` is unknown: one offset in each frame for the heights, and
     one for each direction of slopes or curvatures.
+
+    The axes of the elements may be turned from x, by `turn` (R,) in rad, with which the kinds of
+    readings go.
     """
 
     element: Indices
     quantity: NDArray[np.str_]
     direction: Array
     free: tuple[str, ...] = ()
+    turn: Array | None = None
 
     def __post_init__(self) -> None:
         R = self.element.shape
@@ -221,22 +226,22 @@ class Readings:
         return _unit(self.direction)
 
     @cached_property
-    def _kinds(self) -> tuple[list[tuple[str, float]], Indices]:
+    def kinds(self) -> tuple[list[tuple[str, float]], Indices]:
+        """The different quantities with their directions from the axes of their elements.
+
+        And which of them each reading (R,) is.
+        """
+        own = 0.0 if self.turn is None else self.turn
+        return replace(self, direction=self.direction - own, turn=None).directed
+
+    @cached_property
+    def directed(self) -> tuple[list[tuple[str, float]], Indices]:
+        """The different quantities with their directions from x, and which each reading is."""
         angle = np.where(np.isin(self.quantity, _ALONG), self.direction, 0.0) % (2 * np.pi)
         angle[np.round(angle - 2 * np.pi, _ALIKE) == 0] = 0.0
         each = np.rec.fromarrays([self.quantity, np.round(angle, _ALIKE)])
         _, first, kind = np.unique(each, return_index=True, return_inverse=True)
         return [(str(self.quantity[r]), float(angle[r])) for r in first], kind.reshape(-1)
-
-    @property
-    def kinds(self) -> list[tuple[str, float]]:
-        """The different quantities that are read, each with its direction in rad."""
-        return self._kinds[0]
-
-    @property
-    def kind(self) -> Indices:
-        """Which of `kinds` each reading (R,) is."""
-        return self._kinds[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -437,6 +442,38 @@ class SensorLayout:
         """The same elements as a curvature sensor, all of them live."""
         return replace(self, reads=None, live=_channels(self.patch, len(self)))
 
+    def turned(self, turns: ArrayLike) -> "SensorLayout":
+        """The same on a mesh, with what each element reads along turned by `turns` (P,) in rad.
+
+        A curvature sensor then reads curvatures along 0, 90 and 45 degrees of its own axis.
+        """
+        if not isinstance(self.patch, MeshSkin):
+            raise Refusal(
+                f"expected elements that are turned on a mesh, got a {self.patch.name}; let them "
+                "read slope@DEGREES or curvature@DEGREES instead"
+            )
+        if self.reads is None:
+            return self.reading_each(_ROSETTE).turned(turns)
+        reads, turns = self.reads, np.asarray(turns, float)
+        if turns.shape != (len(self),) or not np.isfinite(turns).all():
+            raise Refusal(f"expected a turn in rad of each of {len(self)} elements, got {turns}")
+        if "twist" in reads.quantity:
+            raise Refusal(
+                "expected readings along directions of elements that are turned, got a twist; read "
+                "curvature@0, curvature@90 and curvature@45 instead"
+            )
+        turn = turns[reads.element]
+        return replace(self, reads=replace(reads, direction=reads.direction + turn, turn=turn))
+
+    @property
+    def turns(self) -> Array | None:
+        """By how much the axis of each element (P,) is turned from x in rad; None where none is."""
+        if self.reads is None or self.reads.turn is None:
+            return None
+        found = np.zeros(len(self))
+        found[self.reads.element] = self.reads.turn
+        return found
+
     def has_room(self, positions: Array) -> Mask:
         """At which `positions` (C, 2) in m the gages and cells of an element are on the skin."""
         half = np.array(self.cell) / 2 * (1 - _ROUNDING)
@@ -476,7 +513,8 @@ class SensorLayout:
         own, reads = of_kind[self.kind], self.reads
         quantity = reads.quantity[own]
         free = tuple(name for name in reads.free if name in quantity)
-        kept = Readings(reads.element[own], quantity, reads.direction[own], free)
+        turn = None if reads.turn is None else reads.turn[own]
+        kept = Readings(reads.element[own], quantity, reads.direction[own], free, turn)
         return replace(self, reads=kept, live=self.live[own])
 
     def without(self, elements: Iterable[int]) -> "SensorLayout":
@@ -529,12 +567,17 @@ class SensorLayout:
     @property
     def kinds(self) -> list[tuple[str, float]]:
         """The different quantities that are read, each with its direction in rad."""
-        return self.reads.kinds if self.reads else list(_CURVATURES)
+        return self.reads.kinds[0] if self.reads else list(_CURVATURES)
+
+    @property
+    def directed(self) -> tuple[list[tuple[str, float]], Indices]:
+        """The `kinds` with directions from x also of elements that are turned, and the `kind`."""
+        return self.reads.directed if self.reads else (self.kinds, self.kind)
 
     @property
     def kind(self) -> Indices:
         """Which of `kinds` each reading (R,) is."""
-        return self.reads.kind if self.reads else np.repeat(np.arange(3), len(self))
+        return self.reads.kinds[1] if self.reads else np.repeat(np.arange(3), len(self))
 
     @property
     def kind_names(self) -> list[str]:
@@ -858,16 +901,17 @@ class NormalCurvature:
             at = [at[0] + H * v, at[1], *turns, *curvature[1:]]
         self._at = np.stack(at).astype(dtype)
         self._first = layout.operator(basis, plate).astype(dtype)
-        along = [_AXES if name == "twist" else [_unit(t)] * 2 for name, t in layout.kinds]
+        kinds, kind = layout.directed
+        along = [_AXES if name == "twist" else [_unit(t)] * 2 for name, t in kinds]
         (a, b), (c, d) = np.moveaxis(np.array(along), 0, -1)
         forms = [
             [a * a, 2 * a * b, b * b],
             [c * c, 2 * c * d, d * d],
             [a * c, a * d + b * c, b * d],
         ]
-        curved = np.isin([name for name, _ in layout.kinds], _CURVED)
-        self._forms = (curved * np.array(forms))[..., layout.kind].astype(dtype)
-        self._element, self._curved = layout.element, curved[layout.kind]
+        curved = np.isin([name for name, _ in kinds], _CURVED)
+        self._forms = (curved * np.array(forms))[..., kind].astype(dtype)
+        self._element, self._curved = layout.element, curved[kind]
         self._all_curved = bool(self._curved.all())
         self._columns = np.concatenate([self._first, *self._at]).T
         self.frame_shape, self._base = layout.frame_shape, np.empty((0, 1), dtype)

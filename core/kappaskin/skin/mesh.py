@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from kappaskin._files import ARCHIVE_DAMAGES
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Indices, Mask
-from kappaskin.skin.mesh_file import Surface, faults
+from kappaskin.skin.mesh_file import Surface, faults, placed
 from kappaskin.skin.patch import SIDES, Base, Number, Polygon, doubled_area
 
 _MOST_STEPS = 64  # of the splines, along the longer side
@@ -69,7 +69,8 @@ class Splines:
         self._transposed = csc_array(B.T * weights)
         self._normal = splu(csc_array(self._transposed @ B + smooth * rough))
         self._count, self._sizes = (self._steps + 3).tolist(), self.step.tolist()
-        self._at = lru_cache(4)(self._weights_at)
+        self.at = lru_cache(4)(self._weights_at)
+        """The first coefficients each way around a place, and weights (6, 16) as of a jet."""
 
     def _cells(self, positions: Array) -> tuple[Indices, Array]:
         """The cell (P, 2) that each place lies in, and the place (P, 2) within it, in steps."""
@@ -102,9 +103,13 @@ class Splines:
 
         Or the first of these `orders` alone.
         """
-        (i, j), rows = self._at(x, y)
-        block = coefficients.reshape(self._count[1], self._count[0], -1)[j : j + 4, i : i + 4]
-        return rows[:orders].dot(block.reshape(16, -1))
+        first, rows = self.at(x, y)
+        return rows[:orders].dot(self.block(coefficients, *first))
+
+    def block(self, coefficients: Array, i: int, j: int) -> Array:
+        """Those (16, k) of coefficients (G, k) of which `at` gives the weights."""
+        found = coefficients.reshape(self._count[1], self._count[0], -1)[j : j + 4, i : i + 4]
+        return found.reshape(16, -1)
 
     def _weights_at(self, x: float, y: float) -> tuple[tuple[int, int], Array]:
         """The first coefficients each way around a place, and weights (6, 16) of those."""
@@ -268,10 +273,11 @@ class MeshSkin(Polygon):
         third = np.linalg.norm(np.cross(u, v), axis=1) / 6
         return _sums(self.triangles.ravel(), np.repeat(third, 3), len(self.points))
 
-    def spread(self, count: int) -> Indices:
-        """So many nodes, spread evenly: each the farthest from those before.
+    def spread(self, count: int, apart: float = 0.0) -> Indices:
+        """So many nodes at most, spread evenly: each the farthest from those before.
 
-        From the rim they are half as far as from one another.
+        From the rim they are half as far as from one another; at least `apart` in m through the
+        air.
         """
         from scipy.spatial import KDTree
 
@@ -279,9 +285,19 @@ class MeshSkin(Polygon):
         found = np.empty(count, np.intp)
         for k in range(count):
             found[k] = away.argmax()
+            if away[found[k]] < apart:
+                return found[:k]
             far = np.linalg.norm(self.points - self.points[found[k]], axis=1)
             away = np.minimum(away, far)
         return found
+
+    def projected(self, points: Array) -> tuple[Array, Array]:
+        """Positions (P, 2) in m nearest to `points` (P, 3) in m in the coordinates of `nodes`.
+
+        And how far (P,) in m these are from there.
+        """
+        triangle, shares, away = placed(Surface(self.nodes, self.triangles), points)
+        return np.einsum("pk,pki->pi", shares, self.places[self.triangles[triangle]]), away
 
     @cached_property
     def splines(self) -> Splines:

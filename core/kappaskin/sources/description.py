@@ -249,12 +249,12 @@ def load_description(file: Path, serial_number: str = "") -> Description:
         text = read_file(file, _LARGEST).decode("utf-8-sig")
     except (OSError, ValueError) as error:
         raise Refusal(f"{file}: cannot be read as a sensor's description ({error})") from error
-    text = _with_mesh(_with_calibration(text.replace("\r\n", "\n"), file), file)
+    text = _with_files(_with_calibration(text.replace("\r\n", "\n"), file), file)
     return description_of(text, str(file), serial_number)
 
 
 # Recordings keep the text of a description, and need no other file: so the gains and offsets of the
-# calibration that it names are put behind it, and the mesh of the skin.
+# calibration that it names are put behind it, and what files of the skin and the elements have.
 _CALIBRATION = "\n[calibration]  # as it was in its file\n"
 
 
@@ -281,26 +281,37 @@ def _with_calibration(text: str, file: Path) -> str:
     return f"{text}{toml_table(_CALIBRATION.rstrip(), values)}"
 
 
-_WITH_FILES = ("skin",)
-_MESH = "\n[kept.skin]  # what the file of the mesh has"
+_REPLACED = ("file", "along")
+_KEPT = "\n[kept.{}]  # what its file has"
 
 
-def _with_mesh(text: str, file: Path) -> str:
-    skin = TomlTable(parsed(text, file), text, str(file)).table("skin")
-    if "file" not in skin:
+def _with_files(text: str, file: Path) -> str:
+    top = TomlTable(parsed(text, file), text, str(file))
+    skin, elements = top.table("skin"), top.table("elements")
+    if "file" not in skin and "file" not in elements:
         return text
-    patch = read_skin(skin, partial(find_file, file.parent, False))[0].patch
-    return f"{text}{toml_table(_MESH, {'mesh': cast('MeshSkin', patch).text})}"
+    find = partial(find_file, file.parent, False)
+    patch = read_skin(skin, find)[0].patch
+    if "file" in skin:
+        text += toml_table(_KEPT.format("skin"), {"mesh": cast("MeshSkin", patch).text})
+    if "file" in elements:
+        layout, _ = read_elements(elements, patch, find, skin)
+        turns = {} if layout.turns is None else {"turns": layout.turns.tolist()}
+        kept = {"positions": layout.positions.tolist(), **turns}
+        text += toml_table(_KEPT.format("elements"), kept)
+    return text
 
 
 def _with_kept(values: dict[str, Any], top: TomlTable) -> None:
     """Put what [kept] has of files in the place of their names in `values`, the table `top`."""
     kept = top.table("kept")
-    for part in _WITH_FILES:
+    for part in ("skin", "elements"):
         for table in (top, kept):
             table.table(part)  # or refused here
         if part in kept:
-            own = {key: value for key, value in values.get(part, {}).items() if key != "file"}
+            own = {
+                key: value for key, value in values.get(part, {}).items() if key not in _REPLACED
+            }
             values[part] = own | values["kept"][part]
     kept.done()
 
@@ -341,7 +352,7 @@ def description_of(text: str, name: str, serial_number: str = "") -> Description
     elements = top.table("elements")
     if "reads" in elements:
         raise elements.refusal("expected none: the columns determine what is read", "reads")
-    layout = read_elements(elements, plate.patch)
+    layout, _ = read_elements(elements, plate.patch, _no_file, skin)
     line = top.table("line")
     kind = LINE.value(line, "kind")
     names, paths = _names(line, kind)
@@ -521,7 +532,8 @@ def _reading(
         if datums.setdefault(quantity, datum) != datum:
             raise Refusal(f"expected one datum of all readings of {quantity}, got fixed and free")
     free = [quantity for quantity, datum in datums.items() if datum == "free"]
-    components = {COMPONENTS[k] for k in np.flatnonzero(layout.live.any(axis=1))}
+    turns, all_of = layout.turns, layout.live.any(axis=-1)
+    components = {COMPONENTS[k] for k in np.flatnonzero(all_of)} if turns is None else set[str]()
     alike = len({readings.of(what, "noise") for what in each}) == 1
     if alike and not free and set(each) == components:
         numbers = np.array([COMPONENTS.index(what) for what in each])
@@ -529,8 +541,9 @@ def _reading(
         live = layout.live & np.isin(np.arange(layout.channels), channels).reshape(3, -1)
         return replace(layout, live=live), channels
     quantities, directions = zip(*kinds, strict=True)
-    read = layout.reading(elements, quantities, directions, free).without(layout.dead)
-    return read, np.arange(len(each))
+    read = layout.reading(elements, quantities, directions, free)
+    read = read if turns is None else read.turned(turns)
+    return read.without(layout.dead), np.arange(len(each))
 
 
 def _columns(

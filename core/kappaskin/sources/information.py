@@ -82,6 +82,7 @@ SENSOR = Part(
         "gage_length": _ELEMENTS.key("gage_length"),
         "cell": replace(_ELEMENTS.key("cell"), default=None),
         "reads": replace(_ELEMENTS.key("reads"), default=None),
+        "turns": _ELEMENTS.key("turns"),
         "readings": Key(
             "Readings",
             "Of readings that come as numbers, instead of the electronics: `resolution`, and "
@@ -132,6 +133,7 @@ def sensor_to_json(sensor: Sensor) -> str:
         "mesh": patch.text if isinstance(patch, MeshSkin) else None,
         "grid": layout.shape,
         "positions": None if layout.shape else layout.positions.tolist(),
+        "turns": None if layout.turns is None else layout.turns.tolist(),
         "dead_channels": np.flatnonzero(~layout.live.ravel()).tolist(),
         "channel_map": None if wired is None else wired.tolist(),
         "inplane": sensor.plate.inplane or None,
@@ -235,6 +237,7 @@ def _layout(patch: Patch, values: dict[str, Any]) -> SensorLayout:
     layout = replace(layout, **averaged)
     if values["reads"]:
         layout = layout.reading_each(values["reads"])
+    layout = layout.turned(values["turns"]) if values["turns"] else layout
     dead, channels = values["dead_channels"], range(layout.channels)
     if unknown := [channel for channel in dead if channel not in channels]:
         raise Refusal(

@@ -29,6 +29,11 @@ if TYPE_CHECKING:
     from kappaskin.studies.cost.report import write_plot as write_plot
     from kappaskin.studies.design import run_study as run_study
     from kappaskin.studies.design import study_workers as study_workers
+    from kappaskin.studies.design.maps import check_maps_file as check_maps_file
+    from kappaskin.studies.design.maps import design_maps as design_maps
+    from kappaskin.studies.design.maps import maps_rows as maps_rows
+    from kappaskin.studies.design.maps import maps_text as maps_text
+    from kappaskin.studies.design.maps import write_maps as write_maps
     from kappaskin.studies.design.measures import Check as Check
     from kappaskin.studies.design.measures import Design as Design
     from kappaskin.studies.design.measures import Prospect as Prospect
@@ -69,6 +74,7 @@ else:
             "parse_length write_plot",
         ),
         ("design", "run_study study_workers"),
+        ("design.maps", "check_maps_file design_maps maps_rows maps_text write_maps"),
         ("design.measures", "Check Design Prospect check prospect"),
         ("design.report", "table_text write_report"),
         ("design.results", "StudyFolder"),

@@ -45,18 +45,25 @@ x = 9e-3
 y = 7e-3
 radius = 1e-3
 force = 0.1
-path = [{ step = "press", seconds = 0.1 }, { step = "hold", seconds = 1.0 }, { step = "release", seconds = 0.1 }]
+path = [
+    { step = "press", seconds = 0.1 },
+    { step = "hold", seconds = 1.0 },
+    { step = "release", seconds = 0.1 },
+]
 """
 
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
+    return record(tmp_path_factory.mktemp("mesh"), TEXT)
+
+
+def record(folder, text):
     """The path of a recording, its scene, and the estimates that were made then."""
-    folder = tmp_path_factory.mktemp("mesh")
     file = folder / "pad.obj"
     nodes, triangles = ellipsoid(18, (9e-3, 7e-3, 6e-3), 1.2)
     file.write_text(obj(1e3 * nodes, triangles))
-    scene = read_scene(TEXT, folder / "scene.toml")
+    scene = read_scene(text, folder / "scene.toml")
     file.unlink()
     clock = VirtualClock(1000.0)
     source = SimulatedSource(scene, clock, clock.sleep)
@@ -78,6 +85,17 @@ def test_a_contact_on_the_mesh_is_found_and_verified(recorded):
     *_, verdict = Verification.steps(path)
     assert verdict.same
     assert verdict.compared > len(made)
+
+
+def test_gages_of_other_directions_find_the_same_contact(recorded, tmp_path):
+    text = TEXT.replace("spread = 30", 'spread = 30\nalong = "principal"')
+    path, scene, made = record(tmp_path, text)
+    assert np.ptp(scene.layout.turns) > 1
+    one, other = made[-1].contact, recorded[2][-1].contact
+    assert one.force == pytest.approx(other.force, rel=0.02)
+    assert np.abs(one.position - other.position).max() < 5e-5
+    *_, verdict = Verification.steps(path)
+    assert verdict.same
 
 
 def test_a_repaired_recording_has_the_mesh(recorded, tmp_path):
@@ -122,6 +140,9 @@ def test_tables_have_a_row_for_each_frame(recorded, tmp_path, suffix):
         with h5py.File(to) as file:
             assert file["force"][:] == pytest.approx(force, nan_ok=True)
             device = json.loads(file.attrs["device"])
+    elif suffix == "csv":
+        (line,) = (line for line in to.read_text().splitlines() if line.startswith("# device: "))
+        device = json.loads(line.removeprefix("# device: "))
     else:
         assert scene.plate.patch.text.encode() in to.read_bytes()
         return

@@ -95,6 +95,24 @@ def test_a_description_is_kept_with_its_mesh(file):
         assert np.array_equal(back.layout.positions, sensor.layout.positions)
 
 
+def test_a_description_is_kept_with_the_places_of_its_elements(file):
+    rows = np.column_stack([1e3 * ellipsoid(18, AXES, ANGLE)[0][:12], np.tile([1, 1, 0], (12, 1))])
+    lines = [",".join(map(repr, row)) for row in rows.tolist()]
+    (file.parent / "elements.csv").write_text("\n".join(["x,y,z,dx,dy,dz", *lines]))
+    names = '"curvature@0:0..11", "curvature@90:0..11"'
+    text = SKIN.replace("spread = 12", 'file = "elements.csv"')
+    file.write_text(text.replace('"xx:0..11", "yy:0..11"', names))
+    found = load_description(file)
+    (file.parent / "elements.csv").unlink()
+
+    layout = found.sensor.layout
+    assert layout.turns == pytest.approx(np.full(12, np.pi / 4), abs=0.05)
+    assert layout.each_reads == ["curvature@0", "curvature@90"]
+    back = sensor_from_json(sensor_to_json(found.sensor)).layout
+    assert np.array_equal(back.reads.direction, layout.reads.direction)
+    assert np.array_equal(back.positions, layout.positions)
+
+
 @pytest.mark.parametrize(
     ("was", "now", "match"),
     [

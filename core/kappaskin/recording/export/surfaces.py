@@ -7,6 +7,7 @@ import math
 import struct
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +50,14 @@ class SkinMesh:
     def __init__(self, basis: Basis, nx: int, ny: int) -> None:
         self._basis = basis
         self._rest = RestMesh(basis.patch, nx, ny)
+
+    def depth(self, coefficients: Array) -> float:
+        """The largest displacement in m, either way."""
+        return float(np.abs(self._values @ coefficients.ravel()).max())
+
+    @cached_property
+    def _values(self) -> Array:
+        return self._basis.at(self._rest.positions)
 
     def __call__(self, coefficients: Array) -> SkinSurface:
         """The surface with `coefficients` (Ni, Nj) in m."""
@@ -231,13 +240,18 @@ class GlbSurfaces(SurfaceWriter):
         self._parts: list[bytes] = []
         self._accessors: list[dict[str, Any]] = []
 
+    def take(self, frame: ExportedFrame) -> bool:
+        c, skin = frame.estimate.coefficients, self._skin(frame.pipeline)
+        known = self._shapes and not self.request.every
+        return bool(known and skin.depth(c) <= self._deepest) or super().take(frame)
+
     def write(self, path: Path, frame: ExportedFrame, surface: SkinSurface) -> None:
-        if (deep := float(np.abs(surface.displacement).max())) > self._deepest:
+        deep = float(np.abs(surface.displacement).max())
+        if not self.request.every:
+            self._shapes = []
+        if deep > self._deepest or not self._shapes:
             self._about, self._deepest = self.description(frame), deep
-            if not self.request.every:
-                self._shapes = []
-        if self.request.every or not self._shapes:
-            self._shapes.append((frame.at, surface))
+        self._shapes.append((frame.at, surface))
         if len(self._shapes) > _MOST_SHAPES:
             raise Refusal(
                 f"expected at most {_MOST_SHAPES} shapes in a .glb, got more; choose a longer time "
@@ -251,63 +265,60 @@ class GlbSurfaces(SurfaceWriter):
 
     def finish(self) -> None:
         times, shapes = zip(*self._shapes, strict=True)
-        first, others = shapes[0], shapes[1:]
+        first = shapes[0]
         deep = np.max([np.abs(each.displacement) for each in shapes], axis=0)
-        deep /= self._deepest or 1.0
-        places = np.linspace(0, 1, len(_ANCHORS))
+        share, places = deep / (self._deepest or 1.0), np.linspace(0, 1, len(_ANCHORS))
         # Of colours glTF has the light, not the values on a screen.
-        light: list[Array] = [np.interp(deep, places, of) ** 2.2 for of in _ANCHORS.T]
+        light: list[Array] = [np.interp(share, places, of) ** 2.2 for of in _ANCHORS.T]
         attributes = {
             "POSITION": self._add(first.points),
             "NORMAL": self._add(first.normals),
             "COLOR_0": self._add(np.column_stack(light)),
         }
+        skin = {"attributes": attributes, "indices": self._add(first.triangles), "material": 0}
         targets = [
             {
                 "POSITION": self._add(each.points - first.points),
                 "NORMAL": self._add(each.normals - first.normals),
             }
-            for each in others
+            for each in shapes[1:]
         ]
-        skin = {"attributes": attributes, "indices": self._add(first.triangles), "material": 0}
-        mesh: dict[str, Any] = {"primitives": [skin | ({"targets": targets} if targets else {})]}
-        made: dict[str, Any] = {"asset": {"version": "2.0", "generator": self.info.program}}
-        made["asset"]["extras"] = json.loads(self._about) | {"brightest [m]": self._deepest}
+        moving: dict[str, Any] = {}
         if targets:
-            mesh["weights"] = [0.0] * len(targets)
-            weights = np.eye(len(times))[:, 1:]
-            moved = self._add(np.array(times) - times[0]), self._add(weights.ravel())
-            sampler = {"input": moved[0], "output": moved[1], "interpolation": "LINEAR"}
+            at, weights = np.array(times) - times[0], np.eye(len(times))[:, 1:]
+            moved = {"input": self._add(at), "output": self._add(weights.ravel())}
             channel = {"sampler": 0, "target": {"node": 0, "path": "weights"}}
-            made["animations"] = [{"samplers": [sampler], "channels": [channel]}]
+            moving["animations"] = [{"samplers": [moved], "channels": [channel]}]
+        many = {"primitives": [skin | {"targets": targets}], "weights": [0.0] * len(targets)}
         look = {"metallicFactor": 0.0, "roughnessFactor": 0.6}
-        made |= {
+        about = json.loads(self._about) | {"brightest [m]": self._deepest}
+        sizes = [len(part) for part in self._parts]
+        made = moving | {
+            "asset": {"version": "2.0", "generator": self.info.program, "extras": about},
             "scene": 0,
             "scenes": [{"nodes": [0]}],
             "nodes": [{"mesh": 0, "name": "skin", "rotation": _UPWARD}],
-            "meshes": [mesh],
+            "meshes": [many if targets else {"primitives": [skin]}],
             "materials": [{"doubleSided": True, "pbrMetallicRoughness": look}],
             "accessors": self._accessors,
+            "bufferViews": [
+                {"buffer": 0, "byteOffset": sum(sizes[:k]), "byteLength": size}
+                for k, size in enumerate(sizes)
+            ],
+            "buffers": [{"byteLength": sum(sizes)}],
         }
-        sizes = [len(part) for part in self._parts]
-        made["bufferViews"] = [
-            {"buffer": 0, "byteOffset": sum(sizes[:k]), "byteLength": size}
-            for k, size in enumerate(sizes)
-        ]
-        made["buffers"] = [{"byteLength": sum(sizes)}]
-        text = json.dumps(made).encode()
-        chunks = (text + b" " * (-len(text) % 4), b"JSON"), (b"".join(self._parts), b"BIN\0")
-        content = b"".join(struct.pack("<I4s", len(data), kind) + data for data, kind in chunks)
-        head = struct.pack("<4sII", b"glTF", 2, 12 + len(content))
-        (self.scratch / self.request.to.name).write_bytes(head + content)
+        text, data = json.dumps(made).encode(), b"".join(self._parts)
+        text += b" " * (-len(text) % 4)
+        head = struct.pack("<4sIII4s", b"glTF", 2, 28 + len(text + data), len(text), b"JSON")
+        content = head + text + struct.pack("<I4s", len(data), b"BIN\0") + data
+        (self.scratch / self.request.to.name).write_bytes(content)
 
     def _add(self, values: NDArray[Any]) -> int:
         """The number of the accessor of some values: points (n, 3), triangles or numbers."""
         whole = values.dtype.kind == "i"
-        points = not whole and values.ndim == 2
+        width, kind = (3, "VEC3") if values.ndim == 2 and not whole else (1, "SCALAR")
         data = values.astype("<u4" if whole else "<f4")
-        rows = data.reshape(-1, 3 if points else 1)
-        kind = "VEC3" if points else "SCALAR"
+        rows = data.reshape(-1, width)
         bounds = {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
         number = {"componentType": _INTEGER if whole else _FLOAT, "count": len(rows), "type": kind}
         self._accessors.append(number | bounds | {"bufferView": len(self._parts)})

@@ -26,7 +26,7 @@ from kappaskin.frames import Array, Contact, Mask, Truth
 from kappaskin.mechanics import DiscLoad, Plate, PointLoad
 from kappaskin.scenes import Indenter, Scene, Simulator, kept_effects, planned
 from kappaskin.sensing import SensorLayout
-from kappaskin.skin import Cap, Patch
+from kappaskin.skin import Cap, MeshSkin, Patch
 from kappaskin.studies.accuracy import covered, points_on, rms_distance, seconds, shares_of
 from kappaskin.studies.summed import summed_functions
 
@@ -157,9 +157,9 @@ def _contact(block: FrameBlock) -> Array:
 def _distance(patch: Patch, found: Array, true: Array) -> Array:
     """Distance (T,) in m of places `found` (T, 2) from `true` ones.
 
-    On a cap, through the air; on a strip, along x.
+    On a cap or a mesh, through the air; on a strip, along x.
     """
-    if isinstance(patch, Cap):
+    if isinstance(patch, Cap | MeshSkin):
         return np.linalg.norm(patch.at_rest(found)[0] - patch.at_rest(true)[0], axis=-1)
     return np.linalg.norm((found - true)[:, : 1 if patch.strip else 2], axis=-1)
 
@@ -246,7 +246,9 @@ def pressed_load(scene: Scene) -> PressedLoad:
     raise Refusal("expected one point or disc that presses, to predict errors of contact and force")
 
 
-def _contact_covariance(scene: Scene, layout: SensorLayout, load: PressedLoad) -> Array:
+def _contact_covariance(
+    scene: Scene, layout: SensorLayout, load: PressedLoad, noise: float
+) -> Array:
     """Covariance (3, 3) due to noise: of the force as a share, and of the place on the skin in m.
 
     Along the frame of the skin there.
@@ -254,7 +256,7 @@ def _contact_covariance(scene: Scene, layout: SensorLayout, load: PressedLoad) -
     if scene.plate.unknown_material:
         raise Refusal("expected a skin of known material to predict a force, got an unknown one")
     x, y, s = load.x, load.y, load.radius**2 if isinstance(load, DiscLoad) else 0.0
-    found = _point_contact(scene, layout).covariance(x, y, s, load.force, noise_of(scene))
+    found = _point_contact(scene, layout).covariance(x, y, s, load.force, noise)
     to_skin = np.diag([1 / load.force, 1.0, 1.0])
     if slopes := scene.plate.patch.base(x, y).slopes:
         to_skin[1:, 1:] = np.linalg.inv(slopes)
@@ -276,8 +278,8 @@ def _covariances(block: FrameBlock) -> Array:
     load = pressed_load(block.scene)
     each = zip(block.contact.tolist(), block.forces().tolist(), strict=True)
     loads = [replace(load, x=x, y=y, force=force) for (x, y), force in each]
-    layout = block.estimator.layout
-    return np.array([_contact_covariance(block.scene, layout, load) for load in loads])
+    layout, noise = block.estimator.layout, noise_of(block.scene)
+    return np.array([_contact_covariance(block.scene, layout, load, noise) for load in loads])
 
 
 def _rate(block: FrameBlock) -> Array:
@@ -359,7 +361,9 @@ class Design:
 
 
 def _area(patch: Patch) -> float:
-    """The area in m^2 of a cap, of other skins that of their box."""
+    """The area in m^2 of a cap or a mesh, of other skins that of their box."""
+    if isinstance(patch, MeshSkin):
+        return float(patch.areas.sum())
     if not isinstance(patch, Cap):
         return patch.a * patch.b
     away, step = np.linspace(0.0, patch.rim_radius, _AREA_STEPS, retstep=True)
@@ -368,32 +372,39 @@ def _area(patch: Patch) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Map:
-    """Points `x` (nx,) and `y` (ny,) in m of a skin, and the `shares` (ny, nx) of it they are for.
+    """`places` (ny, nx, 2) in m of a skin, and the `shares` (ny, nx) of it they are for.
 
-    `on` (ny, nx) are those on the skin where something is known.
+    At `x` (nx,) and `y` (ny,) in m; on a mesh its n nodes, (n, 2), (n,) and so on. `on` (ny, nx)
+    are those on the skin where something is known.
     """
 
     x: Array
     y: Array
+    places: Array
     on: Mask
     shares: Array
 
     @classmethod
     def of(cls, patch: Patch, side: int, margin: float = -math.inf) -> "_Map":
-        """`side` x `side` points of a `patch`, at least `margin` in m from its rim."""
+        """`side` x `side` points of a `patch`, or nodes, at least `margin` in m from its rim."""
+        if isinstance(patch, MeshSkin):
+            places, shares = patch.places, patch.areas / patch.areas.sum()
+            on = patch.depth(places) >= margin
+            return cls(places[:, 0], places[:, 1], places, on, np.where(on, shares, 0.0))
         x, y = patch.grid(side, 2 if patch.strip else side)
-        points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        places = np.stack(np.meshgrid(x, y), axis=-1)
+        points = places.reshape(-1, 2)
         on = patch.contains(points) & (patch.depth(points) >= margin)
         shares = np.zeros((len(y), len(x)))
         shares.ravel()[on] = patch.area(points[on])
         shares[[0, -1]] /= 2  # half of a tile
         shares[:, [0, -1]] /= 2
-        return cls(x, y, on.reshape(shares.shape), shares / shares.sum())
+        return cls(x, y, places, on.reshape(shares.shape), shares / shares.sum())
 
     @property
     def points(self) -> Array:
         """Those (G, 2) in m that are `on`."""
-        return np.stack(np.meshgrid(self.x, self.y), axis=-1)[self.on]
+        return self.places[self.on]
 
     def filled(self, values: Array) -> Array:
         """A map (ny, nx) of `values` (G,) at the points; NaN elsewhere."""
@@ -412,7 +423,8 @@ class Prospect:
 
     It is the standard deviation of the displacement in m, or, of the contact's position in m or of
     the force as a share, the root of the mean square error under the scene's load at each place.
-    `x` (nx,) and `y` (ny,) are in m, `shares` (ny, nx) how much of the skin each point stands for,
+    `x` (nx,) and `y` (ny,) are in m, `shares` (ny, nx) how much of the skin each point stands for;
+    on a mesh x, y, sd and shares (n,) are those of its nodes;
     `positions` (P, 2) where the elements are, `rate` in 1/s what the conversions allow; infinite
     where readings come all at once. `of` is one of `PREDICTIONS`, of a contact's under its `load`.
     """
@@ -492,12 +504,13 @@ def _map_of(scene: Scene, of: str) -> _Map:
 def prospect(design: Design, of: str = "displacement") -> Prospect:
     """The error of one of `PREDICTIONS` by the covariance of a design, without a simulation."""
     estimator, scene, seen = design.estimator(), design.scene, _map_of(design.scene, of)
-    layout = estimator.layout
+    layout, noise = estimator.layout, noise_of(scene)
     if of == "displacement":
-        sd = predicted_sd(estimator, noise_of(scene), seen.points)
+        sd = predicted_sd(estimator, noise, seen.points)
     else:
         loads = [replace(pressed_load(scene), x=x, y=y) for x, y in seen.points.tolist()]
-        each = np.array([_contact_covariance(scene, layout, load).diagonal() for load in loads])
+        covariances = [_contact_covariance(scene, layout, load, noise) for load in loads]
+        each = np.array([one.diagonal() for one in covariances])
         sd = np.sqrt(each[:, 1:].sum(axis=1) if of == "contact" else each[:, 0])
     scan_time = scene.transduction.scan_time(layout.channels)
     rate = 1 / scan_time if scan_time else math.inf

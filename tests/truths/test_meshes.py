@@ -1,0 +1,200 @@
+"""Contacts on meshes: against shells that share nothing with the library."""
+
+from dataclasses import dataclass, replace
+from functools import cache
+from math import pi, radians, sqrt
+
+import numpy as np
+import pytest
+
+from kappaskin import Plate, SensorLayout
+from kappaskin.contact.influence import influence_of
+from kappaskin.skin import MeshSkin
+from koiter import Panel
+from meshes import disk, ellipsoid
+from navier import Load
+from revolution import RevolvedShell, sphere
+from solid_shell import SolidShell, quadratic
+from studies import Case, _even, coverage
+
+pytestmark = pytest.mark.truth
+
+R = 8e-3
+FEW, ALL = 200, 1000
+
+
+@dataclass(frozen=True, eq=False)
+class MeshCase(Case):
+    """A case on a mesh of a sphere, from the pole to an `angle`."""
+
+    angle: float = 0.0
+
+    @property
+    def layout(self):
+        k = np.arange(60)
+        s, azimuth = R * _even((k + 0.5) / 60, self.angle), k * pi * (3 - sqrt(5))
+        return SensorLayout.scattered(self.skin.patch, _on(self.skin.patch, s, azimuth))
+
+
+def _on(mesh, s, azimuth):
+    far = R * np.sin(s / R)
+    return mesh.places[0] + np.stack([far * np.cos(azimuth), far * np.sin(azimuth)], -1)
+
+
+def _polar(mesh, positions):
+    x, y = (positions - mesh.places[0]).T
+    return R * np.arcsin(np.hypot(x, y) / R), np.arctan2(y, x)
+
+
+def _as_seen(read, s, azimuth):
+    """Readings (3, P) along the meridian and the parallel, along x as it is seen from above."""
+    t, zero = s / R, 0 * s
+    along = [np.cos(t) * np.cos(azimuth), np.cos(t) * np.sin(azimuth), -np.sin(t)]
+    around = [-np.sin(azimuth), np.cos(azimuth), zero]
+    out = np.stack([np.sin(t) * np.cos(azimuth), np.sin(t) * np.sin(azimuth), np.cos(t)], -1)
+    x = np.cross([0.0, 1.0, 0.0], out)
+    x /= np.linalg.norm(x, axis=1)[:, None]
+    c, z = np.vecdot(x, np.stack(along, -1)), np.vecdot(x, np.stack(around, -1))
+    ss, tt, st = read
+    xx, yy = c * c * ss + z * z * tt, z * z * ss + c * c * tt
+    xy = c * z * (tt - ss) + (c * c - z * z) * st
+    return np.stack([xx + 2 * c * z * st, yy - 2 * c * z * st, xy])
+
+
+def _case(mm, force, thickness, rings, degrees=60):
+    angle = radians(degrees)
+    mesh = MeshSkin(*ellipsoid(rings, (R, R, R), angle), thickness)
+    plate = Plate(mesh)
+    shell = RevolvedShell(
+        sphere(R), R * angle, rigidity=plate.rigidity, thickness=thickness, edge="clamped"
+    )
+
+    def truth(layout):
+        s, azimuth = _polar(mesh, layout.positions)
+        read = shell.reader(np.stack([s, azimuth], -1))
+
+        def under(load):
+            (far,), (turn,) = _polar(mesh, np.array([[load.x, load.y]]))
+            there = replace(load, x=far * np.cos(turn), y=far * np.sin(turn))
+            return _as_seen(read(there), s, azimuth)
+
+        return under
+
+    def load(share):
+        far = R * _even(share[0], 0.75 * angle)
+        return Load(*_on(mesh, far, 2 * pi * share[1]), force, radius=1e-3 * mm)
+
+    return MeshCase(
+        f"{1e3 * thickness:g} mm, disc of {mm} mm",
+        plate,
+        truth,
+        load,
+        edge="clamped",
+        low=0,
+        high=1,
+        bound=False,
+        angle=angle,
+    )
+
+
+@cache
+def figures(mm, force, frames):
+    return coverage(_case(mm, force, 0.25e-3, 50), frames)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("frames", [FEW, ALL])
+@pytest.mark.parametrize(("mm", "force"), [(1, 2.1), (2, 4.4)])
+def test_intervals_on_a_mesh_of_a_cap_cover_the_truth(mm, force, frames):
+    found = figures(mm, force, frames)
+
+    slack = 0.0 if frames >= ALL else 2 * sqrt(0.95 * 0.05 / frames)
+    assert found.found == 1
+    assert abs(found.bias) < 0.01
+    for share in (found.x, found.y, found.force):
+        assert 0.92 - slack <= share <= 0.98 + slack
+
+
+# An ellipsoid, on two meshes of which none has the nodes of the other
+
+AXES, ANGLE, H, D = (9e-3, 7e-3, 6e-3), radians(60), 1e-3, 3.7e-3
+
+
+def _solid(rings):
+    places, triangles = disk(rings)
+    places, triangles = quadratic(places, triangles)
+    rim = np.hypot(*places[: 1 + 3 * rings * (rings + 1)].T) > 1 - 1e-9
+    far, turn = np.hypot(*places.T), np.arctan2(*places.T[::-1])
+    ends = rim[triangles[:, :3]]
+    on = np.concatenate([rim, np.zeros(len(places) - len(rim), bool)])
+    on[triangles[:, 3:][ends & np.roll(ends, -1, axis=1)]] = True
+    t = ANGLE * np.where(on, 1.0, far)
+    unit = np.column_stack([np.sin(t) * np.cos(turn), np.sin(t) * np.sin(turn), np.cos(t)])
+    normals = unit / AXES
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    return SolidShell(unit * AXES, normals, triangles, np.flatnonzero(on), D, H)
+
+
+@pytest.mark.full
+def test_readings_on_an_ellipsoid_are_those_of_a_solid_shell():
+    solid, mesh = _solid(24), MeshSkin(*ellipsoid(30, AXES, ANGLE), H)
+    elements = np.arange(0, len(solid.triangles), len(solid.triangles) // 50)
+    to_mesh = mesh.places[0] - mesh.nodes[0, :2]
+    at = solid.places(elements)[:, :2] + to_mesh
+    inside = mesh.depth(at) > 0.1 * mesh.a
+    layout, out = SensorLayout.scattered(mesh, at[inside]), np.zeros((4, 3 * inside.sum()))
+    influence = influence_of(Plate(mesh, D), layout, "clamped", 15, out)
+    read, s = solid.reader(elements[inside]), (1.6e-3) ** 2
+
+    for t, turn in ((0.05, 0.0), (0.3, 0.7), (0.5, 2.6)):
+        c = np.array([np.sin(t) * np.cos(turn), np.sin(t) * np.sin(turn), np.cos(t)]) * AXES
+        forces = solid.spread(lambda x, c=c: np.exp(-2 * np.sum((x - c) ** 2, -1) / s))
+        true = read(forces / forces.sum()).ravel()
+        influence.at(*(c[:2] + to_mesh).tolist(), s)
+        # As wide and of a Gaussian's profile.
+        ours = (out[0] + influence.profile(s)[0]) / influence.unit
+
+        assert np.linalg.norm(ours - true) < 0.02 * np.linalg.norm(true)
+        assert ours @ true == pytest.approx(true @ true, rel=0.01)
+
+
+# A shallow dome, held all around
+
+SIDE, RADIUS, THIN = 40e-3, 0.1, 0.4e-3
+
+
+def _dome(count):
+    """A mesh of the dome, of `count` nodes each way, even along its arcs."""
+    line = np.linspace(-SIDE / 2, SIDE / 2, count)
+    u, v = (each.ravel() for each in np.meshgrid(line, line))
+    height = RADIUS * (np.cos(u / RADIUS) + np.cos(v / RADIUS))
+    nodes = np.column_stack([RADIUS * np.sin(u / RADIUS), RADIUS * np.sin(v / RADIUS), height])
+    corner = np.arange(count**2).reshape(count, count)
+    below, above = corner[:-1], corner[1:]
+    a, b, c, d = (
+        each.ravel() for each in (below[:, :-1], below[:, 1:], above[:, 1:], above[:, :-1])
+    )
+    return MeshSkin(nodes, np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]), THIN)
+
+
+@pytest.mark.full
+def test_a_shallow_dome_bends_as_in_closed_form():
+    mesh, panel = _dome(61), Panel(SIDE, SIDE, RADIUS, RADIUS, thickness=THIN, inplane="held")
+    wide, load = 3e-3, Load(0.42 * SIDE, 0.55 * SIDE, 1.0, radius=3e-3)
+    away = wide * np.array([(-2, 0), (-1, 1), (1, 0.5), (2, 0), (0, -1.5), (0, 2)])
+    places = np.array([load.x, load.y]) + away
+
+    def seen(along):
+        half = mesh.a / 2
+        return half + RADIUS * np.sin((along - SIDE / 2) / RADIUS)
+
+    layout, out = SensorLayout.scattered(mesh, seen(places)), np.zeros((4, 18))
+    influence = influence_of(Plate(mesh), layout, "hinged", 15, out)
+    influence.at(*seen(np.array([load.x, load.y])).tolist(), wide**2)
+    curvature = panel.reader(places)(load).ravel()
+    assert np.abs(out[0] / influence.unit - curvature).max() < 0.03 * np.abs(curvature).max()
+
+    at = seen(np.array([load.x, load.y])).tolist()
+    point = replace(load, radius=0.0)
+    w = panel.displacement(point, np.array([[load.x, load.y]]))[2, 0]
+    assert influence.gives(*at) == pytest.approx(w, rel=0.01)
