@@ -171,7 +171,8 @@ class PartKind:
     """One kind of a part, of this name on the screen, that becomes one of a class `made`.
 
     It `needs` keys, here with examples, and may have those named in `may` besides those that every
-    kind may have. `keys` are those that mean something else than in other kinds.
+    kind may have, but for those in `never`. `keys` are those that mean something else than in other
+    kinds.
     """
 
     label: str
@@ -179,6 +180,7 @@ class PartKind:
     needs: Mapping[str, Any] = field(default_factory=dict[str, Any])
     may: tuple[str, ...] = ()
     keys: Mapping[str, Key] = field(default_factory=dict[str, Key])
+    never: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,7 +219,8 @@ class Part:
         own = {name for one in self.kinds.values() for name in (*one.needs, *one.may)}
         common = [name for name in self.keys if name not in own]
         more = self.kinds[kind].may if kind in self.kinds else ()
-        keys = {name: self.key(name, kind) for name in (*common, *more)}
+        never = self.kinds[kind].never if kind in self.kinds else ()
+        keys = {name: self.key(name, kind) for name in (*common, *more) if name not in never}
         return {name: key.beginning for name, key in keys.items() if key.offered}
 
     def known(self, kind: str = "") -> dict[str, Any]:

@@ -119,11 +119,12 @@ def _read(path: Path) -> tuple[dict[str, Array], dict[str, NDArray[np.str_]]]:
     except ARCHIVE_DAMAGES as error:
         raise Refusal(f"{path}: cannot be read as NPZ ({error}); expected {_NEEDED}") from error
     needed = ("values", "element", "quantity") if "values" in found else ("curvature",)
+    needed = "positions", *needed
     if "mesh" not in found:
         needed = "size", *needed
     elif sizes := [name for name in _SIZES if name in found]:
         raise Refusal(f"{path}: expected the mesh alone, got {', '.join(sizes)} too; leave it out")
-    for name in ("positions", *needed):
+    for name in needed:
         if name not in found:
             raise Refusal(f"{path}: has no {name!r} (it has {sorted(found)}); expected {_NEEDED}")
     if other := [name for name in ("values", *_READ) if "curvature" in found and name in found]:

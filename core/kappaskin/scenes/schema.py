@@ -138,10 +138,10 @@ SKIN = Part(
         ),
         "held": Key(
             "Held",
-            "Of a mesh: which part of its rim is held: from the node nearest to the first point, "
-            "in the unit of its file, along the rim to that nearest to the second, counter-"
-            "clockwise seen from outside. All of it if omitted.",
-            kind=tuple[tuple[float, float, float], tuple[float, float, float]],
+            "Of a mesh: which parts of its rim are held, two points for each: from the node "
+            "nearest to the first, in the unit of its file, along the rim to that nearest to the "
+            "second, counter-clockwise seen from outside. All of it if omitted.",
+            kind=tuple[tuple[float, float, float], ...],
             default=None,
             example=[[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]],
         ),
@@ -261,6 +261,7 @@ SKIN = Part(
             MeshSkin,
             {"file": "skin.stl", "unit": "mm", "thickness": 1e-3},
             ("held", "mesh"),
+            never=("axial_stiffness", "fluid", "tension"),
         ),
         "polygon": PartKind(
             "Polygon",

@@ -296,7 +296,7 @@ def test_every_subcommand_shows_an_example_in_its_help(run) -> None:
         ("Recordings", {"record", "info", "verify", "repair", "export", "import", "reconstruct"}),
         ("Sensor", {"calibrate", "tare", "press", "monitor", "device"}),
         ("Studies", {"plan", "simulate", "cost", "compare", "stability", "regions", "study",
-                     "report"}),
+                     "report", "design"}),
         ("Paper", {"tables", "figures"}),
         ("System", {"doctor", "drill"}),
     ],

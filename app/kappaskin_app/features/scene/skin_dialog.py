@@ -277,6 +277,7 @@ class SkinDialog(QDialog):
         for line, which in zip(self.ends, ("From", "To"), strict=True):
             line.setPlaceholderText("x, y, z in the unit of the file")
             line.setAccessibleName(which)
+            line.setToolTip("Where the held part of the rim begins or ends.")
             line.textEdited.connect(guarded(lambda *_: self._show()))
         self.form, self.found = QFormLayout(), QVBoxLayout()
         rows: dict[str, QWidget] = {

@@ -64,6 +64,8 @@ def _edit(widget: QWidget, value: Any) -> Any:
     assert isinstance(widget, QLineEdit)
     if isinstance(value, list) and isinstance(value[0], str):
         text, changed = "xx, another", ["xx", "another"]
+    elif isinstance(value, list) and isinstance(value[0], list):
+        text, changed = "7", [[7.0]]
     else:
         text, changed = ("7", [7]) if isinstance(value, list) else ("another", "another")
     widget.setText(text)

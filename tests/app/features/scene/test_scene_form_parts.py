@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QComboBox, QToolButton
@@ -17,6 +18,7 @@ from kappaskin.scenes.effects import EFFECTS
 from kappaskin_app.features.scene import scene_text
 from kappaskin_app.features.scene.scene_form import SceneForm
 from kappaskin_app.features.scene.sections import Addition, Section, sections_of
+from meshes import ellipsoid
 
 from .conftest import TEXTS, TOUCHED, said_by
 
@@ -47,6 +49,10 @@ def folder(tmp_path: Path) -> Path:
         for face in faces
     )
     (tmp_path / "mesh.stl").write_text(f"solid a\n{facets}endsolid a\n")
+    # In mm, with a rim from (0, 0, 0) to (10, 0, 0) and back.
+    nodes, triangles = ellipsoid(20, (5 / math.sin(1.2), 5.0, 4.0), 1.2)
+    nodes += (5, 0, -4 * math.cos(1.2))
+    trimesh.Trimesh(nodes, triangles, process=False).export(tmp_path / "skin.stl")
     return tmp_path / "scene.toml"
 
 
