@@ -73,7 +73,7 @@ class DrawnSkin:
     def height_of(self, surface: Array, times: float = 1.0) -> Array:
         """How far out in mm points are drawn for a displacement inward (ny, nx) in m.
 
-        A rim that is not held is drawn as the skin beside it runs on.
+        The heights of points on a free rim are weighted means of those of the points inside it.
         """
         height = -MM * times * surface
         near, weights = self._free_points
@@ -86,14 +86,14 @@ class DrawnSkin:
         """Positions (k, 2) in m around the rim of a cap or a mesh; none of other skins."""
         patch = self.patch
         if isinstance(patch, MeshSkin):
-            return patch.points[np.append(patch.rim, patch.rim[0]), :2]
+            return patch.places[np.append(patch.rim, patch.rim[0])]
         if isinstance(patch, Cap):
             turn = np.linspace(0, 2 * np.pi, _AROUND)
             return patch.rim_radius * (1 + np.stack([np.cos(turn), np.sin(turn)], axis=-1))
         return np.empty((0, 2))
 
     def rim_height(self) -> Array:
-        """How far out (k,) in mm the `rim` is drawn: as the skin beside it, unless it is held."""
+        """Height (k,) in mm of the `rim`: 0 where held, else a mean of heights near it."""
         near, weights = self._rim_points
         return np.sum(weights * self.height.ravel()[self._inside[near]], axis=1)
 
@@ -298,7 +298,7 @@ def _is_free(patch: Patch, positions: Array) -> Mask:
     """Whether the rim next to each of `positions` (k, 2) is not held."""
     if not isinstance(patch, MeshSkin) or len(patch.held) == len(patch.rim):
         return np.zeros(len(positions), bool)
-    near = scipy.spatial.KDTree(patch.points[patch.rim, :2]).query(positions)[1]
+    near = scipy.spatial.KDTree(patch.places[patch.rim]).query(positions)[1]
     return ~np.isin(patch.rim[near], patch.held)
 
 

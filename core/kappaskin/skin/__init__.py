@@ -2,8 +2,8 @@
 
 from kappaskin.skin.mesh import MeshSkin as MeshSkin
 from kappaskin.skin.mesh_file import UNITS as UNITS
-from kappaskin.skin.mesh_file import Fault as Fault
-from kappaskin.skin.mesh_file import Surface as Surface
+from kappaskin.skin.mesh_file import MeshFault as MeshFault
+from kappaskin.skin.mesh_file import MeshSurface as MeshSurface
 from kappaskin.skin.mesh_file import faults as faults
 from kappaskin.skin.mesh_file import held_edges as held_edges
 from kappaskin.skin.mesh_file import read_surface as read_surface

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from kappaskin._files import ARCHIVE_DAMAGES
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Indices, Mask
-from kappaskin.skin.mesh_file import Surface, faults, placed
+from kappaskin.skin.mesh_file import MeshSurface, faults, placed
 from kappaskin.skin.patch import SIDES, Base, Number, Polygon, doubled_area
 
 _MOST_STEPS = 64  # of the splines, along the longer side
@@ -182,7 +182,7 @@ class MeshSkin(Polygon):
         given = np.array(nodes, np.float32).astype(float)
         faces = np.array(triangles, np.intp)
         _check_mesh(given, faces, thickness)
-        (rim,) = Surface(given, faces).loops
+        (rim,) = MeshSurface(given, faces).loops
         fixed = np.intersect1d(rim if held is None else np.array(held, np.intp), rim)
         if len(fixed) < 2:
             raise Refusal(f"expected at least two nodes of the rim that are held, got {len(fixed)}")
@@ -296,7 +296,7 @@ class MeshSkin(Polygon):
 
         And how far (P,) in m these are from there.
         """
-        triangle, shares, away = placed(Surface(self.nodes, self.triangles), points)
+        triangle, shares, away = placed(MeshSurface(self.nodes, self.triangles), points)
         return np.einsum("pk,pki->pi", shares, self.places[self.triangles[triangle]]), away
 
     @cached_property
@@ -450,7 +450,7 @@ def _check_mesh(nodes: Array, triangles: Indices, thickness: float) -> None:
         )
     if not 0 < thickness < math.inf:
         raise Refusal(f"expected a thickness above zero in m of the mesh, got {thickness}")
-    for fault in faults(Surface(nodes, triangles)):
+    for fault in faults(MeshSurface(nodes, triangles)):
         if fault.kind not in _LESSER:
             raise Refusal(fault.message)
 

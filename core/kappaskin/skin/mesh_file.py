@@ -26,7 +26,7 @@ _AT_ONCE = 2**19  # triangles tried against points at a time
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class MeshSurface:
     """A skin of `triangles` (F, 3) between `nodes` (n, 3) in m.
 
     The numbers of a triangle's nodes turn left as seen from outside.
@@ -122,9 +122,9 @@ class Surface:
             loops.append(np.array(loop))
         return sorted(loops, key=self._length, reverse=True)
 
-    def part(self, of: Mask) -> "Surface":
+    def part(self, of: Mask) -> "MeshSurface":
         """The surface of the triangles in `of` (F,) alone, with all nodes; itself if of all."""
-        return self if of.all() else Surface(self.nodes, self.triangles[of])
+        return self if of.all() else MeshSurface(self.nodes, self.triangles[of])
 
     def _length(self, loop: Indices) -> float:
         points = self.nodes[loop]
@@ -137,7 +137,7 @@ class Surface:
         return scipy.spatial.cKDTree(self.centres), float(away.max())
 
 
-def read_surface(path: str | Path, unit: str) -> Surface:
+def read_surface(path: str | Path, unit: str) -> MeshSurface:
     """The surface in an STL, OBJ or PLY file, whose `unit` of length is "m", "cm", "mm" or "inch".
 
     An STL file has no common nodes, each triangle has its own three: exactly equal ones are merged.
@@ -170,26 +170,26 @@ def read_surface(path: str | Path, unit: str) -> Surface:
             f"{path}: expected triangles of its {len(nodes)} nodes, got other numbers; export the "
             "mesh again"
         )
-    surface = _used(Surface(nodes, triangles))
+    surface = _used(MeshSurface(nodes, triangles))
     if unit not in UNITS:
         sizes = " or ".join(f"{_size(surface.nodes)} {name}" for name in UNITS)
         raise Refusal(
             f"{path}: expected its unit, one of {', '.join(UNITS)}, got {unit or 'none'}; give the "
             f"one in which the skin has its size: {sizes}"
         )
-    return Surface(UNITS[unit] * surface.nodes, surface.triangles)
+    return MeshSurface(UNITS[unit] * surface.nodes, surface.triangles)
 
 
 def _size(nodes: Array) -> str:
     return " x ".join(f"{side:.3g}" for side in np.ptp(nodes, axis=0))
 
 
-def _used(surface: Surface) -> Surface:
+def _used(surface: MeshSurface) -> MeshSurface:
     """The surface without nodes of no triangle; itself if there are none."""
     used, triangles = np.unique(surface.triangles, return_inverse=True)
     if len(used) == len(surface.nodes):
         return surface
-    return Surface(surface.nodes[used], triangles)
+    return MeshSurface(surface.nodes[used], triangles)
 
 
 def _equal(nodes: Array | Indices) -> Indices:
@@ -201,12 +201,12 @@ def _equal(nodes: Array | Indices) -> Indices:
     return number
 
 
-def _joined(surface: Surface, number: Indices) -> Surface:
+def _joined(surface: MeshSurface, number: Indices) -> MeshSurface:
     """The surface with the nodes of the same `number` (n,), from zero, joined to the first."""
     _, first = np.unique(number, return_index=True)
     if len(first) == len(number):
         return surface
-    return Surface(surface.nodes[first], number[surface.triangles])
+    return MeshSurface(surface.nodes[first], number[surface.triangles])
 
 
 # What NumPy and trimesh raise on files of other contents.
@@ -248,7 +248,7 @@ def _read_stl(content: bytes) -> _Mesh:
             f"got {len(content)} bytes"
             + (f" where {count} triangles are announced" if len(content) >= 84 else "")
         )
-    soup = Surface(corners, np.arange(len(corners)).reshape(-1, 3))
+    soup = MeshSurface(corners, np.arange(len(corners)).reshape(-1, 3))
     merged = _joined(soup, _equal(corners))
     return merged.nodes, merged.triangles
 
@@ -303,7 +303,7 @@ _READERS: dict[str, Callable[[bytes], _Mesh]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Fault:
+class MeshFault:
     """What a mesh has that a skin cannot have: its `kind`, and where, at `places` (k, 3) in m.
 
     The `message` has what was expected, what came and what to do. The `repair` is the one of
@@ -395,12 +395,12 @@ _KINDS: dict[str, tuple[str, str | None]] = {
 }
 
 
-def _fault(kind: str, places: Array, **came: Any) -> Fault:
+def _fault(kind: str, places: Array, **came: Any) -> MeshFault:
     text, repair = _KINDS[kind]
-    return Fault(kind, text.format(**{"count": len(places), **came}), places, repair)
+    return MeshFault(kind, text.format(**{"count": len(places), **came}), places, repair)
 
 
-def faults(surface: Surface, outward: Array | None = None) -> list[Fault]:
+def faults(surface: MeshSurface, outward: Array | None = None) -> list[MeshFault]:
     """What keeps the surface from being a skin: one part, with one rim, of regular triangles.
 
     `outward` (3,) is a direction that the outside mostly faces. One cause is found once: each kind
@@ -419,7 +419,7 @@ def faults(surface: Surface, outward: Array | None = None) -> list[Fault]:
     return [fault for fault in _faults(surface, outward) if len(fault.places)]
 
 
-def _faults(surface: Surface, outward: Array | None) -> Iterator[Fault]:
+def _faults(surface: MeshSurface, outward: Array | None) -> Iterator[MeshFault]:
     """A fault of each kind in finite nodes, without places where there is none."""
     F, middle, nowhere = len(surface.triangles), surface.nodes.mean(axis=0)[None], np.zeros((0, 3))
     yield _fault("too many", middle if _COUNTS[1] < F else nowhere, count=F)
@@ -462,7 +462,7 @@ def _linked(pairs: Indices, count: int) -> Indices:
     return scipy.sparse.csgraph.connected_components(links, directed=False)[1].astype(np.intp)
 
 
-def _coincident(surface: Surface) -> Indices:
+def _coincident(surface: MeshSurface) -> Indices:
     """A number (n,) for each node, from zero, the same for nodes of the rim at one place."""
     rim = np.unique(surface.rim)
     number = _equal(surface.nodes[rim])
@@ -482,7 +482,7 @@ def _copies(triangles: Indices) -> Mask:
     return copy
 
 
-def _turned(surface: Surface) -> tuple[Mask, Mask]:
+def _turned(surface: MeshSurface) -> tuple[Mask, Mask]:
     """Which triangles (F,) face the other way than most of their part, and which have no side."""
     s, t = surface.meeting[surface.counts[surface.edge_of[surface.meeting[:, 0]]] == 2].T
     alike = surface.sides[s, 0] != surface.sides[t, 0]
@@ -496,13 +496,13 @@ def _turned(surface: Surface) -> tuple[Mask, Mask]:
     return turned ^ (share > 0.5)[part], either[0] == either[1]
 
 
-def _parts(surface: Surface) -> tuple[Indices, int]:
+def _parts(surface: MeshSurface) -> tuple[Indices, int]:
     """The number (F,) of the part that each triangle is in, and that of the largest by area."""
     part = _linked(surface.meeting // 3, len(surface.triangles))
     return part, int(np.bincount(part, np.linalg.norm(surface.normals, axis=1)).argmax())
 
 
-def _pinched(surface: Surface) -> Indices:
+def _pinched(surface: MeshSurface) -> Indices:
     """The nodes whose triangles are several fans that meet there alone."""
     s, t = surface.meeting.T
     # The first and second end of one side are the second and first of the other, or not if flipped.
@@ -525,8 +525,8 @@ REPAIRS = ("merge", "remove", "orient", "keep largest part", "decimate")
 
 
 def repaired(
-    surface: Surface, repair: str, outward: Array | None = None, most: int = _COUNTS[1]
-) -> Surface:
+    surface: MeshSurface, repair: str, outward: Array | None = None, most: int = _COUNTS[1]
+) -> MeshSurface:
     """The surface after a `repair`, one of `REPAIRS`.
 
     `merge` joins nodes of rims that are nearer than 1e-5 of the skin's size; `remove` takes away
@@ -552,17 +552,17 @@ def repaired(
     return _used(surface)
 
 
-def _orient(surface: Surface, outward: Array | None) -> Surface:
+def _orient(surface: MeshSurface, outward: Array | None) -> MeshSurface:
     turned, one_sided = _turned(surface)
     turned &= ~one_sided
     normal: Array = np.where(turned, -1.0, 1.0) @ surface.normals
     if outward is not None and normal @ outward < 0:
         turned = ~turned
     triangles = np.where(turned[:, None], surface.triangles[:, ::-1], surface.triangles)
-    return Surface(surface.nodes, triangles) if turned.any() else surface
+    return MeshSurface(surface.nodes, triangles) if turned.any() else surface
 
 
-def _remove(surface: Surface) -> Surface:
+def _remove(surface: MeshSurface) -> MeshSurface:
     copy = _copies(surface.triangles)
     surface = surface.part(~copy & _distinct(surface.triangles))
     while len(flat := np.flatnonzero(surface.smallest < _FLAT)):
@@ -576,7 +576,7 @@ def _remove(surface: Surface) -> Surface:
     return surface
 
 
-def _decimate(surface: Surface, most: int) -> Surface:
+def _decimate(surface: MeshSurface, most: int) -> MeshSurface:
     errors, before = _errors(surface), 0
     while (excess := len(surface.triangles) - most) > 0 and len(surface.triangles) != before:
         before, every = len(surface.triangles), np.ones(len(surface.edges), bool)
@@ -592,7 +592,7 @@ _CHEAPER = 0.15  # of the edges, that may be collapsed before all costs are foun
 _PASSES = 4  # over the edges that others left
 
 
-def _errors(surface: Surface) -> Array:
+def _errors(surface: MeshSurface) -> Array:
     """Quadrics (n, 4, 4) at the nodes, of a place (x, y, z, 1) in m, in m^4.
 
     The area of each triangle there times the squared distance from its plane; at the rim also the
@@ -621,7 +621,9 @@ def _at(nodes: Indices, count: int) -> "scipy.sparse.csr_array":
     return scipy.sparse.csr_array((np.ones(nodes.size), (nodes.ravel(), column)), shape)
 
 
-def _collapsed(surface: Surface, errors: Array, of: Mask, most: int) -> tuple[Surface, Array]:
+def _collapsed(
+    surface: MeshSurface, errors: Array, of: Mask, most: int
+) -> tuple[MeshSurface, Array]:
     """The surface with up to `most` of some edges, `of` (E,), collapsed to nodes, with its errors.
 
     None that would turn a triangle over, or join what is apart.
@@ -655,7 +657,9 @@ def _collapsed(surface: Surface, errors: Array, of: Mask, most: int) -> tuple[Su
     gone = np.flatnonzero(into != np.arange(n))
     errors = errors.copy()
     errors[into[gone]] += errors[gone]
-    return Surface(nodes, into[surface.triangles]).part(_distinct(into[surface.triangles])), errors
+    return MeshSurface(nodes, into[surface.triangles]).part(
+        _distinct(into[surface.triangles])
+    ), errors
 
 
 def _distinct(triangles: Indices) -> Mask:
@@ -664,7 +668,7 @@ def _distinct(triangles: Indices) -> Mask:
     return (a != b) & (b != c) & (c != a)
 
 
-def _links(surface: Surface) -> "scipy.sparse.csr_array":
+def _links(surface: MeshSurface) -> "scipy.sparse.csr_array":
     """The matrix (n, n) that has 1 where two nodes are linked by an edge."""
     i, j = np.concatenate([surface.edges, surface.edges[:, ::-1]]).T
     n = len(surface.nodes)
@@ -688,7 +692,7 @@ def _apart(i: Indices, j: Indices, turn: Indices, n: int) -> Indices:
     return np.flatnonzero((wide[i] == turn) & (wide[j] == turn) & (turn < len(i)))
 
 
-def _spoiling(surface: Surface, nodes: Array, i: Indices, j: Indices, places: Array) -> Indices:
+def _spoiling(surface: MeshSurface, nodes: Array, i: Indices, j: Indices, places: Array) -> Indices:
     """Which collapses of `i` and `j` (k,) to `places` (k, 3) would turn or squeeze a triangle."""
     owner = np.full(len(nodes), -1)
     owner[i] = owner[j] = np.arange(len(i))
@@ -696,14 +700,14 @@ def _spoiling(surface: Surface, nodes: Array, i: Indices, j: Indices, places: Ar
     moved[i] = moved[j] = places
     owners = owner[surface.triangles]
     one = np.count_nonzero(owners >= 0, axis=1) == 1
-    before, after = (Surface(of, surface.triangles[one]) for of in (nodes, moved))
+    before, after = (MeshSurface(of, surface.triangles[one]) for of in (nodes, moved))
     turned = np.sum(_unit(before.normals) * _unit(after.normals), axis=1) < _TURN
     turned &= before.smallest > _FLAT
     squeezed = after.smallest < np.minimum(before.smallest, _SQUEEZED)
     return owners[one].max(axis=1)[turned | squeezed]
 
 
-def placed(surface: Surface, points: Array) -> tuple[Indices, Array, Array]:
+def placed(surface: MeshSurface, points: Array) -> tuple[Indices, Array, Array]:
     """The places on the surface nearest to `points` (P, 3) in m.
 
     The triangle (P,), the shares (P, 3) of its corners (barycentric coordinates), and the distance
@@ -768,7 +772,7 @@ _SAMPLES = 64  # for each place, all over the surface
 _MOVES = 40  # of each place to the middle of its share
 
 
-def spread(surface: Surface, count: int) -> Array:
+def spread(surface: MeshSurface, count: int) -> Array:
     """So many places (count, 3) in m on the surface, each in the middle of an equal share of it.
 
     Lloyd's method on points all over the surface, begun with points far from one another; the same
@@ -800,7 +804,7 @@ def spread(surface: Surface, count: int) -> Array:
     return np.einsum("pk,pkx->px", shares, surface.corners[triangle])
 
 
-def principal_directions(surface: Surface) -> tuple[Array, Array]:
+def principal_directions(surface: MeshSurface) -> tuple[Array, Array]:
     """Unit tangents (n, 2, 3) at the nodes along the principal curvatures (n, 2) in 1/m.
 
     Positive where the skin is convex as seen from outside, the larger first; a direction and its
@@ -839,7 +843,7 @@ def _unit(vectors: Array) -> Array:
 _NEAR = 0.1  # of the size: further from the rim no end of an arc is meant
 
 
-def held_edges(surface: Surface, held: ArrayLike) -> Indices:
+def held_edges(surface: MeshSurface, held: ArrayLike) -> Indices:
     """The sides (H, 2) of the rim that are held, as pairs of nodes with the skin on their left.
 
     `held` is "all", or arcs (A, 2, 3) of the rim, each from the node nearest to one point in m to

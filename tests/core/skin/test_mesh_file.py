@@ -9,7 +9,7 @@ import trimesh
 from kappaskin import Refusal
 from kappaskin.skin.mesh_file import (
     REPAIRS,
-    Surface,
+    MeshSurface,
     faults,
     held_edges,
     placed,
@@ -31,7 +31,7 @@ def sheet(shape, nx=21, ny=15):
     """The surface of `shape(x, y)` over the square of sides 1, at nx x ny nodes."""
     x, y = np.meshgrid(np.linspace(0, 1, nx), np.linspace(0, 1, ny))
     nodes = np.stack(np.broadcast_arrays(*shape(x.ravel(), y.ravel())), axis=-1)
-    return Surface(nodes, triangles(nx, ny))
+    return MeshSurface(nodes, triangles(nx, ny))
 
 
 def dome(x, y):
@@ -86,7 +86,7 @@ WRITTEN = {
 
 @pytest.mark.parametrize("name", WRITTEN)
 def test_a_surface_is_read_from_every_format(tmp_path, name):
-    big = Surface(1e3 * DOME.nodes, DOME.triangles)
+    big = MeshSurface(1e3 * DOME.nodes, DOME.triangles)
     (tmp_path / name).write_bytes(WRITTEN[name](big))
     surface = read_surface(tmp_path / name, "mm")
     assert len(surface.nodes) == len(DOME.nodes)
@@ -124,7 +124,7 @@ def test_another_name_is_refused(tmp_path):
 
 @pytest.mark.parametrize("unit", ["", "km", "MM"])
 def test_a_unit_is_never_guessed(tmp_path, unit):
-    (tmp_path / "skin.obj").write_bytes(obj(Surface(1e3 * DOME.nodes, DOME.triangles)))
+    (tmp_path / "skin.obj").write_bytes(obj(MeshSurface(1e3 * DOME.nodes, DOME.triangles)))
     sizes = "30 x 20 x 4 m or 30 x 20 x 4 cm or 30 x 20 x 4 mm or 30 x 20 x 4 inch"
     with pytest.raises(Refusal, match=sizes):
         read_surface(tmp_path / "skin.obj", unit)
@@ -214,7 +214,7 @@ def test_the_nearest_triangle_is_found_though_its_centre_is_far():
 
 def test_triangles_without_area_do_not_disturb_places():
     nodes = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]])
-    surface = Surface(nodes, np.array([[0, 1, 2], [0, 0, 0], [0, 2, 3]]))
+    surface = MeshSurface(nodes, np.array([[0, 1, 2], [0, 0, 0], [0, 2, 3]]))
     _, _, distance = placed(surface, np.array([[0.5, 0.2, 3.0], [3.0, 0, 0], [1.0, -4, 0]]))
     np.testing.assert_allclose(distance, [3, 1, 4])
 
@@ -230,16 +230,18 @@ def found(surface, kind, **others):
 
 
 def soup(surface):
-    return Surface(surface.corners.reshape(-1, 3), np.arange(surface.triangles.size).reshape(-1, 3))
+    return MeshSurface(
+        surface.corners.reshape(-1, 3), np.arange(surface.triangles.size).reshape(-1, 3)
+    )
 
 
 def with_triangles(surface, *more, nodes=()):
     nodes = np.concatenate([surface.nodes, np.reshape(nodes, (-1, 3))])
-    return Surface(nodes, np.concatenate([surface.triangles, np.reshape(more, (-1, 3))]))
+    return MeshSurface(nodes, np.concatenate([surface.triangles, np.reshape(more, (-1, 3))]))
 
 
 def without(surface, *gone):
-    return Surface(surface.nodes, np.delete(surface.triangles, gone, axis=0))
+    return MeshSurface(surface.nodes, np.delete(surface.triangles, gone, axis=0))
 
 
 def test_a_good_skin_has_no_faults():
@@ -251,7 +253,7 @@ def test_a_good_skin_has_no_faults():
 def test_nodes_that_are_nowhere_are_found_by_their_neighbours(bad):
     nodes = DOME.nodes.copy()
     nodes[50, 1] = bad
-    (fault,) = faults(Surface(nodes, DOME.triangles))
+    (fault,) = faults(MeshSurface(nodes, DOME.triangles))
     assert fault.kind == "not finite"
     assert "at 1 nodes" in fault.message
     assert 4 < len(fault.places) < 9
@@ -263,11 +265,11 @@ def test_nodes_that_are_nowhere_are_found_by_their_neighbours(bad):
 )
 @pytest.mark.filterwarnings("error")
 def test_a_wrong_unit_is_found_by_the_size(factor, size):
-    assert size in found(Surface(factor * DOME.nodes, DOME.triangles), "size").message
+    assert size in found(MeshSurface(factor * DOME.nodes, DOME.triangles), "size").message
 
 
 def test_huge_coordinates_are_of_another_size():
-    assert kinds(Surface(1e300 * DOME.nodes, DOME.triangles)) == ["size"]
+    assert kinds(MeshSurface(1e300 * DOME.nodes, DOME.triangles)) == ["size"]
 
 
 def test_too_few_and_too_many_triangles_are_found():
@@ -281,7 +283,7 @@ def test_too_few_and_too_many_triangles_are_found():
 def test_soup_is_found_once_and_merged(shift):
     apart = soup(DOME)
     random = np.random.default_rng(4).uniform(-shift, shift, apart.nodes.shape)
-    apart = Surface(apart.nodes + random, apart.triangles)
+    apart = MeshSurface(apart.nodes + random, apart.triangles)
     assert kinds(apart) == ["not merged"]
     fault = found(apart, "not merged")
     assert len(fault.places) == len(apart.nodes) - len(DOME.nodes)
@@ -292,7 +294,9 @@ def test_soup_is_found_once_and_merged(shift):
 
 def test_nodes_within_the_skin_are_not_merged_with_others():
     """Two layers that touch in the middle stay two layers."""
-    below = Surface(DOME.nodes * (1, 1, -1) + (0, 0, 2 * DOME.nodes[:, 2].max()), DOME.triangles)
+    below = MeshSurface(
+        DOME.nodes * (1, 1, -1) + (0, 0, 2 * DOME.nodes[:, 2].max()), DOME.triangles
+    )
     both = with_triangles(DOME, below.triangles + len(DOME.nodes), nodes=below.nodes)
     assert len(repaired(both, "merge").nodes) == 2 * len(DOME.nodes)
 
@@ -301,14 +305,14 @@ def test_flipped_triangles_are_found_and_oriented():
     flipped = DOME.triangles.copy()
     some = np.random.default_rng(5).choice(len(flipped), 200, replace=False)
     flipped[some] = flipped[some, ::-1]
-    fault = found(Surface(DOME.nodes, flipped), "flipped")
+    fault = found(MeshSurface(DOME.nodes, flipped), "flipped")
     np.testing.assert_allclose(fault.places, DOME.centres[np.sort(some)])
-    oriented = repaired(Surface(DOME.nodes, flipped), fault.repair)
+    oriented = repaired(MeshSurface(DOME.nodes, flipped), fault.repair)
     np.testing.assert_allclose(oriented.normals, DOME.normals)
 
 
 def test_inside_out_goes_by_the_direction_given():
-    inverted = Surface(DOME.nodes, DOME.triangles[:, ::-1])
+    inverted = MeshSurface(DOME.nodes, DOME.triangles[:, ::-1])
     up = np.array([0, 0, 1.0])
     assert kinds(inverted) == []
     assert kinds(inverted, outward=up) == ["inside out"]
@@ -405,7 +409,7 @@ def test_slivers_are_found():
 
 def test_a_ball_has_no_rim():
     ball = trimesh.creation.icosphere(radius=8e-3)
-    fault = found(Surface(np.array(ball.vertices), np.array(ball.faces)), "closed")
+    fault = found(MeshSurface(np.array(ball.vertices), np.array(ball.faces)), "closed")
     assert "cut it" in fault.message
 
 
@@ -575,7 +579,7 @@ def test_principal_curvatures_of_a_cylinder_and_of_a_saddle():
     directions, curvatures = principal_directions(outside)
     np.testing.assert_allclose(curvatures * R, np.broadcast_to([1, 0], curvatures.shape), atol=0.02)
     assert np.abs(directions[:, 0, 1]).max() < 0.02
-    inside = Surface(outside.nodes, outside.triangles[:, ::-1])
+    inside = MeshSurface(outside.nodes, outside.triangles[:, ::-1])
     assert principal_directions(inside)[1] * R == pytest.approx(
         np.broadcast_to([0, -1], curvatures.shape), abs=0.02
     )

@@ -33,9 +33,9 @@ from kappaskin.mechanics import DiscLoad, Load
 from kappaskin.scenes import read_scene, scaled_to
 from kappaskin.skin import (
     UNITS,
-    Fault,
+    MeshFault,
     MeshSkin,
-    Surface,
+    MeshSurface,
     faults,
     held_edges,
     read_surface,
@@ -100,7 +100,7 @@ class SurfacePreview(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName("The mesh; the arrow keys turn it")
         self.setToolTip("Drag, or press the arrow keys, to turn. Orange: seen from inside.")
-        self.surface: Surface | None = None
+        self.surface: MeshSurface | None = None
         self.places, self.held = np.empty((0, 3)), np.empty((0, 2), np.intp)
         self._pressed: QPoint | None = None
         self._last, self._image, self._near = QPoint(), QImage(), np.empty((1, 1))
@@ -114,7 +114,7 @@ class SurfacePreview(QWidget):
     def sizeHint(self) -> QSize:
         return QSize(420, 400)
 
-    def show_surface(self, surface: Surface | None, places: Array, held: Indices) -> None:
+    def show_surface(self, surface: MeshSurface | None, places: Array, held: Indices) -> None:
         """Draw a surface, faults at `places` (k, 3) in m, and `held` sides (H, 2) of its rim."""
         if surface is not None:
             surface = surface.part(np.isfinite(np.ptp(surface.corners, axis=(1, 2))))
@@ -167,7 +167,7 @@ class SurfacePreview(QWidget):
         x, y = np.clip(seen[:, :2], 0, (width - 1, height - 1)).astype(int).T
         return seen[:, 2] < self._near[y, x] - _JUST_BEHIND
 
-    def _picture(self, surface: Surface) -> QImage:
+    def _picture(self, surface: MeshSurface) -> QImage:
         """Its triangles as dots, those nearer over those farther."""
         width, height = self.width(), self.height()
         corners = self.seen(surface.corners.reshape(-1, 3)).reshape(-1, 3, 3)
@@ -231,7 +231,7 @@ class SurfacePreview(QWidget):
             self._turn(_PER_KEY * way[0], _PER_KEY * way[1])
 
 
-def _finite(surface: Surface | None) -> Array:
+def _finite(surface: MeshSurface | None) -> Array:
     """The finite nodes (n, 3), or zero where there are none."""
     nodes = surface.nodes if surface else np.zeros((1, 3))
     found = nodes[np.isfinite(nodes).all(axis=1)]
@@ -250,8 +250,8 @@ class SkinDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle("Open a skin")
         self.file, self._next = Path(), 0
-        self._read: Surface | None = None  # as in the file, its numbers taken as metres
-        self._faults: list[Fault] | None = None
+        self._read: MeshSurface | None = None  # as in the file, its numbers taken as metres
+        self._faults: list[MeshFault] | None = None
         self._used, self._repaired = Path(), False  # the file that the scene names
         words, cancelled = "Computing the functions of the skin", "Cancelled; nothing is simulated."
         self._reading = BackgroundTask[Any](tasks, "Reading the mesh", self._take, self._refuse)
@@ -348,11 +348,11 @@ class SkinDialog(QDialog):
         self.raise_()
 
     @property
-    def surface(self) -> Surface | None:
+    def surface(self) -> MeshSurface | None:
         """The surface in m; None before it is read and its unit known."""
         if self._read is None or not (unit := self.unit.currentData()):
             return None
-        return Surface(UNITS[unit] * self._read.nodes, self._read.triangles)
+        return MeshSurface(UNITS[unit] * self._read.nodes, self._read.triangles)
 
     def _examine(self) -> None:
         self._faults = None
@@ -360,7 +360,7 @@ class SkinDialog(QDialog):
             self._reading.run(faults, surface)
         self._show("" if surface is None else f"Looking for faults{ELLIPSIS}")
 
-    def _take(self, found: Surface | list[Fault]) -> None:
+    def _take(self, found: MeshSurface | list[MeshFault]) -> None:
         if isinstance(found, list):
             self._faults = found
             self._show()
@@ -379,7 +379,7 @@ class SkinDialog(QDialog):
             self.unit.setItemText(row, f"{unit}: the skin is {sides} mm")
         self._examine()
 
-    def _repair(self, fault: Fault) -> None:
+    def _repair(self, fault: MeshFault) -> None:
         if self._read is not None and fault.repair:
             self._reading.run(repaired, self._read, fault.repair)
             self._show(f"Repairing{ELLIPSIS}")
@@ -406,7 +406,7 @@ class SkinDialog(QDialog):
             raise ValueError
         return ends
 
-    def _held_sides(self, surface: Surface) -> Indices:
+    def _held_sides(self, surface: MeshSurface) -> Indices:
         try:
             arc = self._arc()
         except ValueError:
@@ -446,10 +446,10 @@ class SkinDialog(QDialog):
         self.cancel_button.setText("&Cancel" if self._making.running else "C&lose")
         self.message.setText(printable(sentence(words), keep="\n"))
 
-    def _drawn(self, surface: Surface | None) -> Surface | None:
+    def _drawn(self, surface: MeshSurface | None) -> MeshSurface | None:
         return self._read if surface is None else surface
 
-    def _show_faults(self, found: list[Fault]) -> None:
+    def _show_faults(self, found: list[MeshFault]) -> None:
         while (item := self.found.takeAt(0)) is not None:
             if (widget := item.widget()) is not None:
                 widget.hide()
@@ -513,7 +513,7 @@ def _number(
     return box
 
 
-def _stl(surface: Surface) -> bytes:
+def _stl(surface: MeshSurface) -> bytes:
     """A binary STL file."""
     kind = [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")]
     rows = np.zeros(len(surface.triangles), kind)
@@ -567,7 +567,7 @@ def new_scene(title: str, file: Path, skin: dict[str, Any], elements: int) -> Wr
     if not isinstance(patch, MeshSkin):
         raise TypeError(patch)
     middle = np.array([patch.a, patch.b]) / 2
-    x, y = patch.points[np.linalg.norm(patch.points[:, :2] - middle, axis=1).argmin(), :2].tolist()
+    x, y = patch.places[np.linalg.norm(patch.places - middle, axis=1).argmin()].tolist()
     disc = DiscLoad(x, y, _RADIUS * min(patch.a, patch.b))
     load = scaled_to(scene.plate, disc, _DEPTH * patch.thickness, scene.basis)
     return Written(_text(title, skin, elements, functions, load), at, trust)
