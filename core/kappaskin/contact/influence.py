@@ -267,6 +267,8 @@ class _DiscOnGages:
 
 _NEAREST = 1e-6  # of a standard deviation: nearer, a Gaussian load bends the plate no more
 _FAR = 40.0  # exp1 of it is less than the rounding of what it is added to
+_TAIL = 6.0  # times the squared radius: so far off, a Gaussian as wide has exp(-12) left
+_PER_TAIL = 6000  # steps of its table, which is exact to 1e-4 of a load's middle
 
 
 def _gaussian(d: Array, sd: float) -> tuple[Array, Array]:
@@ -281,10 +283,19 @@ def _gaussian(d: Array, sd: float) -> tuple[Array, Array]:
 
 def _sharper(d: Array, s: float) -> tuple[Array, Array]:
     """What A and B of a Gaussian load differ by from those of a disc as wide, of s = r^2."""
-    A, B = _gaussian(d, math.sqrt(s) / 2)
-    t: Array = d[0] ** 2 + d[1] ** 2
-    m = np.maximum(t, s)
-    return A - np.log(m) - (s + t) / (2 * m), B - (2 - s / m) / m
+    t = d[0] ** 2 + d[1] ** 2
+    t *= _PER_TAIL / (_TAIL * s)
+    A, B = _sharper_table().take(t.astype(np.intp), axis=1, mode="clip")
+    return A, B / s
+
+
+@lru_cache(1)
+def _sharper_table() -> Array:
+    """`_sharper` of s = 1 (2, t) by the squared distance t; farther off both loads are alike."""
+    t = _TAIL * (np.arange(_PER_TAIL) + 0.5) / _PER_TAIL
+    A, B = _gaussian(np.stack([np.sqrt(t), np.zeros_like(t)]), 0.5)
+    m = np.maximum(t, 1.0)
+    return np.stack([A - np.log(m) - (1 + t) / (2 * m), B - (2 - 1 / m) / m])
 
 
 def _under_gaussian(d: Array, sd: float, gage_length: float) -> Array:
@@ -295,8 +306,8 @@ def _under_gaussian(d: Array, sd: float, gage_length: float) -> Array:
 def _read(load: Callable[[Array], tuple[Array, Array]], d: Array, gage_length: float) -> Array:
     """Curvature (3, ...) read at `d` (2, ...) of a load's A and B there."""
     if not gage_length:
-        A, B = load(d)
-        return np.stack([A + B * d[0] ** 2, A + B * d[1] ** 2, B * d[0] * d[1]])
+        (x, y), (A, B) = d, load(d)
+        return np.array([A + B * x * x, A + B * y * y, B * x * y])
 
     def slope(x: float, y: float, along: float) -> Array:
         D = d + (along * np.array([x, y])).reshape(2, *[1] * (d.ndim - 1))
@@ -555,18 +566,20 @@ class _OfMesh:
         # and what a disc's even moments are of those of a Gaussian as wide.
         self._widest, n = float(variances[-1]), len(variances)
         self._shares = np.linalg.inv(np.vander(variances / self._widest, increasing=True))
-        self._powers = np.arange(float(n))
-        self._moments = 2.0**self._powers / scipy.special.factorial(self._powers + 1)
+        self._powers = k = np.arange(float(n))
+        of_disc = 2.0**k / scipy.special.factorial(k + 1)
+        self._moments = np.stack([of_disc, 1 - of_disc, k * of_disc, k * (1 - of_disc)])
         self._basis, self._compliance, _ = read_of_modes(plate, layout.of_curvature, edge, _ON_MESH)
         N, area = self._basis.size, float(self._mesh.areas.sum())
         self._finer = area / (16 * math.pi**2 * plate.rigidity * N)
         base = self._mesh.base(*layout.positions.T)
         tangents: Array = np.swapaxes(base.frame, 0, 1)
         self._origin = np.vecdot(tangents, np.stack(base.point, axis=-1))
-        self._frame: Array = np.ascontiguousarray(tangents).reshape(-1, 3)
+        self._tangents: Array = np.ascontiguousarray(tangents.reshape(-1, 3).T)
+        self._along = np.empty(self._tangents.shape)
         at = layout.positions
         self._disc = _DiscOnGages(at, length, out) if length else _Disc(at, out)
-        self._difference, self._rest = np.zeros(out.shape), np.zeros((3, n, out.shape[1]))
+        self._difference, self._smooth = np.zeros(out.shape), np.zeros((3, 4, out.shape[1]), np.float32)
         self.nodes: tuple[Array, Single] | None = self._searched()
 
     def _searched(self) -> tuple[Array, Single]:
@@ -589,33 +602,35 @@ class _OfMesh:
         mesh, disc, out = self._mesh, self._disc, self._out
         r = mesh.jet(x, y)
         # The load from each element along its tangents, and how that moves with x and y.
-        along = (self._frame @ r[:3].T).reshape(2, -1, 3)
-        np.subtract(along[..., 0], self._origin, disc.d)
+        np.dot(r[:3], self._tangents, self._along)
+        at, by_x, by_y = self._along.reshape(3, 2, -1)
+        np.subtract(at, self._origin, disc.d)
         disc.under(s)
-        by_d = out[1:3].reshape(2, 3, -1)
-        by_x, by_y = along[..., 1], along[..., 2]
-        of_x, of_y = by_d[0] * by_x[0], by_d[0] * by_y[0]
-        of_x += by_d[1] * by_x[1]
-        of_y += by_d[1] * by_y[1]
-        by_d[0], by_d[1] = of_x, of_y
+        by_d, work = out[1:3].reshape(2, 3, -1), self._difference.reshape(4, 3, -1)
+        np.multiply(by_d, by_x[:, None], work[:2])
+        np.multiply(by_d, by_y[:, None], work[2:])
+        np.add(work[0], work[1], by_d[0])
+        np.add(work[2], work[3], by_d[1])
         first, weights = mesh.splines.at(x, y)
-        self._rest = weights[:3].dot(self._block(*first)).reshape(self._rest.shape)
-        out += self._smooth(s, self._moments)
-
-    def _smooth(self, s: float, moments: Array) -> Array:
-        """What is smooth (4, C) of a load of these `moments`, each over that of a Gaussian."""
-        k, found = self._powers, self._difference
-        of_size = moments * (s / 4 / self._widest) ** k
-        np.dot(of_size @ self._shares, self._rest, found[:3])
-        np.dot((k / s * of_size) @ self._shares, self._rest[0], found[3])
-        return found
+        rest = weights[:3].astype(np.float32).dot(self._block(*first))
+        # What is smooth, of the place and by x and y: of a disc, and how a Gaussian load differs.
+        sizes = (s / 4 / self._widest) ** self._powers * self._moments
+        sizes[2:] /= s
+        shares = sizes.dot(self._shares).astype(np.float32)
+        np.matmul(shares, rest.reshape(3, shares.shape[1], -1), out=self._smooth)
+        out[:3] += self._smooth[:, 0]
+        out[3] += self._smooth[0, 2]
 
     def trust(self, s: float, share: float) -> Array | None:
-        under = np.square(self._out[0]).reshape(3, -1).mean(axis=0)
-        return 1 / (1 + share * (_INEXACT / BY_PROFILE) ** 2 * under)
+        felt = self._out[0].reshape(3, -1)
+        under = np.vecdot(felt, felt, axis=0)
+        under *= share * (_INEXACT / BY_PROFILE) ** 2 / 3
+        under += 1
+        return np.reciprocal(under, under)
 
     def profile(self, s: float) -> Array | None:
-        found, length = self._smooth(s, 1 - self._moments), self._gage_length
+        found, smooth, length = self._difference, self._smooth, self._gage_length
+        found[:3], found[3] = smooth[:, 1], smooth[0, 3]
         # And right under the load; its slopes there are taken to be those of a disc.
         near = np.flatnonzero(self._disc.t < _TAIL * s + length**2)
         if len(near):
@@ -637,7 +652,6 @@ _SEARCHED = {0.02: 1, 0.07: 1, 0.16: 2}  # radii of the shorter side, and at eve
 _MESH_SD = 1.2  # steps of the splines: of a Gaussian load
 _CUT = 3.0  # of it: farther away such a load presses no more
 _WIDEST = 0.3  # of the shorter side: a disc as large as the Gaussian loads of the table
-_TAIL = 6.0  # times the squared radius: so far off, a Gaussian as wide has exp(-12) left
 _WIDE = 1.2  # times the decay squared: wider loads are followed by more variances
 _FEW, _MANY = (0.0, 0.4, 1.0), (0.0, 0.08, 0.3, 0.6, 0.85, 1.0)  # of the largest: the variances
 _BLOCK = 16  # elements together: 100 MB
@@ -646,8 +660,8 @@ _BLOCK = 16  # elements together: 100 MB
 @lru_cache(2)
 def _rest_on_mesh(
     plate: Plate, edge: str, places: bytes, gage_length: float
-) -> tuple[Array, Array]:
-    """Splines (G, 3 C) of what is read of Gaussian loads less that on a plate without edges.
+) -> tuple[Single, Array]:
+    """Splines (G, n C) of what is read of n Gaussian loads less that on a plate without edges.
 
     In the units of `_Disc`; and the variances of the loads in m^2.
     """
@@ -658,7 +672,7 @@ def _rest_on_mesh(
         f"discs {mesh.content} {edge} {sizes} {hashlib.sha256(places).hexdigest()}",
         lambda: _made_on_mesh(mesh, edge, of_sheet, places, gage_length, _decay(plate)),
     )
-    return made["splines"].astype(float), made["variances"]
+    return made["splines"], made["variances"]
 
 
 def _made_on_mesh(

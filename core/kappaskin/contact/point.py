@@ -316,7 +316,8 @@ class PointContact:
         for _ in range(_STEPS):
             if hopeless := here.left - _HOPE * here.gain > most:
                 break
-            if self._fits_profile and here.left + here.gain > cost + self._worth(x, y) * variance:
+            worse = here.left + here.gain - cost
+            if self._fits_profile and worse > 0 and worse > self._worth(x, y) * variance:
                 x, y, s = (x + there[0]) / 2, (y + there[1]) / 2, (s + there[2]) / 2
             else:
                 there, cost = (x, y, s), here.left + here.gain
