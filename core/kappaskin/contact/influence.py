@@ -648,7 +648,7 @@ class _OfMesh:
 _ON_MESH = 15  # functions each way, of the displacement under a load
 _INEXACT = 0.01  # of a reading: by elements and theory of shells (`tests/truths/test_meshes.py`)
 _SPREAD = 300  # places searched
-_SEARCHED = {0.02: 1, 0.07: 1, 0.16: 2}  # radii of the shorter side, and at every how many places
+_SEARCHED = {0.02: 1, 0.07: 2, 0.16: 4}  # radii of the shorter side, and at every how many places
 _MESH_SD = 1.2  # steps of the splines: of a Gaussian load
 _CUT = 3.0  # of it: farther away such a load presses no more
 _WIDEST = 0.3  # of the shorter side: a disc as large as the Gaussian loads of the table

@@ -167,6 +167,7 @@ class PointContact:
             self._map = self.basis.on_grid(self._x, self._y)
         else:
             self._places = self._nodes[0]
+            self._searched_T = np.ascontiguousarray(self._nodes[1].T)
         self._still = np.flatnonzero(~self.patch.moves(self._places[:, :2]))
         self._at_node = lru_cache(_NODES)(self._node)
         self._cache = PatternCache[_Tables]()
@@ -259,7 +260,7 @@ class PointContact:
         """T'K (S,) of the loads searched for."""
         if self._nodes is None:
             return self._map(self._modal(K).reshape(self.basis.shape)).ravel()
-        return self._nodes[1].dot(K.astype(np.float32)).astype(float)
+        return K.astype(np.float32).dot(self._searched_T).astype(float)
 
     def _peak(self, explained: Array, node: int) -> tuple[float, float, float]:
         """x, y and s of the load that explains most: between the points, where they are a grid."""
