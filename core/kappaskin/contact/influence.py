@@ -87,6 +87,16 @@ def _of_curvature(plate: Plate) -> Callable[[Plate, SensorLayout, str, Array], I
     return _OfMesh if isinstance(plate.patch, MeshSkin) else _OfPlate
 
 
+_START, _LEAST, _LARGEST = 0.03, 1e-3, 0.2  # of the shorter side: radius of a load
+
+
+def sizes_on(patch: Patch) -> tuple[float, float, float]:
+    """Squared radii in m^2 of a load: one to begin with, the least and the largest fitted."""
+    side = patch.a if patch.strip else min(patch.a, patch.b)
+    largest = _WIDEST if isinstance(patch, MeshSkin) else _LARGEST
+    return (_START * side) ** 2, (_LEAST * side) ** 2, (largest * side) ** 2
+
+
 @lru_cache(1)  # the same array for all, which is read in half the time
 def read_of_modes(
     plate: Plate, layout: SensorLayout, edge: str, functions: int
@@ -285,7 +295,7 @@ def _sharper(d: Array, s: float) -> tuple[Array, Array]:
     """What A and B of a Gaussian load differ by from those of a disc as wide, of s = r^2."""
     t = d[0] ** 2 + d[1] ** 2
     t *= _PER_TAIL / (_TAIL * s)
-    A, B = _sharper_table().take(t.astype(np.intp), axis=1, mode="clip")
+    A, B = (each.take(t.astype(np.intp), mode="clip") for each in _sharper_table())
     return A, B / s
 
 
@@ -561,7 +571,8 @@ class _OfMesh:
         self._gage_length = length = layout.gage_length
         places = layout.positions.tobytes()
         table, variances = _rest_on_mesh(plate, edge, places, length)
-        self._block = lru_cache(32)(partial(self._mesh.splines.block, table))
+        splines = self._mesh.splines
+        self._block = lru_cache(32)(lambda i, j: splines.block(table, i, j).astype(float))
         # Lagrange's polynomials through the variances of the table, by powers of the variance,
         # and what a disc's even moments are of those of a Gaussian as wide.
         self._widest, n = float(variances[-1]), len(variances)
@@ -579,7 +590,10 @@ class _OfMesh:
         self._along = np.empty(self._tangents.shape)
         at = layout.positions
         self._disc = _DiscOnGages(at, length, out) if length else _Disc(at, out)
-        self._difference, self._smooth = np.zeros(out.shape), np.zeros((3, 4, out.shape[1]), np.float32)
+        self._difference, self._smooth = (
+            np.zeros(out.shape),
+            np.zeros((3, 4, out.shape[1])),
+        )
         self.nodes: tuple[Array, Single] | None = self._searched()
 
     def _searched(self) -> tuple[Array, Single]:
@@ -612,18 +626,18 @@ class _OfMesh:
         np.add(work[0], work[1], by_d[0])
         np.add(work[2], work[3], by_d[1])
         first, weights = mesh.splines.at(x, y)
-        rest = weights[:3].astype(np.float32).dot(self._block(*first))
+        rest = weights[:3].dot(self._block(*first))
         # What is smooth, of the place and by x and y: of a disc, and how a Gaussian load differs.
         sizes = (s / 4 / self._widest) ** self._powers * self._moments
         sizes[2:] /= s
-        shares = sizes.dot(self._shares).astype(np.float32)
+        shares = sizes.dot(self._shares)
         np.matmul(shares, rest.reshape(3, shares.shape[1], -1), out=self._smooth)
         out[:3] += self._smooth[:, 0]
         out[3] += self._smooth[0, 2]
 
     def trust(self, s: float, share: float) -> Array | None:
         felt = self._out[0].reshape(3, -1)
-        under = np.vecdot(felt, felt, axis=0)
+        under: Array = np.square(felt).sum(axis=0)
         under *= share * (_INEXACT / BY_PROFILE) ** 2 / 3
         under += 1
         return np.reciprocal(under, under)
@@ -750,14 +764,13 @@ _ON_CAP = 64  # steps of the table of a cap across its box
 _AT_POLE = 1e-3  # of a step: nearer, it is taken for a place so far away
 _RINGS = 2  # steps between the places searched
 _SEARCHED_SIZES = 3, 6, 10  # of the table: radii of 1.5, 4.5 and 8.5 steps
-_SIZES = 0.2  # of the box: the largest radius of a load
 _COARSER = 2  # times the step between sizes, of Gaussian loads, whose readings are smoother
 _TINY = 1e-15  # of the largest of a sum's terms
 
 
 def _radii(steps: int) -> Array:
     """Radii of loads in steps of the table, every so many."""
-    return steps * np.abs(np.arange(math.ceil(_SIZES * _ON_CAP / steps) + 4) - 1.5)
+    return steps * np.abs(np.arange(math.ceil(_LARGEST * _ON_CAP / steps) + 4) - 1.5)
 
 
 @lru_cache(2)

@@ -12,7 +12,7 @@ from scipy.linalg import lapack
 
 from kappaskin.bases import Basis, SineBasis, held_near
 from kappaskin.contact.element_grid import modal_projection
-from kappaskin.contact.influence import BY_PROFILE, influence_of, read_of_modes
+from kappaskin.contact.influence import BY_PROFILE, influence_of, read_of_modes, sizes_on
 from kappaskin.contact.stretched import StretchedSkin
 from kappaskin.estimation import Fit, PatternCache
 from kappaskin.frames import Array, Contact, Mask
@@ -65,7 +65,6 @@ _RIDGE = 1e-12  # keeps a load on the rim, which moves nothing, solvable
 _HARDLY = 1e-9  # of the largest: a direction with no more left is none
 _DOUBTFUL = 0.15  # of a side: within it, a contact may be one on the rim
 _RIM = 1 / 15  # of a side: within it, a load moves the skin too little to be told
-_START, _LEAST, _LARGEST = 0.03, 1e-3, 0.2  # of the shorter side: radius of a load
 _TO_GAUSSIAN = 0.5  # of the way from a disc: the profile of a load, whose standard deviation is as
 _FURTHER = -1.0, 2.0  # much; and how far along that way slopes are followed
 
@@ -155,10 +154,7 @@ class PointContact:
         self._readings = self._none = np.zeros(len(self._M))
         x, y = self.patch.grid(_SEARCHED + 2, 3 if strip else _SEARCHED + 2)
         self._x, self._y = x[1:-1], y[1:-1]
-        side = self.patch.a if strip else min(self.patch.a, self.patch.b)
-        self._start, self._least, self._largest = (
-            (share * side) ** 2 for share in (_START, _LEAST, _LARGEST)
-        )
+        self._start, self._least, self._largest = sizes_on(self.patch)
         self._nodes = self._influence.nodes
         self._fits_profile = self._nodes is not None
         if self._nodes is None:

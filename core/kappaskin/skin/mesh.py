@@ -10,7 +10,7 @@ from functools import cached_property, lru_cache
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from kappaskin._files import ARCHIVE_DAMAGES
 from kappaskin.errors import Refusal
@@ -106,7 +106,7 @@ class Splines:
         first, rows = self.at(x, y)
         return rows[:orders].dot(self.block(coefficients, *first))
 
-    def block(self, coefficients: Array, i: int, j: int) -> Array:
+    def block(self, coefficients: NDArray[Any], i: int, j: int) -> NDArray[Any]:
         """Those (16, k) of coefficients (G, k) of which `at` gives the weights."""
         found = coefficients.reshape(self._count[1], self._count[0], -1)[j : j + 4, i : i + 4]
         return found.reshape(16, -1)
