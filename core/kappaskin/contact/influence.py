@@ -571,8 +571,7 @@ class _OfMesh:
         self._gage_length = length = layout.gage_length
         places = layout.positions.tobytes()
         table, variances = _rest_on_mesh(plate, edge, places, length)
-        splines = self._mesh.splines
-        self._block = lru_cache(32)(lambda i, j: splines.block(table, i, j).astype(float))
+        self._block = lru_cache(32)(partial(self._mesh.splines.block, table))
         # Lagrange's polynomials through the variances of the table, by powers of the variance,
         # and what a disc's even moments are of those of a Gaussian as wide.
         self._widest, n = float(variances[-1]), len(variances)
@@ -590,10 +589,7 @@ class _OfMesh:
         self._along = np.empty(self._tangents.shape)
         at = layout.positions
         self._disc = _DiscOnGages(at, length, out) if length else _Disc(at, out)
-        self._difference, self._smooth = (
-            np.zeros(out.shape),
-            np.zeros((3, 4, out.shape[1])),
-        )
+        self._difference, self._smooth = np.zeros(out.shape), np.zeros((3, 4, out.shape[1]))
         self.nodes: tuple[Array, Single] | None = self._searched()
 
     def _searched(self) -> tuple[Array, Single]:

@@ -106,10 +106,10 @@ class Splines:
         first, rows = self.at(x, y)
         return rows[:orders].dot(self.block(coefficients, *first))
 
-    def block(self, coefficients: NDArray[Any], i: int, j: int) -> NDArray[Any]:
+    def block(self, coefficients: NDArray[Any], i: int, j: int) -> Array:
         """Those (16, k) of coefficients (G, k) of which `at` gives the weights."""
         found = coefficients.reshape(self._count[1], self._count[0], -1)[j : j + 4, i : i + 4]
-        return found.reshape(16, -1)
+        return found.reshape(16, -1).astype(float, copy=False)
 
     def _weights_at(self, x: float, y: float) -> tuple[tuple[int, int], Array]:
         """The first coefficients each way around a place, and weights (6, 16) of those."""
