@@ -23,7 +23,7 @@ from kappaskin.estimation import (
     place_for_loads,
     predicted_sd,
 )
-from kappaskin.frames import Array, Contact, Mask, Truth
+from kappaskin.frames import Array, Contact, Indices, Mask, Truth
 from kappaskin.mechanics import DiscLoad, Plate, PointLoad
 from kappaskin.scenes import Indenter, Scene, Simulator, kept_effects, planned
 from kappaskin.sensing import SensorLayout
@@ -524,13 +524,13 @@ class Prospect:
         places = np.column_stack([self.x, self.y])
         if self.sd.ndim > 1:
             places = np.stack(np.meshgrid(self.x, self.y), axis=-1).reshape(-1, 2)
-        predicted = LinearNDInterpolator(places, self.sd.ravel())(points)
-        predicted[~patch.contains(points)] = np.nan
-        if sd is not None and np.isfinite(sd).sum() > 2:
-            known = np.isfinite(sd.ravel())
-            found = LinearNDInterpolator(places[known], sd.ravel()[known])(points)
-            predicted = np.where(np.isfinite(predicted), found, np.nan)
-        return np.asarray(predicted, float).reshape(ny, nx)
+        values = (self.sd if sd is None else sd).ravel()
+        known = np.isfinite(values)
+        found: Array = LinearNDInterpolator(places[known], values[known])(points)
+        near = values[known][_nearest(places[known], points)]
+        predicted = np.isfinite(self.sd.ravel())[_nearest(places, points)]
+        found = np.where(np.isfinite(found), found, near)
+        return np.where(predicted & patch.contains(points), found, np.nan).reshape(ny, nx)
 
     @property
     def rms(self) -> float:
@@ -549,6 +549,11 @@ class Prospect:
     def worst(self) -> float:
         """The largest on the skin."""
         return float(np.nanmax(self.sd))
+
+
+def _nearest(places: Array, points: Array) -> Indices:
+    """The numbers of the `places` that are nearest to each of the `points`."""
+    return np.asarray(scipy.spatial.KDTree(places).query(points)[1])
 
 
 @dataclass(frozen=True, eq=False)
