@@ -188,14 +188,8 @@ class PointContact:
         size is unknown too, on a cap its profile as well. The noise is in the readings' unit, or in
         units of `sigma`. That a skin stretches is left out.
         """
-        tables, s, n = self._used(self._none)[1], max(s, self._least), self._unknowns
-        strength = force / self._influence.unit
-        self._influence.at(x, y, s)
-        profile = self._influence.profile(s)
-        self._rows[5] = 0.0 if profile is None else profile[0]
-        weights = self._weights(s, strength, tables, noise**2)
-        weights = np.ones(len(self._M)) if weights is None else weights
-        rows = self._rows * weights
+        weights, strength = self._look(x, y, s, force, noise)
+        n, rows = self._unknowns, self._rows * weights
         free = rows[6:]
         if len(free):
             rows -= rows @ free.T @ np.linalg.pinv(free @ free.T) @ free
@@ -208,6 +202,32 @@ class PointContact:
         covariance = of_noise @ of_noise.T + np.multiply.outer(of_profile, of_profile) / known
         unit = np.array([self._influence.unit, 1 / strength, 1 / strength])
         return noise**2 * np.multiply.outer(unit, unit) * covariance[:3, :3]
+
+    def information(self, x: float, y: float, s: float, force: float, noise: float) -> Array:
+        """What the readings of each element tell (P, n, n) of such a load: what adds to W.
+
+        The inverse W of the covariance of all that is unknown: the force as a share, x and y in m,
+        the size, what is free, and as the last the profile, which is 0 with a variance of 1.
+        """
+        weights, strength = self._look(x, y, s, force, noise)
+        n, unit = self._unknowns, strength / noise
+        profile = _TO_GAUSSIAN * unit * self._rows[5:6]
+        rows = np.concatenate([unit * self._rows[:n], self._free, profile])
+        told = np.zeros((self._element.max() + 1, *2 * (len(rows),)))
+        np.add.at(told, self._element, np.einsum("ir,jr,r->rij", rows, rows, weights))
+        return told
+
+    def _look(
+        self, x: float, y: float, s: float, force: float, noise: float
+    ) -> tuple[Array, float]:
+        """Write what is read of a load into the rows; weights (R,), and its strength."""
+        tables, s = self._used(self._none)[1], max(s, self._least)
+        strength = force / self._influence.unit
+        self._influence.at(x, y, s)
+        profile = self._influence.profile(s)
+        self._rows[5] = 0.0 if profile is None else profile[0]
+        weights = self._weights(s, strength, tables, noise**2)
+        return np.ones(len(self._M)) if weights is None else weights, strength
 
     def _tables(self, used: Mask) -> _Tables:
         """The tables for the readings `used` (3 P,)."""
