@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from kappaskin._files import cached
 from kappaskin.bases.facets import Facets, Factored, held_freedoms
+from kappaskin.bases.modes import most_functions
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.skin import MeshSkin
 
 _LOADS = 2  # for each function
 _WIDTH = 0.7  # of the distance between two loads: the standard deviation of one
-_FEWEST = 2  # nodes for each load
 _USUAL = 225  # functions made at once, of which fewer are the first
 _POISSON = 0.3  # of the skin whose shapes these are
 
@@ -68,7 +68,7 @@ class MeshFunctions:
     """
 
     def __init__(self, mesh: MeshSkin, edge: str, count: int) -> None:
-        most = len(mesh.points) // (_FEWEST * _LOADS)
+        most = most_functions(mesh)
         if count > most:
             raise Refusal(
                 f"expected at most {most} functions on a mesh of {len(mesh.points)} nodes, got "
@@ -135,7 +135,7 @@ def _shapes(mesh: MeshSkin, edge: str, count: int) -> tuple[Array, Array]:
 
 @lru_cache(1)
 def _moved(mesh: MeshSkin, edge: str, count: int) -> Array:
-    total = max(count, min(_USUAL, len(mesh.points) // (_FEWEST * _LOADS)))
+    total = max(count, min(_USUAL, most_functions(mesh)))
     return _shapes(mesh, edge, total)[0][:, :count]
 
 
