@@ -478,7 +478,7 @@ def _read_along(layout: SensorLayout) -> tuple[SensorLayout, Indices, Indices, A
         return layout.of_curvature, np.arange(P), channels, parts
     # On a mesh. What one gage reads does not follow from what others do: each is taken for an
     # element of its own, which reads along it; a twist has two of them.
-    both: Array = np.arange(np.count_nonzero(twist))
+    both = np.arange(np.count_nonzero(twist))
     turns = [np.where(twist, np.pi / 4, reads.direction), np.full(len(both), -np.pi / 4)]
     own = np.concatenate([reads.element, reads.element[twist]])
     each = SensorLayout.scattered(layout.patch, layout.positions[own])
