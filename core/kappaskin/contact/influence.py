@@ -13,6 +13,7 @@ import scipy
 from numpy.typing import NDArray
 
 from kappaskin._files import cached
+from kappaskin._processes import progress
 from kappaskin.bases import (
     Basis,
     CapBasis,
@@ -81,10 +82,9 @@ def influence_of(
     _check_decay(plate, functions)
     if not isinstance(plate.patch, Cap | MeshSkin) and not (is_rectangle and _is_stiff(plate)):
         return _OfFunctions(plate, layout, edge, functions, out)
-    mesh = plate.patch if isinstance(plate.patch, MeshSkin) else None
-    if not layout.senses_curvature_only or (layout.reads and layout.gage_length and not mesh):
-        fine = min(_FINE, math.isqrt(most_functions(mesh))) if mesh else _FINE
-        return _OfFunctions(plate, layout, edge, fine, out)
+    is_mesh = isinstance(plate.patch, MeshSkin)
+    if not layout.senses_curvature_only or (layout.reads and layout.gage_length and not is_mesh):
+        return _OfFunctions(plate, layout, edge, _FINE, out)
     if layout.reads or layout.scale is not None:
         return _OfDirections(plate, layout, edge, out)
     return _of_curvature(plate)(plate, layout, edge, out)
@@ -101,10 +101,20 @@ def _of_curvature(plate: Plate) -> Callable[[Plate, SensorLayout, str, Array], I
 def read_of_modes(
     plate: Plate, layout: SensorLayout, edge: str, functions: int
 ) -> tuple[Basis, Compliance, Array]:
-    """So many functions each way, and what the channels read of a unit force on each, (C, N)."""
-    basis = basis_for(plate.patch, edge, functions, 1 if plate.patch.strip else functions)
+    """So many functions each way, and what the channels read of a unit force on each, (C, N).
+
+    Fewer on a mesh that has not the nodes for them.
+    """
+    basis = _basis_of(plate, edge, functions)
     compliance = plate.compliance(basis)
     return basis, compliance, compliance.after(layout.operator(basis, plate))
+
+
+def _basis_of(plate: Plate, edge: str, functions: int) -> Basis:
+    patch = plate.patch
+    if isinstance(patch, MeshSkin):
+        functions = min(functions, math.isqrt(most_functions(patch)))
+    return basis_for(patch, edge, functions, 1 if patch.strip else functions)
 
 
 _FINE = 32  # functions each way that heights and slopes are followed by
@@ -593,8 +603,7 @@ class _OfMesh:
         self._shares = np.linalg.inv(np.vander(variances / self._widest, increasing=True))
         self._powers = np.arange(float(n))
         self._moments = 2.0**self._powers / scipy.special.factorial(self._powers + 1)
-        functions = min(_ON_MESH, math.isqrt(most_functions(self._mesh)))
-        self._basis = basis_for(self._mesh, edge, functions, functions)
+        self._basis = _basis_of(plate, edge, _ON_MESH)
         self._compliance = plate.compliance(self._basis)
         N, area = self._basis.size, float(self._mesh.areas.sum())
         self._finer = area / (16 * math.pi**2 * plate.rigidity * N)
@@ -679,6 +688,7 @@ _TAIL = 6.0  # times the squared radius: so far off, a Gaussian as wide has exp(
 _WIDE = 1.2  # times the decay squared: wider loads are followed by more variances
 _FEW, _MANY = (0.0, 0.4, 1.0), (0.0, 0.08, 0.3, 0.6, 0.85, 1.0)  # of the largest: the variances
 _BLOCK = 16  # elements together: 100 MB
+_READ = 0.5  # of the time that the influence takes: what elements read of forces at nodes
 
 
 @lru_cache(2)
@@ -713,6 +723,7 @@ def _made_on_mesh(
     positions = np.column_stack([x, y])
     read = np.zeros((n, 3, len(x)))
     for i in range(0, len(x), _BLOCK):
+        progress.get()(_READ * i / len(x))
         own = np.s_[i : i + _BLOCK]
         part = SensorLayout.scattered(mesh, positions[own])
         if turns.any():
@@ -733,6 +744,7 @@ def _made_on_mesh(
     times = np.unique(np.round(1 + shares * max(largest / least - 1, 2 * len(shares))))
     variances = least * times
     for k in range(1, int(times[-1]) + 1):
+        progress.get()(_READ + (1 - _READ) * (k - 1) / int(times[-1]))
         read = (spread @ read.reshape(n, -1)).reshape(read.shape)
         if k in times:
             plain = _under_gaussian(d, math.sqrt(variances[len(found)]), gage_length)
@@ -979,16 +991,17 @@ def _check_decay(plate: Plate, functions: int) -> None:
     wave of so many functions.
     """
     patch = plate.patch
-    least = max(patch.a, patch.b) / functions / math.pi
+    least, remedy = max(patch.a, patch.b) / functions / math.pi, "check thickness and radii"
     if isinstance(patch, MeshSkin):
         least = _STEPS_OF_DECAY * float(patch.splines.step.max())
+        remedy = "check the thickness, or use smaller triangles"
     elif isinstance(patch, Cap):
         least = _FOLLOWED * cap_half_wave(patch)
     if (decay := _decay(plate)) < least:
         raise Refusal(
             f"expected a skin on which a load is felt over {1e3 * least:.2g} mm at least, got "
             f"{1e3 * decay:.2g} mm on a {patch.name}: it is too thin for its radii to find "
-            "contacts; check thickness and radii"
+            f"contacts; {remedy}"
         )
 
 
