@@ -13,12 +13,21 @@ import scipy
 from numpy.typing import NDArray
 
 from kappaskin._files import cached
-from kappaskin.bases import Basis, CapBasis, MeshBasis, ProductBasis, SineBasis, basis_for
+from kappaskin._processes import progress
+from kappaskin.bases import (
+    Basis,
+    CapBasis,
+    MeshBasis,
+    ProductBasis,
+    SineBasis,
+    basis_for,
+    most_functions,
+)
 from kappaskin.errors import Refusal
-from kappaskin.frames import Array
+from kappaskin.frames import Array, Indices
 from kappaskin.mechanics import CapWaves, Compliance, Plate, Shell, cap_shell
 from kappaskin.sensing import SensorLayout
-from kappaskin.skin import Cap, MeshSkin, Patch
+from kappaskin.skin import Base, Cap, MeshSkin, Patch
 
 Single = NDArray[np.float32]
 
@@ -73,7 +82,8 @@ def influence_of(
     _check_decay(plate, functions)
     if not isinstance(plate.patch, Cap | MeshSkin) and not (is_rectangle and _is_stiff(plate)):
         return _OfFunctions(plate, layout, edge, functions, out)
-    if not layout.senses_curvature_only or (layout.reads and layout.gage_length):
+    is_mesh = isinstance(plate.patch, MeshSkin)
+    if not layout.senses_curvature_only or (layout.reads and layout.gage_length and not is_mesh):
         return _OfFunctions(plate, layout, edge, _FINE, out)
     if layout.reads or layout.scale is not None:
         return _OfDirections(plate, layout, edge, out)
@@ -101,10 +111,20 @@ def sizes_on(patch: Patch) -> tuple[float, float, float]:
 def read_of_modes(
     plate: Plate, layout: SensorLayout, edge: str, functions: int
 ) -> tuple[Basis, Compliance, Array]:
-    """So many functions each way, and what the channels read of a unit force on each, (C, N)."""
-    basis = basis_for(plate.patch, edge, functions, 1 if plate.patch.strip else functions)
+    """So many functions each way, and what the channels read of a unit force on each, (C, N).
+
+    Fewer on a mesh that has not the nodes for them.
+    """
+    basis = _basis_of(plate, edge, functions)
     compliance = plate.compliance(basis)
     return basis, compliance, compliance.after(layout.operator(basis, plate))
+
+
+def _basis_of(plate: Plate, edge: str, functions: int) -> Basis:
+    patch = plate.patch
+    if isinstance(patch, MeshSkin):
+        functions = min(functions, math.isqrt(most_functions(patch)))
+    return basis_for(patch, edge, functions, 1 if patch.strip else functions)
 
 
 _FINE = 32  # functions each way that heights and slopes are followed by
@@ -437,20 +457,14 @@ class _OfDirections:
     sized = True
 
     def __init__(self, plate: Plate, layout: SensorLayout, edge: str, out: Array) -> None:
-        self._rows, self._out = np.zeros((4, 3 * len(layout))), out
-        self._of = _of_curvature(plate)(plate, layout.of_curvature, edge, self._rows)
+        each, self._of_each, self._channels, self._parts = _read_along(layout)
+        self._rows, self._out = np.zeros((4, 3 * len(each))), out
+        self._of = _of_curvature(plate)(plate, each, edge, self._rows)
         self.unit = self._of.unit
         self.nodes: tuple[Array, Single] | None = None
-        reads, P = layout.reads, len(layout)
-        self._parts = np.repeat(np.eye(3), P, axis=1)
-        if reads is not None:
-            c, s = reads.along.T
-            twist = reads.quantity == "twist"
-            self._parts = np.where(twist, 0.0, [c * c, s * s, 2 * c * s])
-            self._parts[2, twist] = 1.0
         if layout.scale is not None:
             self._parts *= layout.scale
-        self._channels = layout.element + P * np.arange(3)[:, None]
+        self._trust = np.ones(len(layout))
         if self._of.nodes is not None:
             places, read = self._of.nodes
             parts = self._parts.astype(np.float32)
@@ -462,7 +476,11 @@ class _OfDirections:
         np.einsum("cr,ncr->nr", self._parts, self._rows[:, self._channels], out=self._out)
 
     def trust(self, s: float, share: float) -> Array | None:
-        return self._of.trust(s, share)
+        found = self._of.trust(s, share)
+        if found is None or len(found) == len(self._trust):
+            return found
+        self._trust[self._of_each] = found
+        return self._trust
 
     def profile(self, s: float) -> Array | None:
         rows = self._of.profile(s)
@@ -473,6 +491,33 @@ class _OfDirections:
 
     def gives(self, x: float, y: float) -> float:
         return self._of.gives(x, y)
+
+
+def _read_along(layout: SensorLayout) -> tuple[SensorLayout, Indices, Indices, Array]:
+    """Elements that read curvature, which of the layout's they are, and each reading from theirs.
+
+    As the sum of three of their readings (3, C), by parts (3, C).
+    """
+    reads, P = layout.reads, len(layout)
+    channels = layout.element + P * np.arange(3)[:, None]
+    if reads is None:
+        return layout, np.arange(P), channels, np.repeat(np.eye(3), P, axis=1)
+    twist = reads.quantity == "twist"
+    if not layout.gage_length:
+        c, s = reads.along.T
+        parts = np.where(twist, [[0.0], [0.0], [1.0]], [c * c, s * s, 2 * c * s])
+        return layout.of_curvature, np.arange(P), channels, parts
+    # On a mesh. What one gage reads does not follow from what others do: each is taken for an
+    # element of its own, which reads along it; a twist has two of them.
+    both = np.arange(np.count_nonzero(twist))
+    turns = [np.where(twist, np.pi / 4, reads.direction), np.full(len(both), -np.pi / 4)]
+    own = np.concatenate([reads.element, reads.element[twist]])
+    each = SensorLayout.scattered(layout.patch, layout.positions[own])
+    each = each.reading(np.arange(len(own)), "curvature").turned(np.concatenate(turns))
+    channels = np.tile(np.arange(len(twist)), (3, 1))
+    channels[1, twist] = len(twist) + both
+    parts = np.where(twist, [[0.5], [-0.5], [0.0]], [[1.0], [0.0], [0.0]])
+    return replace(each, gage_length=layout.gage_length), own, channels, parts
 
 
 class _OfCap:
@@ -569,7 +614,8 @@ class _OfMesh:
         self._mesh, self._out = cast("MeshSkin", plate.patch), out
         self.unit = 8 * math.pi * plate.rigidity
         self._gage_length = length = layout.gage_length
-        places = layout.positions.tobytes()
+        turns = np.zeros(len(layout)) if layout.turns is None else layout.turns
+        places = np.column_stack([layout.positions, turns]).tobytes()
         table, variances = _rest_on_mesh(plate, edge, places, length)
         self._block = lru_cache(32)(partial(self._mesh.splines.block, table))
         # Lagrange's polynomials through the variances of the table, by powers of the variance,
@@ -579,11 +625,12 @@ class _OfMesh:
         self._powers = k = np.arange(float(n))
         of_disc = 2.0**k / scipy.special.factorial(k + 1)
         self._moments = np.stack([of_disc, 1 - of_disc, k * of_disc, k * (1 - of_disc)])
-        self._basis, self._compliance, _ = read_of_modes(plate, layout.of_curvature, edge, _ON_MESH)
+        self._basis = _basis_of(plate, edge, _ON_MESH)
+        self._compliance = plate.compliance(self._basis)
         N, area = self._basis.size, float(self._mesh.areas.sum())
         self._finer = area / (16 * math.pi**2 * plate.rigidity * N)
         base = self._mesh.base(*layout.positions.T)
-        tangents: Array = np.swapaxes(base.frame, 0, 1)
+        tangents = _tangents(base, turns)
         self._origin = np.vecdot(tangents, np.stack(base.point, axis=-1))
         self._tangents: Array = np.ascontiguousarray(tangents.reshape(-1, 3).T)
         self._along = np.empty(self._tangents.shape)
@@ -665,6 +712,7 @@ _WIDEST = 0.3  # of the shorter side: a disc as large as the Gaussian loads of t
 _WIDE = 1.2  # times the decay squared: wider loads are followed by more variances
 _FEW, _MANY = (0.0, 0.4, 1.0), (0.0, 0.08, 0.3, 0.6, 0.85, 1.0)  # of the largest: the variances
 _BLOCK = 16  # elements together: 100 MB
+_READ = 0.5  # of the time that the influence takes: what elements read of forces at nodes
 
 
 @lru_cache(2)
@@ -695,18 +743,24 @@ def _made_on_mesh(
 ) -> dict[str, NDArray[Any]]:
     basis = cast("MeshBasis", basis_for(mesh, edge, 1, 1))
     n, unit, functions = len(mesh.points), 8 * math.pi * of_sheet[0], basis.functions
-    layout = SensorLayout.scattered(mesh, np.frombuffer(places).reshape(-1, 2))
-    read = np.empty((n, 3, len(layout)))
-    for i in range(0, len(layout), _BLOCK):
-        part = SensorLayout.scattered(mesh, layout.positions[i : i + _BLOCK])
+    x, y, turns = np.frombuffer(places).reshape(-1, 3).T
+    positions = np.column_stack([x, y])
+    read = np.zeros((n, 3, len(x)))
+    for i in range(0, len(x), _BLOCK):
+        progress.get()(_READ * i / len(x))
+        own = np.s_[i : i + _BLOCK]
+        part = SensorLayout.scattered(mesh, positions[own])
+        if turns.any():
+            part = part.reading(np.arange(len(part)), "curvature").turned(turns[own])
         part = replace(part, gage_length=gage_length)
         rows = part.mean_curvature(basis, functions.nodal_curvature)
         of_forces = functions.read_of_forces(rows, *of_sheet)
-        read[:, :, i : i + _BLOCK] = unit * of_forces.reshape(n, 3, -1)
+        of_forces = of_forces.reshape(n, -1, len(part))
+        read[:, : of_forces.shape[1], own] = unit * of_forces
     sd = _MESH_SD * float(mesh.splines.step.max())
-    spread, base = _spread_by(mesh, sd), mesh.base(*layout.positions.T)
+    spread, base = _spread_by(mesh, sd), mesh.base(x, y)
     away = mesh.points.T[:, :, None] - np.stack(base.point)[:, None]
-    d = np.einsum("pak,knp->anp", base.frame, away)
+    d = np.einsum("apk,knp->anp", _tangents(base, turns), away)
     cut, found = _CUT**2 / 2, list[Array]()
     # Spread again and again, up to the largest load.
     least, largest = sd**2 * (1 - cut / math.expm1(cut)), (_WIDEST * min(mesh.a, mesh.b)) ** 2 / 4
@@ -714,11 +768,18 @@ def _made_on_mesh(
     times = np.unique(np.round(1 + shares * max(largest / least - 1, 2 * len(shares))))
     variances = least * times
     for k in range(1, int(times[-1]) + 1):
+        progress.get()(_READ + (1 - _READ) * (k - 1) / int(times[-1]))
         read = (spread @ read.reshape(n, -1)).reshape(read.shape)
         if k in times:
             plain = _under_gaussian(d, math.sqrt(variances[len(found)]), gage_length)
             found.append(mesh.splines.fit((read - np.moveaxis(plain, 0, 1)).reshape(n, -1)))
     return {"splines": np.hstack(found).astype(np.float32), "variances": variances}
+
+
+def _tangents(base: Base, turns: Array) -> Array:
+    """Unit vectors (2, P, 3) of a base, turned by `turns` (P,) in rad."""
+    (x, y), c, s = np.swapaxes(base.frame, 0, 1), np.cos(turns)[:, None], np.sin(turns)[:, None]
+    return np.stack([c * x + s * y, c * y - s * x])
 
 
 def _spread_by(mesh: MeshSkin, sd: float) -> Any:
@@ -953,16 +1014,17 @@ def _check_decay(plate: Plate, functions: int) -> None:
     wave of so many functions.
     """
     patch = plate.patch
-    least = max(patch.a, patch.b) / functions / math.pi
+    least, remedy = max(patch.a, patch.b) / functions / math.pi, "check thickness and radii"
     if isinstance(patch, MeshSkin):
         least = _STEPS_OF_DECAY * float(patch.splines.step.max())
+        remedy = "check the thickness, or use smaller triangles"
     elif isinstance(patch, Cap):
         least = _FOLLOWED * cap_half_wave(patch)
     if (decay := _decay(plate)) < least:
         raise Refusal(
             f"expected a skin on which a load is felt over {1e3 * least:.2g} mm at least, got "
             f"{1e3 * decay:.2g} mm on a {patch.name}: it is too thin for its radii to find "
-            "contacts; check thickness and radii"
+            f"contacts; {remedy}"
         )
 
 
