@@ -34,7 +34,7 @@ from kappaskin.cli.common import (
 from kappaskin.errors import Refusal
 
 if TYPE_CHECKING:
-    from kappaskin.live import Engine, Hand, Status
+    from kappaskin.live import Engine, Fingers, Status
     from kappaskin.recording import Recording
 
 _POLL = 0.05  # s
@@ -135,10 +135,10 @@ def _record_hand(
 ) -> int:
     """Record all fingers of a hand; the exit code."""
     from kappaskin.estimation import slope_warning
-    from kappaskin.live import LOST, Hand
+    from kappaskin.live import LOST, Fingers
     from kappaskin.pipeline import Setup
 
-    with Hand(sources, Setup(quantities=())) as hand:
+    with Fingers(sources, Setup(quantities=())) as hand:
         hand.record(out)
         hand.connect(sources, trust)
         monitors = {finger: FingerMonitor(finger, each) for finger, each in hand.engines.items()}
@@ -167,7 +167,7 @@ def _record_hand(
 
 
 def _hand_recorded(
-    hand: "Hand",
+    hand: "Fingers",
     monitors: dict[str, FingerMonitor],
     seconds: float,
     stopped: list[int],

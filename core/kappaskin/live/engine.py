@@ -33,7 +33,7 @@ from kappaskin.live.resume import ResumedProcess, ResumeInfo, resume_process
 from kappaskin.live.ring import Ring
 from kappaskin.live.status import LOST, STREAMING, Status
 from kappaskin.pipeline import Setup
-from kappaskin.publish import access_of, targets_of
+from kappaskin.publish import access_of, of_finger, targets_of
 from kappaskin.recording import HandPart, HandRecorder, RecordingStatus, unused
 from kappaskin.scenes import Playback, Scene
 
@@ -376,7 +376,7 @@ class Engine:
         self._release_memory()
 
 
-class Hand:
+class Fingers:
     """The engines of the fingers of a hand by their names, each a process with a source of its own.
 
     One that is lost, stalls or dies leaves the others alone; `revive` starts one that died again. A
@@ -404,6 +404,14 @@ class Hand:
         self._recorder = HandRecorder(path.absolute(), tuple(self.engines))
         for finger, engine in self.engines.items():
             engine.record(self._recorder.part(finger))
+
+    def publish(self, targets: Sequence[str], origins: Sequence[str] = ()) -> None:
+        """Send estimates of all fingers to `targets`, as `Engine.publish` does.
+
+        Messages name the finger. Of servers each finger has one, at ports that follow each other.
+        """
+        for number, engine in enumerate(self.engines.values()):
+            engine.publish(of_finger(targets, number), origins)
 
     @property
     def recording(self) -> RecordingStatus:
@@ -454,7 +462,7 @@ class Hand:
         self._recorder.close(within)
         return self._recorder.written
 
-    def __enter__(self) -> "Hand":
+    def __enter__(self) -> "Fingers":
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -125,7 +125,7 @@ class EngineLoop:
                 self._status = replace(self._status, region=requested.region)
                 self._track_region()
             case "targets":
-                self._publishing.request(requested.targets, requested.access)
+                self._publishing.request(requested.targets, requested.access, requested.finger)
                 self._haste(self._publishing.active)
             case "source":
                 self._go_to(requested.source)

@@ -11,7 +11,7 @@ import pytest
 
 from kappaskin import Setup
 from kappaskin._processes import BackgroundProcess
-from kappaskin.live import LOST, STREAMING, Hand
+from kappaskin.live import LOST, STREAMING, Fingers
 from kappaskin.recording import Recording, Verification
 from kappaskin.recording import messages as m
 
@@ -28,18 +28,18 @@ def wait_for(ask: Callable[[], object], within: float = 60.0) -> object:
 
 
 @pytest.fixture
-def hand() -> Iterator[Hand]:
-    with Hand(SOURCES, Setup(quantities=())) as made:
+def hand() -> Iterator[Fingers]:
+    with Fingers(SOURCES, Setup(quantities=())) as made:
         yield made
 
 
-def streams(hand: Hand, finger: str) -> bool:
+def streams(hand: Fingers, finger: str) -> bool:
     engine = hand.engines[finger]
     status = engine.status()
     return status.state == STREAMING and engine.latest(status) is not None
 
 
-def test_fingers_are_aligned_on_one_clock(hand: Hand) -> None:
+def test_fingers_are_aligned_on_one_clock(hand: Fingers) -> None:
     hand.connect(SOURCES)
     assert wait_for(lambda: len(hand.aligned(hand.status())) == 2)
     for _ in range(5):
@@ -53,7 +53,7 @@ def test_fingers_are_aligned_on_one_clock(hand: Hand) -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="by a signal")
-def test_a_finger_that_is_killed_goes_on_in_the_same_file(hand: Hand, tmp_path: Path) -> None:
+def test_a_finger_that_is_killed_goes_on_in_the_same_file(hand: Fingers, tmp_path: Path) -> None:
     path = tmp_path / "hand.mcap"
     hand.record(path)
     hand.connect(SOURCES)
@@ -82,7 +82,7 @@ def test_a_finger_that_is_killed_goes_on_in_the_same_file(hand: Hand, tmp_path: 
         assert verdict.same, verdict.words
 
 
-def test_one_that_cannot_be_opened_leaves_the_others_alone(hand: Hand) -> None:
+def test_one_that_cannot_be_opened_leaves_the_others_alone(hand: Fingers) -> None:
     hand.connect({"thumb": "sim:circle", "index": "/dev/none-there"})
     assert wait_for(lambda: streams(hand, "thumb"))
     lost = hand.status()["index"]
