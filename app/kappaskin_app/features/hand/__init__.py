@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 from PySide6.QtCore import Qt, QTimer, Signal
-from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QRadioButton, QVBoxLayout, QWidget
 
 from kappaskin._text import with_error
 from kappaskin.frames import Estimate
@@ -18,7 +18,7 @@ from kappaskin_app.widgets.surface_map import SurfaceMap
 from kappaskin_app.widgets.text import Coverage
 
 _ABOUT = "A map of each finger of a hand with its force; a click shows that finger in the window"
-_TIP = "Displacement of the skin, with a cross at the contact. All fingers have one scale."
+_TIP = "Displacement of the skin, with a cross at the contact"
 _EVERY = 100  # ms between two pictures of the maps
 _MM = 1e3
 _LEAST = 0.01  # mm, of the scale
@@ -29,27 +29,29 @@ class FingerView(QWidget):
 
     def __init__(self, finger: str) -> None:
         super().__init__()
-        self.button = QPushButton(finger)
-        self.button.setCheckable(True)
+        self.button = QRadioButton(finger)
         self.button.setToolTip(f"Show {finger} in the window, with its settings")
-        self.map = SurfaceMap(finger, "mm", _TIP)
+        self.map, self._scale = SurfaceMap(finger, "mm", _TIP), SteadyRange(_LEAST)
         self.map.title.hide()
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.button)
         column.addWidget(self.map, 1)
 
-    def show_finger(self, status: Status, estimate: Estimate | None, limit: float) -> None:
-        """Show the newest estimate on a scale up to `limit` in mm, and the state of the source."""
+    def show_finger(self, status: Status, estimate: Estimate | None) -> None:
+        """Show the newest estimate, and the state of the source."""
         now, sensor = time.monotonic(), status.sensor
         state = state_of(status, estimate and estimate.host_time, now, paused=False)
         if estimate is None or sensor is None:
-            self.map.show_surface(None, (0.0, limit), "sequential", np.full(2, np.nan), (1.0, 1.0))
+            self.map.show_surface(None, (0.0, 1.0), "sequential", np.full(2, np.nan), (1.0, 1.0))
             self.map.words.show_text(state)
             return
         patch, contact = sensor.layout.patch, estimate.contact
         values, sides = _MM * estimate.surface, (patch.a, patch.b)
-        self.map.show_surface(values, (-limit, limit), "diverging", contact.position, sides)
+        limit = self._scale.follow(largest(values), now)
+        pressed = np.nanmax(values) >= -np.nanmin(values)
+        limits, part = ((0.0, limit), "sequential") if pressed else ((-limit, 0.0), "pulled")
+        self.map.show_surface(values, limits, part, contact.position, sides)
         self.map.map.show_faded(origin(state) not in (LIVE, SIM))
         off = Coverage.now.of(contact.force_sd, contact.force_95)
         said = contact.no_force.partition(":")[0] or with_error(contact.force, off, "N")
@@ -63,13 +65,13 @@ class HandPanel(QWidget):
 
     def __init__(self, session: Session) -> None:
         super().__init__()
-        self._session, self._scale = session, SteadyRange(_LEAST)
+        self._session = session
         self.views = dict[str, FingerView]()
-        self._buttons = QButtonGroup(self)
+        buttons = QButtonGroup(self)
         row = QHBoxLayout(self)
         for finger in session.fingers.engines if session.fingers else ():
             self.views[finger] = view = FingerView(finger)
-            self._buttons.addButton(view.button)
+            buttons.addButton(view.button)
             view.button.clicked.connect(guarded(lambda *_, finger=finger: self.chosen.emit(finger)))
             row.addWidget(view, 1)
         self._timer = QTimer(self, interval=_EVERY)  # pyright: ignore[reportCallIssue]
@@ -85,14 +87,9 @@ class HandPanel(QWidget):
         """Show the newest estimate of each finger."""
         if self._session.closed or not self.isVisible() or self._session.fingers is None:
             return
-        engines, found = self._session.fingers.engines, dict[str, Estimate | None]()
-        statuses = self._session.fingers.status()
-        for finger, status in statuses.items():
-            found[finger] = engines[finger].latest(status)
-        deepest = max((largest(_MM * e.surface) for e in found.values() if e), default=0.0)
-        limit = self._scale.follow(deepest, time.monotonic())
-        for finger, view in self.views.items():
-            view.show_finger(statuses[finger], found[finger], limit)
+        for finger, status in self._session.fingers.status().items():
+            estimate = self._session.fingers.engines[finger].latest(status)
+            self.views[finger].show_finger(status, estimate)
 
 
 class HandFeature:
@@ -112,3 +109,4 @@ class HandFeature:
             guarded(lambda finger: shell.setWindowTitle(f"Kappaskin: {finger}"))
         )
         panel.mark(session.finger)
+        shell.begun.connect(guarded(lambda *_: shell.docks.reveal("hand")))
