@@ -45,6 +45,7 @@ from kappaskin_app.shell.simulation import (
     region_of,
     scene_of,
     scene_or_refusal,
+    settings_for,
     source_settings,
 )
 
@@ -338,7 +339,7 @@ class Session(QObject):
     def begin_fingers(self, sources: Mapping[str, str]) -> None:
         """Begin with the `sources` of a hand, which its engines read already."""
         self._others = {
-            finger: (source, replace(self._settings, **source_settings(source, False)))
+            finger: (source, settings_for(source, self._trusts(source)))
             for finger, source in sources.items()
             if finger != self.finger
         }
