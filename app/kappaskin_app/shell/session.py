@@ -200,14 +200,14 @@ class Session(QObject):
     ) -> None:
         super().__init__(parent)
         self.fingers = engine if isinstance(engine, Fingers) else None
-        engines = self.fingers.engines if self.fingers else {}
-        self.finger, engine = next(iter(engines.items()), ("", engine))
+        engines = {"": engine} if isinstance(engine, Engine) else engine.engines
+        self.finger, engine = next(iter(engines.items()))
         self._others = dict[str, tuple[str, Settings]]()
         """Source and settings of each finger that is not shown."""
         self._history = history
         self._settings = history.settings
         self.trusted: frozenset[Path] = frozenset()
-        self.engine: Engine = engine
+        self.engine = engine
         self.scene = self._planned = scene_of(replace(history.settings, written=None))
         self.refusal = ""
         self._restarts, self.running = False, True

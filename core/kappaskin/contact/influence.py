@@ -21,7 +21,6 @@ from kappaskin.bases import (
     ProductBasis,
     SineBasis,
     basis_for,
-    most_functions,
 )
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Indices
@@ -123,7 +122,7 @@ def read_of_modes(
 def _basis_of(plate: Plate, edge: str, functions: int) -> Basis:
     patch = plate.patch
     if isinstance(patch, MeshSkin):
-        functions = min(functions, math.isqrt(most_functions(patch)))
+        functions = min(functions, math.isqrt(patch.most_functions))
     return basis_for(patch, edge, functions, 1 if patch.strip else functions)
 
 

@@ -4,6 +4,7 @@ import time
 
 import numpy as np
 from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QRadioButton, QVBoxLayout, QWidget
 
 from kappaskin._text import with_error
@@ -25,7 +26,7 @@ _LEAST = 0.01  # mm, of the scale
 
 
 class FingerView(QWidget):
-    """The map of one finger, below the button that shows it in the window."""
+    """The map of one finger; a click on it shows the finger in the window."""
 
     def __init__(self, finger: str) -> None:
         super().__init__()
@@ -37,6 +38,9 @@ class FingerView(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.button)
         column.addWidget(self.map, 1)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        self.button.click()
 
     def show_finger(self, status: Status, estimate: Estimate | None) -> None:
         """Show the newest estimate, and the state of the source."""

@@ -23,12 +23,18 @@ def hand(opened, until):
     return window
 
 
+def hand_of(window):
+    return window.features["hand"].panel.views
+
+
 def words(window):
-    return [view.map.words.text() for view in window.features["hand"].panel.views.values()]
+    return [view.map.words.text() for view in hand_of(window).values()]
 
 
 def choose(window, finger):
-    QTest.mouseClick(window.features["hand"].panel.views[finger].button, Qt.MouseButton.LeftButton)
+    view = hand_of(window)[finger]
+    QTest.mouseClick(view.map.map, Qt.MouseButton.LeftButton)
+    assert view.button.isChecked()
 
 
 def test_each_finger_has_a_map_with_its_state_and_force(hand):

@@ -248,5 +248,5 @@ def test_a_mesh_that_is_dropped_is_opened_as_a_skin_and_simulated(
 def test_triangles_too_large_to_find_contacts_are_refused_before_the_scene(tmp_path) -> None:
     coarse = stl(tmp_path / "coarse.stl", *ellipsoid(10, (9.0, 7.0, 6.0), 1.2))
     skin = {"shape": "mesh", "file": str(coarse), "unit": "mm", "thickness": 1e-3}
-    with pytest.raises(Refusal, match="too thin for its radii .* or use smaller triangles"):
+    with pytest.raises(Refusal, match=r"too thin for its radii .* or use smaller triangles"):
         list(new_scene("Coarse", coarse, skin | {"rigidity": 3e-4}, 40))
