@@ -261,6 +261,11 @@ class MeshSkin(Polygon):
         return not np.array_equal(self.places, self.points[:, :2])
 
     @property
+    def is_held_in_part(self) -> bool:
+        """Whether a part of the rim is free."""
+        return len(self.held) < len(self.rim)
+
+    @property
     def arc_curvature(self) -> float:
         return 0.0
 
