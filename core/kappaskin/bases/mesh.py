@@ -35,14 +35,31 @@ def _factored(
     mesh: MeshSkin, edge: str, rigidity: float, poisson: float, foundation: float
 ) -> Factored:
     held = held_freedoms(mesh.held, edge, len(mesh.points))
-    return Factored(stiffness(mesh, rigidity, 1.0, poisson, foundation), held)
+    return Factored(stiffness(mesh, edge, rigidity, 1.0, poisson, foundation), held)
 
 
-def stiffness(mesh: MeshSkin, D: float, C: float, nu: float, k_f: float) -> Any:
+def stiffness(mesh: MeshSkin, edge: str, D: float, C: float, nu: float, k_f: float) -> Any:
     """Stiffness (6 n, 6 n) of a shell of D in N m, C in N/m, nu and a foam of k_f in N/m^3."""
-    facets = Facets(mesh.points, mesh.triangles)
+    points = _with_ends_moved(mesh) if edge == "clamped" else mesh.points
+    facets = Facets(points, mesh.triangles)
     K = facets.stiffness(D, C, nu)
     return K + facets.foundation(k_f) if k_f else K
+
+
+# Where the clamped part of a rim ends, curvature grows without bound. Triangles there hold the skin
+# as if that part went on by a quarter of its last side: its end is moved back as far.
+_BEYOND = 0.25
+
+
+def _with_ends_moved(mesh: MeshSkin) -> Array:
+    """The nodes (n, 3) in m, the ends of held parts of the rim moved along it."""
+    held = np.isin(mesh.rim, mesh.held)
+    points = mesh.points.copy()
+    for way in (1, -1):
+        end = held & ~np.roll(held, way) & np.roll(held, -way)
+        ends, inner = mesh.rim[end], np.roll(mesh.rim, -way)[end]
+        points[ends] += _BEYOND * (mesh.points[inner] - mesh.points[ends])
+    return points
 
 
 def inward(mesh: MeshSkin) -> Array:
@@ -90,7 +107,7 @@ class MeshFunctions:
         own = C * np.diag(self._own)
         if nu == _POISSON and not k_f and np.isclose(D / C, _rigidity(self._mesh), rtol=1e-9):
             return own
-        K = stiffness(self._mesh, D, C, nu, k_f)
+        K = stiffness(self._mesh, self._edge, D, C, nu, k_f)
         moved = _moved(self._mesh, self._edge, len(self._own))
         found = moved.T @ (K @ moved)
         return (found + found.T) / 2

@@ -18,6 +18,7 @@ from kappaskin.estimation import Fit, PatternCache
 from kappaskin.frames import Array, Contact, Mask
 from kappaskin.mechanics import Plate
 from kappaskin.sensing import SensorLayout
+from kappaskin.skin import MeshSkin
 
 
 def _squares_on_grid(basis: Basis, G: Array, x: Array, y: Array) -> Array:
@@ -68,6 +69,7 @@ _RIM = 1 / 15  # of a side: within it, a load moves the skin too little to be to
 _TO_GAUSSIAN = 0.5  # of the way from a disc: the profile of a load, whose standard deviation is as
 _FURTHER = -1.0, 2.0  # much; and how far along that way slopes are followed
 
+_OF_PLACE = 0.06  # of the shorter side: error of a place on a mesh, times that of a force
 _AS_WELL = 1.2  # times the residual of the fitted shape that a single load may leave
 _REGION = 7.81  # variances: drop of chi-squared in the 95 % region of x, y and size
 
@@ -154,6 +156,7 @@ class PointContact:
         self._readings = self._none = np.zeros(len(self._M))
         x, y = self.patch.grid(_SEARCHED + 2, 3 if strip else _SEARCHED + 2)
         self._x, self._y = x[1:-1], y[1:-1]
+        self._side = self.patch.a if strip else min(self.patch.a, self.patch.b)
         self._start, self._least, self._largest = sizes_on(self.patch)
         self._nodes = self._influence.nodes
         self._fits_profile = self._nodes is not None
@@ -446,12 +449,13 @@ class PointContact:
         sd: list[float] = (spread * np.sqrt(here.inverse.diagonal())).tolist()
         theory = self._theory_error
         of_place = theory if self.patch.is_shallow else 0.0
+        on_mesh = _OF_PLACE * theory * self._side if isinstance(self.patch, MeshSkin) else 0.0
         self.misfit = (spread / float(fit.noise)) ** 2 if fit.noise else math.inf
         under = force * self._influence.gives(x, y)
         if self._stretched is not None:
             under += self._stretched.more(x, y, force)
-        sd_x = math.hypot(sd[1] / strength, of_place * (x - self.patch.a / 2))
-        sd_y = math.hypot(sd[2] / strength, of_place * (y - self.patch.b / 2))
+        sd_x = math.hypot(sd[1] / strength, of_place * (x - self.patch.a / 2), on_mesh)
+        sd_y = math.hypot(sd[2] / strength, of_place * (y - self.patch.b / 2), on_mesh)
         return Contact(
             np.array([x, y]),
             np.array([sd_x, sd_y]),

@@ -179,7 +179,8 @@ class MeshSkin(Polygon):
         held: ArrayLike | None = None,
     ) -> None:
         # As exact as most files have them, which halves what a recording needs.
-        given = np.array(nodes, np.float32).astype(float)
+        with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is refused below
+            given = np.array(nodes, np.float32).astype(float)
         faces = np.array(triangles, np.intp)
         _check_mesh(given, faces, thickness)
         (rim,) = MeshSurface(given, faces).loops
@@ -259,6 +260,11 @@ class MeshSkin(Polygon):
     def is_flattened(self) -> bool:
         """Whether positions are those of the skin flattened, and no projection."""
         return not np.array_equal(self.places, self.points[:, :2])
+
+    @property
+    def is_held_in_part(self) -> bool:
+        """Whether a part of the rim is free."""
+        return len(self.held) < len(self.rim)
 
     @property
     def arc_curvature(self) -> float:
@@ -441,7 +447,7 @@ def _sums(places: Indices, values: Array, count: int) -> Array:
 
 
 def _check_mesh(nodes: Array, triangles: Indices, thickness: float) -> None:
-    if nodes.ndim != 2 or nodes.shape[1] != 3 or not np.isfinite(nodes).all():
+    if nodes.ndim != 2 or nodes.shape[1] != 3 or not (len(nodes) and np.isfinite(nodes).all()):
         raise Refusal(f"expected finite nodes of shape (n, 3) in m, got shape {nodes.shape}")
     if not (SIDES[0] <= np.ptp(nodes, axis=0).max() <= SIDES[1]):
         raise Refusal(f"expected nodes of a skin in m, got {np.ptp(nodes, axis=0)} m of them")

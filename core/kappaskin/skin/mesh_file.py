@@ -867,7 +867,7 @@ def held_edges(surface: MeshSurface, held: ArrayLike) -> Indices:
         far = arcs.reshape(-1, 3)[away.argmax()]
         raise Refusal(
             f"expected ends of the held edge on the rim, got {far} m, which is "
-            f"{1e3 * away.max():.3g} mm away; the unit is m"
+            f"{1e3 * away.max():.3g} mm away; give points of the rim in the unit of the mesh"
         )
     sides: list[Indices] = []
     for begin, end in nodes[near]:
