@@ -243,10 +243,14 @@ def _read_stl(content: bytes) -> _Mesh:
         if len(corners) % 3 or not re.search(rb"\bendsolid\b", content[-1000:], re.IGNORECASE):
             raise Refusal("expected `endsolid` after whole triangles, got an STL text that is cut")
     else:
+        found = f"{len(content)} bytes"
+        if content.isascii() and content:
+            found = f"another text, {content[:20].decode()!r}"
+        elif len(content) >= 84:
+            found += f" where {count} triangles are announced"
         raise Refusal(
             "expected an STL text that begins with `solid`, or 84 bytes and 50 for each triangle, "
-            f"got {len(content)} bytes"
-            + (f" where {count} triangles are announced" if len(content) >= 84 else "")
+            f"got {found}"
         )
     soup = MeshSurface(corners, np.arange(len(corners)).reshape(-1, 3))
     merged = _joined(soup, _equal(corners))

@@ -10,6 +10,7 @@ from kappaskin.bases import edges_of
 from kappaskin.live import PipelineStatus, Status
 from kappaskin.pipeline import Readout
 from kappaskin.sensing import Sensor
+from kappaskin.skin import MeshSkin
 from kappaskin_app.features.compare.comparison import Pair, SetupComparison
 from kappaskin_app.guard import guarded
 from kappaskin_app.shell.colouring import Colouring, SteadyRange, largest
@@ -62,7 +63,9 @@ class OtherForm(Form):
 
     def show_pipeline(self, status: PipelineStatus | None, sensor: Sensor | None) -> None:
         if sensor is not None:
-            self.offer("other_edge", ("", *edges_of(sensor.layout.patch)))
+            patch = sensor.layout.patch
+            self.offer("other_edge", ("", *edges_of(patch)))
+            self.show_functions("other_x", "other_y", isinstance(patch, MeshSkin))
         if status is None:
             self.show_message("")
         elif status.computing:
