@@ -13,6 +13,7 @@ from kappaskin.sensing import Sensor
 from kappaskin.skin import MeshSkin
 from kappaskin_app.features.compare.comparison import Pair, SetupComparison
 from kappaskin_app.guard import guarded
+from kappaskin_app.shell.badge import functions_of
 from kappaskin_app.shell.colouring import Colouring, SteadyRange, largest
 from kappaskin_app.shell.form import Form
 from kappaskin_app.shell.settings import Settings
@@ -172,7 +173,8 @@ class ComparePanel(QWidget):
         for name, setup in setups.items():
             if setup is not None:
                 method = METHOD_SHORT.get(setup.method, setup.method)
-                self.maps[name].words.show_text(f"{setup.Ni} x {setup.Nj}, {method}")
+                functions = functions_of(setup, self._status.sensor)
+                self.maps[name].words.show_text(f"{functions} functions, {method}")
         if (difference := pair.difference) is not None:
             rms = math.sqrt(float(np.nanmean(difference**2)))
             self.maps["difference"].words.show_text(f"RMS {length(rms)}")

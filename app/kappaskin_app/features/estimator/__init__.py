@@ -41,7 +41,9 @@ class BasisPanel(Form):
             self.offer("fit_edge", ("", *edges_of(status.sensor.layout.patch)))
         on_mesh = status.sensor is not None and isinstance(status.sensor.layout.patch, MeshSkin)
         self.show_functions("functions_x", "functions_y", on_mesh)
-        if words := "Computing\N{HORIZONTAL ELLIPSIS}" if status.computing else in_use(status):
+        if status.computing:
+            self.show_message("Computing\N{HORIZONTAL ELLIPSIS}", hint=True)
+        elif words := in_use(status):
             self.show_message(words)
         else:
             self.show_message(_SOFTEST.format(self._count) if on_mesh else "", hint=True)

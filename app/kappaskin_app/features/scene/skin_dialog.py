@@ -133,7 +133,7 @@ class SurfacePreview(QWidget):
         self._shown = self.surface = surface
         if surface is not None:
             finite = np.isfinite(surface.nodes @ np.ones(3))
-            self.surface = surface.part(finite[surface.triangles].all(axis=1))
+            self.surface = surface.part(np.logical_and.reduce(finite[surface.triangles], axis=1))
         nodes = _finite(surface)
         self._box = nodes.min(axis=0), nodes.max(axis=0)
         self._redraw()
