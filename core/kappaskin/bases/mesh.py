@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from kappaskin._files import cached
 from kappaskin._processes import progress
 from kappaskin.bases.facets import Facets, Factored, held_freedoms
-from kappaskin.bases.modes import most_functions
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.skin import MeshSkin
@@ -71,7 +70,7 @@ class MeshFunctions:
     """
 
     def __init__(self, mesh: MeshSkin, edge: str, count: int) -> None:
-        most = most_functions(mesh)
+        most = mesh.most_functions
         if count > most:
             raise Refusal(
                 f"expected at most {most} functions on a mesh of {len(mesh.points)} nodes, got "
@@ -145,7 +144,7 @@ def _shapes(mesh: MeshSkin, edge: str, count: int) -> tuple[Array, Array]:
 
 @lru_cache(1)
 def _moved(mesh: MeshSkin, edge: str, count: int) -> Array:
-    total = max(count, min(_USUAL, most_functions(mesh)))
+    total = max(count, min(_USUAL, mesh.most_functions))
     return _shapes(mesh, edge, total)[0][:, :count]
 
 

@@ -14,15 +14,7 @@ from numpy.typing import NDArray
 
 from kappaskin._files import cached
 from kappaskin._processes import progress
-from kappaskin.bases import (
-    Basis,
-    CapBasis,
-    MeshBasis,
-    ProductBasis,
-    SineBasis,
-    basis_for,
-    most_functions,
-)
+from kappaskin.bases import Basis, CapBasis, MeshBasis, ProductBasis, SineBasis, basis_for
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Indices
 from kappaskin.mechanics import CapWaves, Compliance, Plate, Shell, cap_shell
@@ -113,7 +105,7 @@ def read_of_modes(
 def _basis_of(plate: Plate, edge: str, functions: int) -> Basis:
     patch = plate.patch
     if isinstance(patch, MeshSkin):
-        functions = min(functions, math.isqrt(most_functions(patch)))
+        functions = min(functions, math.isqrt(patch.most_functions))
     return basis_for(patch, edge, functions, 1 if patch.strip else functions)
 
 
