@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, cast
@@ -79,7 +79,6 @@ _HINT = (
 )
 _SAMPLES, _MOST_DOTS = 1_500_000, 1000
 _MOST_DRAWN = 100_000  # triangles
-_LARGE = 5_000_000  # bytes of a file that is read in a process of its own
 _DOT, _BEHIND = 3.0, 0.3  # px, of a fault; opacity of what is behind the surface
 _JUST_BEHIND = 3.0  # px
 _NEAR = 14.0  # px from a click to a node of the rim
@@ -364,26 +363,17 @@ class SkinDialog(QDialog):
         for line in self.ends:
             line.clear()
         self.about.setText(printable(file.name))
-        size = file.stat().st_size if file.is_file() else 0
-        self._start(size > _LARGE, read_surface, file, "m")
+        self._reading.compute(read_surface, file, "m")
         self._show(f"Reading{ELLIPSIS}")
         self.show()
         self.raise_()
-
-    def _start(self, large: bool, make: Callable[..., Any], *about: object) -> None:
-        """Compute beside the window; what is large in a process, which leaves it its time."""
-        (self._reading.compute if large else self._reading.run)(make, *about)
 
     def _examine(self) -> None:
         self._faults, self.surface = None, None
         if self._read is not None and (unit := self.unit.currentData()):
             self.surface = MeshSurface(UNITS[unit] * self._read.nodes, self._read.triangles)
-            self._start(self._is_large, faults, self.surface)
+            self._reading.compute(faults, self.surface)
         self._show("" if self.surface is None else f"Looking for faults{ELLIPSIS}")
-
-    @property
-    def _is_large(self) -> bool:
-        return self._read is not None and len(self._read.triangles) > _MOST_DRAWN
 
     def _take(self, found: MeshSurface | list[MeshFault]) -> None:
         if isinstance(found, list):
@@ -406,7 +396,7 @@ class SkinDialog(QDialog):
 
     def _repair(self, fault: MeshFault) -> None:
         if self._read is not None and fault.repair:
-            self._start(self._is_large, repaired, self._read, fault.repair)
+            self._reading.compute(repaired, self._read, fault.repair)
             self._show(f"Repairing{ELLIPSIS}")
 
     def _refuse(self, error: Exception) -> None:
@@ -585,18 +575,6 @@ def _quoted(value: object) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-def _in_stage(
-    begin: float, end: float, compute: Callable[..., Any], *about: object
-) -> Generator[float, None, Any]:
-    """What `compute(*about)` returns; yields the shares done, from `begin` to `end`."""
-    stage = with_progress(compute, *about)
-    while True:
-        try:
-            yield begin + (end - begin) * next(stage)
-        except StopIteration as stopped:
-            return stopped.value
-
-
 def new_scene(
     title: str, file: Path, skin: dict[str, Any], elements: int
 ) -> Generator[float | Written]:
@@ -618,7 +596,7 @@ def new_scene(
     x, y = patch.places[np.linalg.norm(patch.places - middle, axis=1).argmin()].tolist()
     disc = DiscLoad(x, y, _RADIUS * min(patch.a, patch.b))
     pressed = scene.plate, disc, _DEPTH * patch.thickness, scene.basis
-    load = yield from _in_stage(_READ, _PRESSED, scaled_to, *pressed)
+    load = yield from with_progress(_READ, _PRESSED, scaled_to, *pressed)
     read = scene.plate, scene.layout, scene.edge
-    yield from _in_stage(_PRESSED, 1.0, PointContact, *read)
+    yield from with_progress(_PRESSED, 1.0, PointContact, *read)
     yield Written(_text(title, skin, elements, functions, load), at, trust)
