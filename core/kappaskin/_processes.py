@@ -149,8 +149,10 @@ progress: ContextVar[Callable[[float], None]] = ContextVar("progress", default=l
 """What long computations call with the share that is done, from 0 to 1."""
 
 
-def with_progress(compute: Callable[..., _Item], *about: object) -> Generator[float, None, _Item]:
-    """The shares done that `compute(*about)` reports; returns what it computes, in a thread."""
+def with_progress(
+    begin: float, end: float, compute: Callable[..., _Item], *about: object
+) -> Generator[float, None, _Item]:
+    """The shares done from `begin` to `end`, as `compute(*about)` reports; returns its value."""
     shares = SimpleQueue[float | None]()
 
     def computed() -> _Item:
@@ -163,7 +165,7 @@ def with_progress(compute: Callable[..., _Item], *about: object) -> Generator[fl
     with ThreadPoolExecutor(1) as beside:
         task = beside.submit(computed)
         while (share := shares.get()) is not None:
-            yield share
+            yield begin + (end - begin) * share
         return task.result()
 
 

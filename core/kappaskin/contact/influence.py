@@ -14,14 +14,7 @@ from numpy.typing import NDArray
 
 from kappaskin._files import cached
 from kappaskin._processes import progress
-from kappaskin.bases import (
-    Basis,
-    CapBasis,
-    MeshBasis,
-    ProductBasis,
-    SineBasis,
-    basis_for,
-)
+from kappaskin.bases import Basis, CapBasis, MeshBasis, ProductBasis, SineBasis, basis_for
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Indices
 from kappaskin.mechanics import CapWaves, Compliance, Plate, Shell, cap_shell

@@ -124,18 +124,10 @@ def _over_cell(
 
     The first of them is along `t` (2,) or (P, 2).
     """
-
-    def along(places: Array, across: Array) -> Array:
-        if not cell[0]:
-            return values(places)
-        return _over_gage(_any_way(values), patch, places, cell[0], -_across(across))
-
-    across = _across(t)
-    return (
-        _over_gage(along, patch, positions, cell[1], across)
-        if cell[1]
-        else along(positions, across)
-    )
+    for axis, side in zip((t, _across(t)), cell, strict=True):
+        if side:
+            values = partial(_over_gage, _any_way(values), patch, L=side, t=axis)
+    return values(positions)
 
 
 _SHORTEST = 1e-6  # m: the mean over a shorter gage is lost in rounding

@@ -270,6 +270,11 @@ class MeshSkin(Polygon):
     def arc_curvature(self) -> float:
         return 0.0
 
+    @property
+    def most_functions(self) -> int:
+        """How many functions it has nodes for."""
+        return len(self.points) // 4  # two loads for each, of two nodes each
+
     @cached_property
     def areas(self) -> Array:
         """The area (n,) in m^2 of each node: a third of its triangles'."""

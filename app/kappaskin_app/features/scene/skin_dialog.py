@@ -2,10 +2,10 @@
 
 import json
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from PySide6.QtCore import QPoint, QPointF, QSize, Qt, Signal
@@ -73,8 +73,12 @@ _REPAIRS = {
     "keep largest part": "&Keep the largest part",
     "decimate": "&Decimate",
 }
-_HINT = "Drag to turn. Click two places on the rim, counter-clockwise seen from outside."
+_HINT = (
+    "Drag to turn; orange is the inside. Click two places on the rim, counter-clockwise seen from "
+    "outside."
+)
 _SAMPLES, _MOST_DOTS = 1_500_000, 1000
+_MOST_DRAWN = 100_000  # triangles
 _DOT, _BEHIND = 3.0, 0.3  # px, of a fault; opacity of what is behind the surface
 _JUST_BEHIND = 3.0  # px
 _NEAR = 14.0  # px from a click to a node of the rim
@@ -104,7 +108,8 @@ class SurfacePreview(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName("The mesh; the arrow keys turn it")
         self.setToolTip("Drag, or press the arrow keys, to turn. Orange: seen from inside.")
-        self.surface: MeshSurface | None = None
+        self.surface = self._shown = cast("MeshSurface | None", None)
+        self._box = np.zeros(3), np.zeros(3)
         self.places, self.held = np.empty((0, 3)), np.empty((0, 2), np.intp)
         self._pressed: QPoint | None = None
         self._last, self._image, self._near = QPoint(), QImage(), np.empty((1, 1))
@@ -120,11 +125,17 @@ class SurfacePreview(QWidget):
 
     def show_surface(self, surface: MeshSurface | None, places: Array, held: Indices) -> None:
         """Draw a surface, faults at `places` (k, 3) in m, and `held` sides (H, 2) of its rim."""
+        self.places, self.held = places, held
+        if surface is self._shown:
+            self.update()
+            return
+        self._shown = self.surface = surface
         if surface is not None:
-            surface = surface.part(np.isfinite(np.ptp(surface.corners, axis=(1, 2))))
-        another = surface is not self.surface
-        self.surface, self.places, self.held = surface, places, held
-        self._redraw() if another else self.update()
+            finite = np.isfinite(surface.nodes @ np.ones(3))
+            self.surface = surface.part(np.logical_and.reduce(finite[surface.triangles], axis=1))
+        nodes = _finite(surface)
+        self._box = nodes.min(axis=0), nodes.max(axis=0)
+        self._redraw()
 
     def _redraw(self) -> None:
         self._image = QImage()
@@ -132,8 +143,7 @@ class SurfacePreview(QWidget):
 
     def seen(self, points: Array) -> Array:
         """Where `points` (k, 3) in m are on the widget: x and y in px, and towards the viewer."""
-        nodes = _finite(self.surface)
-        low, high = nodes.min(axis=0), nodes.max(axis=0)
+        low, high = self._box
         size = float(np.linalg.norm(high - low)) or 1.0
         scale = _MARGIN * min(self.width(), self.height()) / size
         found = scale * (points - (low + high) / 2) @ self._axes.T
@@ -149,7 +159,7 @@ class SurfacePreview(QWidget):
             painter.drawImage(0, 0, self._image)
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             for sides, colour, width in (
-                (self.surface.rim, current().text, 1.2),
+                (self._rim(self.surface), current().text, 1.2),
                 (self.held, current().accent, 5.0),
             ):
                 painter.setPen(QPen(QColor(colour), width))
@@ -165,6 +175,10 @@ class SurfacePreview(QWidget):
                 painter.setOpacity(_BEHIND if behind else 1.0)
                 painter.drawEllipse(QPointF(x, y), _DOT, _DOT)
 
+    def _rim(self, surface: MeshSurface) -> Indices:
+        """The sides (R, 2) of the rim; none of a mesh with which nothing can be done before."""
+        return surface.rim if len(surface.triangles) <= _MOST_DRAWN else np.empty((0, 2), np.intp)
+
     def _is_behind(self, seen: Array) -> Mask:
         """Whether points (k, 3) as seen are behind the surface."""
         height, width = self._near.shape
@@ -172,12 +186,14 @@ class SurfacePreview(QWidget):
         return seen[:, 2] < self._near[y, x] - _JUST_BEHIND
 
     def _picture(self, surface: MeshSurface) -> QImage:
-        """Its triangles as dots, those nearer over those farther."""
+        """Its triangles as dots, those nearer over those farther; of very many some."""
+        if (every := -(-len(surface.triangles) // _MOST_DRAWN)) > 1:
+            surface = MeshSurface(surface.nodes, surface.triangles[::every])
         width, height = self.width(), self.height()
         corners = self.seen(surface.corners.reshape(-1, 3)).reshape(-1, 3, 3)
         flat = corners[..., :2]
         longest = np.linalg.norm(flat - np.roll(flat, 1, axis=1), axis=2).max(axis=1)
-        rows = np.clip(np.ceil(1.3 * longest), 1, 2000)
+        rows = np.clip(np.ceil(1.3 * longest * math.sqrt(every)), 1, 2000)
         rows = np.ceil(rows * min(1.0, np.sqrt(_SAMPLES / max((rows**2).sum(), 1.0)))).astype(int)
         of = np.repeat(np.arange(len(rows)), rows**2)
         number = np.arange(len(of)) - np.repeat(np.cumsum(rows**2) - rows**2, rows**2)
@@ -219,8 +235,8 @@ class SurfacePreview(QWidget):
         at, surface = event.position().toPoint(), self.surface
         if surface is None or self._pressed is None:
             return
-        if (at - self._pressed).manhattanLength() <= _STILL and len(surface.rim):
-            nodes = np.unique(surface.rim)
+        if (at - self._pressed).manhattanLength() <= _STILL and len(rim := self._rim(surface)):
+            nodes = np.unique(rim)
             x, y, near = self.seen(surface.nodes[nodes]).T
             far = np.hypot(x - at.x(), y - at.y())
             # Of two rims behind one another the nearer one.
@@ -255,6 +271,7 @@ class SkinDialog(QDialog):
         self.setWindowTitle("Open a skin")
         self.file, self._next = Path(), 0
         self._read: MeshSurface | None = None  # as in the file, its numbers taken as metres
+        self.surface: MeshSurface | None = None  # in m; None before it is read and its unit known
         self._faults: list[MeshFault] | None = None
         self._used, self._repaired = Path(), False  # the file that the scene names
         words, cancelled = "Setting up the skin", "Cancelled; nothing is simulated."
@@ -340,29 +357,23 @@ class SkinDialog(QDialog):
 
     def begin(self, file: Path) -> None:
         """Read the mesh in a file, and show the dialog."""
-        self.file, self._read, self._faults, self._next = file, None, None, 0
+        self.file, self._read, self.surface, self._faults, self._next = file, None, None, None, 0
         self.unit.clear()
         self.held.setCurrentIndex(0)
         for line in self.ends:
             line.clear()
         self.about.setText(printable(file.name))
-        self._reading.run(read_surface, file, "m")
+        self._reading.compute(read_surface, file, "m")
         self._show(f"Reading{ELLIPSIS}")
         self.show()
         self.raise_()
 
-    @property
-    def surface(self) -> MeshSurface | None:
-        """The surface in m; None before it is read and its unit known."""
-        if self._read is None or not (unit := self.unit.currentData()):
-            return None
-        return MeshSurface(UNITS[unit] * self._read.nodes, self._read.triangles)
-
     def _examine(self) -> None:
-        self._faults = None
-        if (surface := self.surface) is not None:
-            self._reading.run(faults, surface)
-        self._show("" if surface is None else f"Looking for faults{ELLIPSIS}")
+        self._faults, self.surface = None, None
+        if self._read is not None and (unit := self.unit.currentData()):
+            self.surface = MeshSurface(UNITS[unit] * self._read.nodes, self._read.triangles)
+            self._reading.compute(faults, self.surface)
+        self._show("" if self.surface is None else f"Looking for faults{ELLIPSIS}")
 
     def _take(self, found: MeshSurface | list[MeshFault]) -> None:
         if isinstance(found, list):
@@ -379,13 +390,13 @@ class SkinDialog(QDialog):
                 self.unit.addItem(unit, unit)
         size = np.ptp(_finite(found), axis=0)
         for row, (unit, scale) in enumerate(UNITS.items(), 1):
-            sides = " x ".join(f"{1e3 * scale * side:.3g}" for side in size)
+            sides = " x ".join(f"{float(f'{1e3 * scale * side:.3g}'):,.10g}" for side in size)
             self.unit.setItemText(row, f"{unit}: the skin is {sides} mm")
         self._examine()
 
     def _repair(self, fault: MeshFault) -> None:
         if self._read is not None and fault.repair:
-            self._reading.run(repaired, self._read, fault.repair)
+            self._reading.compute(repaired, self._read, fault.repair)
             self._show(f"Repairing{ELLIPSIS}")
 
     def _refuse(self, error: Exception) -> None:
@@ -436,7 +447,7 @@ class SkinDialog(QDialog):
             words = words or "Select the unit of length of the file"
         if faulty:
             words = words or "Repair the faults here, or in a mesh program, to simulate this skin"
-        self._show_faults(faulty or [])
+        self._show_faults(faulty or [], not busy)
         places = [fault.places for fault in faulty or []]
         self.preview.show_surface(
             self._drawn(surface), np.concatenate([*places, np.empty((0, 3))]), held
@@ -454,7 +465,7 @@ class SkinDialog(QDialog):
     def _drawn(self, surface: MeshSurface | None) -> MeshSurface | None:
         return self._read if surface is None else surface
 
-    def _show_faults(self, found: list[MeshFault]) -> None:
+    def _show_faults(self, found: list[MeshFault], may_repair: bool) -> None:
         while (item := self.found.takeAt(0)) is not None:
             if (widget := item.widget()) is not None:
                 widget.hide()
@@ -466,6 +477,7 @@ class SkinDialog(QDialog):
             layout.addWidget(text_label(sentence(fault.message)), 1)
             if fault.repair:
                 repair = button(_REPAIRS[fault.repair], f"repair-{fault.kind}", "The file stays.")
+                repair.setEnabled(may_repair)
                 repair.setAutoDefault(False)  # or Enter in a line would press it
                 repair.clicked.connect(guarded(lambda *_, fault=fault: self._repair(fault)))
                 layout.addWidget(repair, 0, Qt.AlignmentFlag.AlignTop)
@@ -563,18 +575,6 @@ def _quoted(value: object) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-def _in_stage(
-    begin: float, end: float, compute: Callable[..., Any], *about: object
-) -> Generator[float, None, Any]:
-    """What `compute(*about)` returns; yields the shares done, from `begin` to `end`."""
-    stage = with_progress(compute, *about)
-    while True:
-        try:
-            yield begin + (end - begin) * next(stage)
-        except StopIteration as stopped:
-            return stopped.value
-
-
 def new_scene(
     title: str, file: Path, skin: dict[str, Any], elements: int
 ) -> Generator[float | Written]:
@@ -596,7 +596,7 @@ def new_scene(
     x, y = patch.places[np.linalg.norm(patch.places - middle, axis=1).argmin()].tolist()
     disc = DiscLoad(x, y, _RADIUS * min(patch.a, patch.b))
     pressed = scene.plate, disc, _DEPTH * patch.thickness, scene.basis
-    load = yield from _in_stage(_READ, _PRESSED, scaled_to, *pressed)
+    load = yield from with_progress(_READ, _PRESSED, scaled_to, *pressed)
     read = scene.plate, scene.layout, scene.edge
-    yield from _in_stage(_PRESSED, 1.0, PointContact, *read)
+    yield from with_progress(_PRESSED, 1.0, PointContact, *read)
     yield Written(_text(title, skin, elements, functions, load), at, trust)
