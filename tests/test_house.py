@@ -26,8 +26,8 @@ LIMITS = {
     # files of other programs; _plugins. Recognition of a board's lines, and the dialog of it.
     # The strip chart. mechanics: caps.
     # skin: meshes and their files; bases: finite elements of shells, functions on meshes; the app's
-    # dialog of a mesh.
-    "modules": 359,
+    # dialog of a mesh. The hand in the window.
+    "modules": 360,
     # Shells and plates that stretch, a load's size, slopes on shells, revisions of estimates;
     # ovals beside objects, and whether an object fits; errors told beforehand, of calibrations on
     # other paths, and of effects that act on one another.
@@ -52,8 +52,9 @@ LIMITS = {
     # objects named on them, profiles of loads, designs of their elements, a mesh for Foxglove.
     # Skins of any shape: files of meshes and what is wrong with them, finite elements of shells,
     # functions, contacts and designs on them; the dialog that opens one; glTF of every skin.
-    # Several fingers at once: a recording of all by a process of its own, commands for each.
-    "statements": 49_000,
+    # Several fingers at once: a recording of all by a process of its own, commands for each; the
+    # hand in the window. Meshes held in part, elements placed by contacts, patches along a mesh.
+    "statements": 49_400,
     # _files: one way to read and write files; _text: text from outside; _plugins: what other
     # packages add. For all rooms and the app.
     "loose modules of core": 11,
