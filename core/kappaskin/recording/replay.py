@@ -219,10 +219,16 @@ class ReplayedSource:
             self._take(self._next)
         self._ready.clear()
 
-    def seek(self, at: float | None, speed: float, looped: bool | None = None) -> None:
+    def seek(
+        self,
+        at: float | None,
+        speed: float,
+        looped: bool | None = None,
+        since: float | None = None,
+    ) -> None:
         """Continue at `at` s, or at the present time, at a `speed` of at most `FASTEST`; 0 pauses.
 
-        Standing, it gives the one frame that is next.
+        Standing, it gives the one frame that is next. It is at `at` when the clock is `since`.
         """
         now = self._at() if at is None else at
         self._speed = min(max(speed, 0.0), FASTEST)
@@ -232,6 +238,7 @@ class ReplayedSource:
             self._from, self._since = min(now, self.length), self._clock()
         else:
             self._go_to(min(max(at, 0.0), self.length))
+            self._since = self._since if since is None else since
             self._steps = 0 if self._speed else 1
 
     def step(self, frames: int) -> None:
