@@ -109,7 +109,7 @@ class _Ready(NamedTuple):
 
 
 class ReplayedSource:
-    """Yields the frames of the recording at `path` when they are due, of one `finger` of a hand.
+    """Yields the frames of the recording at `path` when they are due; of a hand at FILE#FINGER.
 
     Opening raises a `Refusal` where it is none, or has several fingers of which none is named.
     """
@@ -122,10 +122,9 @@ class ReplayedSource:
         path: Path,
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
-        finger: str | None = None,
     ) -> None:
-        self._clock, self._sleep, self._finger = clock, sleep, finger
-        self._recording = Recording(path, finger)
+        self._clock, self._sleep = clock, sleep
+        self._recording = Recording(path)
         try:
             self._begin()
         except Refusal:
@@ -134,7 +133,7 @@ class ReplayedSource:
 
     def _begin(self) -> None:
         recording = self._recording
-        if self._finger is None and len(recording.fingers) > 1:
+        if recording.any_finger and len(recording.fingers) > 1:
             raise Refusal(
                 f"{recording.path}: has the fingers {', '.join(recording.fingers)}; play one, such "
                 f"as {self.SCHEME}{recording.path}#{recording.fingers[0]}"
@@ -433,12 +432,4 @@ def _brief(event: Event) -> Event:
     return Event(event.time, event.kind[:_LONGEST], event.text[:_LONGEST])
 
 
-def _opened(name: str, _: bool) -> ReplayedSource:
-    """The recording FILE, or one finger of it, as FILE#FINGER."""
-    file, found, finger = name.rpartition("#")
-    if found and not Path(name).exists():
-        return ReplayedSource(Path(file), finger=finger)
-    return ReplayedSource(Path(name))
-
-
-register_scheme(ReplayedSource.SCHEME, _opened)
+register_scheme(ReplayedSource.SCHEME, lambda name, _: ReplayedSource(Path(name)))

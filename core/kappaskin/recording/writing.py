@@ -426,7 +426,11 @@ class _HandWriter:
         while self._file.written.active:
             with suppress(OSError, EOFError, AuthenticationError):
                 line = cast("Connection[Any, Any]", self._listener.accept())
-                self._lines[line] = line.recv()
+                finger, until = line.recv(), time.monotonic() + _SILENT
+                # What came of it before, from a process that died, has its end first.
+                while finger in self._lines.values() and time.monotonic() < until:
+                    time.sleep(_WAIT)
+                self._lines[line] = finger
 
     def _take(self, finger: str, files: list[tuple[str, str, bytes]], messages: list[Any]) -> None:
         for name, kind, data in files:

@@ -65,6 +65,15 @@ def test_the_first_finger_is_read_where_none_is_named(whole: Path) -> None:
         Recording(whole, "ring")
 
 
+def test_a_finger_may_be_named_in_the_path(whole: Path, tmp_path: Path) -> None:
+    assert times(whole.with_name("hand.mcap#index_2"), None) == list(range(50, 100))
+    odd = tmp_path / "a#thumb"  # where that is a file, it is the file
+    odd.write_bytes(whole.read_bytes())
+    assert times(odd, "index_2") == list(range(50, 100))
+    with pytest.raises(Refusal, match=r"none\.mcap: cannot be read"):
+        Recording(tmp_path / "none.mcap#thumb")
+
+
 def test_others_see_a_topic_for_each_finger(whole: Path) -> None:
     with whole.open("rb") as file:
         reader = make_reader(file)
@@ -236,7 +245,8 @@ def test_replays_that_begin_together_keep_what_fingers_are_apart(whole: Path) ->
 
     for finger, first in (("thumb", 0.0), ("index_2", 50.0)):
         now = 100.0
-        with closing(ReplayedSource(whole, clock, lambda _: None, finger)) as source:
+        path = whole.with_name(f"{whole.name}#{finger}")
+        with closing(ReplayedSource(path, clock, lambda _: None)) as source:
             source.seek(0.0, 1.0, since=105.0)
             now = 104.9
             assert source.replay.at == 0.0
