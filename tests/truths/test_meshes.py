@@ -115,6 +115,56 @@ def test_intervals_on_a_mesh_of_a_cap_cover_the_truth(mm, force, frames):
         assert 0.92 - slack <= share <= 0.98 + slack
 
 
+# Gages of some length: the mean of the shell's curvature along great circles
+
+
+def _along_circles(mesh, positions, turns, far):
+    """Places and unit vectors along the sphere (P, 2) so far along great circles, as turned."""
+    x, y = (positions - mesh.places[0]).T / R
+    out = np.column_stack([x, y, np.sqrt(1 - x * x - y * y)])
+
+    def frame(out):
+        e_x = np.cross([0.0, 1.0, 0.0], out)
+        e_x /= np.linalg.norm(e_x, axis=1)[:, None]
+        return e_x, np.cross(out, e_x)
+
+    e_x, e_y = frame(out)
+    way = np.cos(turns)[:, None] * e_x + np.sin(turns)[:, None] * e_y
+    c, s = np.cos(far / R), np.sin(far / R)
+    there, onward = c * out + s * way, c * way - s * out
+    ways = np.stack([np.vecdot(onward, each) for each in frame(there)], axis=-1)
+    return mesh.places[0] + R * there[:, :2], ways
+
+
+@pytest.mark.full
+def test_gages_on_a_mesh_read_the_mean_along_them():
+    length, case, count = 2e-3, _case(1, 1.0, 1e-3, 24), 12
+    mesh, k = case.skin.patch, np.arange(count)
+    turns = np.random.default_rng(0).uniform(-pi, pi, count)
+    places = _on(mesh, R * _even((k + 0.5) / count, 0.8 * case.angle), k * pi * (3 - sqrt(5)))
+    layout = SensorLayout.scattered(mesh, places).reading(k, "curvature").turned(turns)
+    out = np.zeros((4, count))
+    influence = influence_of(case.skin, replace(layout, gage_length=length), "clamped", 15, out)
+    steps = length * np.linspace(-0.5, 0.5, 9)
+    weights = np.array([1, *[4, 2] * 3, 4, 1]) / 24  # Simpson's rule
+
+    for share in (0.1, 0.5):
+        load = case.load((share, 0.2))
+
+        def read(far, load=load):
+            at, ways = _along_circles(mesh, places, turns, far)
+            xx, yy, xy = case.truth(SensorLayout.scattered(mesh, at))(load)
+            c, s = ways.T
+            return c * c * xx + 2 * c * s * xy + s * s * yy
+
+        mean = sum(w * read(far) for w, far in zip(weights, steps, strict=True))
+        influence.at(load.x, load.y, load.radius**2)
+
+        scale = np.linalg.norm(mean)
+        assert np.linalg.norm(out[0] / influence.unit - mean) < 0.02 * scale
+        assert np.linalg.norm(read(0.0) - mean) > 0.1 * scale
+
+
 # An ellipsoid, on two meshes of which none has the nodes of the other
 
 AXES, ANGLE, H, D = (9e-3, 7e-3, 6e-3), radians(60), 1e-3, 3.7e-3

@@ -15,6 +15,7 @@ from kappaskin.bases.modes import CapBasis as CapBasis
 from kappaskin.bases.modes import DiskBasis, PolygonBasis
 from kappaskin.bases.modes import MeshBasis as MeshBasis
 from kappaskin.bases.modes import ModeBasis as ModeBasis
+from kappaskin.bases.modes import most_functions as most_functions
 from kappaskin.bases.modes import radial as radial
 from kappaskin.bases.product import ClampedBasis
 from kappaskin.bases.product import ElasticBasis as ElasticBasis

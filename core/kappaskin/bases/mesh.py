@@ -8,14 +8,17 @@ import scipy
 from numpy.typing import NDArray
 
 from kappaskin._files import cached
+from kappaskin._processes import progress
 from kappaskin.bases.facets import Facets, Factored, held_freedoms
+from kappaskin.bases.modes import most_functions
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array
 from kappaskin.skin import MeshSkin
 
 _LOADS = 2  # for each function
 _WIDTH = 0.7  # of the distance between two loads: the standard deviation of one
-_FEWEST = 2  # nodes for each load
+_REPORTED = 48  # loads solved between two reports of progress
+_SOLVED = 0.6  # of the time that functions take: solving
 _USUAL = 225  # functions made at once, of which fewer are the first
 _POISSON = 0.3  # of the skin whose shapes these are
 
@@ -68,7 +71,7 @@ class MeshFunctions:
     """
 
     def __init__(self, mesh: MeshSkin, edge: str, count: int) -> None:
-        most = len(mesh.points) // (_FEWEST * _LOADS)
+        most = most_functions(mesh)
         if count > most:
             raise Refusal(
                 f"expected at most {most} functions on a mesh of {len(mesh.points)} nodes, got "
@@ -125,8 +128,15 @@ def _shapes(mesh: MeshSkin, edge: str, count: int) -> tuple[Array, Array]:
     middles = mesh.points[mesh.spread(loads)]
     squares = scipy.spatial.distance.cdist(mesh.points, middles, "sqeuclidean")
     forces = np.exp(-squares / (2 * _WIDTH**2 * area / loads)) * mesh.areas[:, None]
-    felt = pressed(mesh, forces / forces.sum(axis=0))
-    moved = factored(mesh, edge, _rigidity(mesh), _POISSON)(felt)
+    felt, solve = (
+        pressed(mesh, forces / forces.sum(axis=0)),
+        factored(mesh, edge, _rigidity(mesh), _POISSON),
+    )
+    moved = np.empty_like(felt)
+    for k in range(0, loads, _REPORTED):
+        progress.get()(_SOLVED * k / loads)
+        moved[:, k : k + _REPORTED] = solve(felt[:, k : k + _REPORTED])
+    progress.get()(_SOLVED)
     f = along_normals(mesh, moved)
     mass = 4 / area * (f.T * mesh.areas) @ f
     softest = cast("Any", scipy.linalg.eigh)(felt.T @ moved, mass, subset_by_index=(0, count - 1))
@@ -135,7 +145,7 @@ def _shapes(mesh: MeshSkin, edge: str, count: int) -> tuple[Array, Array]:
 
 @lru_cache(1)
 def _moved(mesh: MeshSkin, edge: str, count: int) -> Array:
-    total = max(count, min(_USUAL, len(mesh.points) // (_FEWEST * _LOADS)))
+    total = max(count, min(_USUAL, most_functions(mesh)))
     return _shapes(mesh, edge, total)[0][:, :count]
 
 

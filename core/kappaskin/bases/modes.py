@@ -467,6 +467,11 @@ class PolygonBasis(ModeBasis):
         return self._modes.points, self._modes.weights
 
 
+def most_functions(mesh: MeshSkin) -> int:
+    """How many functions a mesh has nodes for."""
+    return len(mesh.points) // 4  # two loads for each, of two nodes each
+
+
 @dataclass(frozen=True)
 class MeshBasis(ModeBasis):
     """The softest shapes of a mesh, hinged or `clamped` where it is held, by finite elements.

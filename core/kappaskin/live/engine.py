@@ -468,10 +468,16 @@ class Fingers:
                 found[finger] = estimate
         return found
 
-    def end_recording(self, within: float = _WRITTEN) -> RecordingStatus:
-        """End the file, and wait until it is whole, for `within` s at most; its last state."""
+    def stop_recording(self) -> None:
+        """End the file; `recording` says when it is whole."""
         for engine in self.engines.values():
             engine.record(None)
+        if self._recorder is not None:
+            self._recorder.end()
+
+    def end_recording(self, within: float = _WRITTEN) -> RecordingStatus:
+        """End the file, and wait until it is whole, for `within` s at most; its last state."""
+        self.stop_recording()
         if self._recorder is None:
             return RecordingStatus()
         self._recorder.close(within)

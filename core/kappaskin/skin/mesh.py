@@ -10,7 +10,7 @@ from functools import cached_property, lru_cache
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from kappaskin._files import ARCHIVE_DAMAGES
 from kappaskin.errors import Refusal
@@ -106,10 +106,10 @@ class Splines:
         first, rows = self.at(x, y)
         return rows[:orders].dot(self.block(coefficients, *first))
 
-    def block(self, coefficients: Array, i: int, j: int) -> Array:
+    def block(self, coefficients: NDArray[Any], i: int, j: int) -> Array:
         """Those (16, k) of coefficients (G, k) of which `at` gives the weights."""
         found = coefficients.reshape(self._count[1], self._count[0], -1)[j : j + 4, i : i + 4]
-        return found.reshape(16, -1)
+        return found.reshape(16, -1).astype(float, copy=False)
 
     def _weights_at(self, x: float, y: float) -> tuple[tuple[int, int], Array]:
         """The first coefficients each way around a place, and weights (6, 16) of those."""
@@ -400,11 +400,12 @@ _GEODESIC = 2
 def _base(jet: Any) -> Base:
     """`Base` of derivatives (6, 3, ...) of the points in space."""
     r, r_x, r_y, *seconds = jet
-    E, t = _dot(r_x, r_x), _dot(r_x, r_y)
-    t = t / E
-    across = tuple(v - t * u for u, v in zip(r_x, r_y, strict=True))
-    a, d = 1 / E**0.5, 1 / _dot(across, across) ** 0.5
-    e_x, e_y = tuple(a * u for u in r_x), tuple(d * u for u in across)
+    (ux, uy, uz), (vx, vy, vz) = r_x, r_y
+    E = ux * ux + uy * uy + uz * uz
+    t = (ux * vx + uy * vy + uz * vz) / E
+    vx, vy, vz = vx - t * ux, vy - t * uy, vz - t * uz
+    a, d = 1 / E**0.5, 1 / (vx * vx + vy * vy + vz * vz) ** 0.5
+    e_x, e_y = (a * ux, a * uy, a * uz), (d * vx, d * vy, d * vz)
     n = (
         e_x[1] * e_y[2] - e_x[2] * e_y[1],
         e_x[2] * e_y[0] - e_x[0] * e_y[2],
@@ -425,7 +426,8 @@ def _base(jet: Any) -> Base:
 
 
 def _dot(u: Any, v: Any) -> Number:
-    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+    (a, b, c), (x, y, z) = u, v
+    return a * x + b * y + c * z
 
 
 def _sums(places: Indices, values: Array, count: int) -> Array:

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Callable, Generator
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,9 @@ from PySide6.QtWidgets import (
 )
 
 from kappaskin._files import write_whole
+from kappaskin._processes import with_progress
 from kappaskin._text import printable
+from kappaskin.contact import PointContact
 from kappaskin.errors import Refusal
 from kappaskin.frames import Array, Indices, Mask
 from kappaskin.mechanics import DiscLoad, Load
@@ -56,6 +59,7 @@ _POISSON = 0.3
 _FUNCTIONS, _PER_FUNCTION = 15, 4  # along a side, of the true shape; nodes for each
 _RADIUS = 0.12  # of the shorter side: of the disc that presses the new skin
 _DEPTH = 0.3  # of its thickness, that it presses
+_READ, _PRESSED = 0.05, 0.35  # of the time: when the mesh is read, and its functions computed
 _STEPS = (
     '{ step = "press", seconds = 0.6 }',
     '{ step = "hold", seconds = 2.0 }',
@@ -253,9 +257,9 @@ class SkinDialog(QDialog):
         self._read: MeshSurface | None = None  # as in the file, its numbers taken as metres
         self._faults: list[MeshFault] | None = None
         self._used, self._repaired = Path(), False  # the file that the scene names
-        words, cancelled = "Computing the functions of the skin", "Cancelled; nothing is simulated."
+        words, cancelled = "Setting up the skin", "Cancelled; nothing is simulated."
         self._reading = BackgroundTask[Any](tasks, "Reading the mesh", self._take, self._refuse)
-        self._making = BackgroundTask[Written](
+        self._making = BackgroundTask[Written | float](
             tasks, words, self._finish, self._refuse, cancelled=cancelled
         )
         self.preview = SurfacePreview()
@@ -295,7 +299,7 @@ class SkinDialog(QDialog):
             self.form.addRow(words, widget)
         self.unit.currentIndexChanged.connect(guarded(lambda *_: self._examine()))
         self.held.currentIndexChanged.connect(guarded(lambda *_: self._show()))
-        self.bar = QProgressBar(maximum=0)  # pyright: ignore[reportCallIssue]
+        self.bar = QProgressBar(maximum=100)  # pyright: ignore[reportCallIssue]
         self.begin_button = button("&Simulate", "simulate-skin", "Simulate this skin.")
         self.cancel_button = button("C&lose", "close-skin", "Close (Esc).")
         self.begin_button.setDefault(True)
@@ -440,6 +444,7 @@ class SkinDialog(QDialog):
         for line in self.ends:
             self.form.setRowVisible(line, self.held.currentIndex() == 1)
         self.bar.setVisible(busy)
+        self.bar.setRange(0, 100 if self._making.running else 0)  # of reading no share is known
         for widget in self._inputs:
             widget.setEnabled(not self._making.running)
         self.begin_button.setEnabled(ready)
@@ -489,9 +494,13 @@ class SkinDialog(QDialog):
             skin["held"] = arc
         title = self.file.stem
         self._making.compute(new_scene, title, self._used.resolve(), skin, self.elements.value())
-        self._show("Computing the functions of the skin: the first time 5 to 30 s, and none later")
+        self._show("Setting up the skin: the first time 10 to 60 s, and none later")
+        self.bar.setValue(0)
 
-    def _finish(self, scene: Written) -> None:
+    def _finish(self, scene: Written | float) -> None:
+        if isinstance(scene, float):
+            self.bar.setValue(round(100 * scene))
+            return
         self._making.stop()
         self.accept()
         self.made.emit(scene)
@@ -554,20 +563,40 @@ def _quoted(value: object) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-def new_scene(title: str, file: Path, skin: dict[str, Any], elements: int) -> Written:
-    """A scene of the mesh in `file`, pressed in its middle; computes and stores its functions.
+def _in_stage(
+    begin: float, end: float, compute: Callable[..., Any], *about: object
+) -> Generator[float, None, Any]:
+    """What `compute(*about)` returns; yields the shares done, from `begin` to `end`."""
+    stage = with_progress(compute, *about)
+    while True:
+        try:
+            yield begin + (end - begin) * next(stage)
+        except StopIteration as stopped:
+            return stopped.value
 
-    `skin` is its table, with the path of the file.
+
+def new_scene(
+    title: str, file: Path, skin: dict[str, Any], elements: int
+) -> Generator[float | Written]:
+    """A scene of the mesh in `file`, pressed in its middle, after shares done from 0 to 1.
+
+    It computes and stores the mesh's functions, and what elements read of loads. `skin` is its
+    table, with the path of the file.
     """
     at, trust = file.with_suffix(".toml"), frozenset((file,))
+    yield 0.0
     nodes = len(read_surface(file, skin["unit"]).nodes)
     functions = min(_FUNCTIONS, math.isqrt(nodes // _PER_FUNCTION))
     scene = read_scene(_text(title, skin, elements, functions), at, trust)
+    yield _READ
     patch = scene.plate.patch
     if not isinstance(patch, MeshSkin):
         raise TypeError(patch)
     middle = np.array([patch.a, patch.b]) / 2
     x, y = patch.places[np.linalg.norm(patch.places - middle, axis=1).argmin()].tolist()
     disc = DiscLoad(x, y, _RADIUS * min(patch.a, patch.b))
-    load = scaled_to(scene.plate, disc, _DEPTH * patch.thickness, scene.basis)
-    return Written(_text(title, skin, elements, functions, load), at, trust)
+    pressed = scene.plate, disc, _DEPTH * patch.thickness, scene.basis
+    load = yield from _in_stage(_READ, _PRESSED, scaled_to, *pressed)
+    read = scene.plate, scene.layout, scene.edge
+    yield from _in_stage(_PRESSED, 1.0, PointContact, *read)
+    yield Written(_text(title, skin, elements, functions, load), at, trust)

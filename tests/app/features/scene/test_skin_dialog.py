@@ -1,5 +1,6 @@
 """Open skin: what is asked, shown, mended and made of a mesh file."""
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QPushButton
 
-from kappaskin import read_scene
+from kappaskin import Refusal, read_scene
 from kappaskin.scenes import scene_file
 from kappaskin.skin import MeshSkin, read_surface
 from kappaskin_app.features.scene.scene_text import named
@@ -16,7 +17,7 @@ from kappaskin_app.shell.background import Tasks
 from meshes import ellipsoid
 
 LEFT = Qt.MouseButton.LeftButton
-PAD = ellipsoid(12, (9.0, 7.0, 6.0), 1.2)
+PAD = ellipsoid(16, (9.0, 7.0, 6.0), 1.2)
 KIND = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -114,7 +115,7 @@ def test_repairs_are_made_one_by_one_when_clicked(dialog, until, qtbot, broken) 
 def test_two_clicks_on_the_rim_hold_the_part_between_them(dialog, until, qtbot, pad) -> None:
     opened(dialog, until, qtbot, pad)
     dialog.resize(900, 600)
-    assert len(dialog.preview.held) == 72
+    assert len(dialog.preview.held) == 96
     for place in ((5.0, -5.0), (5.0, 5.0)):
         surface = dialog.preview.surface
         nodes = np.unique(surface.rim)
@@ -123,7 +124,7 @@ def test_two_clicks_on_the_rim_hold_the_part_between_them(dialog, until, qtbot, 
         qtbot.mouseClick(dialog.preview, LEFT, pos=QPoint(round(x), round(y)))
 
     held = dialog.preview.held
-    assert 10 < len(held) < 36
+    assert 10 < len(held) < 48
     assert surface.nodes[held][..., 0].min() > 3e-3
     assert dialog.begin_button.isEnabled()
     dialog.ends[1].selectAll()
@@ -182,8 +183,12 @@ def test_computing_can_be_cancelled(dialog, until, qtbot, pad) -> None:
     assert dialog.cancel_button.text() == "&Cancel"
     assert not dialog.unit.isEnabled()
     assert not dialog.bar.isHidden()
+    until(lambda: dialog.bar.value() > 5)
+    assert dialog.bar.maximum() == 100
+    begin = time.monotonic()
     qtbot.mouseClick(dialog.cancel_button, LEFT)
 
+    assert time.monotonic() - begin < 1
     assert dialog.message.text() == "Cancelled; nothing is simulated."
     assert dialog.begin_button.isEnabled()
     assert dialog.isVisible()
@@ -192,7 +197,11 @@ def test_computing_can_be_cancelled(dialog, until, qtbot, pad) -> None:
 
 def test_the_scene_of_a_mesh_presses_its_middle(pad, tmp_path, monkeypatch) -> None:
     skin = {"shape": "mesh", "file": str(pad), "unit": "mm", "thickness": 1e-3, "rigidity": 3e-4}
-    written = new_scene("My pad", pad, skin, 40)
+    *shares, written = new_scene("My pad", pad, skin, 40)
+
+    assert shares == sorted(shares)
+    assert len(shares) > 10
+    assert (shares[0], shares[-1] > 0.9) == (0.0, True)
 
     scene = read_scene(written.text, written.file, written.trust)
     assert scene.title == "My pad"
@@ -234,3 +243,10 @@ def test_a_mesh_that_is_dropped_is_opened_as_a_skin_and_simulated(
     repaired = read_surface(Path(name), "mm")
     assert Path(name) != broken
     assert len(repaired.triangles) == len(PAD[1])
+
+
+def test_triangles_too_large_to_find_contacts_are_refused_before_the_scene(tmp_path) -> None:
+    coarse = stl(tmp_path / "coarse.stl", *ellipsoid(10, (9.0, 7.0, 6.0), 1.2))
+    skin = {"shape": "mesh", "file": str(coarse), "unit": "mm", "thickness": 1e-3}
+    with pytest.raises(Refusal, match="too thin for its radii .* or use smaller triangles"):
+        list(new_scene("Coarse", coarse, skin | {"rigidity": 3e-4}, 40))
