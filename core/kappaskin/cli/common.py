@@ -190,8 +190,9 @@ class FingerMonitor:
         if status.state == LOST or self._engine.silent:
             notices.append(status.message)
         for text in filter(None, (*notices, status.refusal)):
-            if text not in self._printed:
-                self._printed.add(text)
+            words = "".join(filter(str.isalpha, text))  # it may count seconds
+            if words not in self._printed:
+                self._printed.add(words)
                 show(f"kappaskin: {self._finger}: {text}", error=True)
         return status
 

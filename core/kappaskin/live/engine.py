@@ -34,7 +34,7 @@ from kappaskin.live.ring import Ring
 from kappaskin.live.status import LOST, STREAMING, Status
 from kappaskin.pipeline import Setup
 from kappaskin.publish import access_of, of_finger, targets_of
-from kappaskin.recording import HandPart, HandRecorder, RecordingStatus, unused
+from kappaskin.recording import HandPart, HandRecorder, RecordingStatus, ReplayedSource, unused
 from kappaskin.scenes import Playback, Scene
 
 LONGEST_NOTE = 500
@@ -45,6 +45,7 @@ _PATIENCE = 1800.0  # s that a recording continues without a window
 _PREPARING = 0.2  # share of its silence that counts while it prepares a setup, which delays it
 _SILENT = 2.0  # s without a report, of an engine that reports ten times a second
 _POLL = 1.0  # s between two polls at most that count as silence: this process may have been stopped
+_TOGETHER = 0.3  # s within which every engine has a request
 _DEATHS, _WITHIN = 3, 10.0  # so many in so many s, and the process is not started again
 
 _OF_SOURCE = "source", "trust", "scene", "speed", "looped", "recomputes"  # which it comes with
@@ -228,15 +229,23 @@ class Engine:
         """Continue a simulated source with `scene`; no effect on any other source."""
         self._requests.change(scene=scene)
 
-    def seek(self, at: float | None = None, speed: float = 1.0, looped: bool | None = None) -> None:
+    def seek(
+        self,
+        at: float | None = None,
+        speed: float = 1.0,
+        looped: bool | None = None,
+        since: float | None = None,
+    ) -> None:
         """Continue a simulated scene or a recording from time `at` in s; by default from now.
+
+        A recording is there when the monotonic clock is `since` s, by default now.
 
         It plays at `speed` times real time, at most ten; at zero it is paused, while a scene is
         still read. A recording that is `looped` restarts at its end. `status` has the position.
         """
         Playback(at or 0.0, 0.0, speed)  # or refused here
         after = self.requested.looped if looped is None else looped
-        self._requests.act(Seek(at, speed, looped), speed=speed, looped=after)
+        self._requests.act(Seek(at, speed, looped, since), speed=speed, looped=after)
 
     def restart_effects(self) -> None:
         """Restart the simulated sensor's effects, as from rest."""
@@ -387,6 +396,7 @@ class Fingers:
     def __init__(self, fingers: Iterable[str], setup: Setup | None = None) -> None:
         self.engines: dict[str, Engine] = {}
         self._recorder: HandRecorder | None = None
+        self._opening = False  # recordings, which begin together
         try:
             for finger in fingers:
                 self.engines[finger] = Engine(setup, finger=finger)
@@ -398,6 +408,8 @@ class Fingers:
         """Take frames of each finger from its source."""
         for finger, source in sources.items():
             self.engines[finger].connect(source, trust)
+        played = (source.startswith(ReplayedSource.SCHEME) for source in sources.values())
+        self._opening = len(sources) > 1 and all(played)
 
     def record(self, path: Path) -> None:
         """Record all fingers to one file from now on; a `Refusal` where there can be none."""
@@ -419,9 +431,18 @@ class Fingers:
         return self._recorder.poll() if self._recorder else RecordingStatus()
 
     def revive(self) -> None:
-        """Start each process that died again; to be called now and then."""
+        """Start each process that died again; to be called now and then.
+
+        Recordings begin together once all are open: fingers are then as far apart in time as they
+        were.
+        """
         for engine in self.engines.values():
             engine.revive()
+        statuses = self.status().values() if self._opening else ()
+        if statuses and all(each.replay or each.state == LOST for each in statuses):
+            self._opening, since = False, time.monotonic() + _TOGETHER
+            for engine in self.engines.values():
+                engine.seek(0.0, since=since)
 
     def status(self) -> dict[str, Status]:
         return {finger: engine.status() for finger, engine in self.engines.items()}

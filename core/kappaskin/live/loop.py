@@ -230,7 +230,7 @@ class EngineLoop:
                 if isinstance(source, ReplayedSource):
                     source.step(request.frames)
             elif isinstance(source, ReplayedSource):
-                source.seek(request.at, request.speed, request.looped)
+                source.seek(request.at, request.speed, request.looped, request.since)
             elif isinstance(source, SimulatedSource):
                 source.seek(request.at, request.speed)
         except Refusal as refusal:  # a file that is damaged there, or gone

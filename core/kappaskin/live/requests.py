@@ -33,12 +33,14 @@ SETTINGS = (
 class Seek:
     """Continue a scene or recording from time `at` in s, or from its present time, at a `speed`.
 
-    A recording that is `looped` restarts at its end; None leaves this setting unchanged.
+    A recording that is `looped` restarts at its end; None leaves this setting unchanged. It
+    is at that time when the monotonic clock is `since` s, by default now.
     """
 
     at: float | None
     speed: float
     looped: bool | None = None
+    since: float | None = None
 
     def overtakes(self, other: "Action | str") -> bool:
         """Whether this request makes the `other` one, which came just before, ineffective."""

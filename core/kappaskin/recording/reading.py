@@ -225,12 +225,16 @@ class Recording:
     messages each topic has, and `chunks` where they are. It was recorded by the program `library`,
     whose estimates have the `revision`; 0 if unknown, as of recordings before there were revisions.
 
-    Of a hand it is the recording of one `finger`, by default of the first of its `fingers`, whose
-    names are empty where there is one without a name. Times are the same for all fingers.
+    Of a hand it is the recording of one `finger`, or of that in a `path` FILE#FINGER; else, of
+    `any_finger`, of the first of its `fingers`, whose name is empty where there is one without.
+    Times are the same for all fingers.
     """
 
     def __init__(self, path: Path, finger: str | None = None) -> None:
-        self.path, self.finger, self._first_finger = path, finger or "", finger is None
+        if "#" in path.name and not path.exists():
+            name, _, named = path.name.rpartition("#")
+            path, finger = path.with_name(name), named if finger is None else finger
+        self.path, self.finger, self.any_finger = path, finger or "", finger is None
         self._fingers: dict[str, None] = {}
         try:
             self._file = open_file(path)
@@ -368,7 +372,7 @@ class Recording:
             finger, topic = finger_of(channel.topic)
             kind = _KINDS.get(topic)
             if (kind, channel.message_encoding) == (self._schemas.get(channel.schema_id), "cdr"):
-                if self._first_finger and not self._fingers:
+                if self.any_finger and not self._fingers:
                     self.finger = finger
                 self._fingers[finger] = None
                 if finger == self.finger:

@@ -109,7 +109,7 @@ class _Ready(NamedTuple):
 
 
 class ReplayedSource:
-    """Yields the frames of the recording at `path` when they are due, of one `finger` of a hand.
+    """Yields the frames of the recording at `path` when they are due; of a hand at FILE#FINGER.
 
     Opening raises a `Refusal` where it is none, or has several fingers of which none is named.
     """
@@ -122,10 +122,9 @@ class ReplayedSource:
         path: Path,
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
-        finger: str | None = None,
     ) -> None:
-        self._clock, self._sleep, self._finger = clock, sleep, finger
-        self._recording = Recording(path, finger)
+        self._clock, self._sleep = clock, sleep
+        self._recording = Recording(path)
         try:
             self._begin()
         except Refusal:
@@ -134,7 +133,7 @@ class ReplayedSource:
 
     def _begin(self) -> None:
         recording = self._recording
-        if self._finger is None and len(recording.fingers) > 1:
+        if recording.any_finger and len(recording.fingers) > 1:
             raise Refusal(
                 f"{recording.path}: has the fingers {', '.join(recording.fingers)}; play one, such "
                 f"as {self.SCHEME}{recording.path}#{recording.fingers[0]}"
@@ -219,10 +218,16 @@ class ReplayedSource:
             self._take(self._next)
         self._ready.clear()
 
-    def seek(self, at: float | None, speed: float, looped: bool | None = None) -> None:
+    def seek(
+        self,
+        at: float | None,
+        speed: float,
+        looped: bool | None = None,
+        since: float | None = None,
+    ) -> None:
         """Continue at `at` s, or at the present time, at a `speed` of at most `FASTEST`; 0 pauses.
 
-        Standing, it gives the one frame that is next.
+        Standing, it gives the one frame that is next. It is at `at` when the clock is `since`.
         """
         now = self._at() if at is None else at
         self._speed = min(max(speed, 0.0), FASTEST)
@@ -232,6 +237,7 @@ class ReplayedSource:
             self._from, self._since = min(now, self.length), self._clock()
         else:
             self._go_to(min(max(at, 0.0), self.length))
+            self._since = self._since if since is None else since
             self._steps = 0 if self._speed else 1
 
     def step(self, frames: int) -> None:
@@ -426,12 +432,4 @@ def _brief(event: Event) -> Event:
     return Event(event.time, event.kind[:_LONGEST], event.text[:_LONGEST])
 
 
-def _opened(name: str, _: bool) -> ReplayedSource:
-    """The recording FILE, or one finger of it, as FILE#FINGER."""
-    file, found, finger = name.rpartition("#")
-    if found and not Path(name).exists():
-        return ReplayedSource(Path(file), finger=finger)
-    return ReplayedSource(Path(name))
-
-
-register_scheme(ReplayedSource.SCHEME, _opened)
+register_scheme(ReplayedSource.SCHEME, lambda name, _: ReplayedSource(Path(name)))

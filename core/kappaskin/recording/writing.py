@@ -42,6 +42,7 @@ _EACH = 128  # bytes of memory for each message in addition to its own
 _SUMMED = 512  # bytes of the end of the file for each chunk
 _UNDATED = 0
 _KEY = 32  # bytes
+_SILENT = 5.0  # s that a finger may take to end, each of which sends every 0.1 s
 _WRITER = "the process that writes the recording"
 
 
@@ -304,8 +305,8 @@ class HandRecorder:
     """The process that writes the recording of a hand with these `fingers` to `path`.
 
     It goes on when a finger's process has ended, also when all have, until `end`; or when this
-    process has ended, until the last of theirs has. Then the file is whole. A `Refusal` where none
-    can be made.
+    process has ended, until the last of theirs has. Then the file is whole, also where one of them
+    hangs. A `Refusal` where none can be made.
     """
 
     def __init__(self, path: Path, fingers: Sequence[str]) -> None:
@@ -392,11 +393,17 @@ class _HandWriter:
         self._file, self._pipe, self._listener = file, pipe, listener
         self._lines: dict[Connection[Any, Any], str] = {}
         self._topics = {topic.name: topic for topic in TOPICS}
-        self._ending = False
+        self._ending, self._heard = False, time.monotonic()
+
+    @property
+    def _over(self) -> bool:
+        """Whether nothing more comes: a finger that hangs is not waited for."""
+        silent = time.monotonic() - self._heard > _SILENT
+        return not self._file.written.active or (self._ending and (silent or not self._lines))
 
     def run(self) -> None:
         threading.Thread(target=self._accept, name="hand-listener", daemon=True).start()
-        while self._file.written.active and not (self._ending and not self._lines):
+        while not self._over:
             for ready in wait([*self._lines, *([] if self._ending else [self._pipe])], _FLUSH):
                 line = cast("Connection[Any, Any]", ready)
                 try:
@@ -406,7 +413,7 @@ class _HandWriter:
                 if line is self._pipe and received:
                     self._report()
                 elif line is self._pipe:
-                    self._ending = True
+                    self._ending, self._heard = True, time.monotonic()
                 elif received is None:
                     self._close(line)
                 else:
@@ -419,13 +426,18 @@ class _HandWriter:
         while self._file.written.active:
             with suppress(OSError, EOFError, AuthenticationError):
                 line = cast("Connection[Any, Any]", self._listener.accept())
-                self._lines[line] = line.recv()
+                finger, until = line.recv(), time.monotonic() + _SILENT
+                # What came of it before, from a process that died, has its end first.
+                while finger in self._lines.values() and time.monotonic() < until:
+                    time.sleep(_WAIT)
+                self._lines[line] = finger
 
     def _take(self, finger: str, files: list[tuple[str, str, bytes]], messages: list[Any]) -> None:
         for name, kind, data in files:
             self._file.attach(f"{finger}/{name}", kind, data)
         for name, at, data in messages:
             self._file.put(self._topics[name].of(finger), at, data)
+        self._heard = time.monotonic()
         self._file.wait()
 
     def _close(self, line: "Connection[Any, Any]") -> None:

@@ -4,6 +4,7 @@ import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -281,3 +282,24 @@ def test_a_hand_that_is_none_is_refused(arguments, why, tmp_path, monkeypatch, c
     assert main(["record", *by_place, *arguments]) == 2
     assert re.search(why, capsys.readouterr().err)
     assert os.listdir(tmp_path) == []
+
+
+def test_a_hand_is_published_with_its_fingers_named_but_for_the_one_that_is_lost() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(60)
+        port = receiver.getsockname()[1]
+        command = [sys.executable, "-m", "kappaskin", "publish", "--udp", f"127.0.0.1:{port}"]
+        for finger, source in (("thumb", "sim:"), ("ring", "/dev/none"), ("index", "sim:")):
+            command += ["--source", f"{finger}={source}"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+            seen = set[tuple[str, str]]()
+            wanted = {("thumb", "contact"), ("index", "contact"), ("ring", "status")}
+            while not wanted <= seen:
+                message = json.loads(receiver.recv(65536))
+                seen.add((message["finger"], message["kind"]))
+            process.send_signal(signal.SIGINT)
+            _, told = process.communicate(timeout=60)
+            assert process.returncode == 1
+    assert ("ring", "contact") not in seen
+    assert b"kappaskin: ring: /dev/none: there is no such port" in told

@@ -11,8 +11,8 @@ import pytest
 
 from kappaskin import Setup
 from kappaskin._processes import BackgroundProcess
-from kappaskin.live import LOST, STREAMING, Fingers
-from kappaskin.recording import Recording, Verification
+from kappaskin.live import LOST, STREAMING, Fingers, Status
+from kappaskin.recording import Recording, Replay, Verification
 from kappaskin.recording import messages as m
 
 pytestmark = pytest.mark.slow
@@ -88,3 +88,37 @@ def test_one_that_cannot_be_opened_leaves_the_others_alone(hand: Fingers) -> Non
     lost = hand.status()["index"]
     assert (lost.state, "/dev/none-there" in lost.message) == (LOST, True)
     assert list(hand.aligned(hand.status())) == ["thumb"]
+
+
+class OpenedReplay:
+    """An engine whose recording is open once `replay` is there."""
+
+    def __init__(self) -> None:
+        self.replay, self.sought = None, list[dict[str, float]]()
+
+    def connect(self, source: str, trust: bool) -> None: ...
+
+    def revive(self) -> None: ...
+
+    def status(self) -> Status:
+        return Status(replay=self.replay)
+
+    def seek(self, at: float, since: float) -> None:
+        self.sought.append({"at": at, "since": since})
+
+
+def test_recordings_begin_together_once_all_are_open() -> None:
+    hand = Fingers([])
+    engines = {"thumb": OpenedReplay(), "index": OpenedReplay()}
+    hand.engines = engines  # type: ignore[assignment]
+    hand.connect({finger: f"replay:hand.mcap#{finger}" for finger in engines})
+    engines["thumb"].replay = Replay(0.1, 9.0, 1.0, False, (), (), 0.0, True)
+    hand.revive()
+    assert engines["thumb"].sought == []
+    engines["index"].replay = engines["thumb"].replay
+    for _ in range(2):
+        hand.revive()
+    [thumb], [index] = (engine.sought for engine in engines.values())
+    assert thumb == index
+    assert thumb["at"] == 0.0
+    assert 0.0 < thumb["since"] - time.monotonic() < 1.0

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from multiprocessing.connection import Client
 from pathlib import Path
 
 import pytest
@@ -62,6 +63,15 @@ def test_the_first_finger_is_read_where_none_is_named(whole: Path) -> None:
     assert times(whole, None) == list(range(100))
     with pytest.raises(Refusal, match="one of its fingers, thumb, index_2; got 'ring'"):
         Recording(whole, "ring")
+
+
+def test_a_finger_may_be_named_in_the_path(whole: Path, tmp_path: Path) -> None:
+    assert times(whole.with_name("hand.mcap#index_2"), None) == list(range(50, 100))
+    odd = tmp_path / "a#thumb"  # where that is a file, it is the file
+    odd.write_bytes(whole.read_bytes())
+    assert times(odd, "index_2") == list(range(50, 100))
+    with pytest.raises(Refusal, match=r"none\.mcap: cannot be read"):
+        Recording(tmp_path / "none.mcap#thumb")
 
 
 def test_others_see_a_topic_for_each_finger(whole: Path) -> None:
@@ -186,6 +196,17 @@ def test_where_the_writer_is_killed_the_fingers_say_so_and_the_file_is_read(
     assert times(part_of(recorder.path), "thumb") == [1.0]
 
 
+def test_a_finger_that_hangs_does_not_keep_the_file_from_its_end(recorder: HandRecorder) -> None:
+    part = recorder.part("thumb")
+    with Client(part.address, authkey=part.key) as hangs:
+        hangs.send("thumb")
+        with closing(HandLine(recorder.part("index_2"))) as index:
+            index.put(m.LINES, 1.0, line(1))
+        recorder.close(20.0)
+    assert (recorder.written.active, recorder.written.trouble) == (False, "")
+    assert times(recorder.path, "index_2")[0] == 1.0
+
+
 def test_no_file_is_written_over(whole: Path) -> None:
     with pytest.raises(Refusal, match="already exists"):
         HandRecorder(whole, FINGERS)
@@ -214,3 +235,22 @@ def test_where_all_others_are_killed_the_file_is_ended(tmp_path: Path) -> None:
     subprocess.run([sys.executable, str(tmp_path / "ends.py"), str(path)], check=False)
     assert wait_for(path.exists)
     assert len(times(path, "thumb")) == 101  # and that the line ended
+
+
+def test_replays_that_begin_together_keep_what_fingers_are_apart(whole: Path) -> None:
+    now = 100.0
+
+    def clock() -> float:
+        return now
+
+    for finger, first in (("thumb", 0.0), ("index_2", 50.0)):
+        now = 100.0
+        path = whole.with_name(f"{whole.name}#{finger}")
+        with closing(ReplayedSource(path, clock, lambda _: None)) as source:
+            source.seek(0.0, 1.0, since=105.0)
+            now = 104.9
+            assert source.replay.at == 0.0
+            source.read(0.0)
+            assert next(source._messages).stamp <= 10**18 + (first + 1) * 1e9  # noqa: SLF001
+            now = 105.0 + first + 0.1
+            assert source.replay.at == pytest.approx(first + 0.1)
