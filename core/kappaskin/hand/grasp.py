@@ -14,7 +14,6 @@ from kappaskin.frames import Array, Estimate
 from kappaskin.hand.description import Finger, Placement
 
 _AXES = np.eye(3)
-_COARSE = 2 / 3  # of the functions along each side: another measure
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,19 +66,17 @@ def finger_contact(
 
     From the `estimate` of a frame and the `fit` that the pipeline made it of. The depth is that of
     the contact, whose error bar has what the functions of the fit do not resolve. That of the
-    normal has what the slopes change by with two thirds of the functions.
+    normal has what the normals of the skin deflected and at rest differ by: under a small load the
+    slopes of the fit may be as far off.
     """
     contact, geometry = estimate.contact, estimate.geometry
     if not contact.present or contact.near_rim:
         return None
     x, y = contact.position.tolist()
     base, (jet, covariance) = fit.estimator.basis.patch.base(x, y), fit.jet(x, y)
-    Ni, Nj = fit.coefficients.shape
-    fine = fit.coefficients.copy()  # of the shape, what two thirds of its functions leave out
-    fine[: math.ceil(_COARSE * Ni), : math.ceil(_COARSE * Nj)] = 0.0
-    fine_slopes = (base.covariant @ fit.estimator.basis.jet(x, y) @ fine.ravel())[1:3]
+    leaning = (base.covariant @ jet)[1:3]
     slopes = propagated_covariance(base.covariant, covariance)[1:3, 1:3]
-    slopes = slopes + fine_slopes @ fine_slopes / 2 * np.eye(2)
+    slopes = slopes + leaning @ leaning / 2 * np.eye(2)
     n0, metric, K = np.array(base.normal), geometry.metric, geometry.curvature_form
     J = np.zeros((8, 8))
     J[:3, :2], J[:3, 2] = geometry.frame[:2].T @ metric, -n0
