@@ -26,6 +26,7 @@ _STEPS, _SETTLED, _MOST = 40, 1e-4, 1e9  # of Levenberg and Marquardt: gain and 
 _STARTS, _TRIED = 48, 2  # axes of a cylinder or an edge that are looked at, and refined
 _LEAST = 1e-3  # m, of the distance of the contacts, as a scale
 _NIL = 1e-12  # of the information that a scale has: less is none
+_FLOOR = np.diag(np.repeat([1e-9, 1e-7, 1e-6], [3, 2, 3]) ** 2)  # m, rad, 1/m: none is surer
 _REACH = 1.959964  # standard deviations to either side in a 95 % interval
 
 
@@ -155,7 +156,7 @@ class _Contacts:
         self.m = -self.frames[:, 2]
         covariance = np.array([one.covariance for one in contacts])
         self.curved = np.isfinite(covariance[:, 5, 5])
-        self.covariance = np.nan_to_num(covariance, nan=0.0)
+        self.covariance = np.nan_to_num(covariance, nan=0.0) + _FLOOR
         self.curvature = np.array([one.curvature for one in contacts])
         apart = np.linalg.norm(self.p[:, None] - self.p, axis=-1)
         self.extent = float(max(apart.max(), _LEAST))
@@ -431,7 +432,8 @@ class HeldObject:
         if self.is_none:
             return f"not one of {', '.join(HELD)}"
         if kind := self.kind:
-            return self._said(self.fits[kind])
+            others = [self._said(one) for one in self.possible if one.kind != kind]
+            return ", or a ".join([self._said(self.fits[kind]), *others])
         return f"not determined: {' or '.join(map(self._said, self.possible))}"
 
     def _said(self, one: ObjectFit) -> str:
@@ -439,7 +441,7 @@ class HeldObject:
             return one.kind
         low, high = one.radius_95
         if math.isinf(high):
-            return f"{one.kind} of radius above {1e3 * low:.3g} mm"
+            return f"{one.kind} of radius above {1e3 * low:.4g} mm"
         return (
             f"{one.kind} of radius {1e3 * one.radius:.3g} mm ({1e3 * low:.3g} to {1e3 * high:.3g})"
         )
